@@ -393,8 +393,8 @@ def keep_recordings(
 
 
 def import_later(rubric: LoadedRubric) -> None:
-    """Import modules before they are needed. Only probes and steps need ROS's own message types, hundreds of them."""
-    sends = any(scenario.probes or scenario.steps for scenario in rubric.rubric.scenarios.values())
+    """Import modules before they are needed. Only what the grader sends needs ROS's own message types, hundreds."""
+    sends = any(s.probes or s.steps or s.serves for s in rubric.rubric.scenarios.values())
     for name in (*LATER, *([ROS_TYPES] if sends else [])):
         import_module(name)
 

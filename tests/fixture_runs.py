@@ -73,6 +73,14 @@ TOGETHER = {
         "build-unknown-component+node-named-otherwise+launch-without-a-namespace",
         "no-default+topic-absolute",
     ),
+    "record-and-replay": (
+        "build-unknown-component+recorder-name+steps-in-cm+bag-elsewhere+node-name+backward-less+table-no-names",
+    ),
+    "service-client": (
+        "build-unknown-component",
+        "fields-of-32-bits+error-kept-quiet",
+        "numbers-swapped+adds-by-itself",
+    ),
     "sheffield-com2009-week1": (
         "publisher-not-executable+subscriber-name+manifest-malformed",
         "chatter-float+subscriber-other-topic+launch-as-printed+cmake-no-catkin-package",

@@ -7,13 +7,15 @@ from typing_extensions import Self
 from grader.model.record import Record
 
 SUBMISSION_MESSAGE_BYTES = 160 << 20
+SUBMISSION_KEPT_BYTES = 20 << 20
 LEAST_RUN_BYTES = 8 << 20
 
 
 class RunLimits(Record):
     """Memory, processes, tasks (threads count), CPU seconds, output, `home_bytes` (what its home may hold besides the
     workspace's own files) and the number of files in each folder are of one process tree; messages and bytes of one
-    channel, or of one run (`run_bytes`, `channels`); so is what the buffers of its sockets hold (`socket_bytes`)."""
+    channel, or of one run (`run_bytes`, `channels`); so is what the buffers of its sockets hold (`socket_bytes`), and
+    so are the files that are kept of it."""
 
     memory_bytes: int = 1 << 30
     processes: int = 200
@@ -39,10 +41,17 @@ class RunLimits(Record):
     channel_bytes: int = 64 << 20
     run_bytes: int = 64 << 20
     channels: int = 300
+    kept_bytes: int = 16 << 20
+    kept_files: int = 10
 
-    def shared_by(self, runs: int) -> Self:
-        """Return the limits of each of so many runs of one submission: together they record no more than one may."""
+    def shared_by(self, runs: int, *, keeping: int = 0) -> Self:
+        """Return the limits of each of so many runs of one submission, of which some keep files: together they record
+        no more than one may."""
         run_bytes = max(LEAST_RUN_BYTES, min(self.run_bytes, SUBMISSION_MESSAGE_BYTES // max(1, runs)))
         return self.model_copy(
-            update={"run_bytes": run_bytes, "channel_bytes": min(self.channel_bytes, run_bytes)}
+            update={
+                "run_bytes": run_bytes,
+                "channel_bytes": min(self.channel_bytes, run_bytes),
+                "kept_bytes": min(self.kept_bytes, SUBMISSION_KEPT_BYTES // max(1, keeping)),
+            }
         )

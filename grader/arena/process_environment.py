@@ -81,6 +81,7 @@ OWN_VARIABLES = (
     "ROSCONSOLE_CONFIG_FILE",
 )
 """The arena's to set: what a package's environment hooks say of them would lead its nodes elsewhere."""
+SERVICE_TYPES_MAX = 500
 SOURCES_MAX, SOURCE_BYTES_MAX = 200, 256 << 10
 
 
@@ -189,6 +190,17 @@ class ProcessEnvironment:
                 return data.decode(errors="replace")
         return None
 
+    def is_own(self, type_: str) -> bool:
+        """Return whether a type belongs to a package of the submission."""
+        return (self.workspace.repaired / type_.partition("/")[0]).is_dir()
+
+    def service_types(self) -> tuple[str, ...]:
+        """Return the types of services in the package and on this machine, as far as these are not too many."""
+        folders = (self.workspace.repaired, *self.share_folders)
+        files = (path for folder in folders for path in folder.glob("*/srv/*.srv"))
+        found = (f"{path.parent.parent.name}/{path.stem}" for path in islice(files, SERVICE_TYPES_MAX))
+        return tuple(dict.fromkeys(found))
+
     def has_line(self, pattern: re.Pattern[bytes]) -> bool:
         """Return whether a Python file of the package has it."""
         own = self.workspace.repaired / self.workspace.folder
@@ -263,6 +275,7 @@ class ProcessEnvironment:
             "script": None,
             "repairs": [],
             "stdin": False,
+            "keeps": [],
             **more,
         }
 

@@ -91,7 +91,8 @@ class Recorder:
         self._rubric = rubric
         self._beside = beside
         self._progress = progress
-        self._limits = RunLimits().shared_by(len(rubric.scenarios))
+        keeping = sum(bool(scenario.keeps) for scenario in rubric.scenarios.values())
+        self._limits = RunLimits().shared_by(len(rubric.scenarios), keeping=keeping)
         ros = find_ros()
         if ros is None:
             raise RosMissing(NO_ROS, hint=INSTALL_HINT)

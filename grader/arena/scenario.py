@@ -84,7 +84,9 @@ async def run_scenario(
     starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place, numbers)]
     typed_to = {step.type.process for step in scenario.steps if step.type is not None}
     typed_to |= {start.name for start in scenario.start if start.tests is not None}
-    starts = [(start, spec | {"stdin": start.name in typed_to}) for start, spec in starts]
+    for start, spec in starts:
+        spec["stdin"] = start.name in typed_to
+        spec["keeps"] = scenario.keeps if spec["role"] == "student" else ()
     with EvidenceWriter(path, scenario=name, clock=scenario.clock, warp=warp, metadata=metadata) as writer:
         session = ArenaSession(place, writer, last_run=last_run, on_lateness=admission.note_lateness)
         if not any(spec["role"] == "student" for _, spec in starts):

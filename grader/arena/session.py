@@ -19,6 +19,7 @@ from typing_extensions import Self
 from grader.arena.admission import MEMINFO, read_numbers
 from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
+from grader.arena.left_files import LeftFiles
 from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.run_state import RunState
@@ -84,6 +85,7 @@ class ArenaSession:
         self._failure = ""
         self._error: Exception | None = None
         self._killed = Killed(sandboxed=place.sandbox.bubblewrap)
+        self._left = LeftFiles(place, writer)
         self._last_run = last_run
         self._on_lateness = on_lateness
         self._offset_ns = time.time_ns() - time.monotonic_ns()
@@ -93,6 +95,7 @@ class ArenaSession:
         self._clock_ns = 0
         self._watched: dict[str, deque[bytes]] = {}
         self._printed: dict[str, deque[str]] = {}
+        self.on_request = self.on_other_type = _ignore
 
     async def __aenter__(self) -> Self:
         argv = [self.place.ros.python, "-s", "-B", str(ARENA)]
@@ -152,9 +155,9 @@ class ArenaSession:
     def course(self, event: ScenarioEvent) -> None:
         self._writer.event("/grader/scenario", self._now_ns(), event)
 
-    def note(self, event: ActorEvent) -> None:
-        """Write down what the grader did, or learnt."""
-        self._writer.event("/grader/actor", self._now_ns(), event)
+    def note(self, event: ActorEvent, time_ns: int | None = None) -> None:
+        """Write down what the grader did, or learnt: now, or when the arena did."""
+        self._writer.event("/grader/actor", self._now_ns() if time_ns is None else time_ns, event)
 
     async def call(self, timeout_s: float, **command: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
         """Call a service: `{"data": base64}` of its response, or `{"error": why not}`."""
@@ -243,7 +246,7 @@ class ArenaSession:
         elif frame.kind == "E":
             self._event(frame)
         elif frame.kind == "S":
-            self._status(frame.fields)
+            self._status(frame.time_ns, frame.fields)
         else:
             fields = frame.fields
             number, topic, caller_id = fields.pop("id"), fields["topic"], fields["callerid"]
@@ -309,7 +312,7 @@ class ArenaSession:
             self._killed.ended(record)
         self.live.exited(name, time.monotonic())
 
-    def _status(self, fields: dict[str, Any]) -> None:
+    def _status(self, time_ns: int, fields: dict[str, Any]) -> None:
         status = fields["status"]
         if status == "ready":
             self._ready = True
@@ -319,6 +322,10 @@ class ArenaSession:
             self.live.rests(fields["name"], fields["rest"], fields["programs"], time.monotonic())
         elif status == "answer":
             self._answers[fields["id"]] = fields
+        elif status == "left":
+            self._left.add(fields["name"], fields["path"], fields["bytes"], fields["data"], self._now_ns())
+        elif status in {"request", "other-type"}:
+            self._asked(time_ns, fields)
         elif status == "graph":
             pairs = [c for c in fields["connections"] if not is_grader_node(c["subscriber"])]
             self.live.connections({c["topic"] for c in pairs}, time.monotonic())
@@ -329,6 +336,14 @@ class ArenaSession:
         elif status == "done":
             self._note_cost(fields)
             self._done = True
+
+    def _asked(self, time_ns: int, fields: dict[str, Any]) -> None:
+        """A client called a service that the grader offers, by its type or by another one."""
+        if fields["status"] == "request":
+            self.live.active(time.monotonic())
+            self.on_request(time_ns, fields)
+        else:
+            self.on_other_type(time_ns, fields)
 
     def _note_cost(self, fields: dict[str, Any]) -> None:
         """What the arena itself took: CPU seconds, and bytes of memory at its peak."""
@@ -351,6 +366,10 @@ class ArenaSession:
 
     def _why(self) -> str:
         return f"{self._failure} {self._process.last_words()}".strip() or "it did not answer"
+
+
+def _ignore(time_ns: int, fields: dict[str, Any]) -> None:
+    """In the place of who wants to know of the calls of the grader's services: when it was, and what the arena says."""
 
 
 class Killed:

@@ -21,6 +21,7 @@ from typing_extensions import Self
 from grader.arena.function_calls import call_functions
 from grader.arena.run_state import is_settled
 from grader.arena.scenario_inputs import make_shots
+from grader.arena.served import ServedServices
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
 from grader.evidence.events import MISFIT, ActorEvent
@@ -72,6 +73,7 @@ class StepRunner:
         self._stopped: set[str] = set()
         self._may_start = False
         self._arena = arena
+        self._services = ServedServices(scenario.serves, arena)
         self._live = arena.live
         self._tell = tell
         self._types: dict[str, MessageType] = {}
@@ -92,7 +94,8 @@ class StepRunner:
                 await task
 
     def advertise(self) -> None:
-        """Say on which topics there will be messages, before anything is started."""
+        """Say on which topics there will be messages, and offer the services, before anything is started."""
+        self._services.offer()
         for probe in self._scenario.probes:
             self._advertise(probe.topic, probe.type, latched=False)
         for step in self._scenario.steps:
@@ -164,7 +167,7 @@ class StepRunner:
         try:
             found = MessageType(type_, find_text or self._message_text)
         except ValueError as error:
-            begin = MISFIT if self._is_own(type_) else f"the grader cannot publish {type_}: "
+            begin = MISFIT if self._arena.place.is_own(type_) else f"the grader cannot publish {type_}: "
             self._note("note", topic, f"{begin}{error}")
             return
         if self._md5sums.setdefault(topic, found.md5sum) != found.md5sum:
@@ -230,7 +233,11 @@ class StepRunner:
         try:
             self._send(publish.topic, value, index, total)
         except ValueError as error:
-            begin = MISFIT if self._is_own(publish.type) else f"the grader cannot publish {publish.type}: "
+            begin = (
+                MISFIT
+                if self._arena.place.is_own(publish.type)
+                else f"the grader cannot publish {publish.type}: "
+            )
             self._note("note", publish.topic, f"{begin}{error}")
             return False
         return True
@@ -396,11 +403,7 @@ class StepRunner:
             await self._ask(call)
 
     async def _ask(self, call: Call) -> None:
-        from grader.evidence.decode import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
-        from grader.evidence.message_values import (  # noqa: PLC0415 - as above
-            MessageType,
-            Moment,
-        )
+        from grader.evidence.message_values import Moment, ServiceTypes  # noqa: PLC0415 - numpy, which not every run needs
 
         text, fits = None, True
         try:
@@ -409,10 +412,10 @@ class StepRunner:
             if differs:
                 self._refuse(call, text, differs, fits=False)
                 return
-            type_ = ServiceType(call.type, text or "", self._message_text)
-            request = MessageType(f"{call.type}Request", full=type_.request)
+            types = ServiceTypes(call.type, text or "", self._message_text)
             moment, fits = Moment(0, 1, self._arena.ros_now_ns()), False
-            data, shown = request.encode(call.request, moment), request.shown(call.request, moment)
+            data = types.request.encode(call.request, moment)
+            shown = types.request.shown(call.request, moment)
         except ValueError as error:
             self._refuse(call, text, str(error), fits=fits)
             return
@@ -425,22 +428,18 @@ class StepRunner:
         if "data" not in answer:
             self._answer(call, None, answer["error"])
             return
-        value = type_.decode_response(base64.b64decode(answer["data"]))
+        value = types.response.decode(base64.b64decode(answer["data"]))
         self._answer(call, value, "" if value is not None else f"the answer is no {call.type}")
 
     def _refuse(self, call: Call, text: str | None, error: str, *, fits: bool) -> None:
         """Note a call that cannot be made: by the fault of the student's own definition, or of this machine."""
         name = call.type.partition("/")[2]
-        if not self._is_own(call.type) or (fits and text is not None):
+        if not self._arena.place.is_own(call.type) or (fits and text is not None):
             self._answer(call, None, f"the grader could not call it: {error}")
             return
         about = {"topic": call.service, "type": call.type, "value": call.request}
         self._arena.note(ActorEvent(action="call", actor="grader", **about))
         self._answer(call, None, MISFIT + (error if text is not None else f"srv/{name}.srv is not there"))
-
-    def _is_own(self, type_: str) -> bool:
-        """Return whether a type belongs to a package of the submission."""
-        return (self._arena.place.workspace.repaired / type_.partition("/")[0]).is_dir()
 
     # --- Actions (wiki.ros.org/actionlib/DetailedDescription) ---------------------------------------------------------
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from grader.checks.registry import check
+from grader.checks.support.idioms import INIT, publisher, subscriber
 from grader.checks.support.nodes import GlobalName, is_called
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import End, cite, no_node, nodes_on, topics_with
@@ -107,7 +108,7 @@ def _misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:
         return None
     near = near_names(f"/{wanted.lstrip('/')}", there)
     seen = join_words(near or run.student_nodes() or there)
-    hint = f"the node's name is what rospy.init_node(…) or the launch file gives it: {wanted.lstrip('/')}"
+    hint = f"the node's name is what {INIT} or the launch file gives it: {wanted.lstrip('/')}"
     return failed(f"there is no node /{wanted.lstrip('/')}; there is {seen}", hint=hint)
 
 
@@ -117,8 +118,8 @@ def _not_on_topic(run: Run, end: End, params: ConnectedParams) -> Verdict:
     topics = topics_with(run, end, lambda node: _fits(run, node, wanted))
     near = near_names(params.topic, topics) or topics
     message = f"{who} never {does} {params.topic}" if wanted else f"{who} {does} {params.topic}"
-    kind = "Publisher" if end == "publishers" else "Subscriber"
-    hint = f"rospy.{kind}('{params.topic}', …); look for a <remap> or a namespace"
+    call = publisher if end == "publishers" else subscriber
+    hint = f"{call(params.topic)}; look for a <remap> or a namespace"
     return failed(f"{message}; it {does} {join_words(near)}" if near and wanted else message, hint=hint)
 
 

@@ -20,6 +20,7 @@ from grader.checks.support.counters import (
     wrong_steps,
 )
 from grader.checks.support.exit_causes import explain_early_end
+from grader.checks.support.idioms import LOOP
 from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
@@ -248,4 +249,4 @@ def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) ->
     message = f"only {plural(steps + 1, 'value')} came on {params.topic}{cause}"
     if losses(run, params.topic):
         return inconclusive(message, hint="grade again")
-    return unjudged(message, hint="publish in a loop `while not rospy.is_shutdown():`")
+    return unjudged(message, hint=f"publish in a loop `{LOOP}`")

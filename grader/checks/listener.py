@@ -17,6 +17,7 @@ from grader.checks.support.console_output import (
     text_places,
 )
 from grader.checks.support.exit_causes import explain_early_end, explain_error
+from grader.checks.support.idioms import SPIN, both, subscriber
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import lives, not_started
 from grader.checks.support.text import OTHER_WORDS_SHARE, VALUE, in_words, near_names, shown
@@ -30,7 +31,7 @@ from grader.wording import join_words, plural, significant
 HAND_IN = "add the script to the package, and push it"
 CALLBACK_HINT = (
     "print the message's .data in the callback, without a condition and nothing slow beside it; "
-    "end with rospy.spin()"
+    f"end with {SPIN}"
 )
 """Of the points, for a message that is printed, but not in the handout's words."""
 
@@ -145,7 +146,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     elif verdict is None:
         near = near_names(topic, subscribed)
         other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""
-        hint = f"add rospy.Subscriber('{topic}', …, callback)"
+        hint = f"add {subscriber(topic, '…, callback')}"
         verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint)
     return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))
 
@@ -179,7 +180,7 @@ def _types_differ(run: Run, topic: str) -> Verdict | None:
     other = f"another definition of {asked.type}" if asked.type == asked.value else asked.type
     message = f"{asked.actor} subscribes to {topic} with {other}, so that nothing arrives"
     wanted = f"{asked.value}, the type" if isinstance(asked.value, str) else "the type"
-    return failed(message, hint=f"give rospy.Subscriber('{topic}', …) {wanted} that the handout asks for")
+    return failed(message, hint=f"give {subscriber(topic)} {wanted} that the handout asks for")
 
 
 def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]) -> Verdict | None:
@@ -217,7 +218,8 @@ def _by_number(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequenc
         sent = f"; {probes[0].value!r} was sent first" if isinstance(probes[0].value, str) else ""
         return failed(f"none of the messages that were sent was printed{sent}; {seen}", hint=CALLBACK_HINT)
     if len(missing) == len(probes) - 1 and missing[0] is not probes[0]:
-        hint = "subscribe with a callback and rospy.spin(); wait_for_message(…) waits for one message only"
+        waits = both("wait_for_message(…)", "waitForMessage(…)")
+        hint = f"subscribe with a callback and {SPIN}; {waits} waits for one message only"
         return failed("only the first message is printed", hint=hint)
     value = missing[0].value
     first = significant(value) if isinstance(value, int) else repr(value)

@@ -9,8 +9,9 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import ProcessName, check
-from grader.checks.support.console_output import CALLS, Level, Logged, console_log, logged_by
+from grader.checks.support.console_output import Level, Logged, console_log, logged_by
 from grader.checks.support.exit_causes import explain_end
+from grader.checks.support.idioms import INIT, both, log
 from grader.checks.support.nodes import nodes_of
 from grader.checks.support.processes import early_end, life, lives, not_started
 from grader.checks.support.text import OTHER_WORDS_SHARE, shown
@@ -98,7 +99,7 @@ def _only_printed(run: Run, params: LogsParams) -> Verdict | None:
     of_logger = next((log for log in map(console_log, (line.line for line in said)) if log), None)
     if of_logger is None:
         message = f"{shown(said[0].line)!r} is only printed, not logged"
-        return failed(message, hint=f"{_call(params)} instead of print(…)")
+        return failed(message, hint=f"{_call(params)} instead of {both('print(…)', 'std::cout')}")
     if of_logger[0] != params.level:
         message = f"{params.text!r} is logged at level {of_logger[0].upper()}, not {params.level.upper()}"
         return failed(message, hint=_call(params))
@@ -161,14 +162,14 @@ def _nothing(
         end = explain_end(ended, run, package)
         return end.verdict(unjudged, f"the node ended before it logged {params.text!r}: {end.cause}")
     if not nodes:
-        hint = "call rospy.init_node(…) before logging"
+        hint = f"call {INIT} before logging"
         return unjudged("no node was registered that could log", hint=hint)
     if lines:
         message = f"{join_words(nodes)} logs {shown(lines[0].text)!r}, not {params.text!r}"
         return failed(message, hint=_call(params))
-    hint = f"{_call(params)} below rospy.init_node(…): above it, nothing is sent"
+    hint = f"{_call(params)} below {INIT}: above it, nothing is sent"
     return failed(f"{join_words(nodes)} logs nothing", hint=hint)
 
 
 def _call(params: LogsParams) -> str:
-    return f'write {CALLS[params.level]}("{params.text}")'
+    return f"write {log(params.level, params.text)}"

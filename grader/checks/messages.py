@@ -10,8 +10,9 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.clocks import GET_TIME, WATCHED_S, clocks_at, wrong_growth
+from grader.checks.support.clocks import ASK_AGAIN, WATCHED_S, clocks_at, wrong_growth
 from grader.checks.support.exit_causes import explain_early_end
+from grader.checks.support.idioms import both
 from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.processes import early_end, is_flood, life_of, observed_until_ns
 from grader.checks.support.text import (
@@ -32,6 +33,7 @@ from grader.wording import plural
 ENOUGH = 3
 _LAST_NUMBER = re.compile(rf".*?({NUMBER})\D*", re.DOTALL)
 SECONDS_CHARS_MAX = 60
+TIMED = both(" % rospy.get_time()", " with ros::Time::now().toSec() for %s")
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
 
 
@@ -116,7 +118,7 @@ def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdic
     else:
         message = f"a message reads {in_one_line(text)!r}, not '{wanted}'"
     cited = cite(run, params.topic, at_ns, at_ns)
-    value = " % rospy.get_time()" if SECONDS in params.template else ""
+    value = TIMED if SECONDS in params.template else ""
     hint = f'publish "{form}"{value}'
     if value and _tells_time(run, heard):
         return partial(OTHER_WORDS_SHARE, f"{message}; its time is right", hint=hint, citations=(cited,))
@@ -180,7 +182,7 @@ def _counted(package: PackageFacts, run: Run, channel: Channel, told: Sequence[f
         return None
     message = f"the number in the messages counts them ({told[0]:.0f}, {told[1]:.0f}, …) and is not a time"
     place = FileCitation(file=slip.file, line=slip.line)
-    return failed(f"{message}: {slip.file} reads no clock", hint=GET_TIME, citations=(place,))
+    return failed(f"{message}: {slip.file} reads no clock", hint=ASK_AGAIN, citations=(place,))
 
 
 def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:
@@ -197,5 +199,5 @@ def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: 
         message = f"{few} before the node ended ({end.cause}): too few to see the time grow"
         return end.verdict(unjudged, message)
     if _watched_ns(run, heard) >= WATCHED_S * 1e9:
-        return unjudged(f"{few}: too few to see the time grow", hint=f"publish in the loop; {GET_TIME}")
+        return unjudged(f"{few}: too few to see the time grow", hint=f"publish in the loop; {ASK_AGAIN}")
     return inconclusive(f"{few} while it was watched: too few to see the time grow", hint="grade again")

@@ -14,6 +14,7 @@ from grader.checks.support.exit_causes import (
     is_rospys_own,
     process_tracebacks,
 )
+from grader.checks.support.idioms import INIT, LOOP, both
 from grader.checks.support.nodes import (
     Anonymous,
     are_noted,
@@ -31,7 +32,7 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, seconds
 
-LOOP = "loop with `while not rospy.is_shutdown():` and catch rospy.ROSInterruptException around it"
+IN_A_LOOP = f"loop with `{LOOP}`" + both(" and catch rospy.ROSInterruptException around it", "")
 
 
 class NodeLivesParams(Record):
@@ -132,7 +133,7 @@ def node_name(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
 
 def _nameless(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdict:
     """No node was registered: why, where its process ended by itself."""
-    message, hint = "no node was registered, so there is no name", "call rospy.init_node(…)"
+    message, hint = "no node was registered, so there is no name", f"call {INIT}"
     one = life(run, params.process)
     if one is None or not one.ended_early:
         return unjudged(message, measured="no node", hint=hint)
@@ -169,10 +170,10 @@ def _early_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
 
 def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None:
     if not nodes:
-        hint = "call rospy.init_node(…) before anything that waits"
+        hint = f"call {INIT} before anything that waits"
         return failed(f"{_script(one)} runs, but never registers as a node", hint=hint).once()
     if len(nodes) > (1 if are_noted(run) else max(1, len(lives(run)))):
-        hint = "one script is one node: call rospy.init_node(…) once, start no other process"
+        hint = f"one script is one node: call {INIT} once, start no other process"
         return failed(f"{_script(one)} registers as {len(nodes)} nodes: {join_words(nodes)}", hint=hint)
     return None
 
@@ -192,14 +193,15 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
         if excuse is not None:
             return excuse
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
-        return failed(message, hint=f"{LOOP}; a bare `except:` in the loop swallows the Ctrl-C")
+        hint = IN_A_LOOP + both("; a bare `except:` in the loop swallows the Ctrl-C", "")
+        return failed(message, hint=hint)
     found = process_tracebacks(run, one.name, after_ns=one.interrupt_ns)
     own = [f for f in found if not is_rospys_own(f)]
     if not own:
         return None
     end = explain_traceback(own[-1], package)
     message = f"{_script(one)} ends on Ctrl-C with a traceback: {end.cause}"
-    return failed(message, hint=end.hint or LOOP, citations=end.citations)
+    return failed(message, hint=end.hint or IN_A_LOOP, citations=end.citations)
 
 
 def _locked_up(one: Life, run: Run) -> Verdict | None:

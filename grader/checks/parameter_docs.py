@@ -29,6 +29,8 @@ REFERRED = {
     "published": "topic of the student's",
     "set": "parameter that the scenario sets",
     "action": "action of the scenario's steps",
+    "kept": "file that the scenario keeps",
+    "served": "service that the scenario offers",
     "watched_s": "number",
 }
 REQUIRED = "required"

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from grader.checks.registry import ProcessName, Refers, check
 from grader.checks.support.console_output import printed_lines
+from grader.checks.support.idioms import get_param, log_param, set_param
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.parameters import (
     Key,
@@ -287,12 +288,12 @@ def _not_printed(
     copied = (n for n in missing if any(is_printed(v, lines) for v in _in_file(build, params.file, n)))
     if (hard := next(copied, None)) is not None:
         message = f"{hard} is printed as {params.file} has it, not as the parameter server has it"
-        hint = f"read it with rospy.get_param('{hard}'), and not from the file or the script"
+        hint = f"read it with {get_param(hard)}, and not from the file or the script"
         return _share_printed(params, missing, message, hint)
     texts = [line.text.strip() for line in lines if line.text.strip()]
     seen = f"; it prints {shown(texts[-1])!r}" if texts else "; it prints nothing at all"
     message = f"{names} {_are(missing)} not printed with the values on the server{seen}"
-    return _share_printed(params, missing, message, f"rospy.loginfo(rospy.get_param('{missing[0]}'))")
+    return _share_printed(params, missing, message, log_param(missing[0]))
 
 
 def _share_printed(params: ParamsReadParams, missing: Sequence[str], message: str, hint: str) -> Verdict:
@@ -383,7 +384,7 @@ def _not_set(
     sets = [e for t, e in run.params if e.action == "set" and t <= until_ns]
     mine = [e for e in sets if run.is_student_node(e.caller_id)]
     last = next((e for e in reversed(mine) if absolute_name(e.name) == params.name), None)
-    hint = f"write rospy.set_param('{params.name}', {params.value!r})"
+    hint = f"write {set_param(params.name, params.value)}"
     if last is not None and params.name in after:
         return _set_to_another(mine, after[params.name], params)
     if params.name not in after and params.name in params_given(run):
@@ -404,7 +405,7 @@ def _set_to_another(mine: Sequence[ParamEvent], got: object, params: ParamsSetPa
     if any(absolute_name(e.name) == params.name and _is_value(e.value, params.value) for e in mine):
         message = f"{params.name} is set to {params.value}, and to {now} after that"
         return failed(message, hint=f"take out the later line that sets {params.name} to {now}")
-    hint = f"write rospy.set_param('{params.name}', {params.value!r})"
+    hint = f"write {set_param(params.name, params.value)}"
     return failed(f"{params.name} is set to {now}, not to {params.value}", hint=hint)
 
 
@@ -415,7 +416,7 @@ def _clobbered(run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verd
         was = known[name].value if name in known else before.get(name)
         if was is None or after.get(name) == was:
             continue
-        hint = f"set the one value alone: rospy.set_param('{params.name}', {params.value!r})"
+        hint = f"set the one value alone: {set_param(params.name, params.value)}"
         if name in after:
             message = f"{name} was {shown(str(was))} and is {shown(str(after[name]))} afterwards"
             return failed(message, hint=hint)
@@ -438,7 +439,7 @@ def _not_logged(run: Run, params: ParamsSetParams) -> Verdict | None:
     if not params.logged or is_printed(params.value, printed_lines(run)):
         return None
     message = f"{params.name} is set to {params.value}, but the new value is never printed"
-    return failed(message, hint=f"rospy.loginfo(rospy.get_param('{params.name}'))")
+    return failed(message, hint=log_param(params.name))
 
 
 class ParamValueParams(Record):
@@ -516,4 +517,4 @@ def _not_there(package: PackageFacts, run: Run, names: Iterable[str], params: Pa
     if absent := no_node(package, run, f"there is no parameter {params.name}"):
         return absent
     message = f"nothing set the parameter {params.name}, or it was deleted again"
-    return failed(message, hint=f"rospy.set_param('{params.name}', …), or a <param> in the launch file")
+    return failed(message, hint=f"{set_param(params.name)}, or a <param> in the launch file")

@@ -11,10 +11,11 @@ from pydantic import Field
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.exit_causes import explain_early_end
+from grader.checks.support.idioms import LOOP, both, loop_rate
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, excused, lateness
 from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.processes import observed_until_ns
-from grader.checks.support.topics import cite, no_message, whole_until_ns
+from grader.checks.support.topics import Sender, cite, nothing_sent, sent_by, whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
@@ -55,6 +56,9 @@ class RateParams(Record):
     """The share of the gaps that has to lie within `gap_tolerance`."""
     min_window_s: Annotated[Positive, Refers("watched_s")] = 5.0
     """So long messages have to be seen before the rate is judged."""
+    of: Sender = "student"
+    """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
+    `anyone`'s."""
 
     @property
     def low_hz(self) -> float:
@@ -115,9 +119,9 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     if run.clock != "real":
         message = "rates are judged in real time only, and this run was warped"
         return inconclusive(message, expected=expected, hint="give the criterion a scenario with clock: real")
-    found = judged_rhythm(run, params, run.student_channels(params.topic))
+    found = judged_rhythm(run, params, sent_by(run, params.topic, params.of))
     if found is None:
-        return no_message(package, run, params.topic).about(expected=expected)
+        return nothing_sent(package, run, params.topic, params.of).about(expected=expected)
     uneven = _uneven(found, params)
     if uneven is not None:
         why = partial(_why_late, found, params=params)
@@ -154,10 +158,11 @@ def _flood(found: Rhythm, package: PackageFacts, params: RateParams) -> Verdict 
     if not slips and found.mean_hz < FLOOD_HZ and found.is_even:
         return None
     where = f" ({slips[0].file}, line {slips[0].line}: {slips[0].message})" if slips else ""
+    hz = significant(params.rate_hz)
+    made = both(f"rate = rospy.Rate({hz})", f"ros::Rate rate({hz})")
     return failed(
         f"{params.topic} is flooded with {hertz(found.mean_hz)}: the loop does not sleep{where}",
-        hint="call rate.sleep(), with parentheses, in every iteration; "
-        f"rate = rospy.Rate({significant(params.rate_hz)})",
+        hint=f"call rate.sleep(), with parentheses, in every iteration; {made}",
         citations=tuple(FileCitation(file=s.file, line=s.line) for s in slips[:3]),
     )
 
@@ -192,7 +197,7 @@ def _fell_silent(found: Rhythm, params: RateParams) -> Verdict | None:
         return None
     lasted = seconds(found.times_ns[-1] - found.times_ns[0])
     message = f"{params.topic} falls silent {lasted} after its first message, while its node lives on"
-    hint = "publish in a loop `while not rospy.is_shutdown():`, not a number of times"
+    hint = f"publish in a loop `{LOOP}`, not a number of times"
     return failed(message, hint=hint).once()
 
 
@@ -220,12 +225,12 @@ def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
 def _rate_hint(ratio: float, nominal: str, *, even: bool) -> str:
     """Return what may be wrong where a loop comes round `ratio` times as often as it should."""
     if abs(ratio - 0.5) < 0.05:
-        return f"use rospy.Rate({nominal}), and one rate.sleep() in each turn: two of them halve the rate"
+        return f"use {loop_rate(nominal)}, and one rate.sleep() in each turn: two of them halve the rate"
     if abs(ratio - 2) < 0.2 and not even:
-        return f"twice the rate: does the loop, or a second publisher, publish twice? rospy.Rate({nominal})"
+        return f"twice the rate: does the loop, or a second publisher, publish twice? {loop_rate(nominal)}"
     if ratio < 1:
-        return f"use rospy.Rate({nominal}) and one rate.sleep() in each turn, with nothing slow beside it"
-    return f"the number is in Hz, turns in a second: rospy.Rate({nominal})"
+        return f"use {loop_rate(nominal)} and one rate.sleep() in each turn, with nothing slow beside it"
+    return f"the number is in Hz, turns in a second: {loop_rate(nominal)}"
 
 
 def _why_late(found: Rhythm, late: Lateness, params: RateParams) -> str:

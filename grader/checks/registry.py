@@ -35,7 +35,8 @@ class Refers:
     `process`: a start of the student's in the scenario. `launch`: a launch file that the scenario starts. `program`:
     `package/program` of another package. `message`, `service`: a type. `field`: a field's type. `sent`: a topic on
     which the scenario's probes send. `published`: a topic on which the student publishes. `set`: a parameter that the
-    scenario sets. `action`: an action to which its steps send goals. `watched_s`: so long the scenario has to last.
+    scenario sets. `action`: an action to which its steps send goals. `kept`: a file that it keeps. `served`: a service
+    that the grader offers in it. `watched_s`: so long the scenario has to last.
     """
 
     to: Literal[
@@ -49,6 +50,8 @@ class Refers:
         "published",
         "set",
         "action",
+        "kept",
+        "served",
         "watched_s",
     ]
 
@@ -101,18 +104,25 @@ class Check:
 
     def references(self, parameters: Mapping[str, object]) -> Iterator[Reference]:
         """Yield what these parameters refer to, defaults among them."""
-        for name, info in self.params.model_fields.items():
-            value = parameters.get(name, None if info.is_required() else info.default)
-            kinds = [known for known in info.metadata if isinstance(known, Refers)] or _refers(
-                info.annotation
-            )
-            yield from (Reference((name,), known.to, value) for known in kinds)
-            if get_origin(info.annotation) is tuple and isinstance(value, list | tuple):
-                kinds = _refers(get_args(info.annotation)[0])
-                yield from (Reference((name, n), k.to, item) for n, item in enumerate(value) for k in kinds)
-            if get_origin(info.annotation) is dict and isinstance(value, dict):
-                kinds = _refers(get_args(info.annotation)[1])
-                yield from (Reference((name, key), k.to, item) for key, item in value.items() for k in kinds)
+        yield from _references(self.params, parameters)
+
+
+def _references(record: type[Record], parameters: Mapping[str, object]) -> Iterator[Reference]:
+    for name, info in record.model_fields.items():
+        value = parameters.get(name, None if info.is_required() else info.default)
+        kinds = [known for known in info.metadata if isinstance(known, Refers)] or _refers(info.annotation)
+        yield from (Reference((name,), known.to, value) for known in kinds)
+        if get_origin(info.annotation) is tuple and isinstance(value, list | tuple):
+            kinds = _refers(get_args(info.annotation)[0])
+            yield from (Reference((name, n), k.to, item) for n, item in enumerate(value) for k in kinds)
+        if get_origin(info.annotation) is dict and isinstance(value, dict):
+            inner = get_args(info.annotation)[1]
+            kinds = _refers(inner)
+            yield from (Reference((name, key), k.to, item) for key, item in value.items() for k in kinds)
+            if isinstance(inner, type) and issubclass(inner, Record):
+                for key, item in value.items():
+                    found = _references(inner, item) if isinstance(item, dict) else ()
+                    yield from (one._replace(path=(name, key, *one.path)) for one in found)
 
 
 def _refers(annotation: object) -> list[Refers]:

@@ -25,6 +25,7 @@ from grader.checks.support.geometry import (
     stands,
     track,
 )
+from grader.checks.support.idioms import subscriber
 from grader.checks.support.lateness import Lateness, excused
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import observed_until_ns
@@ -189,7 +190,7 @@ def _not_asked(asked: Stretch | None, run: Run, params: EndsAtParams) -> Verdict
         return None
     if nodes_on(run, params.asked_on, "subscribers"):
         return inconclusive(f"message {params.number} on {params.asked_on} was not sent", hint="grade again")
-    hint = f"subscribe to it: rospy.Subscriber('{params.asked_on}', …)"
+    hint = f"subscribe to it: {subscriber(params.asked_on)}"
     return unjudged(f"no node listens to {params.asked_on}, so no goal could be sent", hint=hint)
 
 

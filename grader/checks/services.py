@@ -10,6 +10,7 @@ from pydantic import Field
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.exit_causes import HEADING, Traceback, explain_end, explain_traceback, tracebacks
+from grader.checks.support.idioms import SERVICE, SPIN, imports, service_call
 from grader.checks.support.nodes import GlobalName, TypeName, plain_type
 from grader.checks.support.processes import life_of
 from grader.checks.support.text import near_names, shown
@@ -116,7 +117,7 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
 def _judged(offer: Offer, package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
     """A service of that name is there, or was."""
     name, _, kind = params.type.partition("/")
-    hint = f"from {name}.srv import {kind}, then rospy.Service('{params.service}', {kind}, callback)"
+    hint = f"{imports(name, kind, 'srv')}, then {service_call(params.service, f'{kind}, callback')}"
     if offer.type and offer.type != params.type:
         message = f"{params.service} of {offer.node} is of type {offer.type}, not {params.type}"
         return failed(message, hint=hint)
@@ -239,14 +240,14 @@ def not_offered(package: PackageFacts, run: Run, service: str) -> Verdict:
     near = near_names(service, found)
     if owner:
         message = f"{service} is offered by {owner}, which is not a node of the package"
-        return failed(message, hint=f"offer it with rospy.Service('{service}', …) in a node of your own")
+        return failed(message, hint=f"offer it with {service_call(service)} in a node of your own")
     if near:
         message = f"there is no service {service}; {found[near[0]].node} offers {join_words(near)}"
         return failed(message, hint=_rename_hint(service, near[0], found[near[0]].node))
     if absent := no_node(package, run, f"there is no service {service}"):
         return absent
     others = f"; it offers {join_words(found)}" if found else ""
-    hint = f"add rospy.Service('{service}', …, callback) before the loop or rospy.spin()"
+    hint = f"add {service_call(service, '…, callback')} before the loop or {SPIN}"
     return failed(f"no node offers {service}{others}", hint=hint)
 
 
@@ -257,10 +258,10 @@ def _other_owner(run: Run, service: str) -> str:
 
 def _rename_hint(wanted: str, found: str, node: str) -> str:
     if found == f"{node}{wanted}":
-        return f"a name with ~ is put below the node's own: write rospy.Service('{wanted}', …)"
+        return f"a name with ~ is put below the node's own: write {service_call(wanted)}"
     if wanted == f"{node}{found}":
-        return f"a name with ~ is put below the node's own: write rospy.Service('~{found[1:]}', …)"
-    return f"name it {wanted} in rospy.Service(…)"
+        return f"a name with ~ is put below the node's own: write {service_call(f'~{found[1:]}')}"
+    return f"name it {wanted} in {SERVICE}"
 
 
 def handler_traceback(run: Run, service: str, since_ns: int) -> Traceback | None:
@@ -319,4 +320,4 @@ def other_type(run: Run, service: str, one: Exchange) -> Verdict | None:
     if not kind or not one.type or kind == one.type:
         return None
     message = f"{service} cannot be called as {one.type}: it is of type {kind}"
-    return unjudged(message, hint=f"give rospy.Service('{service}', …) the type {one.type}")
+    return unjudged(message, hint=f"give {service_call(service)} the type {one.type}")

@@ -11,6 +11,7 @@ from pydantic import Field
 from grader.checks.registry import check
 from grader.checks.support.clocks import ros_seconds
 from grader.checks.support.fields import FieldPath, no_field, readings
+from grader.checks.support.idioms import NOW, both
 from grader.checks.support.lateness import NEVER_LATE_S, Lateness, excused
 from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.text import shown
@@ -142,7 +143,7 @@ def _told(value: Mapping[str, Any]) -> tuple[float, bool, str | None]:
 
 def _now(params: StampsParams) -> str:
     item, _, name = _name(params).rpartition("[*].")
-    return f"set it just before each publish: {'msg.' if not item else 'each '}{name} = rospy.Time.now()"
+    return f"set it just before each publish: {'msg.' if not item else 'each '}{name} = {NOW}"
 
 
 def _nothing_to_judge(
@@ -194,8 +195,8 @@ def _other_clock(run: Run, found: Sequence[Stamp], params: StampsParams) -> Verd
         return None
     message = f"{_name(params)} of {params.topic} is the computer's time, and not that of /clock"
     hint = (
-        "take the time from rospy.Time.now(), which follows /clock where /use_sim_time is set; time.time() and "
-        "datetime do not"
+        f"take the time from {NOW}, which follows /clock where /use_sim_time is set; "
+        f"{both('time.time() and datetime', 'std::chrono and time(…)')} do not"
     )
     return failed(message, hint=hint)
 

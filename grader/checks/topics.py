@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from grader.checks.registry import Refers, check
+from grader.checks.support.idioms import imports, publisher
 from grader.checks.support.nodes import GlobalName, PublishedTopic, TypeName, plain_type
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import cite, no_message, no_node, nodes_on, published_topics
@@ -78,7 +79,8 @@ def _listed_topics(run: Run) -> str:
 
 def _wrong_type(channel: Channel, params: TopicTypeParams) -> Verdict:
     package, _, name = params.type.partition("/")
-    hint = f"from {package}.msg import {name}, then rospy.Publisher('{params.topic}', {name}, queue_size=10)"
+    call = publisher(params.topic, f"{name}, queue_size=10", type=f"{package}::{name}")
+    hint = f"{imports(package, name, 'msg')}, then {call}"
     message = f"{channel.publisher} publishes {plain_type(channel.type)} on {params.topic}, not {params.type}"
     return failed(message, hint=hint)
 
@@ -154,7 +156,7 @@ def _unexpected(
     meant = near_names(first, missing)
     named = join_words(f"{t} ({published[t]})" if published[t] else t for t in unexpected)
     message = f"{_publisher(run, first)} publishes on {named}, which the lab does not ask for"
-    hint = f"did you mean {meant[0]}?" if meant else f"remove the rospy.Publisher('{first}', …)"
+    hint = f"did you mean {meant[0]}?" if meant else f"remove the {publisher(first)}"
     return failed(message, hint=hint)
 
 
@@ -196,7 +198,7 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
         message = f"the recording does not say whether {params.topic} was latched"
         verdict = inconclusive(message, hint="let the grader run the package itself")
     elif plain:
-        hint = f"rospy.Publisher('{params.topic}', …, latch=True, queue_size=1)"
+        hint = publisher(params.topic, "…, latch=True, queue_size=1", "1, true")
         verdict = failed(f"{join_words(plain)} publishes on {params.topic} without latching", hint=hint)
     else:
         verdict = passed(f"{join_words(c.callerid for c in channels)} latches {params.topic}")

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import check
 from grader.checks.support.clocks import run_seconds
+from grader.checks.support.idioms import RATE
 from grader.checks.support.lateness import excused, why_late
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import observed_until_ns
@@ -329,7 +330,7 @@ def _too_seldom(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verd
     if rate_hz >= params.min_hz:
         return None
     message = f"{params.name} is sent {significant(rate_hz)} times a second, and at least {params.min_hz:g} are asked"
-    verdict = failed(message, hint="send it in a loop with rospy.Rate, or in the callback of what it follows")
+    verdict = failed(message, hint=f"send it in a loop with {RATE}, or in the callback of what it follows")
     return excused(verdict.once(), run, seen[0].time_ns, seen[-1].time_ns, why_late)
 
 

@@ -16,6 +16,7 @@ from grader.checks.support.console_output import (
     sent_by,
 )
 from grader.checks.support.exit_causes import ended_after, explain_end
+from grader.checks.support.idioms import GET_TIME, INIT, SPIN, init
 from grader.checks.support.nodes import GlobalName, are_noted, nodes_of
 from grader.checks.support.processes import NO_SCRIPT_HINT, Life, life, lives
 from grader.checks.support.text import VALUE, in_words
@@ -115,7 +116,7 @@ def _not_started(package: PackageFacts, run: Run, params: CopiesParams) -> Verdi
             return end.verdict(unjudged, f"{one.name} ended before the copies were started: {end.cause}")
         if not nodes_of(run, one.name):
             message = f"{one.name} never registers as a node, so what waits for it was not started"
-            return unjudged(message, hint="call rospy.init_node(…) before anything that waits").once()
+            return unjudged(message, hint=f"call {INIT} before anything that waits").once()
     if any(one.name in {params.first, params.second} for one in waited_for):
         return inconclusive("only one copy was started", hint="grade again")
     return unjudged("no copy was started: there is no script to run", hint=NO_SCRIPT_HINT)
@@ -133,7 +134,7 @@ def _taken_over(run: Run, trio: Trio, params: CopiesParams) -> Verdict | None:
         down = "the first takes it back, and both are shut down"
     message = f"the second copy takes the name {name} over, and {down}: ROS allows each name once"
     base = name.strip("/")
-    hint = f"write rospy.init_node('{base}', anonymous=True): then each copy has a name of its own"
+    hint = f"write {init(base, anonymous=True)}: then each copy has a name of its own"
     return partial(params.taken_over_score, message, hint=hint, measured=f"one name for two copies: {name}")
 
 
@@ -166,9 +167,9 @@ def _unnamed(run: Run, trio: Trio) -> Verdict | None:
     which = "second" if trio.first_nodes else "first" if trio.second_nodes else ""
     if not which:
         message = "neither copy registers as a node"
-        return unjudged(message, hint="call rospy.init_node(…) before anything that waits").once()
+        return unjudged(message, hint=f"call {INIT} before anything that waits").once()
     message = f"the {which} copy never registers as a node beside the other"
-    return failed(message, hint="call rospy.init_node('…', anonymous=True) before anything that waits")
+    return failed(message, hint=f"call {init('…', anonymous=True)} before anything that waits")
 
 
 def _listener_gone(package: PackageFacts, run: Run, trio: Trio) -> Verdict | None:
@@ -237,8 +238,8 @@ def _unheard(
     counts = heard_of(first, second, printed), heard_of(second, first, printed)
     if not any(counts):
         message = f"{names[0]} and {names[1]} send the same texts, and not all of them are printed twice"
-        return unjudged(message, hint="let each message tell the time: rospy.get_time()")
+        return unjudged(message, hint=f"let each message tell the time: {GET_TIME}")
     lost = names[0] if counts[1] else names[1]
     message = f"{names[0]} and {names[1]} live at once, but {params.listener} prints nothing of {lost}"
-    hint = "subscribe with a callback and rospy.spin(); a subscriber hears every publisher of its topic"
+    hint = f"subscribe with a callback and {SPIN}; a subscriber hears every publisher of its topic"
     return unjudged(message, hint=hint)

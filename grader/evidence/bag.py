@@ -48,11 +48,12 @@ class BagLimitError(ValueError):
     """The bag exceeds a limit."""
 
 
-def load_bag(path: Path, budget: MemoryBudget | None = None) -> Run:
-    """Read a bag as a real-time run named after the file, without processes. Raises EvidenceError."""
+def load_bag(path: Path, budget: MemoryBudget | None = None, data: bytes | None = None) -> Run:
+    """Read a bag as a real-time run named after the file, without processes. `data` takes the place of what is in the
+    file. Raises EvidenceError."""
     budget = budget or MemoryBudget()
     try:
-        with _Reader(path) as reader:
+        with _Reader(path, data) as reader:
             channels = _channels(reader, budget)
     except ReaderError as error:
         raise _explain(path, str(error)) from error
@@ -96,9 +97,9 @@ class _Reader(Reader):
     Where messages lie it need not know: chunks are read from front to back, each once.
     """
 
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
-        self.path = self.file = _File(path)  # type: ignore[assignment] # as far as it is used as a path
+    def __init__(self, path: Path, data: bytes | None) -> None:
+        self.file = _File(path, data)
+        super().__init__(self.file)  # type: ignore[arg-type] # as far as it is used as a path
         self._seen: set[int] = set()
         self._count = 0
 
@@ -135,15 +136,19 @@ class _Reader(Reader):
 class _File:
     """A file of which no more is read at once than a header may have, and no more in all than a sound bag needs."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._left_bytes = READ_TIMES * path.stat().st_size + MAX_HEADER_BYTES
+    def __init__(self, path: Path, data: bytes | None) -> None:
+        self._path, self._data = path, data
+        size_bytes = path.stat().st_size if data is None else len(data)
+        self._left_bytes = READ_TIMES * size_bytes + MAX_HEADER_BYTES
 
     def __str__(self) -> str:
         return str(self._path)
 
+    def exists(self) -> bool:
+        return True  # its size is known
+
     def open(self, mode: Literal["rb"]) -> _File:
-        self._file = self._path.open(mode)
+        self._file = self._path.open(mode) if self._data is None else BytesIO(self._data)
         return self
 
     def close(self) -> None:

@@ -272,8 +272,8 @@ _PARTS_MAX = 100
 
 
 class ServiceType:
-    """Decodes responses of one service type, from the text of its `.srv` file (wiki.ros.org/srv). `request` is the full
-    definition of its requests.
+    """Decodes responses of one service type, from the text of its `.srv` file (wiki.ros.org/srv). `request` and
+    `response` are the full definitions of its two messages.
 
     `find_text` returns the text of messages that ROS Noetic's own packages do not have.
 
@@ -284,9 +284,8 @@ class ServiceType:
         parts = DIVIDER.split(text)
         if len(parts) != 2:
             raise ValueError(f"{type}: a service has a request and a response with one line --- between them")
-        request, response = (full_definition(type, part, find_text) for part in parts)
-        self.request = request
-        self._response = Decoder(f"{type}Response", response)
+        self.request, self.response = (full_definition(type, part, find_text) for part in parts)
+        self._response = Decoder(f"{type}Response", self.response)
 
     def decode_response(self, data: bytes) -> Value:
         """The response's fields, None where the bytes do not fit."""

@@ -15,6 +15,7 @@ from grader.evidence.decode import (
     Decoder,
     Encoder,
     FindText,
+    ServiceType,
     definition,
     full_definition,
 )
@@ -99,6 +100,25 @@ class MessageType:
         """
         found = _Filling(self._types, moment, shown=True).fields(self.type, value)
         return found if _is_fields(value, found) else found["data"]
+
+
+class ServiceTypes:
+    """The request and the response of a service type, from the text of its `.srv` file.
+
+    Raises ValueError for a text that is no service definition, or needs a type that is nowhere.
+    """
+
+    def __init__(self, type: str, text: str, find_text: FindText = lambda _: None) -> None:  # noqa: A002 - ROS's own word
+        found = ServiceType(type, text, find_text)
+        self.request = MessageType(f"{type}Request", full=found.request)
+        self.response = MessageType(f"{type}Response", full=found.response)
+
+    @property
+    def md5sum(self) -> str:
+        """As `rossrv md5` gives it."""
+        parts = (self.request, self.response)
+        texts = (_md5_text(p.type, dict(sections_of(p.type, p.definition)), {}) for p in parts)
+        return hashlib.md5("".join(texts).encode(), usedforsecurity=False).hexdigest()
 
 
 def _definition(type_: str, find_text: FindText) -> str:
@@ -279,17 +299,20 @@ def md5_of(type_: str, full: str) -> str:
 
 def _md5(type_: str, parts: Mapping[str, tuple[str, ...]], known: dict[str, str]) -> str:
     if type_ not in known:
-        constants, fields = [], []
-        for line in parts[type_]:
-            if (match := _CONSTANT.match(line)) is not None:
-                value = match[3] if match[1] == "string" else match[3].partition("#")[0]
-                constants.append(f"{match[1]} {match[2]}={value.strip()}")
-            elif (match := _FIELD.match(line)) is not None:
-                fields.append(_md5_line(type_, match, parts, known))
-        known[type_] = hashlib.md5(
-            "\n".join([*constants, *fields]).encode(), usedforsecurity=False
-        ).hexdigest()
+        text = _md5_text(type_, parts, known)
+        known[type_] = hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
     return known[type_]
+
+
+def _md5_text(type_: str, parts: Mapping[str, tuple[str, ...]], known: dict[str, str]) -> str:
+    constants, fields = [], []
+    for line in parts[type_]:
+        if (match := _CONSTANT.match(line)) is not None:
+            value = match[3] if match[1] == "string" else match[3].partition("#")[0]
+            constants.append(f"{match[1]} {match[2]}={value.strip()}")
+        elif (match := _FIELD.match(line)) is not None:
+            fields.append(_md5_line(type_, match, parts, known))
+    return "\n".join([*constants, *fields])
 
 
 def _md5_line(

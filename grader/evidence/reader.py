@@ -68,6 +68,15 @@ def load_run(source: Path | BinaryIO, budget: MemoryBudget | None = None) -> Run
         return _load(source.name, file, budget, shown=str(source))
 
 
+def load_recording(name: str, data: bytes) -> Run:
+    """Read a bag or MCAP file that a run left behind. Raises EvidenceError."""
+    if data.startswith(BAG_MAGIC):
+        from grader.evidence.bag import load_bag  # noqa: PLC0415 - few runs leave a bag
+
+        return load_bag(Path(name), data=data)
+    return _load(name, BytesIO(data), MemoryBudget())
+
+
 def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
     """Read the runs of these files by scenario; a folder stands for its recordings and those of `evidence/` in it.
 

@@ -36,6 +36,25 @@ LETTER_BYTES = 1_400
 """What a decoder takes, and for each letter of its definition: time more than memory."""
 
 
+class LeftFile(NamedTuple):
+    """A file that a process left behind."""
+
+    process: str
+    """What the scenario calls the process."""
+    path: str
+    """Where it lay: `~/run.bag` in the process's working folder, `~/catkin_ws/src/<package>/…` in the package."""
+    size_bytes: int
+    """Its size, in bytes."""
+    data: bytes | None
+    """Its content; None where the scenario does not keep it, or where it is larger than it may be."""
+
+    def recording(self) -> Run:
+        """Return the messages of a bag or MCAP file. Raises EvidenceError."""
+        from grader.evidence.reader import load_recording  # noqa: PLC0415 - few runs leave one
+
+        return load_recording(self.path, self.data or b"")
+
+
 class Message(NamedTuple):
     """A recorded message."""
 
@@ -108,6 +127,11 @@ class Channel:
     def data(self) -> tuple[Any, ...]:
         """The field `data` of each message (std_msgs), None where it has none."""
         return tuple(v.get("data") if isinstance(v, dict) else None for v in self.values)
+
+
+def left_name(process: str, path: str) -> str:
+    """Return the attachment's name of a file that a process left."""
+    return f"left/{process}/{path}"
 
 
 def is_grader_node(name: str) -> bool:
@@ -207,6 +231,15 @@ class Run:
         if lines[0].startswith("#!") and text.startswith(f"{lines[0]}\r"):
             lines[0] += "\r"
         return lines if lines[-1] else lines[:-1]
+
+    @property
+    def left_files(self) -> tuple[LeftFile, ...]:
+        """The files that the student's processes left, of a scenario that keeps files."""
+        left = [event for _, event in self.actors if event.action == "left"]
+        return tuple(
+            LeftFile(e.actor, e.detail, e.value, self.attachments.get(left_name(e.actor, e.detail)))
+            for e in left
+        )
 
     @property
     def outcome(self) -> ScenarioEvent | None:

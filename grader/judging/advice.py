@@ -1,42 +1,18 @@
-"""What hints say of this package: in its own language, and with what costs nothing, as scripts that do not parse."""
+"""What hints say besides, and costs nothing: scripts that do not parse, nodes that do not start."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 
 from grader.checks.support.exit_causes import SYNTAX, syntax_hint
 from grader.checks.support.launch import node_slip, not_executable, own_script
-from grader.checks.support.scripts import PYTHON, chmod_hint, cmake_calls, installed, is_product, names_script
+from grader.checks.support.scripts import PYTHON, chmod_hint, installed, is_product, names_script
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status
 from grader.rubric.model import Rubric
 
 POINTS_MAX = 3
-# what hints say in Python, and how roscpp has it
-IN_CPP = (
-    (r"rospy\.init_node\('([^']*)', anonymous=True\)",
-     r'ros::init(argc, argv, "\1", ros::init_options::AnonymousName)'),
-    (r"rospy\.init_node\('([^']*)'\)", r'ros::init(argc, argv, "\1")'),
-    (r"rospy\.init_node(\(…\))?", "ros::init(argc, argv, …) and ros::NodeHandle"),
-    (r"(rate = )?rospy\.Rate\(([^()]*)\)", r"ros::Rate rate(\2)"),
-    (r"rospy\.Rate\b", "ros::Rate"),
-    (r"rospy\.Publisher\('([^']*)', (\w+), queue_size=\d+\)", r'nh.advertise<\2>("\1", 10)'),
-    (r"rospy\.Publisher\b", "nh.advertise"),
-    (r"rospy\.Subscriber\b", "nh.subscribe"),
-    (r"rospy\.Service\b", "nh.advertiseService"),
-    (r"rospy\.spin\(\)", "ros::spin()"),
-    (r"while not rospy\.is_shutdown\(\):", "while (ros::ok())"),
-    (r"rospy\.loginfo\b", "ROS_INFO"),
-    (r"rospy\.logwarn\b", "ROS_WARN"),
-    (r"rospy\.logerr\b", "ROS_ERROR"),
-    (r"rospy\.get_time\(\)", "ros::Time::now().toSec()"),
-    (r"rospy\.get_param\b", "ros::param::get"),
-    (r"rospy\.set_param\b", "ros::param::set"),
-    (r"from (\w+)\.(?:msg|srv) import (\w+), then ", r'#include "\1/\2.h", then '),
-    (r"(;| and) catch rospy\.ROSInterruptException around it", ""),
-)  # fmt: skip
 OF_FILES = ("build", "cmake", "manifest")
 """Checks whose criterion takes the advice: it is of the package as a whole."""
 
@@ -45,7 +21,6 @@ def add_advice(
     results: Sequence[CriterionResult], package: PackageFacts, rubric: Rubric
 ) -> tuple[CriterionResult, ...]:
     """Return the criteria, with what none of them tells as the hint of one that passed."""
-    results = [in_own_language(c, package) for c in results]
     visible = {c.id for c in rubric.criteria if c.visibility == "visible"}
     good = [c for c in results if c.status is Status.PASS and c.id in visible]
     host = next((c for check in OF_FILES for c in good if c.check == check), None)
@@ -54,18 +29,6 @@ def add_advice(
         return tuple(results)
     told = host.model_copy(update={"hint": "; ".join(filter(None, (host.hint, *points)))})
     return tuple(told if c is host else c for c in results)
-
-
-def in_own_language(result: CriterionResult, package: PackageFacts) -> CriterionResult:
-    """Return the criterion of a run with a hint that speaks of C++, where the package's nodes are C++ alone."""
-    if result.scenario is None or any(f.python for f in package.files if not is_product(f.path)):
-        return result
-    if not cmake_calls(package, "add_executable"):
-        return result
-    hint = result.hint
-    for pattern, cpp in IN_CPP:
-        hint = re.sub(pattern, cpp, hint)
-    return result.model_copy(update={"hint": hint})
 
 
 def _points(package: PackageFacts) -> Iterator[tuple[FileCitation, str]]:

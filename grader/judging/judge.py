@@ -17,6 +17,7 @@ from grader.evidence.run import Run
 from grader.judging.advice import add_advice
 from grader.judging.cited_lines import show_lines
 from grader.judging.facts import PACKAGE_RUN, Facts, try_facts
+from grader.judging.languages import said_for_node
 from grader.judging.other_runs import (
     judged_on_copy,
     needs_build,
@@ -109,11 +110,12 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         )
     try:
         asked = facts.of(check, criterion, check.params.model_validate(criterion.parameters))
-        return (
+        found = (
             asked
             if isinstance(asked, Verdict)
             else heed_losses(check, asked, _sound(check.function(**asked)))
         )
+        return said_for_node(found, criterion, facts)
     except NotRecorded as missing:
         return missing.verdict
     except EvidenceError as error:

@@ -12,6 +12,7 @@ from typing import Any
 from grader.checks.registry import Check
 from grader.rubric.faults import model_faults
 from grader.rubric.references import reference_faults
+from grader.rubric.served import served_faults
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
 from grader.rubric.steps import given_steps, slash, step_faults
 from grader.wording import did_you_mean
@@ -254,6 +255,7 @@ def scenario_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     yield from _probes(path, scenario)
     for index, call in as_maps(scenario.get("calls")):
         yield from slash((*path, "calls", index, "service"), call.get("service"), "a service")
+    yield from served_faults(path, scenario)
     yield from step_faults(path, scenario)
     yield from _until((*path, "until"), as_map(scenario.get("until")), scenario)
 
@@ -266,7 +268,10 @@ def _means(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
         elif "until" not in scenario and not (scenario.get("steps") or _has_tests(scenario)):
             yield (*path, "until"), "is missing"
         return
-    for key in ("start", "params", "probes", "calls", "steps", "until", "clock", "warp"):
+    for key in (
+        *("start", "params", "probes", "calls", "serves", "steps"),
+        *("until", "keeps", "clock", "warp"),
+    ):
         if key in scenario:
             yield (*path, key), "is not for a scenario with a recording: nothing is run"
 

@@ -125,6 +125,31 @@ class Call(Record):
     """How long after the service is offered."""
 
 
+class Served(Record):
+    """A service that the grader offers, from before anything starts. Give one of `answer`, `answers` and `fails`."""
+
+    service: str
+    """The service, with its slash: `/add`."""
+    type: Annotated[str, Field(pattern=TYPE_PATTERN)]
+    """Of ROS's, of the student's package (`lab5/Add`), or of one of the course's."""
+    answer: dict[str, Any] | None = None
+    """The fields of each answer; those that it lacks are zero."""
+    answers: tuple[dict[str, Any], ...] = ()
+    """The answers in turn; the last one is given again and again."""
+    fails: bool = False
+    """Whether each call ends with an error, as it does where a server's callback raises one."""
+    definition: Annotated[str | None, AfterValidator(_service_text)] = None
+    """The handout's text of a `.srv` that students write themselves: where theirs differs, their calls are refused, as
+    a server of the handout's would."""
+    delay_s: Annotated[float, Field(ge=0, le=STEP_S_MAX)] = 0.0
+    """How long each answer takes."""
+
+    @property
+    def in_turn(self) -> tuple[dict[str, Any], ...]:
+        """The answers, one after the other; none where it fails."""
+        return self.answers or (() if self.answer is None else (self.answer,))
+
+
 class Publish(Record):
     """Messages on one topic. Give `value`, the same each time, or `values`, which take turns.
 
@@ -385,11 +410,15 @@ class Scenario(Record):
     """Messages that the grader publishes once the student's node has subscribed."""
     calls: tuple[Call, ...] = ()
     """Services that the grader calls."""
+    serves: tuple[Served, ...] = ()
+    """Services that the grader offers to the student's nodes."""
     steps: tuple[Step, ...] = ()
     """What the grader does, one after the other; `until` is looked at once they are over, and its times count from
     then on."""
     until: Annotated[Until, Field(default_factory=lambda: Until(messages={}))]
     """When the run has seen enough."""
+    keeps: tuple[Annotated[str, Field(min_length=1)], ...] = ()
+    """Patterns for files that the student's processes leave (`*.bag`, `results/*.csv`): they become evidence."""
 
     @property
     def started_later(self) -> frozenset[str]:
@@ -407,6 +436,10 @@ class Scenario(Record):
         left_out: dict[str, Any] = {"title": True}
         if not self.steps:  # before there were any, none were counted, and so it is with definitions
             left_out["steps"] = True
+        if not self.keeps:
+            left_out["keeps"] = True
+        if not self.serves:
+            left_out["serves"] = True
         if not any(call.definition for call in self.calls):
             left_out["calls"] = {"__all__": {"definition"}}
         if not any(start.tests for start in self.start):

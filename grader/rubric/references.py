@@ -6,7 +6,8 @@ An instructor's slip (a process, a topic, a type that is nowhere) would else cos
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.registry import Check, Reference
@@ -55,8 +56,9 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
                 f'roslaunch takes the file\'s whole name: "{launch}.launch"',
             )
         yield from _of_machine((*path, "start", index, "program"), "program", start.get("program"), rubric)
-    for index, call in as_maps(scenario.get("calls")):
-        yield from _of_machine((*path, "calls", index, "type"), "service", call.get("type"), rubric)
+    for key in ("calls", "serves"):
+        for index, one in as_maps(scenario.get(key)):
+            yield from _of_machine((*path, key, index, "type"), "service", one.get("type"), rubric)
 
 
 def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -86,8 +88,7 @@ def _criterion_faults(
     for one in check.references(given):
         at = (*path, "with", *one.path)
         yield from _of_machine(at, one.to, one.value, rubric)
-        of_student = given.get("of", "student") == "student"
-        if scenario and check.needs_run and scenario.get("recording") is None and of_student:
+        if scenario and check.needs_run and scenario.get("recording") is None:
             yield from ((at, fault) for fault in _misfits(one, check, criterion, scenario))
 
 
@@ -103,17 +104,26 @@ def _misfits(
     elif one.to == "process" and not any(_is_process(value, start) for start in starts):
         own = [str(start.get("name")) for start in starts if start.get("program") is None]
         yield f'{name} starts no process "{value}" of the student\'s{_instead(value, own)}'
-    elif one.to == "launch" and value not in (there := _named(starts, "launch")):
-        yield f'{name} does not start "{value}"{_instead(value, there)}'
-    elif one.to == "sent" and value not in (there := sorted(_sent(scenario))):
-        yield f"no probe of {name} sends on {value}{_instead(value, there)}"
-    elif one.to == "action" and value not in (there := _actions(scenario)):
-        yield f"no step of {name} sends a goal to {value}{_instead(value, there)}"
+    elif one.to in LISTED:
+        words, listed = LISTED[one.to]
+        if value not in (there := sorted(listed(scenario))):
+            yield words.format(name=name, value=value, instead=_instead(value, there))
+    elif one.to == "kept" and not any(PurePosixPath(value).match(keep) for keep in _kept(scenario)):
+        yield f'{name} keeps no file "{value}"{_instead(value, _kept(scenario))}; add it to its keeps'
     elif one.to == "set" and not _is_set(value, scenario):
         there = [str(param.get("name")) for _, param in as_maps(scenario.get("params"))]
         yield f"{name} sets no parameter {value}{did_you_mean(value, there)}: add it to its params"
-    elif one.to == "published" and (program := _only_publisher(value, starts)):
-        yield f"{program} publishes on {value}, and {check.name} judges the student's messages"
+    elif one.to == "published":
+        yield from _wrong_sender(value, as_map(criterion.get("with")).get("of", "student"), check, starts)
+
+
+def _wrong_sender(topic: str, of: object, check: Check, starts: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield why nobody whose messages are judged sends any."""
+    program = _only_publisher(topic, starts)
+    if of == "student" and program:
+        yield f"{program} publishes on {topic}, and {check.name} judges the student's messages: give it of: program"
+    if of == "program" and not any(start.get("program") for start in starts):
+        yield f"the scenario starts no program, and {check.name} judges the messages of one (of: program)"
 
 
 def _is_process(name: str, start: dict[str, Any]) -> bool:
@@ -221,6 +231,26 @@ def _actions(scenario: dict[str, Any]) -> list[str]:
         for _, step in as_maps(scenario.get("steps"))
         if "action" in step
     ]
+
+
+def _kept(scenario: dict[str, Any]) -> list[str]:
+    return [pattern for _, pattern in as_texts(scenario.get("keeps")) if pattern]
+
+
+def _served(scenario: dict[str, Any]) -> list[str]:
+    return [str(served.get("service")) for _, served in as_maps(scenario.get("serves"))]
+
+
+LISTED: Mapping[str, tuple[str, Callable[[dict[str, Any]], Iterable[str]]]] = {
+    "launch": (
+        '{name} does not start "{value}"{instead}',
+        lambda scenario: _named(_starts(scenario), "launch"),
+    ),
+    "sent": ("no probe of {name} sends on {value}{instead}", _sent),
+    "action": ("no step of {name} sends a goal to {value}{instead}", _actions),
+    "served": ("the grader does not offer {value} in {name}{instead}: add it to serves", _served),
+}
+"""Of what a scenario has to list: what is said where it does not, and where to look."""
 
 
 def _starts(scenario: dict[str, Any]) -> list[dict[str, Any]]:

@@ -54,6 +54,7 @@ def test_whose_definition_it_is_that_does_not_fit(
     events: list[ActorEvent] = []
     place: Any = SimpleNamespace(workspace=SimpleNamespace(repaired=tmp_path), share_folders=())
     place.type_text = partial(ProcessEnvironment.type_text, place)
+    place.is_own = partial(ProcessEnvironment.is_own, place)
     arena = SimpleNamespace(place=place, note=events.append, ros_now_ns=lambda: 0)
     runner: Any = object.__new__(StepRunner)
     runner._arena = arena

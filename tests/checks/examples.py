@@ -13,6 +13,7 @@ from typing import Any
 import yaml
 
 from grader.checks import CHECKS
+from grader.checks.support.idioms import in_language
 from grader.checks.support.topics import heed_losses
 from grader.evidence.run import Run
 from grader.model.interfaces import parse_interface
@@ -100,7 +101,8 @@ def judge_runs(name: str, params: dict[str, Any], runs: dict[str, Run]) -> Verdi
         "params": check.params.model_validate(params),
     }
     asked = {fact: facts[fact] for fact in check.facts}
-    return heed_losses(check, asked, check.function(**asked))
+    verdict = heed_losses(check, asked, check.function(**asked))
+    return verdict.model_copy(update={"hint": in_language(verdict.hint, "python")})
 
 
 def differences(verdict: Verdict, expect: dict[str, Any]) -> list[str]:

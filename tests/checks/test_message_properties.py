@@ -44,11 +44,11 @@ def test_no_other_pace_passes(start: float, rate_hz: float, pace: float) -> None
 
 @pytest.mark.full
 @given(text=st.text(max_size=20), at=st.integers(0, 60))
-def test_one_message_with_other_words_fails(text: str, at: int) -> None:
+def test_one_message_with_other_words_does_not_pass(text: str, at: int) -> None:
     told = texts(5, 10, 2)
     told[at] = f"The time was {text}"
     found = verdict(told, 10)
-    assert found.status is Status.FAIL
+    assert found.status in {Status.FAIL, Status.PARTIAL}  # it may tell the time
     assert "\n" not in found.message
 
 

@@ -12,6 +12,7 @@ import yaml
 
 from grader.checks import CHECKS, HEADINGS, Check
 from grader.checks.parameter_docs import inner_records, parameters
+from grader.checks.support.idioms import in_language
 from grader.model.verdict import Status
 from scripts.reference.checks import checks_page
 from tests.checks.examples import LOADER, Example, differences, examples
@@ -27,6 +28,7 @@ def test_verdict(example: Example) -> None:
     assert verdict.expected, "every verdict says what was expected"
     assert verdict.message == verdict.message.strip()
     assert "\n" not in verdict.message + verdict.hint + verdict.measured
+    assert in_language(verdict.message, "cpp") == verdict.message, "only hints speak of code"
     if verdict.status is not Status.PASS:
         assert verdict.hint, "where points are lost, the student is told what to do"
 

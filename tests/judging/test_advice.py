@@ -1,10 +1,8 @@
-"""What hints say of the package as a whole: its language, and what does not start and costs nothing."""
+"""What hints say of the package as a whole: what does not start and costs nothing."""
 
 from __future__ import annotations
 
-import pytest
-
-from grader.judging.advice import add_advice, in_own_language
+from grader.judging.advice import add_advice
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
@@ -13,10 +11,6 @@ from tests.judging.rubrics import rubric
 from tests.package.trees import CMAKE, MANIFEST, make_package
 
 CMAKE_CHECK = {"id": "cmake", "check": "cmake", "with": {"name": "lab1"}}
-CPP = {
-    "CMakeLists.txt": CMAKE + "\nadd_executable(talker src/talker.cpp)\n",
-    "src/talker.cpp": "int main() {}\n",
-}
 OUT = "roslaunch leaves a <node> out: launch/x.launch, line 2:"
 NODES = '<launch>\n<node pkg="lab1" type="talker" name="a"/>\n<node pkg="lab1" type="plain.py" name="b"/></launch>'
 
@@ -67,30 +61,3 @@ def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
     assert add_advice([told], package, rubric(CMAKE_CHECK)) == (told,)
     lost = criterion(status=Status.FAIL)
     assert add_advice([lost], package, rubric(CMAKE_CHECK)) == (lost,)
-
-
-@pytest.mark.parametrize(
-    ("hint", "cpp"),
-    [
-        (
-            "write rospy.init_node('a', anonymous=True)",
-            'write ros::init(argc, argv, "a", ros::init_options::AnonymousName)',
-        ),
-        (
-            "rospy.Rate(10): loop `while not rospy.is_shutdown():`",
-            "ros::Rate rate(10): loop `while (ros::ok())`",
-        ),
-        (
-            "from std_msgs.msg import Int8, then rospy.Publisher('/n', Int8, queue_size=10)",
-            '#include "std_msgs/Int8.h", then nh.advertise<Int8>("/n", 10)',
-        ),
-        (
-            "add rospy.Subscriber('/n', …, callback); end with rospy.spin()",
-            "add nh.subscribe('/n', …, callback); end with ros::spin()",
-        ),
-    ],
-)
-def test_a_package_in_cpp_is_told_of_roscpp(tmp_path, hint, cpp) -> None:
-    own = criterion(hint, scenario="talker")
-    assert in_own_language(own, facts(tmp_path, **CPP)).hint == cpp
-    assert in_own_language(own, facts(tmp_path / "py", **{**CPP, "src/a.py": ""})).hint == hint

@@ -326,6 +326,8 @@ def test_a_rubric_names_what_is_wanted() -> None:
         "scripts/talker.py",
         "scripts/listener.py",
     )
+    avoid = load_rubric(str(Path(TURTLE).with_name("avoid-obstacles.yaml"))).rubric
+    assert {"/scan", "/cmd_vel"} <= set(wanted_of(avoid).topics), "what the robot's world has counts too"
     assert "/details/contact/phone" in wanted_of(load_rubric("eyantra-ros-basics").rubric).params
 
 

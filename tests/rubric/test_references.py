@@ -106,6 +106,12 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
             id="action",
         ),
         pytest.param(
+            "check: logs, with: {text: a}",
+            "check: file-left, with: {file: run.bag}",
+            '39: criteria[9].with.file: launch keeps no file "run.bag": there is none; add it to its keeps',
+            id="file-that-is-not-kept",
+        ),
+        pytest.param(
             "check: logs, with: {text: a}, scenario: launch",
             'check: definition, with: {file: msg/A.msg, fields: {a: "std_msgs/Strin[]"}}',
             '39: criteria[9].with.fields.a: std_msgs has no message type "Strin" (did you mean "String"?)',
@@ -224,8 +230,21 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
             "check: path, with: {topic: /turtle1/pose, points: [[1, 0]], tolerance_m: 0.1}",
             "check: field-bounds, with: {topic: /turtle1/pose, field: x, min: 0}",
             "37: criteria[7].with.topic: turtlesim/turtlesim_node publishes on /turtle1/pose, "
-            "and field-bounds judges the student's messages",
+            "and field-bounds judges the student's messages: give it of: program",
             id="topic-of-a-program",
+        ),
+        pytest.param(
+            "check: path, with: {topic: /turtle1/pose, points: [[1, 0]], tolerance_m: 0.1}",
+            "check: field-bounds, with: {topic: /turtle1/pose, field: x, min: 0, of: program}",
+            "",
+            id="topic-of-a-program-and-its-messages",
+        ),
+        pytest.param(
+            "{topic: /chatter, rate_hz: 10}",
+            "{topic: /chatter, rate_hz: 10, of: program}",
+            "31: criteria[1].with.topic: the scenario starts no program, "
+            "and rate judges the messages of one (of: program)",
+            id="messages-of-no-program",
         ),
         pytest.param(
             "{topic: /chatter, rate_hz: 10}",
@@ -256,6 +275,20 @@ def test_a_slip_is_refused(old: str, new: str, fault: str, tmp_path: Path) -> No
         assert len(faults(path)) == (2 if old in FOLLOWED else 1)
     else:
         assert load_rubric(str(path)).rubric.id == "sample"
+
+
+def test_what_a_map_of_a_checks_parameters_names_is_looked_at(tmp_path: Path) -> None:
+    keeps = "alive_s: 3}\n    keeps: ['*.bag']\n"
+    left = "check: file-left, with: {file: run.bag, topics: {/chatter: {type: %s}}}"
+    for kind, fault in (
+        ("String", []),
+        ("Strng", ['std_msgs has no message type "Strng" (did you mean "String"?)']),
+    ):
+        path = _written(tmp_path, "check: logs, with: {text: a}", left % f"std_msgs/{kind}")
+        path.write_text(path.read_text().replace("alive_s: 3}\n", keeps))
+        where = "lab.yaml:40: criteria[9].with.topics./chatter.type: "
+        assert (faults(path) if fault else []) == [where + one for one in fault]
+        assert fault or load_rubric(str(path)).rubric.scenarios["launch"].keeps == ("*.bag",)
 
 
 def test_a_scenario_that_no_criterion_judges_is_refused(tmp_path: Path) -> None:

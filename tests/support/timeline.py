@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from pydantic import TypeAdapter
+from rosbags.rosbag1 import Writer
 
 from grader.evidence import decode
 from grader.evidence.events import (
@@ -22,11 +24,11 @@ from grader.evidence.events import (
     ScenarioEvent,
 )
 from grader.evidence.reader import load_run
-from grader.evidence.run import Run
+from grader.evidence.run import Run, left_name
 from grader.evidence.writer import EvidenceStream, EvidenceWriter
 from grader.model.record import Record
 from tests.support.timeline_facts import complete_facts
-from tests.support.timeline_model import Acted, Host, Printed, TimelineRun, TopicLine
+from tests.support.timeline_model import Acted, Host, LeftLine, Printed, TimelineRun, TopicLine
 from tests.support.timeline_topics import Sent, messages
 
 EPOCH_NS = 1_700_000_000_000_000_000
@@ -110,6 +112,37 @@ def _record(line: TimelineRun, writer: EvidenceStream) -> None:
         writer.package(complete_facts(line.package), EPOCH_NS)
     for name, text in line.attachments.items():
         writer.attach(name, text.encode(), EPOCH_NS, "text/plain")
+    for left in line.left:
+        _left(left, writer)
+
+
+def _left(left: LeftLine, writer: EvidenceStream) -> None:
+    data = None if left.text is None else left.text.encode()
+    if left.topics is not None:
+        data = _bag(left.topics)
+    size_bytes = left.size_bytes if data is None else len(data)
+    event = ActorEvent(action="left", actor=left.process, value=size_bytes, detail=left.path)
+    writer.event("/grader/actor", at_ns(left.at_s), event)
+    if data is not None:
+        name = left_name(left.process, left.path)
+        writer.attach(name, data, at_ns(left.at_s), "application/octet-stream")
+
+
+def _bag(topics: Sequence[TopicLine]) -> bytes:
+    with TemporaryDirectory() as folder:
+        with Writer(path := Path(folder, "left.bag")) as bag:
+            for topic in topics:
+                about = _identity(topic)
+                number = bag.add_connection(
+                    topic.topic,
+                    topic.type.replace("/", "/msg/"),
+                    msgdef=about["definition"],
+                    md5sum=about["md5sum"],
+                    callerid=topic.callerid,
+                )
+                for one in messages(topic):
+                    bag.write(number, at_ns(one.at_s), one.data)
+        return path.read_bytes()
 
 
 def _sender(writer: EvidenceStream, topic: TopicLine, one: Sent) -> Callable[[], None]:

@@ -170,6 +170,17 @@ class RecorderLine(RecorderEvent):
     at_s: At = 0.4
 
 
+class LeftLine(Record):
+    """A file that a process left: its `text`, or the `topics` of a bag; neither is a file of which nothing was kept."""
+
+    process: str
+    path: str
+    text: str | None = None
+    topics: tuple[TopicLine, ...] | None = None
+    size_bytes: int = 0
+    at_s: At = 0.6
+
+
 class TimelineRun(Record):
     """One run. `graph`, `host` and `recorder` are made up where left out; an empty list means none."""
 
@@ -191,6 +202,7 @@ class TimelineRun(Record):
     outcome_detail: str = ""
     end_s: At | None = None
     attachments: dict[str, str] = Field(default_factory=dict)
+    left: tuple[LeftLine, ...] = ()
     package: dict[str, Any] | None = None
 
     @model_validator(mode="after")

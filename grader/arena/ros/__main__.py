@@ -32,7 +32,7 @@ from sockets import buffer_bytes
 from wire import Wire, set_clock
 
 PR_SET_CHILD_SUBREAPER = 36
-ROS = ("actor", "guard", "master", "recorder", "rpc", "sockets", "tcpros")
+ROS = ("actor", "guard", "master", "recorder", "rpc", "services", "sockets", "tcpros")
 """What a run needs, and a build does not."""
 FINISH_S = 2.0
 REAP_S = 1.0
@@ -170,6 +170,9 @@ class Arena:
 
     def _advertise(self, command):
         self._actor.advertise(self._master, command["fields"])
+
+    def _serve(self, command):
+        self._actor.serve(self._master, command["fields"])
 
     def _publish(self, command):
         self._actor.publish(command["topic"], base64.b64decode(command["data"]))

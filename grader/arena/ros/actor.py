@@ -1,4 +1,4 @@
-"""The grader's own publishers: probe messages, `/clock`, `/rosout_agg`.
+"""The grader's own node: it publishes probe messages, `/clock`, `/rosout_agg`, and offers services (`services`).
 
 The bytes come ready-made from the grader, so the arena needs no message classes. What is sent is recorded in the
 moment of sending, not by a detour over the network.
@@ -14,6 +14,7 @@ import time
 
 from bounded_sockets import LOOPBACK, UNKNOWN_PROCESS, BoundedSocket, ProtocolError
 from guard import shown
+from services import Services
 from tcpros import HEADER_BYTES_MAX, Closed, check_fields, read_header, write_header
 from wire import LENGTH, now_ns
 
@@ -90,7 +91,7 @@ class _Topic:
 
 
 class Actor:
-    """One node, `/grader_…`, with a TCPROS server for any number of topics."""
+    """One node, `/grader_…`, with a TCPROS server for any number of topics and services."""
 
     def __init__(self, loop, wire, caller_id, guard, owners):
         self.topics = {}
@@ -99,6 +100,7 @@ class Actor:
         self._other_types = set()
         self.caller_id = caller_id
         self._wire = wire
+        self._services = Services(wire, caller_id, guard)
         self.port = TcprosServer(loop, self._join, guard, owners).port
         self.uri = None
 
@@ -107,6 +109,12 @@ class Actor:
         channel = self._wire.channel(callerid=self.caller_id, **fields)
         self.topics[fields["topic"]] = _Topic(fields, channel)
         master.registerPublisher(self.caller_id, fields["topic"], fields["type"], self.uri)
+
+    def serve(self, master, fields):
+        """Register a service; `fields` holds service, type, md5sum, answers (base64), error, delay_s."""
+        self._services.add(fields)
+        address = "rosrpc://{}:{}".format(LOOPBACK, self.port)
+        master.registerService(self.caller_id, fields["service"], address, self.uri)
 
     def publish(self, topic_name, data):
         """Send and record one message."""
@@ -132,7 +140,10 @@ class Actor:
         sock.close()
 
     def _join(self, sock, header, who):
-        """Take a subscriber up, or tell it why not."""
+        """Serve a client, or take a subscriber up, or tell it why not."""
+        if "service" in header:
+            self._services.serve(sock, header, who)
+            return
         topic = self.topics.get(header.get("topic"))
         problem = self._mismatch(topic, header)
         if not problem and list(self._whose.values()).count(who) >= SUBSCRIBERS_MAX:

@@ -19,6 +19,7 @@ from registry_log import GraphLog, ParamLog
 
 NOTIFY_S = 10.0
 OPENED_MAX, ARGUMENTS_MAX, ARGUMENT_CHARS = 100, 20, 1000
+LOOKUPS_MAX = 100
 PROBE_S = 0.5
 SUBSCRIBED_S = 0.3
 LOOK_S = 0.01
@@ -52,6 +53,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._recorder = recorder
         self._own = own
         self._opened = 0
+        self._lookups = set()
         self._rosout_ended = False
         self._pool = Pool()
         self._calling = threading.local()
@@ -143,6 +145,16 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         if answer[0] == 1 and not service.endswith(EVERY_NODE_HAS):
             self._pool.submit(self._process, lambda: self._learn_type(service, service_api))
         return self._arrived(answer)
+
+    def lookupService(self, caller_id, service):
+        """What a client asks for is told once: `wait_for_service` asks again and again."""
+        answer = super().lookupService(caller_id, service)
+        key = caller_id, str(service)
+        if self._caller is not None and key not in self._lookups and len(self._lookups) < LOOKUPS_MAX:
+            self._lookups.add(key)
+            record = {"action": "lookup", "actor": caller_id, "topic": cut(service, ARGUMENT_CHARS)}
+            self._wire.event("/grader/actor", dict(record, detail="" if answer[0] == 1 else "not there"))
+        return answer
 
     def getParam(self, caller_id, key):
         if key == "/use_sim_time":

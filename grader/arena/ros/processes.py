@@ -7,6 +7,7 @@ import signal
 import time
 
 from launching import launch
+from left_files import left_files
 from process_tree import (
     LOOK_RARELY_S,
     LOOK_S,
@@ -30,7 +31,9 @@ PIPE_READS = 16
 
 class Process:
     """One process tree. `spec` is made by `ProcessEnvironment.spec` (arena/process_environment.py): name,
-    role, argv, env, outer, bwrap, wall, filter, shell, collect, script, repairs, stdin (whether it has one).
+    role, argv, env, outer, bwrap, wall, filter, shell, collect, script, repairs, stdin (whether it has one), keeps.
+
+    `keeps` are patterns of files: what the process leaves is listed, and what fits is handed over.
 
     `collect` names a file for what the process writes to `{collect}`, and how many bytes of it are taken.
     """
@@ -57,6 +60,7 @@ class Process:
         self._groups = groups
         self._stage = stage
         self._collected = None
+        self._keeps = spec["keeps"]
         self._spawn(spec)
         self._event("start", argv=spec["argv"], script=spec["script"], repairs=spec["repairs"])
         loop.call_later(WATCH_S, self._watch)
@@ -127,6 +131,7 @@ class Process:
         launched = launch(spec, self._stage, self._groups)
         self._popen = launched.popen
         self._scratches = launched.scratches
+        self._places = _places(spec["wall"] or [], launched.scratches, self._stage)
         self.pid = self._popen.pid
         if launched.info is not None:
             self._read_info(launched.info)
@@ -311,6 +316,7 @@ class Process:
         if self._groups is not None:
             self._cpu_s = max(self._cpu_s, self._groups.cpu_s() or 0.0)
         self._leave_groups()
+        self._tell_left()
         for name in self._scratches:
             self._stage.give_up(name)
         if not self._entered and self._stopped_by is None:
@@ -327,6 +333,12 @@ class Process:
             max_rss_bytes=self._peak_bytes,
         )
         self._on_exit(self)
+
+    def _tell_left(self):
+        """Its memory is given up next, and all files with it."""
+        if self._keeps:
+            for file in left_files(self._places, self._keeps, self._limits):
+                self._wire.status("left", name=self.name, **file)
 
     def _leave_groups(self):
         if self._groups is None:
@@ -358,6 +370,13 @@ def reap_all(patience_s):
             left_s = deadline - time.monotonic()
             if pid == 0 and (left_s <= 0 or signal.sigtimedwait({signal.SIGCHLD}, left_s) is None):
                 return
+
+
+def _places(wall, scratches, stage):
+    """Where the scratches lie for the process, and where here. In `/dev/shm` lie no results."""
+    inside = [wall[n + 1] for n, word in enumerate(wall) if isinstance(word, dict) and "scratch" in word]
+    found = {path: os.path.join(stage.folder, scratches[n]) for n, path in enumerate(inside)}
+    return {path: folder for path, folder in found.items() if not path.startswith("/dev/")}
 
 
 def _signal_of(code):

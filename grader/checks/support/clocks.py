@@ -6,6 +6,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
+from grader.checks.support.idioms import GET_TIME
 from grader.evidence.run import Run
 from grader.model.verdict import Verdict, failed, inconclusive
 from grader.wording import plural
@@ -19,7 +20,7 @@ WATCHED_S = 3.0
 SHORT_S = 1.1
 WHOLE_S = 1.05
 UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
-GET_TIME = "rospy.get_time() gives the time in seconds; ask it again for every message"
+ASK_AGAIN = f"{GET_TIME} gives the time in seconds; ask it again for every message"
 
 
 def clocks_at(run: Run, times_ns: Sequence[int]) -> tuple[Seconds, ...]:
@@ -87,7 +88,7 @@ def wrong_growth(told: Sequence[float], clocks: Sequence[Seconds], *, short: boo
     enough_s = SHORT_S if short else WATCHED_S
     if told[0] == told[-1] == max(told) == min(told):
         message = f"the time in the messages stays at {_plain(told[0])} for {span_s:.1f} s"
-        return failed(message, hint=GET_TIME) if span_s >= enough_s else _too_short(span_s)
+        return failed(message, hint=ASK_AGAIN) if span_s >= enough_s else _too_short(span_s)
     back = next(((a, b) for a, b in pairwise(told) if b < a), None)
     if back is not None:
         return _falls_back(*back)
@@ -114,7 +115,7 @@ def _falls_back(before: float, after: float) -> Verdict:
     message = f"the time in the messages goes back from {_plain(before)} to {_plain(after)}"
     within = before < 1e9 and before == int(before) and before > 1e6
     why = "`.nsecs` is only the part after the whole second; " if within else ""
-    return failed(message, hint=why + GET_TIME)
+    return failed(message, hint=why + ASK_AGAIN)
 
 
 def _other_pace(told: Sequence[float], span_s: float) -> Verdict:
@@ -122,14 +123,14 @@ def _other_pace(told: Sequence[float], span_s: float) -> Verdict:
     pace = growth / span_s if span_s > 0 else 0.0
     unit = next((name for factor, name in UNITS.items() if 0.7 <= pace / factor <= 1.4), "")
     if unit:
-        return failed(f"the time in the messages is in {unit}, not in seconds", hint=GET_TIME)
+        return failed(f"the time in the messages is in {unit}, not in seconds", hint=ASK_AGAIN)
     if all(b - a == 1 for a, b in pairwise(told)):
         message = f"the number in the messages counts them ({_plain(told[0])}, {_plain(told[1])}, …) and is not a time"
-        return failed(message, hint=GET_TIME)
+        return failed(message, hint=ASK_AGAIN)
     message = (
         f"the number in the messages grows by {_plain(growth)} in {span_s:.1f} s: it is not a time in seconds"
     )
-    return failed(f"{message} ({plural(len(told), 'message')})", hint=GET_TIME)
+    return failed(f"{message} ({plural(len(told), 'message')})", hint=ASK_AGAIN)
 
 
 def _plain(value: float) -> str:

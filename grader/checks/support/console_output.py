@@ -41,7 +41,6 @@ SEARCHED_CHARS_MAX = 100_000_000
 PUNCTUATION = ".,;:!?'\"()[]{}<>"
 Level = Literal["debug", "info", "warn", "error", "fatal"]
 LEVELS: dict[int, Level] = {1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal"}
-CALLS = {level: f"rospy.log{'err' if level == 'error' else level}" for level in LEVELS.values()}
 _CONSOLE = re.compile(r"^\s*\[\s*(DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*\[[^\]]*\]\s*:?\s?(.*)$")
 
 

@@ -12,6 +12,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field
 
 from grader.checks.support.exit_causes import explain_early_end, explain_traceback, process_tracebacks
+from grader.checks.support.idioms import loop_rate
 from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.processes import lives, observed_until_ns
 from grader.checks.support.topics import losses, whole_until_ns
@@ -370,7 +371,7 @@ def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Ve
         return unjudged(message, hint="first make the counter go up by one at its rate")
     if len(count.steps) < params.rate_hz * span_s / 2:
         message = f"{params.topic} is too slow to see {params.wraps} resets: {seen}"
-        return unjudged(message, hint=f"use rospy.Rate({significant(params.rate_hz)})")
+        return unjudged(message, hint=f"use {loop_rate(significant(params.rate_hz))}")
     end = {"timeout": "the run's time was over", "host": "the grading machine failed"}.get(
         outcome or "", "the run ended"
     )

@@ -7,6 +7,7 @@ import signal
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from grader.checks.support.idioms import LOOP, SPIN
 from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import path_in_package
 from grader.checks.support.text import near_names, shown
@@ -217,7 +218,7 @@ def _explained(life: Life, run: Run, package: PackageFacts) -> Ending:
     if life.end is not None and life.end.signal is not None and life.end.stopped_by is None:
         return Ending(f"{_signal_name(life.end.signal)} ended it", RUN_IT)
     if code == 0:
-        hint = "a node has to stay alive: `rospy.spin()`, or a loop `while not rospy.is_shutdown():`"
+        hint = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
         return Ending("its script came to its end", hint, by_itself=True)
     last = next((line.line for _, line in reversed(list(run.lines(life.name))) if line.line.strip()), "")
     words = f"; its last words: {shown(last)}" if last else ""

@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.support.exit_causes import explain_traceback, process_tracebacks, syntax_hint
+from grader.checks.support.idioms import INIT
 from grader.checks.support.processes import lives, observed_until_ns
 from grader.checks.support.scripts import (
     add_hint,
@@ -384,7 +385,7 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
 
 def _silent(run: Run, node: LaunchNode) -> Absence | None:
     """Started, and never registered."""
-    hint = "call rospy.init_node(…) before anything that waits"
+    hint = f"call {INIT} before anything that waits"
     others = [n for n in run.student_nodes() if re.fullmatch(r"/.+_\d+_\d{9,}", n)]
     if finished(run, node):
         return Absence("its script came to its end without ever being a node", hint, of_script=True)

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from grader.checks.registry import Refers
+from grader.checks.support.idioms import ANONYMOUS, init
 from grader.evidence.run import Run
 from grader.wording import join_words
 
@@ -61,12 +62,10 @@ def name_hint(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous
     counted = [n for n in there if any(re.fullmatch(rf"{re.escape(b)}_*\d+", n) for b in _bases(names))]
     if counted and anonymous == "allowed":
         name = names[0].lstrip("/")
-        return f"write rospy.init_node('{name}', anonymous=True): that adds numbers by itself"
-    flag = ", anonymous=True" if anonymous == "required" else ""
+        return f"write {init(name, anonymous=True)}: that adds numbers by itself"
     spare = anonymous == "forbidden" and not {base_name(n) for n in there}.isdisjoint(_bases(names))
-    return (
-        f"write rospy.init_node('{names[0].lstrip('/')}'{flag}){' without anonymous=True' if spare else ''}"
-    )
+    call = init(names[0].lstrip("/"), anonymous=anonymous == "required")
+    return f"write {call} without {ANONYMOUS}" if spare else f"write {call}"
 
 
 def _bases(names: Iterable[str]) -> list[str]:

@@ -36,6 +36,12 @@ NAMES_ARE = {
 }
 """What the parameter `names` of a check holds."""
 PARAMETER_CHECKS = ("params-set", "param-value")
+TOPIC_KEYS = ("topic", "asked_on")
+TOPICS_OF = {
+    "robot_world/robot_world": ("/scan", "/odom", "/cmd_vel"),
+    "turtlesim/turtlesim_node": ("/turtle1/pose", "/turtle1/cmd_vel"),
+}
+"""What a program that a scenario starts has for the student's nodes: a rubric need not name it."""
 
 
 def wanted_of(rubric: Rubric) -> Wanted:
@@ -50,6 +56,7 @@ def wanted_of(rubric: Rubric) -> Wanted:
 def _of_scenarios(rubric: Rubric) -> Iterator[tuple[str, Any]]:
     for scenario in rubric.scenarios.values():
         for start in scenario.start:
+            yield from _each("topics", TOPICS_OF.get(start.program or ""))
             yield from (("scripts", start.script), ("launch_files", start.launch), ("files", start.load))
         for param in scenario.params:
             yield from (("params", param.name), ("files", param.file))
@@ -69,10 +76,8 @@ def _of_criteria(criteria: Iterable[Criterion]) -> Iterator[tuple[str, Any]]:
     for criterion in criteria:
         check, given = criterion.check, criterion.parameters
         yield from (("launch_files", given.get("launch")), ("files", given.get("file")))
-        yield from (
-            ("topics", given.get("topic")),
-            ("types", given.get("type") if "topic" in given else None),
-        )
+        yield from (("topics", topic) for topic in _topics_in(given))
+        yield ("types", given.get("type") if "topic" in given else None)
         yield from _each("topics", given.get("topics"))
         yield from _each("files", given.get("files"))
         yield from _each("dependencies", given.get("dependencies"))
@@ -82,6 +87,14 @@ def _of_criteria(criteria: Iterable[Criterion]) -> Iterator[tuple[str, Any]]:
         if check in PARAMETER_CHECKS:
             yield "params", given.get("name")
             yield from _each("params", given.get("unchanged"))
+
+
+def _topics_in(given: Any) -> Iterator[Any]:  # noqa: ANN401 - as an instructor wrote it
+    """Yield the topics that a check's parameters name, at any depth."""
+    if isinstance(given, dict):
+        yield from (given[key] for key in TOPIC_KEYS if key in given)
+        for value in given.values():
+            yield from _topics_in(value)
 
 
 def _each(field: str, names: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 - as an instructor wrote it

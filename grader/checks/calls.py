@@ -1,0 +1,201 @@
+"""Whether the student's node calls a service that the grader offers, with the right request."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import Field
+
+from grader.checks.registry import Refers, check
+from grader.checks.support.exit_causes import explain_early_end, explain_error
+from grader.checks.support.lateness import excused, why_late
+from grader.checks.support.nodes import GlobalName
+from grader.checks.support.processes import lives
+from grader.checks.support.text import near_names, shown
+from grader.checks.support.topics import cite, no_node
+from grader.checks.support.values import Difference, differences, fields_text
+from grader.evidence.events import MISFIT, OTHER_TYPE
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import Verdict, failed, passed, unjudged
+from grader.wording import join_words, plural
+
+
+class CallsParams(Record):
+    """The service, and what has to be asked of it."""
+
+    service: Annotated[GlobalName, Refers("served")]
+    """A service that the scenario `serves`, with its slash: `/add`."""
+    expect: dict[str, Any] | tuple[dict[str, Any], ...] = ()
+    """The request's fields that matter, and their values; or a list of requests in their order. Calls between them, and
+    fields that are left out, do not matter."""
+    at_least: Annotated[int, Field(ge=1)] = 1
+    """So many calls have to come, each of them as `expect` has it where that is one request."""
+    tolerance: Annotated[float, Field(ge=0)] = 1e-6
+    """How much numbers may differ."""
+
+    @property
+    def wanted(self) -> tuple[dict[str, Any], ...]:
+        """The requests that have to come."""
+        if isinstance(self.expect, dict):
+            return (self.expect,) * self.at_least
+        return (*self.expect, *({},) * (self.at_least - len(self.expect)))
+
+    @property
+    def words(self) -> str:
+        asked = (self.expect,) if isinstance(self.expect, dict) else self.expect
+        requests = f" with {join_words(map(fields_text, asked), 'then')}" if any(asked) else ""
+        return f"{plural(len(self.wanted), 'call')} of {self.service}{requests}"
+
+
+class Request(NamedTuple):
+    """A call of the student's; `fields` is None where the bytes were none of the service's type."""
+
+    at_ns: int
+    node: str
+    fields: dict[str, Any] | None
+
+
+@check("calls", params=CallsParams)
+def calls(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
+    """The node calls the service with the right request.
+
+    What it checks
+        That a node of the package calls the grader's service as often as it should, and that the fields of its
+        requests have the right values.
+
+    Why it matters on a robot
+        A server does what it is asked. A client that swaps two fields, or never calls, drives the robot to
+        another place, or leaves it standing.
+
+    How it is measured
+        The grader offers the service before any node starts and records each request with its fields. Numbers
+        are compared within a tolerance, text exactly.
+
+    How to fix
+        `rospy.wait_for_service('<service>')`, then `add = rospy.ServiceProxy('<service>', <Type>)`, then
+        `answer = add(a=…, b=…)`: with the fields by name, none can be swapped.
+    """
+    made = requests(run, params.service)
+    missing = _first_missing(made, params)
+    verdict = (
+        passed(f"{params.service} is called with {join_words(dict.fromkeys(_text(r) for r in made))}")
+        if missing is None
+        else _excused(
+            _never(package, run, params) if not made else _fault(package, run, params, *missing), run
+        )
+    )
+    return verdict.about(
+        expected=params.words,
+        measured=join_words(_text(r) for r in made) or verdict.measured or "no call",
+        citations=(*verdict.citations, cite(run, "/grader/actor", *_span(made))),
+    )
+
+
+def requests(run: Run, service: str) -> tuple[Request, ...]:
+    """Return the calls of one of the grader's services by nodes of the student's, in their order."""
+    return tuple(
+        Request(time_ns, event.actor, event.value["request"])
+        for time_ns, event in run.actors
+        if event.action == "serve" and event.topic == service and run.is_student_node(event.actor)
+    )
+
+
+def _text(request: Request) -> str:
+    return "what is no request" if request.fields is None else fields_text(request.fields)
+
+
+def _span(made: tuple[Request, ...]) -> tuple[int | None, int | None]:
+    return (made[0].at_ns, made[-1].at_ns) if made else (None, None)
+
+
+def _first_missing(
+    made: tuple[Request, ...], params: CallsParams
+) -> tuple[dict[str, Any], tuple[Request, ...]] | None:
+    """Return the first request that did not come, and the calls after the one before it; None where all came."""
+    left = made
+    for wanted in params.wanted:
+        fits = (n for n, one in enumerate(left) if not any(_differences(one, wanted, params)))
+        number = next(fits, None)
+        if number is None:
+            return wanted, left
+        left = left[number + 1 :]
+    return None
+
+
+def _differences(one: Request, wanted: dict[str, Any], params: CallsParams) -> Iterator[Difference]:
+    return differences(one.fields, wanted, params.tolerance)
+
+
+def _fault(
+    package: PackageFacts, run: Run, params: CallsParams, wanted: dict[str, Any], left: tuple[Request, ...]
+) -> Verdict:
+    """Some call came: either it is another one, or there are too few."""
+    if left:
+        nearest = min(left, key=lambda one: len(list(_differences(one, wanted, params))))
+        found = join_words(map(str, _differences(nearest, wanted, params)))
+        message = f"{params.service} is called with {_text(nearest)}: {found}"
+        return failed(message, hint="give the fields of the request by name, with the values that are asked")
+    came = len(requests(run, params.service))
+    with_fields = f" with {fields_text(wanted)}" if wanted else ""
+    what = f"{params.service} is called {plural(came, 'time')}, and no other call{with_fields} came"
+    if end := explain_early_end(package, run) or explain_error(package, run):
+        return end.verdict(failed, f"{what}: {end.cause}")
+    return failed(what, hint=f"{plural(len(params.wanted), 'call')} are asked: call it again").once()
+
+
+def _never(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
+    """Why no call came at all: the surest reason first. What is then wrong with the request, no one knows."""
+    what, service = f"no node calls {params.service}", params.service
+    asked = [e for _, e in run.actors if e.action == "lookup" and run.is_student_node(e.actor)]
+    looked = {e.topic or "": e.actor for e in asked}
+    near = near_names(service, looked)
+    if refused := _refused(run, service):
+        return refused
+    if near and service not in looked:
+        hint = f"name it {service} in rospy.wait_for_service(…) and rospy.ServiceProxy(…)"
+        return unjudged(f"{what}: {looked[near[0]]} asks for {near[0]}", hint=hint)
+    if end := explain_error(package, run):
+        return end.verdict(unjudged, f"{what}: {end.cause}")
+    if service in looked:
+        hint = f"behind wait_for_service, call it: rospy.ServiceProxy('{service}', <Type>)(…)"
+        return _unless_over(
+            unjudged(f"{looked[service]} looks where {service} is, and never calls it", hint=hint), run
+        )
+    if absent := no_node(package, run, what):
+        return absent
+    others = f"; it asks for {join_words(looked)}" if looked else ""
+    verdict = unjudged(f"{what}{others}", hint=f"rospy.ServiceProxy('{service}', <Type>)(…) calls it")
+    return verdict if any(e.detail for e in asked) else _unless_over(verdict, run)
+
+
+def _unless_over(verdict: Verdict, run: Run) -> Verdict:
+    """A program that came to its end has done all that it does; one that ran on may have been late with a call."""
+    return verdict if all(one.ended_early for one in lives(run)) else verdict.once()
+
+
+def _refused(run: Run, service: str) -> Verdict | None:
+    """Return the verdict where the grader could not offer it, or a client asked for another type."""
+    for _, note in run.actors:
+        if note.action != "note" or note.topic != service:
+            continue
+        if note.detail.startswith(MISFIT):
+            kind = (note.type or "").partition("/")[2]
+            hint = f"give srv/{kind}.srv the names and types of the handout, and build again"
+            return unjudged(
+                f"{service} cannot be offered as the handout asks: {shown(note.detail)}", hint=hint
+            )
+        if note.detail.startswith(OTHER_TYPE) and run.is_student_node(note.actor):
+            theirs, why = note.type or "another type", note.detail.partition(": ")[2]
+            if note.type == note.value:
+                theirs = f"another definition of {note.type}" + (f" ({shown(why)})" if why else "")
+            message = f"{note.actor} calls {service} with {theirs}; the server has {note.value}"
+            return unjudged(message, hint=f"give rospy.ServiceProxy('{service}', …) the type of the handout")
+    return None
+
+
+def _excused(verdict: Verdict, run: Run) -> Verdict:
+    """Calls that did not come may be the machine's fault; those that came are not."""
+    return excused(verdict, run, run.start_ns, run.end_ns, why_late) if verdict.timing else verdict
