@@ -17,6 +17,7 @@ NAME_PATTERN = r"^[a-z][a-z0-9-]*$"
 PROGRAM_PATTERN = r"^[A-Za-z][\w-]*/[\w.-]+$"
 TYPE_PATTERN = r"^[A-Za-z]\w*/[A-Za-z]\w*$"
 PACKAGE_PATTERN = r"^[A-Za-z]\w*$"
+FOLDER_PATTERN = r"^[A-Za-z][\w-]*$"
 MESSAGES_MAX = 10_000
 LINE_CHARS_MAX = 1_000
 TF_TYPE = "tf2_msgs/TFMessage"
@@ -577,6 +578,9 @@ class Rubric(Record):
     """With `none`, `grader check --fix` repairs nothing: students are to find it themselves."""
     packages: tuple[Annotated[str, Field(pattern=PACKAGE_PATTERN)], ...] = ()
     """Folders beside the rubric, each a ROS package of the course: nodes, messages, launch files."""
+    starter: Annotated[str, Field(pattern=FOLDER_PATTERN)] | None = None
+    """A folder beside the rubric with the files that the course hands out; what is still as it was there is said
+    where its criterion is lost."""
     needs: Annotated[Needs, Field(default_factory=Needs)]
     """What the machine has to have besides."""
     groups: Annotated[dict[Name, Group], Field(default_factory=dict)]
