@@ -19,7 +19,7 @@ from grader.checks.support.fields import (
 )
 from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.text import shown
-from grader.checks.support.topics import cite, losses, no_message
+from grader.checks.support.topics import Sender, cite, losses, nothing_sent, sent_by
 from grader.checks.support.values import differences, value_text
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -43,6 +43,9 @@ class FieldBoundsParams(Record):
     """The greatest value, in the field's own unit; null: no bound."""
     share: Annotated[float, Field(gt=0, le=1)] = 1.0
     """The share of the messages that has to lie within the bounds, above 0 and at most 1."""
+    of: Sender = "student"
+    """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
+    `anyone`'s."""
 
     @model_validator(mode="after")
     def _some_bound(self) -> FieldBoundsParams:
@@ -80,13 +83,13 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
         Clip the value before it is published: `min(max(value, low), high)`. `rostopic echo <topic>/<field>`
         shows it.
     """
-    channels = run.student_channels(params.topic)
+    channels = sent_by(run, params.topic, params.of)
     found = readings(channels, params.field)
     missing = next((r for r in found if not r.values), None)
     usable = [r for r in found if r.values]
     outside = [r for r in found if not (r.values and all(map(params.holds, r.values)))]
     if not found:
-        verdict = no_message(package, run, params.topic)
+        verdict = nothing_sent(package, run, params.topic, params.of)
     elif not usable and missing:
         verdict = no_field(missing, channels)
     elif len(found) - len(outside) < params.share * len(found) - ROUNDING:
@@ -146,6 +149,9 @@ class FieldEqualsParams(Record):
     """How much numbers may differ, in the field's own unit."""
     when: Literal["every", "first", "last", "any"] = "every"
     """Which messages have to have the value: `every` one, the `first`, the `last` of the run, or `any` of them."""
+    of: Sender = "student"
+    """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
+    `anyone`'s."""
 
     @property
     def words(self) -> str:
@@ -170,20 +176,20 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
         nothing but the message.
 
     How it is measured
-        The messages of the package's nodes are decoded by the definition that their publisher sent. Numbers
+        The messages are decoded by the definition that their publisher sent. Numbers
         may differ by the tolerance; text, true and false have to be the same. Of a list with `[*]`, every
         item counts.
 
     How to fix
         Set the field before you call `publish(…)`. `rostopic echo <topic>/<field>` shows it.
     """
-    channels = run.student_channels(params.topic)
+    channels = sent_by(run, params.topic, params.of)
     found = readings(channels, params.field, numbers=False)
     asked = {"first": found[:1], "last": found[-1:]}.get(params.when, found)
     wrong = [r for r in asked if not params.fits(r)]
     which = {"any": "any message", "every": "every message"}.get(params.when, f"the {params.when} message")
     if not found:
-        verdict = no_message(package, run, params.topic)
+        verdict = nothing_sent(package, run, params.topic, params.of)
     elif not any(r.values for r in found):
         verdict = no_field(found[0], channels)
     elif len(wrong) == len(asked) if params.when == "any" else wrong:

@@ -28,7 +28,7 @@ from grader.checks.support.geometry import (
 )
 from grader.checks.support.lateness import Lateness, excused
 from grader.checks.support.nodes import GlobalName
-from grader.checks.support.topics import cite, no_message
+from grader.checks.support.topics import Sender, cite, nothing_sent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -56,6 +56,9 @@ class PathParams(Record):
     before them."""
     hold_s: Annotated[float, Field(gt=0)] | None = 1.0
     """A velocity holds until the next one, but no longer than this; null: for ever."""
+    of: Sender | None = None
+    """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
+    `anyone`'s; null: the poses of a program, where one tells them, else the student's messages."""
 
     @model_validator(mode="after")
     def _is_a_way(self) -> PathParams:
@@ -95,7 +98,7 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
         Distance is speed times time, an angle is `angular.z` times time, in radians: a quarter turn is
         `math.pi / 2`. Publish at a steady rate while it has to move, and a zero velocity at the end.
     """
-    found = track(run, params.topic, params.hold_s)
+    found = track(run, params.topic, params.hold_s, of=params.of)
     if found is None:
         verdict = _nothing(package, run, params)
     elif found.misfit:
@@ -117,7 +120,7 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
 def _nothing(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     if run_seconds(run) is None:
         return inconclusive("the run's fast clock was not recorded", hint="grade again")
-    return no_message(package, run, params.topic)
+    return nothing_sent(package, run, params.topic, params.of or "student")
 
 
 def _judged(found: Track, run: Run, params: PathParams) -> Verdict:

@@ -58,6 +58,8 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
         yield from _of_machine((*path, "start", index, "program"), "program", start.get("program"), rubric)
     for key in ("calls", "serves"):
         for index, one in as_maps(scenario.get(key)):
+            if one.get("action") is not None:
+                continue  # whether there is an action, only its file says
             yield from _of_machine((*path, key, index, "type"), "service", one.get("type"), rubric)
 
 
@@ -88,8 +90,7 @@ def _criterion_faults(
     for one in check.references(given):
         at = (*path, "with", *one.path)
         yield from _of_machine(at, one.to, one.value, rubric)
-        of_student = given.get("of", "student") == "student"
-        if scenario and check.needs_run and scenario.get("recording") is None and of_student:
+        if scenario and check.needs_run and scenario.get("recording") is None:
             yield from ((at, fault) for fault in _misfits(one, check, criterion, scenario))
 
 
@@ -114,8 +115,17 @@ def _misfits(
     elif one.to == "set" and not _is_set(value, scenario):
         there = [str(param.get("name")) for _, param in as_maps(scenario.get("params"))]
         yield f"{name} sets no parameter {value}{did_you_mean(value, there)}: add it to its params"
-    elif one.to == "published" and (program := _only_publisher(value, starts)):
-        yield f"{program} publishes on {value}, and {check.name} judges the student's messages"
+    elif one.to == "published":
+        yield from _wrong_sender(value, as_map(criterion.get("with")).get("of", "student"), check, starts)
+
+
+def _wrong_sender(topic: str, of: object, check: Check, starts: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield why nobody whose messages are judged sends any."""
+    program = _only_publisher(topic, starts)
+    if of == "student" and program:
+        yield f"{program} publishes on {topic}, and {check.name} judges the student's messages: give it of: program"
+    if of == "program" and not any(start.get("program") for start in starts):
+        yield f"the scenario starts no program, and {check.name} judges the messages of one (of: program)"
 
 
 def _is_process(name: str, start: dict[str, Any]) -> bool:
@@ -230,7 +240,7 @@ def _kept(scenario: dict[str, Any]) -> list[str]:
 
 
 def _served(scenario: dict[str, Any]) -> list[str]:
-    return [str(served.get("service")) for _, served in as_maps(scenario.get("serves"))]
+    return [str(one.get("service") or one.get("action")) for _, one in as_maps(scenario.get("serves"))]
 
 
 LISTED: Mapping[str, tuple[str, Callable[[dict[str, Any]], Iterable[str]]]] = {

@@ -230,8 +230,21 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
             "check: path, with: {topic: /turtle1/pose, points: [[1, 0]], tolerance_m: 0.1}",
             "check: field-bounds, with: {topic: /turtle1/pose, field: x, min: 0}",
             "37: criteria[7].with.topic: turtlesim/turtlesim_node publishes on /turtle1/pose, "
-            "and field-bounds judges the student's messages",
+            "and field-bounds judges the student's messages: give it of: program",
             id="topic-of-a-program",
+        ),
+        pytest.param(
+            "check: path, with: {topic: /turtle1/pose, points: [[1, 0]], tolerance_m: 0.1}",
+            "check: field-bounds, with: {topic: /turtle1/pose, field: x, min: 0, of: program}",
+            "",
+            id="topic-of-a-program-and-its-messages",
+        ),
+        pytest.param(
+            "{topic: /chatter, rate_hz: 10}",
+            "{topic: /chatter, rate_hz: 10, of: program}",
+            "31: criteria[1].with.topic: the scenario starts no program, "
+            "and rate judges the messages of one (of: program)",
+            id="messages-of-no-program",
         ),
         pytest.param(
             "{topic: /chatter, rate_hz: 10}",

@@ -13,6 +13,7 @@ from grader.checks.support.clocks import run_seconds
 from grader.checks.support.fields import FieldPath, NoField, values_at
 from grader.checks.support.nodes import plain_type
 from grader.checks.support.processes import observed_until_ns
+from grader.checks.support.topics import Sender, sent_by
 from grader.evidence.run import Channel, Run
 from grader.model.record import Record
 
@@ -189,10 +190,16 @@ class Track(NamedTuple):
     fault: str = ""
 
 
-def track(run: Run, topic: str, hold_s: float | None, fields: PoseFields | None = None) -> Track | None:
+def track(
+    run: Run,
+    topic: str,
+    hold_s: float | None,
+    fields: PoseFields | None = None,
+    of: Sender | None = None,
+) -> Track | None:
     """Return the path told on a topic, None where no message came (or, in a warped run, no clock)."""
     seconds = run_seconds(run)
-    channels = _publishers(run, topic, fields)
+    channels = [c for c in sent_by(run, topic, of) if c.messages] if of else _publishers(run, topic, fields)
     pairs = sorted(
         (pair for c in channels for pair in zip(c.times_ns, c.values, strict=True)), key=lambda pair: pair[0]
     )

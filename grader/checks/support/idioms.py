@@ -34,9 +34,6 @@ ANONYMOUS = both("anonymous=True", "ros::init_options::AnonymousName")
 PUBLISHER = both("rospy.Publisher(…)", "nh.advertise<…>(…)")
 SERVICE = both("rospy.Service(…)", "nh.advertiseService(…)")
 
-WAIT_FOR_SERVICE = both("rospy.wait_for_service(…)", "ros::service::waitForService(…)")
-SERVICE_CLIENT = both("rospy.ServiceProxy(…)", "nh.serviceClient<…>(…)")
-
 
 def init(name: str, *, anonymous: bool = False) -> str:
     """Return the call that makes the program a node of this name."""

@@ -12,7 +12,7 @@ from grader.checks.support.nodes import plain_type
 from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives
 from grader.checks.support.text import near_names, texts_in
 from grader.evidence.events import MISFIT
-from grader.evidence.run import Run
+from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Status, Verdict, failed, inconclusive, unjudged
@@ -20,6 +20,9 @@ from grader.wording import join_words, plural
 
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 End = Literal["publishers", "subscribers"]
+Sender = Literal["student", "program", "anyone"]
+"""Whose messages a check judges: the student's nodes', those of programs that the scenario starts beside them (a
+simulator), or both."""
 READ_TOO = {"logs": ("/rosout",), "hears": ("/rosout",), "transform": ("/tf", "/tf_static")}
 """Topics that a check reads, and that its parameters do not name."""
 TAKEN = {Status.FAIL, Status.PARTIAL}
@@ -95,6 +98,22 @@ def no_message(
     only = f"it publishes on {join_words(published)}; " if published else ""
     hint = f"{only}add {publisher(topic)} and publish in the loop"
     return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
+
+
+def sent_by(run: Run, topic: str, of: Sender) -> tuple[Channel, ...]:
+    """Return what these senders published on a topic."""
+    if of == "student":
+        return run.student_channels(topic)
+    found = (c for c in run.channels if c.topic == topic and not c.by_grader)
+    return tuple(c for c in found if of == "anyone" or c.callerid in run.grader_nodes)
+
+
+def nothing_sent(package: PackageFacts, run: Run, topic: str, of: Sender) -> Verdict:
+    """Return why no message of these senders came: what a program beside the student's does not send costs nobody."""
+    if of != "program":
+        return no_message(package, run, topic)
+    message = f"no program that runs beside the student's nodes published on {topic}"
+    return inconclusive(message, measured="no message", hint="let the criterion judge other messages: of")
 
 
 def misfit(run: Run, topic: str = "") -> Verdict | None:

@@ -33,6 +33,7 @@ from grader.checks.support.counters import (
 from grader.checks.support.exit_causes import process_tracebacks
 from grader.checks.support.lateness import lateness
 from grader.checks.support.processes import how_it_ended, life_of
+from grader.checks.support.topics import sent_by
 from grader.evidence.events import ProcessEvent
 from grader.evidence.run import Channel, Run
 from grader.model.figure import (
@@ -196,7 +197,7 @@ def rate_figures(run: Run, params: RateParams) -> Iterator[RateFigure]:
     """All publishers of the student's together, as they are judged; then each of them, where there are several."""
     if run.clock != "real":
         return
-    channels = [c for c in run.student_channels(params.topic) if c.messages]
+    channels = [c for c in sent_by(run, params.topic, params.of) if c.messages]
     groups = [channels, *([c] for c in channels[:PUBLISHERS_MAX] if len(channels) > 1)]
     for group in groups:
         found = judged_rhythm(run, params, group)

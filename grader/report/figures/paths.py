@@ -26,7 +26,7 @@ CORNERS_MAX = 100
 
 def path_figures(run: Run, params: PathParams) -> Iterator[PathFigure]:
     """Seen from its start where the points are."""
-    found = track(run, params.topic, params.hold_s)
+    found = track(run, params.topic, params.hold_s, of=params.of)
     if found is None or not found.path:
         return
     taken = relative(found.path) if params.relative else list(found.path)
