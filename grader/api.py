@@ -138,7 +138,7 @@ def judge(evidence: StrPath | Sequence[StrPath], rubric: StrPath | LoadedRubric)
     paths = [evidence] if isinstance(evidence, (str, os.PathLike)) else evidence
     loaded = _loaded(rubric)
     runs = load_evidence([Path(path) for path in paths])
-    criteria = criteria_of(loaded.rubric, runs, loaded.checks)
+    criteria = criteria_of(loaded.rubric, runs, loaded.checks, loaded.handed_out)
     result = pipeline.assemble_result(_submission(runs), loaded, runs, criteria, timing=NO_TIME)
     return result.model_copy(update={"environment": _environment(runs)})
 

@@ -414,7 +414,7 @@ def judge_folder(evidence: Path, rubric: LoadedRubric) -> Judged:
     from grader.evidence.reader import load_evidence  # noqa: PLC0415 - see LATER
 
     runs = load_evidence([evidence])
-    return runs, judge(rubric.rubric, runs, rubric.checks)
+    return runs, judge(rubric.rubric, runs, rubric.checks, rubric.handed_out)
 
 
 def keep_and_judge(
@@ -437,7 +437,7 @@ def keep_and_judge(
 def judge_early(facts: PackageFacts, rubric: LoadedRubric, options: GradeOptions) -> tuple[EarlyVerdict, ...]:
     """Return the verdicts that the files alone decide, without hidden ones where `options` leave them out."""
     hidden = frozenset[str]() if options.keep_hidden else hidden_ids(rubric.rubric)
-    found = judge_files(rubric.rubric, facts, rubric.checks)
+    found = judge_files(rubric.rubric, facts, rubric.checks, rubric.handed_out)
     return tuple(verdict for verdict in found if verdict.criterion.id not in hidden)
 
 

@@ -61,15 +61,11 @@ class RosPackages:
         there = sorted(p.stem for p in (folder / kind).glob(f"*.{kind}")) if folder else []
         return tuple(there) or (noetic_messages().get(package, ()) if kind == "msg" else ())
 
-    def service_text(self, type_: str) -> str | None:
-        """Return the text of a service type's `.srv` file; None where it is not installed here."""
+    def text(self, type_: str, kind: Literal["srv", "action"]) -> str | None:
+        """Return the text of a service's or an action's file; None where it is not installed here."""
         package, _, name = type_.partition("/")
-        folder = self.folders.get(package)
-        return (
-            (folder / "srv" / f"{name}.srv").read_text("utf-8", "replace")
-            if folder and name in self.types(package, "srv")
-            else None
-        )
+        file = self.folders.get(package, Path()) / kind / f"{name}.{kind}"
+        return file.read_text("utf-8", "replace") if package in self.folders and file.is_file() else None
 
     def lacks(self, package: str) -> bool:
         """Return whether a package exists that is not installed here."""

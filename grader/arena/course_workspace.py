@@ -23,7 +23,7 @@ from grader.arena.session import ArenaSession
 from grader.arena.workspace import give_to
 from grader.errors import ArenaError
 from grader.evidence.writer import EvidenceWriter
-from grader.rubric.course_packages import SCRIPT, package_files
+from grader.rubric.course_packages import SCRIPT, folder_files
 
 NAME = "course packages"
 ARCHIVE = "course.tar"
@@ -42,7 +42,7 @@ def copy_course(beside: Path, packages: Collection[str], folder: Path) -> None:
     """
     for name in packages:
         try:
-            files = package_files(beside, name)
+            files = folder_files(beside, name)
         except (OSError, ValueError) as error:
             raise ArenaError(f"the lab's package {name} cannot be read: {error}") from error
         for path, data in files.items():

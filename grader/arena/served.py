@@ -25,7 +25,7 @@ class ServedServices:
     """Offers them, and notes what they are asked."""
 
     def __init__(self, served: tuple[Served, ...], arena: ArenaSession) -> None:
-        self._served = {one.service: one for one in served}
+        self._served = {one.name: one for one in served if one.service}
         self._arena = arena
         self._types: dict[str, ServiceTypes] = {}
         arena.on_request = self._note_request
@@ -40,13 +40,13 @@ class ServedServices:
         from grader.evidence.message_values import Moment  # noqa: PLC0415 - numpy, which not every run needs
 
         try:
-            types = self._types[one.service] = self._find(one.type, one.definition)
+            types = self._types[one.name] = self._find(one.type, one.definition)
             now_ns, total = self._arena.ros_now_ns(), len(one.in_turn)
             answers = [types.response.encode(a, Moment(n, total, now_ns)) for n, a in enumerate(one.in_turn)]
         except ValueError as error:
             self._refuse(one, str(error))
             return
-        fields = {"service": one.service, "type": one.type, "md5sum": types.md5sum, "delay_s": one.delay_s}
+        fields = {"service": one.name, "type": one.type, "md5sum": types.md5sum, "delay_s": one.delay_s}
         encoded = [base64.b64encode(answer).decode() for answer in answers]
         self._arena.send(
             do="serve", fields={**fields, "answers": encoded, "error": FAILS if one.fails else ""}
@@ -65,16 +65,16 @@ class ServedServices:
     def _refuse(self, one: Served, error: str) -> None:
         """Only the student's own file may be other than the rubric thinks: else it is this machine that lacks it."""
         if one.definition is not None or not self._arena.place.is_own(one.type):
-            raise ArenaError(f"the grader cannot offer {one.service}: {error}", hint="grader doctor")
-        about = {"topic": one.service, "type": one.type}
+            raise ArenaError(f"the grader cannot offer {one.name}: {error}", hint="grader doctor")
+        about = {"topic": one.name, "type": one.type}
         self._arena.note(ActorEvent(action="note", actor="grader", **about, detail=f"{MISFIT}{error}"))
 
     def _note_request(self, time_ns: int, fields: dict[str, Any]) -> None:
         one = self._served[fields["service"]]
-        request = self._types[one.service].request.decode(base64.b64decode(fields["data"]))
+        request = self._types[one.name].request.decode(base64.b64decode(fields["data"]))
         response = None if one.fails else one.in_turn[fields["answer"]]
         detail = f"the request is no {one.type}" if request is None else FAILS if one.fails else ""
-        about = {"topic": one.service, "type": one.type, "value": {"request": request, "response": response}}
+        about = {"topic": one.name, "type": one.type, "value": {"request": request, "response": response}}
         event = ActorEvent(action="serve", actor=fields["caller"], **about, detail=detail)
         self._arena.note(event, time_ns)
 
@@ -84,7 +84,7 @@ class ServedServices:
         found = next((t for t in place.service_types() if self._has_sum(t, fields["md5sum"])), None)
         own = place.type_text(one.type, "srv") if found == one.type else None
         differs = other_fields(one.type, own, one.definition) if own and one.definition else ""
-        about = {"topic": one.service, "type": found, "value": one.type}
+        about = {"topic": one.name, "type": found, "value": one.type}
         detail = f"{OTHER_TYPE}: {differs}" if differs else OTHER_TYPE
         self._arena.note(ActorEvent(action="note", actor=fields["caller"], **about, detail=detail), time_ns)
 

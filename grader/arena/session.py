@@ -94,6 +94,7 @@ class ArenaSession:
         self._answers: dict[int, dict[str, Any]] = {}
         self._clock_ns = 0
         self._watched: dict[str, deque[bytes]] = {}
+        self.last_from: dict[str, str] = {}
         self._printed: dict[str, deque[str]] = {}
         self.on_request = self.on_other_type = _ignore
 
@@ -145,7 +146,7 @@ class ArenaSession:
         await self.wait(lambda: name in self.exit_codes, int_s + term_s + END_S)
 
     def watch(self, topic: str) -> deque[bytes]:
-        """Return where the latest messages on a topic will be, as they come."""
+        """Return where the latest messages on a topic will be, as they come; whose the last is, `last_from` says."""
         return self._watched.setdefault(topic, deque(maxlen=WATCHED_MAX))
 
     def watch_console(self, process: str) -> deque[str]:
@@ -153,11 +154,11 @@ class ArenaSession:
         return self._printed.setdefault(process, deque(maxlen=WATCHED_MAX))
 
     def course(self, event: ScenarioEvent) -> None:
-        self._writer.event("/grader/scenario", self._now_ns(), event)
+        self._writer.event("/grader/scenario", self.now_ns(), event)
 
     def note(self, event: ActorEvent, time_ns: int | None = None) -> None:
         """Write down what the grader did, or learnt: now, or when the arena did."""
-        self._writer.event("/grader/actor", self._now_ns() if time_ns is None else time_ns, event)
+        self._writer.event("/grader/actor", self.now_ns() if time_ns is None else time_ns, event)
 
     async def call(self, timeout_s: float, **command: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
         """Call a service: `{"data": base64}` of its response, or `{"error": why not}`."""
@@ -265,6 +266,7 @@ class ArenaSession:
                 self.live.talking.setdefault(channel.callerid, time.monotonic())
             if channel.topic in self._watched:
                 self._watched[channel.topic].extend(frame.datas)
+                self.last_from[channel.topic] = channel.callerid
             self.live.message(channel.topic, len(frame.datas), time.monotonic(), active=own)
             self.live.arrived(channel.topic, len(frame.datas), frame.time_ns)
 
@@ -323,7 +325,7 @@ class ArenaSession:
         elif status == "answer":
             self._answers[fields["id"]] = fields
         elif status == "left":
-            self._left.add(fields["name"], fields["path"], fields["bytes"], fields["data"], self._now_ns())
+            self._left.add(fields["name"], fields["path"], fields["bytes"], fields["data"], self.now_ns())
         elif status in {"request", "other-type"}:
             self._asked(time_ns, fields)
         elif status == "graph":
@@ -355,13 +357,14 @@ class ArenaSession:
             cpu_s=round(fields["cpu_s"], 4),
             max_rss_bytes=fields["max_rss_bytes"],
         )
-        self._writer.event("/grader/process", self._now_ns(), event)
+        self._writer.event("/grader/process", self.now_ns(), event)
 
     def ros_now_ns(self) -> int:
         """Return the time of the run's nodes: `/clock` where there is one."""
-        return self._clock_ns or self._now_ns()
+        return self._clock_ns or self.now_ns()
 
-    def _now_ns(self) -> int:
+    def now_ns(self) -> int:
+        """Return the time as the evidence has it."""
         return self._offset_ns + time.monotonic_ns()
 
     def _why(self) -> str:

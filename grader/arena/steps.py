@@ -22,9 +22,10 @@ from grader.arena.function_calls import call_functions
 from grader.arena.run_state import is_settled
 from grader.arena.scenario_inputs import make_shots
 from grader.arena.served import ServedServices
+from grader.arena.served_actions import ServedAction
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
-from grader.evidence.events import MISFIT, ActorEvent
+from grader.evidence.events import GOAL_STATUS, MISFIT, ActorEvent
 from grader.model.definition import other_fields
 from grader.rubric.model import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
@@ -43,10 +44,6 @@ TERM_S = 2.0
 NOT_PLAYED = frozenset({"/clock", "/rosout", "/rosout_agg"})
 """Where none is named: they are the run's own."""
 GOAL_ID = "actionlib_msgs/GoalID"
-GOAL_STATUS = (
-    "PENDING", "ACTIVE", "PREEMPTED", "SUCCEEDED", "ABORTED", "REJECTED", "PREEMPTING", "RECALLING", "RECALLED", "LOST",
-)  # fmt: skip
-"""By number (actionlib_msgs/GoalStatus)."""
 
 Spec: TypeAlias = dict[str, Any]
 """What the arena needs to start a process (`ProcessEnvironment.spec`)."""
@@ -74,6 +71,7 @@ class StepRunner:
         self._may_start = False
         self._arena = arena
         self._services = ServedServices(scenario.serves, arena)
+        self._actions = [ServedAction(one, arena) for one in scenario.serves if one.action]
         self._live = arena.live
         self._tell = tell
         self._types: dict[str, MessageType] = {}
@@ -96,6 +94,9 @@ class StepRunner:
     def advertise(self) -> None:
         """Say on which topics there will be messages, and offer the services, before anything is started."""
         self._services.offer()
+        for action in self._actions:
+            action.offer()
+            self._endless.append(asyncio.ensure_future(action.serve()))
         for probe in self._scenario.probes:
             self._advertise(probe.topic, probe.type, latched=False)
         for step in self._scenario.steps:

@@ -13,7 +13,7 @@ from grader.checks.support.lateness import excused, why_late
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import lives
 from grader.checks.support.text import near_names, shown
-from grader.checks.support.topics import cite, no_node
+from grader.checks.support.topics import cite, no_node, nodes_on, topics_with
 from grader.checks.support.values import Difference, differences, fields_text
 from grader.evidence.events import MISFIT, OTHER_TYPE
 from grader.evidence.run import Run
@@ -27,10 +27,10 @@ class CallsParams(Record):
     """The service, and what has to be asked of it."""
 
     service: Annotated[GlobalName, Refers("served")]
-    """A service that the scenario `serves`, with its slash: `/add`."""
+    """A service or an action that the scenario `serves`, with its slash: `/add`."""
     expect: dict[str, Any] | tuple[dict[str, Any], ...] = ()
-    """The request's fields that matter, and their values; or a list of requests in their order. Calls between them, and
-    fields that are left out, do not matter."""
+    """The fields of the request, or of the goal, that matter, and their values; or a list of requests in their order.
+    Calls between them, and fields that are left out, do not matter."""
     at_least: Annotated[int, Field(ge=1)] = 1
     """So many calls have to come, each of them as `expect` has it where that is one request."""
     tolerance: Annotated[float, Field(ge=0)] = 1e-6
@@ -150,25 +150,37 @@ def _never(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
     """Why no call came at all: the surest reason first. What is then wrong with the request, no one knows."""
     what, service = f"no node calls {params.service}", params.service
     asked = [e for _, e in run.actors if e.action == "lookup" and run.is_student_node(e.actor)]
-    looked = {e.topic or "": e.actor for e in asked}
+    looked = {e.topic or "": e.actor for e in asked} | _clients(run)
     near = near_names(service, looked)
     if refused := _refused(run, service):
         return refused
     if near and service not in looked:
-        hint = f"name it {service} in rospy.wait_for_service(…) and rospy.ServiceProxy(…)"
+        hint = f"name it {service} where it is waited for, and where it is called"
         return unjudged(f"{what}: {looked[near[0]]} asks for {near[0]}", hint=hint)
     if end := explain_error(package, run):
         return end.verdict(unjudged, f"{what}: {end.cause}")
     if service in looked:
-        hint = f"behind wait_for_service, call it: rospy.ServiceProxy('{service}', <Type>)(…)"
+        hint = f"to wait for it is not enough: {_call(run, service)} calls it"
         return _unless_over(
             unjudged(f"{looked[service]} looks where {service} is, and never calls it", hint=hint), run
         )
     if absent := no_node(package, run, what):
         return absent
     others = f"; it asks for {join_words(looked)}" if looked else ""
-    verdict = unjudged(f"{what}{others}", hint=f"rospy.ServiceProxy('{service}', <Type>)(…) calls it")
+    verdict = unjudged(f"{what}{others}", hint=f"{_call(run, service)} calls it")
     return verdict if any(e.detail for e in asked) else _unless_over(verdict, run)
+
+
+def _clients(run: Run) -> dict[str, str]:
+    """Return the actions that nodes of the student's could send goals to, each with its node."""
+    topics = [topic for topic in topics_with(run, "publishers") if topic.endswith("/goal")]
+    return {topic.removesuffix("/goal"): nodes_on(run, topic, "publishers")[0] for topic in topics}
+
+
+def _call(run: Run, service: str) -> str:
+    if any(f"{service}/status" in event.publishers for _, event in run.graph):
+        return f"actionlib.SimpleActionClient('{service}', <Type>).send_goal(…)"
+    return f"rospy.ServiceProxy('{service}', <Type>)(…)"
 
 
 def _unless_over(verdict: Verdict, run: Run) -> Verdict:
@@ -179,7 +191,7 @@ def _unless_over(verdict: Verdict, run: Run) -> Verdict:
 def _refused(run: Run, service: str) -> Verdict | None:
     """Return the verdict where the grader could not offer it, or a client asked for another type."""
     for _, note in run.actors:
-        if note.action != "note" or note.topic != service:
+        if note.action != "note" or note.topic not in {service, f"{service}/feedback", f"{service}/result"}:
             continue
         if note.detail.startswith(MISFIT):
             kind = (note.type or "").partition("/")[2]
@@ -192,7 +204,7 @@ def _refused(run: Run, service: str) -> Verdict | None:
             if note.type == note.value:
                 theirs = f"another definition of {note.type}" + (f" ({shown(why)})" if why else "")
             message = f"{note.actor} calls {service} with {theirs}; the server has {note.value}"
-            return unjudged(message, hint=f"give rospy.ServiceProxy('{service}', …) the type of the handout")
+            return unjudged(message, hint="call it with the type of the handout")
     return None
 
 

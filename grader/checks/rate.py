@@ -14,8 +14,10 @@ from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.idioms import LOOP, both, loop_rate
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, excused, lateness
 from grader.checks.support.nodes import PublishedTopic
-from grader.checks.support.processes import observed_until_ns
+from grader.checks.support.parameters import params_on_server, resolved_param, where_given
+from grader.checks.support.processes import life_of, observed_until_ns
 from grader.checks.support.topics import Sender, cite, nothing_sent, sent_by, whole_until_ns
+from grader.checks.support.values import value_text
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
@@ -122,7 +124,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     found = judged_rhythm(run, params, sent_by(run, params.topic, params.of))
     if found is None:
         return nothing_sent(package, run, params.topic, params.of).about(expected=expected)
-    uneven = _uneven(found, params)
+    uneven = _uneven(found, run, package, params)
     if uneven is not None:
         why = partial(_why_late, found, params=params)
         uneven = excused(uneven, run, found.times_ns[0], found.until_ns, why)
@@ -178,7 +180,7 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     return inconclusive(message, hint="record for longer" if run.foreign else "grade again")
 
 
-def _uneven(found: Rhythm, params: RateParams) -> Verdict | None:
+def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
     """Return what is wrong with the rate, None if nothing is."""
     mean_hz, period_ns = found.mean_hz, params.period_ns
     outside = found.outside(*params.bounds_ns)
@@ -187,7 +189,8 @@ def _uneven(found: Rhythm, params: RateParams) -> Verdict | None:
     in_bounds = params.low_hz * (1 - ROUNDING) <= mean_hz <= params.high_hz * (1 + ROUNDING)
     if in_bounds and even:
         return None
-    return _fell_silent(found, params) or _bursts(found, outside, even, params) or _wrong_mean(found, params)
+    other = _fell_silent(found, params) or _bursts(found, outside, even, params)
+    return other or _by_parameter(_wrong_mean(found, params), run, package, params)
 
 
 def _fell_silent(found: Rhythm, params: RateParams) -> Verdict | None:
@@ -220,6 +223,31 @@ def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
     ratio = found.mean_hz / params.rate_hz
     verdict = failed(message, hint=_rate_hint(ratio, nominal, even=found.is_even))
     return verdict.once() if abs(ratio - 1) < NEAR_SHARE else verdict
+
+
+def _by_parameter(verdict: Verdict, run: Run, package: PackageFacts, params: RateParams) -> Verdict:
+    """Say where the value comes from, if the rate of the node's loop is a parameter with another value than the asked
+    one."""
+    for channel in run.student_channels(params.topic):
+        life = life_of(run, channel.callerid)
+        script = life.start.script if life else None
+        slip = next((s for s in package.slips if s.kind == "rate-parameter" and s.file == script), None)
+        name = resolved_param(slip.message, channel.callerid) if slip else ""
+        value = params_on_server(run).get(name)
+        if slip is None or value == params.rate_hz:
+            continue
+        given = where_given(package, name) if value is not None else None
+        place = given or slip
+        where = f"{place.file}, line {place.line}"
+        hint = f"set {slip.message} to {significant(params.rate_hz)}" + (f" in {where}" if given else "")
+        told = f"which is {value_text(value)}" + (f" in {where}" if given else "")
+        if value is None:
+            told = f"which nothing sets in this run: the default in {where} counts"
+            hint = f"make {significant(params.rate_hz)} the default in {where}, or {hint}"
+        message = f"{verdict.message}; the node takes its rate from {slip.message}, {told}"
+        cited = (FileCitation(file=place.file, line=place.line),)
+        return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+    return verdict
 
 
 def _rate_hint(ratio: float, nominal: str, *, even: bool) -> str:

@@ -89,7 +89,7 @@ def _needed(loaded: LoadedRubric) -> dict[str, list[str]]:
     names = [start.program for s in rubric.scenarios.values() for start in s.start if start.program]
     names += [probe.type for s in rubric.scenarios.values() for probe in s.probes]
     names += [call.type for s in rubric.scenarios.values() for call in s.calls]
-    names += [served.type for s in rubric.scenarios.values() for served in s.serves]
+    names += [served.type for s in rubric.scenarios.values() for served in s.serves if served.service]
     names += [
         str(one.value)
         for criterion in rubric.criteria

@@ -34,7 +34,7 @@ CHANNELS_MAX = 500
 
 def judge_evidence(evidence: Sequence[Path], loaded: LoadedRubric, out: str) -> ExitCode:
     """Judge one submission and write its criteria as JSON to the file `out`, or to stdout for `-`."""
-    criteria = judge(loaded.rubric, load_evidence(evidence), loaded.checks)
+    criteria = judge(loaded.rubric, load_evidence(evidence), loaded.checks, loaded.handed_out)
     _write(out, lambda ascii_only: criteria_text(criteria, ascii_only=ascii_only))
     return exit_code(criteria, loaded.rubric)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
@@ -14,10 +15,11 @@ from rich.text import Text
 from grader.classes.batch.folder import RUN, open_batch
 from grader.classes.similarity.comparison import percent, stretches
 from grader.classes.similarity.sources import PLACE
-from grader.errors import UsageError
+from grader.errors import GraderError, UsageError
 from grader.model.similarity import NotCompared, Pair, Similarity
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
+from grader.rubric.load import load_rubric
 from grader.wording import first_few
 
 NAME_CHARS = 22
@@ -53,6 +55,15 @@ def submissions_in(folder: Path) -> tuple[dict[str, Path], dict[str, str], dict[
             f"{folder} contains no submissions with evidence", hint="give the --out of `grader batch`"
         )
     return {path.name: path for path in below}, {}, {}
+
+
+def starter_of(folder: Path) -> list[Path]:
+    """Return the folder of the starter that the batch's rubric names, as far as the rubric is still there."""
+    with suppress(GraderError):
+        if (folder / RUN).exists():
+            rubric = load_rubric(open_batch(folder).run.rubric_source)
+            return [rubric.path.parent / rubric.rubric.starter] if rubric.rubric.starter else []
+    return []
 
 
 def _report(similarity: Similarity, names: Mapping[str, str]) -> Iterator[RenderableType]:

@@ -17,6 +17,10 @@ MISFIT = "the package's definition does not fit: "
 """Begins the detail of the answer to a call that could not be made, because the student's own `.srv` is another one."""
 
 
+GOAL_STATUS = (
+    "PENDING", "ACTIVE", "PREEMPTED", "SUCCEEDED", "ABORTED", "REJECTED", "PREEMPTING", "RECALLING", "RECALLED", "LOST",
+)  # fmt: skip
+"""By number (actionlib_msgs/GoalStatus)."""
 OTHER_TYPE = "asks for another type"
 """Begins the detail of the note on a node that the grader's own node refused for its type."""
 
@@ -140,9 +144,10 @@ class ActorEvent(Record):
     `goal`, `cancel` and `result` are an action's: `topic` is its name, `detail` the word for the result's status
     (`SUCCEEDED`), or why there is none. `play`: the recording `topic` was played; its messages are on their topics.
     `left`: the process `actor` left the file `detail`, of `value` bytes; what is kept of it is an attachment.
-    Of services that the grader offers: `serve` is a call by the node `actor`, and `value` has the fields of its
-    `request` and of the `response`, None where the service fails. `lookup`: the node `actor` asked the master for the
-    service `topic`, the first time; `detail` says where it was not there.
+    Of services and actions that the grader offers: `serve` is a call, or a goal, of the node `actor`, and `value` has
+    the fields of its `request` and of the `response` or result, None where the service fails; a goal's state is in
+    `detail`. `lookup`: the node `actor` asked the master for the service `topic`, the first time; `detail` says where
+    it was not there.
     """
 
     action: Literal[

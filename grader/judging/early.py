@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from graphlib import TopologicalSorter
 from typing import Any, cast
 
@@ -10,6 +10,7 @@ from grader.checks import CHECKS, Check
 from grader.evidence.run import Run
 from grader.judging.facts import NOT_RUN, PACKAGE_RUN, Facts
 from grader.judging.judge import Requirements, result_of, verdict_of
+from grader.judging.starter import tell_unchanged
 from grader.model.package import PackageFacts
 from grader.model.result import EarlyVerdict
 from grader.rubric.model import Rubric
@@ -30,7 +31,10 @@ UNBUILT = Run(
 
 
 def judge_files(
-    rubric: Rubric, package: PackageFacts, checks: Mapping[str, Check] = CHECKS
+    rubric: Rubric,
+    package: PackageFacts,
+    checks: Mapping[str, Check] = CHECKS,
+    handed_out: Collection[str] = (),
 ) -> tuple[EarlyVerdict, ...]:
     """Return the criteria that need no run, as far as the files decide them, in the rubric's order; with them those
     of a launch file that nothing can read.
@@ -41,7 +45,11 @@ def judge_files(
     judging = _Judging(rubric, package, checks)
     for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
         judging.judge(name)
-    return tuple(judging.results[c.id] for c in rubric.criteria if c.id in judging.results)
+    found = (judging.results[c.id] for c in rubric.criteria if c.id in judging.results)
+    return tuple(
+        one.model_copy(update={"criterion": tell_unchanged(one.criterion, rubric, package, handed_out)})
+        for one in found
+    )
 
 
 class _Judging:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from graphlib import TopologicalSorter
 from pathlib import PurePath
 from traceback import extract_tb
@@ -26,6 +26,7 @@ from grader.judging.other_runs import (
     split_runs,
     was_built,
 )
+from grader.judging.starter import tell_unchanged
 from grader.judging.summary import leave_out, round_half_up
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive
@@ -35,14 +36,18 @@ MANUAL = "manual"
 
 
 def judge(
-    rubric: Rubric, runs: Mapping[str, Run], checks: Mapping[str, Check] = CHECKS
+    rubric: Rubric,
+    runs: Mapping[str, Run],
+    checks: Mapping[str, Check] = CHECKS,
+    handed_out: Collection[str] = (),
 ) -> tuple[CriterionResult, ...]:
     """Return every criterion in the rubric's order. `runs` maps scenarios, and `package`, to their recorded runs.
 
-    `checks` are the grader's and the rubric's own (`LoadedRubric.checks`). The same evidence and rubric always give
+    `checks` are the grader's and the rubric's own (`LoadedRubric.checks`), `handed_out` the sha256 of the starter's
+    files (`LoadedRubric.handed_out`). The same evidence and rubric always give
     equal results; nothing that is wrong with the evidence raises.
     """
-    return judge_all_runs(rubric, runs, checks).criteria
+    return judge_all_runs(rubric, runs, checks, handed_out).criteria
 
 
 class Judgement(NamedTuple):
@@ -53,7 +58,10 @@ class Judgement(NamedTuple):
 
 
 def judge_all_runs(
-    rubric: Rubric, runs: Mapping[str, Run], checks: Mapping[str, Check] = CHECKS
+    rubric: Rubric,
+    runs: Mapping[str, Run],
+    checks: Mapping[str, Check] = CHECKS,
+    handed_out: Collection[str] = (),
 ) -> Judgement:
     """Judge the first runs, then what repeated runs and a repaired copy say besides."""
     first, repeated, repaired = split_runs(runs)
@@ -73,8 +81,11 @@ def judge_all_runs(
     build = first.get(PACKAGE_RUN)
     shown = {name: show_lines(verdict, build) for name, verdict in verdicts.items()} if build else verdicts
     results = tuple(result_of(c, shown[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
-    advised = results if facts.package is None else add_advice(results, facts.package, rubric)
-    return Judgement(leave_out(rubric, advised), doubtful)
+    package = facts.package
+    if package is not None:
+        results = tuple(tell_unchanged(result, rubric, package, handed_out) for result in results)
+        results = add_advice(results, package, rubric)
+    return Judgement(leave_out(rubric, results), doubtful)
 
 
 def judge_facts(rubric: Rubric, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> dict[str, Verdict]:

@@ -136,16 +136,18 @@ class SourceFile(Record):
 
 
 class PythonSlip(Record):
-    """A slip in a Python file that compiles; it shows only when the node runs.
+    """What is remarkable in a Python file that compiles, most of it slips that show only when the node runs.
 
     `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and nodes
     get none. `misspelt`: a name that the file does not define, beside one that it does. `no-clock`: it publishes
     and counts, and nothing in it can tell the time; that is a slip only where its messages are to tell it.
+    `rate-parameter`: no slip, but a loop whose rate is a parameter;
+    `message` is its name as written.
     """
 
     file: str
     line: int
-    kind: Literal["not-called", "input", "no-clock", "misspelt"]
+    kind: Literal["not-called", "input", "no-clock", "misspelt", "rate-parameter"]
     message: str
 
 

@@ -1,4 +1,4 @@
-"""The ROS packages that lie beside a rubric: messages, simulators, launch files and bags of the course.
+"""The folders that lie beside a rubric: ROS packages of the course (messages, simulators, bags), and the starter.
 
 Their files belong to the rubric: they are part of its digest, and go wherever it goes.
 """
@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from grader.rubric.model import FOLDER_PATTERN
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
 from grader.wording import did_you_mean
 
@@ -24,8 +25,8 @@ _NAME = re.compile(rb"<name>\s*([\w-]+)\s*</name>")
 _TARGET = re.compile(r"add_executable\s*\(\s*\"?([\w.-]+)")
 
 
-def package_files(folder: Path, name: str) -> dict[str, bytes]:
-    """Return the files of the package `name` in a rubric's folder, by their paths from there.
+def folder_files(folder: Path, name: str) -> dict[str, bytes]:
+    """Return the files of the folder `name` beside a rubric, by their paths from the rubric's folder.
 
     Raises OSError, and ValueError for more than a rubric may bring along.
     """
@@ -52,7 +53,7 @@ def read_packages(rubric: dict[str, Any], folder: Path) -> tuple[dict[str, bytes
         if not re.fullmatch(r"[A-Za-z]\w*", name):
             continue  # said elsewhere
         try:
-            files = package_files(folder, name)
+            files = folder_files(folder, name)
         except (OSError, ValueError) as error:
             faults.append((("packages", index), str(error)))
             continue
@@ -65,6 +66,20 @@ def read_packages(rubric: dict[str, Any], folder: Path) -> tuple[dict[str, bytes
         else:
             faults += _programs(rubric, name, files)
     return read, faults
+
+
+def read_starter(rubric: dict[str, Any], folder: Path) -> tuple[dict[str, bytes], list[Fault]]:
+    """Return the files that the course hands out, and what is wrong with their folder."""
+    name = rubric.get("starter")
+    if not isinstance(name, str) or not re.fullmatch(FOLDER_PATTERN, name):
+        return {}, []  # said elsewhere
+    try:
+        files = folder_files(folder, name)
+    except (OSError, ValueError) as error:
+        return {}, [(("starter",), str(error))]
+    if not any(files.values()):
+        return {}, [(("starter",), f"there is no folder {name} with files in it beside the rubric")]
+    return files, []
 
 
 def _programs(rubric: dict[str, Any], package: str, files: Mapping[str, bytes]) -> Iterator[Fault]:

@@ -23,7 +23,7 @@ from typing import TextIO
 from grader.checks import CHECKS, Check
 from grader.checks.registry import collecting
 from grader.model.verdict import Verdict
-from grader.rubric.course_packages import read_packages
+from grader.rubric.course_packages import read_packages, read_starter
 from grader.rubric.pytest_check import BAG, PYTHON, FileFault, pytest_check, read_beside
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps
 from grader.rubric.steps import bag_faults, played_bags
@@ -38,16 +38,18 @@ _STREAMS = threading.RLock()
 
 @dataclass(frozen=True, kw_only=True)
 class Beside:
-    """The files by name, the instructor's own checks, all checks by name, and faults of the rubric's own keys."""
+    """The files by name, the instructor's own checks, all checks by name, faults of the rubric's own keys, and the
+    sha256 of each file of the starter."""
 
     files: dict[str, bytes]
     own: OwnChecks
     known: dict[str, Check]
     faults: tuple[Fault, ...]
+    handed_out: frozenset[str]
 
 
 def read_instructor(data: object, folder: Path) -> Beside:
-    """Read what `checks:`, `packages:`, `check: pytest`, tests and steps that play name, and run the file of checks."""
+    """Read what the rubric names beside it (checks, packages, a starter, tests, bags), and run the file of checks."""
     rubric = as_map(data)
     named: list[tuple[KeyPath, object]] = [(("checks",), rubric["checks"])] if "checks" in rubric else []
     named += [
@@ -63,6 +65,9 @@ def read_instructor(data: object, folder: Path) -> Beside:
     played = played_bags(rubric)
     named += [(path, play.get("bag")) for path, play in played.items()]
     files, faults = read_packages(rubric, folder)
+    starter, more = read_starter(rubric, folder)
+    files |= starter
+    faults += more
     own = OwnChecks(complete=rubric.get("checks") is None)
     for path, name in named:
         if not isinstance(name, str):
@@ -76,7 +81,9 @@ def read_instructor(data: object, folder: Path) -> Beside:
             faults += bag_faults(path, file, played[path])
         if path == ("checks",):
             own = run_checks_file(file, files[name])
-    return Beside(files=files, own=own, known=known_checks(folder, own.checks), faults=tuple(faults))
+    handed_out = frozenset(hashlib.sha256(content).hexdigest() for content in starter.values() if content)
+    known = known_checks(folder, own.checks)
+    return Beside(files=files, own=own, known=known, faults=tuple(faults), handed_out=handed_out)
 
 
 def known_checks(folder: Path, own: Mapping[str, Check]) -> dict[str, Check]:

@@ -23,12 +23,14 @@ class LoadedRubric(Record):
     """A rubric and where it came from; `digest` is the sha256 of the file's bytes, and of the instructor's files.
 
     `own` is the text of the instructor's file of checks: another process, to which this record is sent, runs it again.
+    `handed_out` holds the sha256 of each file of the starter.
     """
 
     rubric: Rubric
     path: Path
     digest: str
     own: bytes | None = None
+    handed_out: frozenset[str] = frozenset()
 
     @property
     def checks(self) -> dict[str, Check]:
@@ -58,7 +60,8 @@ def load_rubric(name_or_path: str) -> LoadedRubric:
         raise RubricError(faults)
     rubric = share_points(Rubric.model_validate_json(json.dumps(source.data), strict=True))
     own = beside.files[rubric.checks] if rubric.checks is not None else None
-    return LoadedRubric(rubric=rubric, path=path, digest=_digest(source.raw, beside), own=own)
+    digest = _digest(source.raw, beside)
+    return LoadedRubric(rubric=rubric, path=path, digest=digest, own=own, handed_out=beside.handed_out)
 
 
 def share_points(rubric: Rubric) -> Rubric:
@@ -86,7 +89,8 @@ def _shares(whole: float, weights: dict[str, float], digits: int) -> dict[str, f
 
 
 def read_beside_rubric(rubric: LoadedRubric) -> dict[str, bytes]:
-    """Return the files that a rubric brings along, by their paths from its folder: checks, tests, recordings, packages.
+    """Return the files that a rubric brings along, by their paths from its folder: checks, tests, recordings, packages
+    and the starter.
 
     Raises RubricError where its file is not there any more.
     """
@@ -162,12 +166,17 @@ def files_of(rubric: Rubric) -> frozenset[str]:
     paths = [
         path for s in rubric.scenarios.values() for p in s.start for path in (p.script, p.launch, p.load)
     ]
-    for criterion in rubric.criteria:
-        given = criterion.parameters
-        scripts = given.get("scripts")
-        paths += [given.get("path"), given.get("file"), given.get("launch")]
-        paths += scripts if isinstance(scripts, list | tuple) else []
-    return frozenset(PurePosixPath(path).name for path in paths if isinstance(path, str))
+    names = {PurePosixPath(path).name for path in paths if path is not None}
+    return frozenset(names.union(*(names_in(criterion) for criterion in rubric.criteria)))
+
+
+def names_in(criterion: Criterion) -> set[str]:
+    """Return the names of the files that a criterion's parameters name, without folders."""
+    given = criterion.parameters
+    scripts = given.get("scripts")
+    paths = [given.get("path"), given.get("file"), given.get("launch")]
+    paths += scripts if isinstance(scripts, list | tuple) else []
+    return {PurePosixPath(path).name for path in paths if isinstance(path, str)}
 
 
 def needs_package(loaded: LoadedRubric) -> bool:

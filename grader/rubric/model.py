@@ -17,6 +17,7 @@ NAME_PATTERN = r"^[a-z][a-z0-9-]*$"
 PROGRAM_PATTERN = r"^[A-Za-z][\w-]*/[\w.-]+$"
 TYPE_PATTERN = r"^[A-Za-z]\w*/[A-Za-z]\w*$"
 PACKAGE_PATTERN = r"^[A-Za-z]\w*$"
+FOLDER_PATTERN = r"^[A-Za-z][\w-]*$"
 MESSAGES_MAX = 10_000
 LINE_CHARS_MAX = 1_000
 TF_TYPE = "tf2_msgs/TFMessage"
@@ -125,12 +126,23 @@ class Call(Record):
 
 
 class Served(Record):
-    """A service that the grader offers, from before anything starts. Give one of `answer`, `answers` and `fails`."""
+    """A service or an action that the grader offers, from before anything starts.
 
-    service: str
+    Give `service`, and one of `answer`, `answers` and `fails`; or `action`, and what becomes of its goals.
+    """
+
+    service: str | None = None
     """The service, with its slash: `/add`."""
+    action: str | None = None
+    """The action, with its slash: `/fibonacci`."""
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
     """Of ROS's, of the student's package (`lab5/Add`), or of one of the course's."""
+    feedback: tuple[dict[str, Any], ...] = ()
+    """What is sent of each goal on its way, one after the other."""
+    result: dict[str, Any] = Field(default_factory=dict)
+    """The fields of each goal's result; those that it lacks are zero."""
+    ends: Literal["succeeded", "aborted"] = "succeeded"
+    """The state in which goals end. One that the client cancels before is preempted."""
     answer: dict[str, Any] | None = None
     """The fields of each answer; those that it lacks are zero."""
     answers: tuple[dict[str, Any], ...] = ()
@@ -141,7 +153,12 @@ class Served(Record):
     """The handout's text of a `.srv` that students write themselves: where theirs differs, their calls are refused, as
     a server of the handout's would."""
     delay_s: Annotated[float, Field(ge=0, le=STEP_S_MAX)] = 0.0
-    """How long each answer takes."""
+    """How long each answer takes; of an action, each feedback and the result."""
+
+    @property
+    def name(self) -> str:
+        """The service's or the action's."""
+        return self.service or self.action or ""
 
     @property
     def in_turn(self) -> tuple[dict[str, Any], ...]:
@@ -410,7 +427,7 @@ class Scenario(Record):
     calls: tuple[Call, ...] = ()
     """Services that the grader calls."""
     serves: tuple[Served, ...] = ()
-    """Services that the grader offers to the student's nodes."""
+    """Services and actions that the grader offers to the student's nodes."""
     steps: tuple[Step, ...] = ()
     """What the grader does, one after the other; `until` is looked at once they are over, and its times count from
     then on."""
@@ -561,6 +578,9 @@ class Rubric(Record):
     """With `none`, `grader check --fix` repairs nothing: students are to find it themselves."""
     packages: tuple[Annotated[str, Field(pattern=PACKAGE_PATTERN)], ...] = ()
     """Folders beside the rubric, each a ROS package of the course: nodes, messages, launch files."""
+    starter: Annotated[str, Field(pattern=FOLDER_PATTERN)] | None = None
+    """A folder beside the rubric with the files that the course hands out; what is still as it was there is said
+    where its criterion is lost."""
     needs: Annotated[Needs, Field(default_factory=Needs)]
     """What the machine has to have besides."""
     groups: Annotated[dict[Name, Group], Field(default_factory=dict)]

@@ -58,6 +58,8 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
         yield from _of_machine((*path, "start", index, "program"), "program", start.get("program"), rubric)
     for key in ("calls", "serves"):
         for index, one in as_maps(scenario.get(key)):
+            if one.get("action") is not None:
+                continue  # whether there is an action, only its file says
             yield from _of_machine((*path, key, index, "type"), "service", one.get("type"), rubric)
 
 
@@ -238,7 +240,7 @@ def _kept(scenario: dict[str, Any]) -> list[str]:
 
 
 def _served(scenario: dict[str, Any]) -> list[str]:
-    return [str(served.get("service")) for _, served in as_maps(scenario.get("serves"))]
+    return [str(one.get("service") or one.get("action")) for _, one in as_maps(scenario.get("serves"))]
 
 
 LISTED: Mapping[str, tuple[str, Callable[[dict[str, Any]], Iterable[str]]]] = {

@@ -9,6 +9,7 @@ import pytest
 
 from grader.evidence.message_values import ServiceTypes
 from grader.evidence.run import Run
+from grader.ros_packages import ros_packages
 from grader.rubric.model import Scenario, Served
 from tests.arena.support import SCRIPT, make_place, printed, run
 
@@ -119,3 +120,34 @@ def test_what_a_scenario_without_services_is_stays_the_same() -> None:
     one = Scenario(title="test")
     with_door = one.model_copy(update={"serves": (Served(service="/door", type=SET, answer={}),)})
     assert one.digest != with_door.digest
+
+
+needs_actionlib = pytest.mark.skipif(ros_packages().lacks("actionlib"), reason="actionlib is not installed")
+ACTION = "import actionlib\nfrom actionlib.msg import TestAction, TestGoal\n"
+
+
+@needs_actionlib
+@pytest.mark.ros
+def test_an_action_reports_ends_and_can_be_cancelled(tmp_path: Path) -> None:
+    seen = _run(
+        tmp_path,
+        ACTION
+        + "client = actionlib.SimpleActionClient('/count', TestAction)\nprint(client.wait_for_server())\n"
+        "client.send_goal(TestGoal(5), feedback_cb=lambda f: print('at', f.feedback))\nclient.wait_for_result()\n"
+        "print(client.get_state(), client.get_result().result)\n"
+        "client.send_goal(TestGoal(7), feedback_cb=lambda _: client.cancel_goal())\nclient.wait_for_result()\n"
+        "print(client.get_state(), client.get_result().result)\n",
+        {
+            "action": "/count",
+            "type": "actionlib/Test",
+            "feedback": [{"feedback": 1}, {"feedback": 2}],
+            "result": {"result": 9},
+            "delay_s": 0.5,
+        },
+    )
+    assert printed(seen, "client") == ["True", "at 1", "at 2", "3 9", "2 9"]
+    goals = [(actor, topic, value["request"], end) for actor, topic, value, end in _did(seen, "serve")]
+    assert goals == [
+        ("/client", "/count", {"goal": 5}, "SUCCEEDED"),
+        ("/client", "/count", {"goal": 7}, "PREEMPTED"),
+    ]

@@ -132,6 +132,24 @@ def test_slips_are_found_and_named(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("rate", "found"),
+    [
+        ("rospy.Rate(rospy.get_param('~rate', 5))", [("~rate", 3)]),
+        ("rospy.Rate(float(rospy.get_param('/hz')))", [("/hz", 3)]),
+        ("rospy.Rate(hz)", [("hz", 2)]),
+        ("rospy.Rate(10)", []),
+        ("rospy.Rate(rospy.get_param(name))", []),
+        ("rospy.Rate(other)", []),
+    ],
+)
+def test_a_rate_that_is_a_parameter_is_known(tmp_path, rate, found):
+    text = f"import rospy\nhz = rospy.get_param('hz')\nrate = {rate}\nother = rospy.get_param('a')\nother = 3\n"
+    (tmp_path / "a.py").write_text(text)
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [(s.message, s.line) for s in slips if s.kind == "rate-parameter"] == found
+
+
+@pytest.mark.parametrize(
     ("value", "imported", "told"),
     [
         ("next(n)", "import itertools\nn = itertools.count()\n", True),

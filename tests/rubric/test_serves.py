@@ -21,6 +21,7 @@ def _serving(folder: Path, served: str) -> Path:
 @pytest.mark.parametrize(
     "served",
     [
+        "{action: /count, type: lab1/Count, feedback: [{count: 1}], result: {total: 3}, ends: aborted, delay_s: 1}",
         f"{{{OWN}, answer: {{sum: 7}}}}",
         f"{{{OWN}, answers: [{{sum: 7}}, {{sum: 8}}], delay_s: 2, {TEXT}}}",
         f"{{{OWN}, fails: true}}",
@@ -39,6 +40,13 @@ def test_sound_services(served: str, tmp_path: Path) -> None:
         (
             f"{{{OWN}, answer: {{}}, fails: true}}",
             ": give one of answer, answers and fails: answer and fails are",
+        ),
+        ("{type: lab1/Add, fails: true}", ": give one of service and action, not neither"),
+        ("{action: /a, type: a/B, fails: true}", ".fails: is not for an action"),
+        (f"{{{OWN}, fails: true, result: {{}}}}", ".result: is not for a service"),
+        (
+            "{action: /a, type: actionlib/Test, result: {reslt: 1}}",
+            ".result: actionlib/TestResult has no field reslt",
         ),
         ("{service: add, type: lab1/Add, fails: true}", '.service: a service begins with a slash: "/add"'),
         (

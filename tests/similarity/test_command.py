@@ -12,9 +12,11 @@ import pytest
 
 from grader.classes.similarity import comparison
 from grader.cli.main import run as grader
+from grader.cli.similarity import starter_of
 from grader.model.batch import BatchRun, Entry
 from grader.model.result import RubricInfo
 from grader.model.similarity import Similarity
+from tests.rubric.samples import spoiled
 from tests.similarity.classes import class_of, renamed, solution
 
 COPY = renamed(solution("timed")).encode()
@@ -138,12 +140,22 @@ def test_without_the_extra_it_says_what_to_install(class_folder, capsys, monkeyp
     assert not (class_folder / "similarity.json").exists()
 
 
-def write_run(folder: Path, *students: tuple[str, str, str]) -> None:
+def test_the_starter_of_the_batchs_rubric_is_no_ones_own(class_folder, tmp_path) -> None:
+    rubric = spoiled(tmp_path, ("package: lab1\n", "package: lab1\nstarter: handed_out\n"))
+    write_run(class_folder, ("ann", "Ann", ""), rubric=str(rubric))
+    assert starter_of(class_folder) == []  # its folder is gone, and the rubric is faulty without it
+    (tmp_path / "handed_out").mkdir()
+    (tmp_path / "handed_out" / "timed.py").write_text(solution("timed"), encoding="utf-8")
+    assert starter_of(class_folder) == [tmp_path / "handed_out"]
+    assert starter_of(tmp_path) == []
+
+
+def write_run(folder: Path, *students: tuple[str, str, str], rubric: str = "lab") -> None:
     run = BatchRun(
         state="complete",
         grader="0",
         rubric=RubricInfo(id="lab", version="1", digest="0"),
-        rubric_source="lab",
+        rubric_source=rubric,
         title="Lab",
         max_points=1.0,
         criteria=(),

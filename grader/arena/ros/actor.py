@@ -74,7 +74,7 @@ class SlaveApi:
 
 
 class _Topic:
-    def __init__(self, fields, channel):
+    def __init__(self, fields, channel, known_as):
         self.name = fields["topic"]
         self.type = fields["type"]
         self.latching = fields["latching"]
@@ -83,6 +83,7 @@ class _Topic:
             "md5sum": fields["md5sum"],
             "message_definition": fields["definition"],
             "latching": "1" if fields["latching"] else "0",
+            "callerid": known_as,
         }
         self.channel = channel
         self.subscribers = {}
@@ -105,9 +106,13 @@ class Actor:
         self.uri = None
 
     def advertise(self, master, fields):
-        """Register a topic; `fields` holds topic, type, md5sum, definition, latching."""
+        """Register a topic; `fields` holds topic, type, md5sum, definition, latching.
+
+        `known_as` is the node that subscribers are told of, in place of this one.
+        """
+        known_as = fields.pop("known_as", self.caller_id)
         channel = self._wire.channel(callerid=self.caller_id, **fields)
-        self.topics[fields["topic"]] = _Topic(fields, channel)
+        self.topics[fields["topic"]] = _Topic(fields, channel, known_as)
         master.registerPublisher(self.caller_id, fields["topic"], fields["type"], self.uri)
 
     def serve(self, master, fields):
@@ -155,7 +160,7 @@ class Actor:
             write_header(sock, {"error": problem})
             sock.close()
             return
-        write_header(sock, dict(topic.header, callerid=self.caller_id))
+        write_header(sock, topic.header)
         subscriber = str(header.get("callerid", ""))
         sock.allow(None, 0)
         sock.setblocking(False)

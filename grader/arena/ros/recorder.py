@@ -41,7 +41,7 @@ class Recorder:
     def __init__(self, loop, wire, caller_id, limits, *, guard, own_ports):
         self.loop = loop
         self.wire = wire
-        self._caller_id = caller_id
+        self.caller_id = caller_id
         self._guard = guard
         self._own_ports = own_ports
         self._budget = Budget(limits)
@@ -145,15 +145,15 @@ class Recorder:
             api = slave_api(caller_api, max(0.05, deadline - time.monotonic()))
         except ValueError as error:
             raise ProtocolError(str(error)) from error
-        protocol = call(api.requestTopic, self._caller_id, topic, [["TCPROS"]])
+        protocol = call(api.requestTopic, self.caller_id, topic, [["TCPROS"]])
         if not isinstance(protocol, list) or len(protocol) != 3 or not isinstance(protocol[2], int):
             raise ProtocolError("no TCPROS offered")
         port = protocol[2]
         if port in self._own_ports:
             raise ProtocolError("a port of the grader's")
-        sock, header = self._subscribe(self._caller_id, topic, port, deadline - time.monotonic())
+        sock, header = self._subscribe(self.caller_id, topic, port, deadline - time.monotonic())
         try:
-            self._subscribe(self._caller_id + KNOCK, topic, port, deadline - time.monotonic())[0].close()
+            self._subscribe(self.caller_id + KNOCK, topic, port, deadline - time.monotonic())[0].close()
         except ProtocolError:
             sock.close()
             raise
@@ -183,7 +183,7 @@ class Recorder:
             latching = False
             with contextlib.suppress(ProtocolError):  # then no one knows
                 sock, header = self._subscribe(
-                    self._caller_id + KNOCK, connection.topic, connection.port, LATCHING_S
+                    self.caller_id + KNOCK, connection.topic, connection.port, LATCHING_S
                 )
                 sock.close()
                 latching = header.get("latching") == "1"

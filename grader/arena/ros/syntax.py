@@ -191,11 +191,35 @@ def slips(tree):
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             found.append({"line": node.lineno, "kind": "input", "message": message})
     found += misspelt(tree)
+    found += rate_parameters(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
     if published is not None and counts(tree) and not knows_time(tree):
         message = "the script counts, and reads no clock"
         found.append({"line": published.lineno, "kind": "no-clock", "message": message})
     return sorted(found, key=lambda slip: slip["line"])[:SLIPS_LIMIT]
+
+
+def rate_parameters(tree):
+    """Loops whose rate is a parameter that is read there, or given to a name once, with the parameter as written."""
+    bound = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign) and len(node.targets) == 1:
+            bound.setdefault(ast.dump(node.targets[0]).replace("Store()", "Load()"), []).append(node.value)
+    for node in ast.walk(tree):
+        if is_call(node, "Rate") and node.args:
+            values = bound.get(ast.dump(node.args[0]), [node.args[0]])
+            name = read_parameter(values[0]) if len(values) == 1 else None
+            if name:
+                yield {"line": values[0].lineno, "kind": "rate-parameter", "message": name[:TEXT_LIMIT]}
+
+
+def read_parameter(node):
+    """The name in `get_param('name')`, also within `float(…)`."""
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
+        node = node.args[0] if node.func.id in ("float", "int") else node
+    if is_call(node, "get_param") and node.args and isinstance(node.args[0], ast.Constant):
+        return node.args[0].value if isinstance(node.args[0].value, str) else None
+    return None
 
 
 def misspelt(tree):

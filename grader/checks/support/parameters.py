@@ -17,7 +17,7 @@ from grader.checks.support.processes import early_end
 from grader.checks.support.text import near_names
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
-from grader.model.package import PackageFacts
+from grader.model.package import LaunchParam, PackageFacts
 from grader.wording import join_words
 
 SYSTEM = (
@@ -81,6 +81,19 @@ def params_on_server(
         if (until_ns is None or at_ns <= until_ns) and by(event.caller_id):
             _apply(found, event)
     return found
+
+
+def resolved_param(name: str, node: str) -> str:
+    """Return the whole name of a parameter that a node reads by this one: `~rate`, `rate` or `/rate`."""
+    if name.startswith("~"):
+        return f"{node}/{name.lstrip('~/')}"
+    return absolute_name(name if name.startswith("/") else f"{node.rpartition('/')[0]}/{name}")
+
+
+def where_given(package: PackageFacts, name: str) -> LaunchParam | None:
+    """Return the `<param>` of the package's launch files that gives a parameter; None where it is another's doing."""
+    given = (param for launch in package.launch_files for param in launch.params)
+    return next((param for param in given if absolute_name(param.name) == name), None)
 
 
 def without_system_params(found: Mapping[str, Any]) -> dict[str, Any]:

@@ -57,7 +57,7 @@ def _judge_one(rubric: LoadedRubric, fitting: bool, folder: Path) -> Judged:
     try:
         runs = load_evidence([folder])
         runs = fitting_runs(lab, runs) if fitting else runs
-        criteria = judge(lab, runs, rubric.checks)
+        criteria = judge(lab, runs, rubric.checks, rubric.handed_out)
     except GraderError as error:
         return Judged(folder=folder, criteria=None, error=error.message, hint=error.hint)
     except Exception as error:  # noqa: BLE001 - whatever it is, the others are judged

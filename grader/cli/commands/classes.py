@@ -342,10 +342,11 @@ def similar(
     with loading():
         from grader.classes.similarity import compare, write_similarity
         from grader.cli.output import say_json
-        from grader.cli.similarity import print_similarity, submissions_in
+        from grader.cli.similarity import print_similarity, starter_of, submissions_in
         from grader.portable import cores
     folders, names, groups = submissions_in(folder)
-    found = compare(folders, starter=list(starter), groups=groups, threshold=threshold / 100, jobs=cores())
+    given = [*starter, *starter_of(folder)]
+    found = compare(folders, starter=given, groups=groups, threshold=threshold / 100, jobs=cores())
     written = write_similarity(found, folder, names)
     if as_json:
         say_json(found.model_dump(mode="json", by_alias=True))

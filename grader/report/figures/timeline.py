@@ -18,7 +18,7 @@ PARTS = 400
 """Messages that are nearer to each other than such a part of the run are drawn as one stretch."""
 SAYS_LETTERS = 120
 ROSOUT = "rosout"
-QUIET = frozenset({"clock", "interrupt", "open", "note", "lookup"})
+QUIET = frozenset({"clock", "interrupt", "open", "note", "left", "lookup"})
 
 
 def timeline_of(run: Run) -> TimelineFigure | None:
