@@ -9,6 +9,7 @@ from pydantic import Field
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.exit_causes import explain_early_end, explain_error
+from grader.checks.support.idioms import action_client, service_client
 from grader.checks.support.lateness import excused, why_late
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import lives
@@ -179,8 +180,8 @@ def _clients(run: Run) -> dict[str, str]:
 
 def _call(run: Run, service: str) -> str:
     if any(f"{service}/status" in event.publishers for _, event in run.graph):
-        return f"actionlib.SimpleActionClient('{service}', <Type>).send_goal(…)"
-    return f"rospy.ServiceProxy('{service}', <Type>)(…)"
+        return action_client(service)
+    return service_client(service)
 
 
 def _unless_over(verdict: Verdict, run: Run) -> Verdict:

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from grader.checks.registry import check
 from grader.checks.support.counters import (
+    LOST_GAP_SHARE,
     Count,
     Step,
     WrapParams,
@@ -40,6 +41,8 @@ class StartParams(Record):
     """The topic, with its slash: `/chatter`."""
     start: int = 0
     """The first value that the counter has to publish."""
+    rate_hz: Annotated[float, Field(gt=0)] = 10.0
+    """The nominal rate, to know a flood of messages from a counter."""
 
 
 class StepParams(Record):
@@ -67,8 +70,9 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
         one at the start is off by one for ever.
 
     How it is measured
-        The recorder is connected before the publisher's registration returns, so the first message is never
-        missed.
+        The recorder is connected before the publisher's registration returns, so the first message is not
+        missed. A later value counts only if it is seen twice where there was time for those before it, and not at
+        all in a flood, whose first values the publisher itself may drop.
 
     How to fix
         Set the counter before the loop, publish it, and only then add one. `rostopic echo <topic>`, started
@@ -96,9 +100,21 @@ def _start(first: Count, run: Run, params: StartParams) -> Verdict:
         message = f"the recorder missed the first messages on {params.topic}"
         return inconclusive(message, hint="grade again")
     hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
-    return failed(
-        f"the first value on {params.topic} is {significant(first.values[0])}, not {params.start}", hint=hint
-    )
+    message = f"the first value on {params.topic} is {significant(first.values[0])}, not {params.start}"
+    if first.values[0] > params.start and first.is_flood(run, params.rate_hz):
+        why = f"{message}; but its node floods its topics, and a publisher's queue drops values of a flood"
+        return inconclusive(why, hint="grade again")
+    verdict = failed(message, hint=hint)
+    return verdict.once() if _may_follow_others(run, first, params) else verdict
+
+
+def _may_follow_others(run: Run, first: Count, params: StartParams) -> bool:
+    """Return whether there was time for the values from the start on, between the registration and the first one."""
+    registered = _registered_ns(run, params.topic, first.callerid)
+    missing = first.values[0] - params.start
+    if registered is None or missing <= 0:
+        return False
+    return first.times_ns[0] - registered >= LOST_GAP_SHARE * missing * first.period_ns
 
 
 @check("counter-step", params=StepParams, messages_only=True, heeds_losses=True)
@@ -197,9 +213,13 @@ def missed_the_first(run: Run, topic: str, first: Count) -> bool:
     return first.sequences[0] > 0 or _recorder_was_late(run, topic, first.callerid)
 
 
+def _registered_ns(run: Run, topic: str, callerid: str) -> int | None:
+    return min((t for t, e in run.graph if callerid in e.publishers.get(topic, ())), default=None)
+
+
 def _recorder_was_late(run: Run, topic: str, callerid: str) -> bool:
     """It was connected more than the second later that `registerPublisher` waits for it."""
-    registered = min((t for t, e in run.graph if callerid in e.publishers.get(topic, ())), default=None)
+    registered = _registered_ns(run, topic, callerid)
     events = ((t, e) for t, e in run.recorder if e.topic == topic and e.callerid == callerid)
     connected = min((t for t, e in events if e.event == "connected"), default=None)
     return registered is not None and connected is not None and connected - registered > CONNECT_NS

@@ -94,7 +94,10 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
         verdict = (
             _error(run, one, source.path)
             or (_missing(found, missing, source.path, package, build) if missing else None)
-            or passed(f"{source.path} loads and sets {join_words(wanted)}", hint=moved)
+            or passed(
+                f"{source.path} loads and sets {join_words(wanted)}",
+                hint="; ".join(filter(None, (moved, _shadowed(source.path, _keys_of(build, source.path))))),
+            )
         )
     measured = f"on the server: {join_words(found)}" if found else "nothing on the server"
     cited: tuple[Citation, ...] = (cite(run, "/grader/param"),)
@@ -170,9 +173,7 @@ def _readers(package: PackageFacts, build: Run, name: str, not_below: str) -> It
 
 def _given_twice(name: str, path: str, keys: tuple[Key, ...]) -> Verdict | None:
     """A map that is begun a second time: YAML keeps only the last."""
-    lines: dict[str, list[int]] = {}
-    for key in keys:
-        lines.setdefault(key.path, []).append(key.line)
+    lines = _lines_of(keys)
     above = next((k for k, at in lines.items() if len(at) > 1 and f"{name}/".startswith(f"{k}/")), None)
     if above is None:
         return None
@@ -182,6 +183,25 @@ def _given_twice(name: str, path: str, keys: tuple[Key, ...]) -> Verdict | None:
     message = f"{path} has `{last}:` {where}, and only the last one counts: there is no {name}"
     hint = f"delete line {second}, and put what stands below it under the `{last}:` of line {first}"
     return failed(message, hint=hint, citations=(FileCitation(file=path, line=second),))
+
+
+def _lines_of(keys: tuple[Key, ...]) -> dict[str, list[int]]:
+    """Return the lines in which each name of a file is given."""
+    lines: dict[str, list[int]] = {}
+    for key in keys:
+        lines.setdefault(key.path, []).append(key.line)
+    return lines
+
+
+def _shadowed(path: str, keys: tuple[Key, ...]) -> str:
+    """Return the advice where a name is given twice: YAML keeps only the last, and says nothing."""
+    twice = next(((name, at) for name, at in _lines_of(keys).items() if len(at) > 1), None)
+    if twice is None:
+        return ""
+    name, lines = twice
+    return (
+        f"{path} gives {name} in line {lines[0]} and again in line {lines[-1]}, and only the last one counts"
+    )
 
 
 def _column(name: str, shallow: str, keys: tuple[Key, ...]) -> str:
@@ -452,7 +472,7 @@ class ParamValueParams(Record):
 
 
 @check("param-value", params=ParamValueParams)
-def param_value(package: PackageFacts, run: Run, params: ParamValueParams) -> Verdict:
+def param_value(package: PackageFacts, build: Run, run: Run, params: ParamValueParams) -> Verdict:
     """The parameter has its value.
 
     What it checks
@@ -475,7 +495,7 @@ def param_value(package: PackageFacts, run: Run, params: ParamValueParams) -> Ve
     verdict = (
         _not_there(package, run, without_system_params(held), params)
         if got is MISSING
-        else _judged(got, params)
+        else _given_before(package, build, params, got) or _judged(got, params)
     )
     cited = cite(run, "/grader/param")
     return verdict.about(
@@ -483,6 +503,23 @@ def param_value(package: PackageFacts, run: Run, params: ParamValueParams) -> Ve
         measured=verdict.measured or ("not set" if got is MISSING else shown(value_text(got))),
         citations=(*verdict.citations, cited),
     )
+
+
+def _given_before(package: PackageFacts, build: Run, params: ParamValueParams, got: object) -> Verdict | None:
+    """Return the loss where a YAML file gives the right value, and another one for the same name below it."""
+    for file in (f.path for f in package.files if f.path.endswith((".yaml", ".yml"))):
+        text = _text_of(build, file).splitlines()
+        keys = [key for key in _keys_of(build, file) if absolute_name(params.name).endswith(key.path)]
+        values = [
+            text[key.line - 1].partition(":")[2].partition(" #")[0].strip().strip("'\"") for key in keys
+        ]
+        if len(values) < 2 or len({key.path for key in keys}) > 1 or values[-1] != str(got):
+            continue
+        if values[0] == str(params.value) != values[-1]:
+            last = keys[-1].line
+            place = FileCitation(file=file, line=last)
+            return failed(_shadowed(file, tuple(keys)), hint=f"delete line {last}", citations=(place,))
+    return None
 
 
 def _until_ns(run: Run) -> int:

@@ -143,7 +143,9 @@ def test_slips_are_found_and_named(tmp_path):
     ],
 )
 def test_a_rate_that_is_a_parameter_is_known(tmp_path, rate, found):
-    text = f"import rospy\nhz = rospy.get_param('hz')\nrate = {rate}\nother = rospy.get_param('a')\nother = 3\n"
+    text = (
+        f"import rospy\nhz = rospy.get_param('hz')\nrate = {rate}\nother = rospy.get_param('a')\nother = 3\n"
+    )
     (tmp_path / "a.py").write_text(text)
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [(s.message, s.line) for s in slips if s.kind == "rate-parameter"] == found

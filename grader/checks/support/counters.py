@@ -28,6 +28,7 @@ STUCK_COUNT = 5
 LEAST_AFTER_START = 3
 LOST_GAP_SHARE = 0.75
 """Of the time that lost values would have taken: a longer gap is a machine that stood still for longer."""
+STALL_PERIODS = 2
 SILENT_PERIODS = 20
 SILENT_NS = 500_000_000
 
@@ -93,14 +94,18 @@ class Count(Record):
     def lost_on_the_way(self, step: Step, jump: float) -> bool:
         """Return whether `jump - 1` values between these two were published and did not arrive.
 
-        The recording says so, or the time between them fits: then it was the transport or the host. A jump in
-        normal time, or one that comes again and again, is the program's.
+        The recording says so, or the time between them fits, or that of a stall just before: a process that the host
+        has stopped goes on with what its queue has kept. Then it was the transport or the host. A jump in normal time,
+        or one that comes again and again, is the program's.
         """
         if step.lost_messages:
             return True
         if jump < 2 or self.period_ns <= 0 or self._comes_again(step):
             return False
-        return (step.to_ns - step.from_ns) / self.period_ns / jump >= LOST_GAP_SHARE
+        before = self.steps[step.number - 2] if step.number > 1 else step
+        stall = (before.to_ns - before.from_ns) / self.period_ns
+        gap = (step.to_ns - step.from_ns) / self.period_ns
+        return gap / jump >= LOST_GAP_SHARE or (before.change == 1 and STALL_PERIODS <= jump <= stall)
 
     def is_single(self, steps: Sequence[Step]) -> bool:
         """Return whether these are jumps that one run's timing could have made: few, and none that comes again."""

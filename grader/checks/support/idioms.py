@@ -61,6 +61,19 @@ def service_call(name: str, python: str = "…") -> str:
     return both(f"rospy.Service('{name}', {python})", f'nh.advertiseService("{name}", callback)')
 
 
+def service_client(name: str) -> str:
+    """Return what calls the service."""
+    return both(f"rospy.ServiceProxy('{name}', <Type>)(…)", f'nh.serviceClient<…>("{name}").call(…)')
+
+
+def action_client(name: str) -> str:
+    """Return what sends a goal to the action."""
+    return both(
+        f"actionlib.SimpleActionClient('{name}', <Type>).send_goal(…)",
+        f'actionlib::SimpleActionClient<…>("{name}").sendGoal(…)',
+    )
+
+
 def imports(package: str, name: str, folder: str) -> str:
     """Return the line that makes a type known: `folder` is `msg` or `srv`."""
     return both(f"from {package}.{folder} import {name}", f'#include "{package}/{name}.h"')
