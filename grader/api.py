@@ -81,9 +81,9 @@ def grade(
 ) -> GradingResult:
     """Grade one submission, as `grader grade` does: build it, run it, record it, judge the recording, write reports.
 
-    `source` is a folder, an archive (`.zip`, `.tar.*`), a recording (`.bag`, `.mcap`) or a git URL with an optional
-    `@ref`. `rubric` is what `load_rubric` takes or returns. Results go to `out/<submission id>/` and replace older
-    ones; missing folders are made. `submission_id` is by default made from `source`.
+    `source` is a folder, an archive (`.zip`, `.tar.*`), a recording (`.bag`, `.mcap`, `.db3`) or a git URL with an
+    optional `@ref`. `rubric` is what `load_rubric` takes or returns. Results go to `out/<submission id>/` and
+    replace older ones; missing folders are made. `submission_id` is by default made from `source`.
     `package` is the name of the package to grade, whatever the rubric calls it.
 
     `sandbox`: `auto` confines students' code where this machine can, `require` raises SandboxMissing (a HostError)
@@ -123,9 +123,9 @@ def grade(
 def judge(evidence: StrPath | Sequence[StrPath], rubric: StrPath | LoadedRubric) -> GradingResult:
     """Judge what was recorded before, as `grader judge` does: nothing is run or written, and no ROS is needed.
 
-    `evidence` is a folder of results, its `evidence/`, or files (`.mcap`, `.bag`) of one submission. The same evidence
-    and rubric always give an equal result, apart from `environment`, which names this grader and Python; its `criteria`
-    are those that `grade` returns. It holds no overrides and no late penalty, and all its times are 0.
+    `evidence` is a folder of results, its `evidence/`, or files (`.mcap`, `.bag`, `.db3`) of one submission. The same
+    evidence and rubric always give an equal result, apart from `environment`, which names this grader and Python; its
+    `criteria` are those that `grade` returns. It holds no overrides and no late penalty, and all its times are 0.
 
     `submission` is what the evidence says of it; for another tool's recording, the file's name.
 

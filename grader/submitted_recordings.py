@@ -70,12 +70,12 @@ def _check(path: Path) -> None:
 
 
 def _suffix(path: Path) -> str:
-    """Return `.bag` or `.mcap`, by which evidence is found."""
+    """Return `.bag`, `.mcap` or `.db3`, by which evidence is found."""
     suffix = path.suffix.casefold()
     if suffix in SUFFIXES:
         return suffix
     with path.open("rb") as file:
-        return ".mcap" if file.read(5) == b"\x89MCAP" else ".bag"
+        return {b"\x89MCAP": ".mcap", b"SQLit": ".db3"}.get(file.read(5), ".bag")
 
 
 def _copy(path: Path, target: Path) -> Path:

@@ -22,8 +22,8 @@ from grader.cli.parser import build_parser, commands, options, value_of
 Completer = Callable[..., Mapping[str, str]]
 """Called with `prefix` and `parsed_args`; returns values, each with a description or ""."""
 RUBRICS = (".yaml", ".yml")
-ARCHIVES = (".bag", ".mcap", ".tar", ".tar.bz2", ".tar.gz", ".tar.xz", ".tgz", ".zip")
-RECORDINGS = (".bag", ".mcap")
+ARCHIVES = (".bag", ".mcap", ".db3", ".tar", ".tar.bz2", ".tar.gz", ".tar.xz", ".tgz", ".zip")
+RECORDINGS = (".bag", ".mcap", ".db3")
 DESCRIPTION_CHARS = 80
 
 

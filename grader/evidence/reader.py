@@ -1,4 +1,4 @@
-"""Read evidence files into `Run`s: the grader's own, and MCAP or bag files that other tools recorded from ROS."""
+"""Read evidence files into `Run`s: the grader's own, and recordings of other tools (MCAP, bags)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from zstandard import ZstdError
 
 from grader.errors import EvidenceError
 from grader.evidence.container import MAX_FILE_BYTES, ContainerError, records
-from grader.evidence.definitions import DefinitionError
 from grader.evidence.events import FIELDS, METADATA_NAME, PACKAGE_TOPIC, TOPICS
 from grader.evidence.memory_budget import LESS, BudgetExceeded, MemoryBudget
 from grader.evidence.run import OTHER_RUNS, Channel, Message, Run, merge_channels
@@ -30,9 +29,10 @@ MAX_CHANNELS = 4_096
 NAMES_SHOWN = 5
 NAME_CHARS_SHOWN = 80
 READ = {str(number) for number in range(1, EVIDENCE.version + 1)}
-SUFFIXES = {".mcap", ".bag"}
+SUFFIXES = {".mcap", ".bag", ".db3"}
 MAGIC = b"\x89MCAP0\r\n"
 BAG_MAGIC = b"#ROSBAG V"
+SQLITE_MAGIC = b"SQLite format 3\0"
 SCHEMAS = {"ros1": "ros1msg", "cdr": "ros2msg"}
 """By the encoding of messages, that of their definitions: of ROS 1, and of ROS 2."""
 _DAMAGE = (
@@ -59,12 +59,16 @@ def load_run(source: Path | BinaryIO, budget: MemoryBudget | None = None) -> Run
         name = Path(str(getattr(source, "name", "evidence.mcap"))).name
         return _load(name, BytesIO(source.read(MAX_FILE_BYTES + 1)), budget)
     with _readable(source), source.open("rb") as file:
-        head = file.read(len(BAG_MAGIC))
+        head = file.read(len(SQLITE_MAGIC))
         file.seek(0)
-        if head == BAG_MAGIC:
+        if head.startswith(BAG_MAGIC):
             from grader.evidence.bag import load_bag  # noqa: PLC0415 - few submissions hold a bag
 
             return load_bag(source, budget)
+        if head == SQLITE_MAGIC:
+            from grader.evidence.rosbag2 import load_rosbag2  # noqa: PLC0415 - few submissions hold one
+
+            return load_rosbag2(source, budget)
         return _load(source.name, file, budget, shown=str(source))
 
 
@@ -80,9 +84,9 @@ def load_recording(name: str, data: bytes) -> Run:
 def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
     """Read the runs of these files by scenario; a folder stands for its recordings and those of `evidence/` in it.
 
-    Recordings are `*.mcap` and `*.bag`. What a repaired copy or a repeated run showed has its folder before its name:
-    `repaired-1/talker`. Raises EvidenceError where nothing is found, a file cannot be read, another tool's recording is
-    empty, or two files hold the same scenario.
+    Recordings are `*.mcap`, `*.bag` and `*.db3`. What a repaired copy or a repeated run showed has its folder before
+    its name: `repaired-1/talker`. Raises EvidenceError where nothing is found, a file cannot be read, another tool's
+    recording is empty, or two files hold the same scenario.
     """
     runs: dict[str, Run] = {}
     origin: dict[str, Path] = {}
@@ -146,8 +150,6 @@ def _damage(stream: BinaryIO) -> tuple[str, str]:
     tail = stream.read()
     if head.startswith(b"version https://git-lfs"):
         return "only a pointer of Git LFS, the recording itself is not here", "`git lfs pull` fetches it"
-    if head.startswith(b"SQLite format 3"):
-        return "a bag of ROS 2 in SQLite, and this grader reads those in MCAP", "`ros2 bag convert` makes one"
     again = "record it again, or copy it again"
     if not head.startswith(MAGIC[:5]):
         return "not an MCAP file and not a bag", again
@@ -179,7 +181,7 @@ def _files(paths: Iterable[Path]) -> list[Path]:
         inside = _recordings(path) if path.is_dir() else [path]
         if not inside:
             raise EvidenceError(
-                f"{path}: no evidence (*.mcap, *.bag) in this folder or in evidence/ below it"
+                f"{path}: no evidence (*.mcap, *.bag, *.db3) in this folder or in evidence/ below it"
             )
         for file in inside:
             found.setdefault(file.resolve(), file)
@@ -344,21 +346,9 @@ class _RunBuilder:
 
     def _ros2_channel(self, number: int, channel: mcap.Channel) -> Channel:
         """The same, with its messages as ROS 1's."""
-        from grader.evidence import ros2  # noqa: PLC0415 - few submissions hold one
+        from grader.evidence.ros2 import as_ros1  # noqa: PLC0415 - few submissions hold one
 
-        found = self._ros_channel(number, channel)
-        try:
-            definition = ros2.ros1_definition(found.type, found.definition)
-        except DefinitionError:
-            definition = found.definition  # then none of its messages can be read
-        data = ros2.ros1_messages(found.type, definition, [message.data for message in found.messages])
-        told = zip(found.messages, data, strict=True)
-        return replace(
-            found,
-            definition=definition,
-            latching=ros2.is_latched(channel.metadata.get("offered_qos_profiles", "")),
-            messages=tuple(message._replace(data=one) for message, one in told),
-        )
+        return as_ros1(self._ros_channel(number, channel), channel.metadata.get("offered_qos_profiles", ""))
 
     def _json(self, topic: str) -> list[Message]:
         """Messages on the grader's own channel; one of that name that a node published is no JSON channel."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
-from grader.evidence.definitions import sections_of
+from grader.evidence.definitions import DefinitionError, sections_of
+from grader.evidence.run import Channel
 
 OWN_TYPES = {
     "byte": "uint8",
@@ -62,6 +64,22 @@ def ros1_messages(type_: str, definition: str, data: list[bytes]) -> list[bytes]
 
     decoder = Decoder(type_, definition)
     return [decoder.from_cdr(one) for one in data]
+
+
+def as_ros1(channel: Channel, qos_profiles: str) -> Channel:
+    """Return a channel of ROS 2, with its definition as `ros2msg` and messages in CDR, as one of ROS 1."""
+    try:
+        definition = ros1_definition(channel.type, channel.definition)
+    except DefinitionError:
+        definition = channel.definition  # then none of its messages can be read
+    data = ros1_messages(channel.type, definition, [message.data for message in channel.messages])
+    told = zip(channel.messages, data, strict=True)
+    return replace(
+        channel,
+        definition=definition,
+        latching=is_latched(qos_profiles),
+        messages=tuple(message._replace(data=one) for message, one in told),
+    )
 
 
 def is_latched(qos_profiles: str) -> bool:

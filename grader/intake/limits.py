@@ -11,12 +11,12 @@ from grader.intake.tree import MAX_DEPTH, too_deep
 # What is not run and not read: pictures, models, data, archives.
 NO_CODE = frozenset(
     (
-        ".avi", ".bag", ".bak", ".bz2", ".csv", ".dae", ".db", ".gif", ".gz", ".h5", ".jpeg", ".jpg", ".key", ".log",
-        ".mcap", ".md", ".mp4", ".npy", ".npz", ".obj", ".onnx", ".pcd", ".pdf", ".pem", ".pgm", ".ply", ".png", ".pt",
-        ".pth", ".pyc", ".sqlite", ".stl", ".svg", ".swp", ".tar", ".webm", ".xz", ".zip",
+        ".avi", ".bag", ".bak", ".bz2", ".csv", ".dae", ".db", ".db3", ".gif", ".gz", ".h5", ".jpeg", ".jpg", ".key",
+        ".log", ".mcap", ".md", ".mp4", ".npy", ".npz", ".obj", ".onnx", ".pcd", ".pdf", ".pem", ".pgm", ".ply", ".png",
+        ".pt", ".pth", ".pyc", ".sqlite", ".stl", ".svg", ".swp", ".tar", ".webm", ".xz", ".zip",
     )
 )  # fmt: skip
-_RECORDINGS = (".bag", ".mcap")
+_RECORDINGS = (".bag", ".mcap", ".db3")
 # A file takes whole blocks of a disk, however little is in it.
 _BLOCK_BYTES = 4096
 
@@ -26,7 +26,7 @@ class IntakeLimits:
     """Of an archive: `packed_bytes` as it is handed in, `stream_bytes` that come out of a packed tar, kept or not.
 
     Of an archive or a commit: `entries`, and `total_bytes` on this machine's disk. A file of more than `file_bytes`
-    (`recording_bytes` for a bag or MCAP) is left out, and so are pictures, models and data once they are more than
+    (`recording_bytes` for a recording) is left out, and so are pictures, models and data once they are more than
     `material_bytes` together, and the largest files of a package of more than `package_bytes`, which is copied twice.
     `links` have a relative target: each is followed to see where it leads.
     """

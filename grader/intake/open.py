@@ -31,7 +31,7 @@ from grader.model.submission import RecordedSubmission, SourcePackage, Submissio
 
 _OTHERS_AT_MOST = 200
 _SUFFIX = re.compile(r"\.(bag|bag\.active|bag\.orig|mcap|db3)$", re.IGNORECASE)
-_MAGIC = (b"#ROSBAG V", b"\x89MCAP0\r\n")
+_MAGIC = (b"#ROSBAG V", b"\x89MCAP0\r\n", b"SQLite format 3\0")
 
 
 _AnySubmission = TypeVar("_AnySubmission", Submission, RecordedSubmission)

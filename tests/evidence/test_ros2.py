@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 from mcap.writer import Writer
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from grader.errors import EvidenceError
 from grader.evidence.decode import Decoder
 from grader.evidence.reader import load_run
 from grader.evidence.ros2 import is_latched, ros1_definition, ros1_messages
@@ -143,3 +149,97 @@ def test_definitions_that_cannot_be_followed_leave_the_messages_unread(tmp_path:
 def test_what_keeps_its_last_message() -> None:
     assert is_latched("- history: 1\n  durability: transient_local\n")
     assert not is_latched("- history: 1\n  durability: 2\n")
+
+
+KEPT = Qos(
+    QosHistory.KEEP_LAST,
+    1,
+    QosReliability.RELIABLE,
+    QosDurability.TRANSIENT_LOCAL,
+    QosTime(0, 0),
+    QosTime(0, 0),
+    QosLiveliness.AUTOMATIC,
+    QosTime(0, 0),
+    avoid_ros_namespace_conventions=False,
+)
+
+
+def rosbag2(folder: Path, version: int, *, own: bool = True) -> Path:
+    """Write a bag as `ros2 bag record` does by default (SQLite), and return the `.db3` file of it."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    store.register(get_types_from_msg(PLAIN, "lab/msg/Reading"))
+    with Rosbag2Writer(folder, version=version, storage_plugin=StoragePlugin.SQLITE3) as bag:  # type: ignore[arg-type]
+        chatter = bag.add_connection("/chatter", "std_msgs/msg/String", typestore=store)
+        for i in (2, 0, 1):  # the file's order is not that of time
+            bag.write(chatter, 1_700_000_000_000_000_000 + i * 100_000_000, text_message(f"hello {i}"))
+        if own:
+            reading = bag.add_connection(
+                "/map", "lab/msg/Reading", typestore=store, offered_qos_profiles=[KEPT]
+            )
+            bag.write(reading, 1_700_000_000_000_000_000, own_message())
+    (file,) = folder.glob("*.db3")
+    return file
+
+
+def test_a_bag_of_ros_2_in_sqlite(tmp_path: Path) -> None:
+    file = rosbag2(tmp_path / "lab", 9)
+    run = load_run(file)
+    chatter, reading = run.student_channels()
+    assert (run.foreign, run.scenario, run.end_ns - run.start_ns) == (True, file.stem, 200_000_000)
+    assert (chatter.type, chatter.data) == ("std_msgs/String", ("hello 0", "hello 1", "hello 2"))
+    assert (reading.type, reading.values, reading.latching) == ("lab/Reading", (VALUE,), True)
+
+
+def test_a_bag_without_definitions_holds_ros_2s_own_types(tmp_path: Path) -> None:
+    file = rosbag2(tmp_path / "own", 9, own=False)
+    change(file, "DROP TABLE message_definitions")
+    assert [c.data for c in load_run(file).channels] == [("hello 0", "hello 1", "hello 2")]
+
+
+def test_a_type_without_any_definition_is_refused(tmp_path: Path) -> None:
+    file = rosbag2(tmp_path / "lab", 9)
+    change(file, "DROP TABLE message_definitions")
+    with pytest.raises(EvidenceError, match="no definition of 'lab/msg/Reading' in it"):
+        load_run(file)
+
+
+def change(file: Path, *statements: str) -> None:
+    with closing(sqlite3.connect(file)) as bag:
+        for statement in statements:
+            bag.execute(statement)
+        bag.commit()
+
+
+ENDLESS = "CREATE VIEW messages(topic_id, timestamp, data) AS "
+ENDLESS += "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i, i, x'' FROM n"
+
+
+@pytest.mark.parametrize(
+    "statements",
+    [
+        ["DROP TABLE messages"],
+        ["DROP TABLE topics"],
+        ["UPDATE messages SET data = 'text'"],
+        ["UPDATE messages SET timestamp = 'soon'"],
+        ["ALTER TABLE topics RENAME COLUMN type TO kind"],
+        ["DROP TABLE messages", ENDLESS],
+        [
+            "DROP TABLE messages",
+            "CREATE TABLE messages(topic_id, timestamp, data GENERATED ALWAYS AS (zeroblob(900000000)))",
+            "INSERT INTO messages VALUES(1, 1)",
+        ],
+        ["DROP TABLE messages", "CREATE VIRTUAL TABLE messages USING fts4(topic_id, timestamp, data)"],
+    ],
+)  # fmt: skip
+def test_a_hostile_or_damaged_bag_is_refused(tmp_path: Path, statements: list[str]) -> None:
+    file = rosbag2(tmp_path / "lab", 9, own=False)
+    change(file, *statements)
+    with pytest.raises(EvidenceError, match="a bag of ROS 2 in SQLite, damaged"):
+        load_run(file)
+
+
+def test_a_bag_that_is_cut_short_is_refused(tmp_path: Path) -> None:
+    file = rosbag2(tmp_path / "lab", 9)
+    file.write_bytes(file.read_bytes()[:5_000])
+    with pytest.raises(EvidenceError, match="a bag of ROS 2 in SQLite, damaged or cut short"):
+        load_run(file)

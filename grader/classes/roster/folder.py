@@ -14,7 +14,7 @@ from grader.intake.names import archive_stem, encodable, is_archive_name, listin
 from grader.model.batch import Entry, Roster
 
 IGNORED = {"__MACOSX", "Thumbs.db", "desktop.ini"}
-RECORDINGS = (".bag", ".mcap")
+RECORDINGS = (".bag", ".mcap", ".db3")
 
 
 def from_folder(folder: Path, local: Local) -> Roster:

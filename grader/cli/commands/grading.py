@@ -106,7 +106,8 @@ def judge(
     evidence: Annotated[
         Sequence[Path],
         Argument(
-            "EVIDENCE", ".mcap and .bag files, folders of them, or a folder of results with every submission"
+            "EVIDENCE",
+            ".mcap, .bag and .db3 files, folders of them, or a folder of results with every submission",
         ),
     ],
     rubric: Annotated[str, RUBRIC],
@@ -131,7 +132,7 @@ def judge(
 @command("inspect")
 def inspect(
     *,
-    file: Annotated[Path, Argument("FILE", "an .mcap or .bag file")],
+    file: Annotated[Path, Argument("FILE", "an .mcap, .bag or .db3 file")],
     as_json: JsonFlag = False,
 ) -> ExitCode:
     """Show what is in an evidence file or a bag: rates, gaps, nodes."""
