@@ -9,11 +9,7 @@ from pydantic import Field
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.exit_causes import explain_early_end, explain_error
-<<<<<<< HEAD
-from grader.checks.support.idioms import both, service_client
-=======
 from grader.checks.support.idioms import action_client, service_client
->>>>>>> main
 from grader.checks.support.lateness import excused, why_late
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import lives
@@ -184,12 +180,7 @@ def _clients(run: Run) -> dict[str, str]:
 
 def _call(run: Run, service: str) -> str:
     if any(f"{service}/status" in event.publishers for _, event in run.graph):
-<<<<<<< HEAD
-        cpp = f'actionlib::SimpleActionClient<…>("{service}").sendGoal(…)'
-        return both(f"actionlib.SimpleActionClient('{service}', <Type>).send_goal(…)", cpp)
-=======
         return action_client(service)
->>>>>>> main
     return service_client(service)
 
 
