@@ -126,6 +126,7 @@ class Session:
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
+            preexec_fn=_hears_interrupts,  # noqa: PLW1509 - it starts no thread and takes no lock
         )
 
     def _run(self, command: Command, *, any_code: bool) -> None:
@@ -142,6 +143,11 @@ class Session:
         told = f"$ {command.text}\n{output}\nstderr:\n{errors[-2000:]}\nended with {self._code}"
         assert any_code or self._code == 0, told
         assert pattern(shown).fullmatch(plain(output)), "not as printed:\n" + "\n".join(shown) + f"\n\n{told}"
+
+
+def _hears_interrupts() -> None:
+    """A shell's background job ignores Ctrl-C, and so would all that the tests start in one."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _interrupted(process: subprocess.Popen[str], until: re.Pattern[str]) -> tuple[str, str]:
