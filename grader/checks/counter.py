@@ -83,14 +83,15 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
     if not found:
         return _nothing(package, run, params.topic).about(expected=expected)
     first = found[0]
-    return _start(first, run, params).about(
+    return judge_start(first, run, params).about(
         expected=expected,
         measured=first_values(first.values),
         citations=(cite(run, params.topic, first.times_ns[0], first.times_ns[0]),),
     )
 
 
-def _start(first: Count, run: Run, params: StartParams) -> Verdict:
+def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:
+    """Judge the first value of the publisher that came first."""
     if begins_with(first, params.start):
         return passed(f"{params.topic} begins with {params.start}")
     if run.foreign:

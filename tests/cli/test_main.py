@@ -123,7 +123,9 @@ def test_judge_without_evidence_says_so(tmp_path, capsys):
         run(["judge", str(tmp_path), "--rubric", str(spoiled(tmp_path)), "--out", str(tmp_path / "x.json")])
         == 3
     )
-    assert capsys.readouterr().err.startswith(f"grader: error: {tmp_path}: no evidence (*.mcap, *.bag)")
+    assert capsys.readouterr().err.startswith(
+        f"grader: error: {tmp_path}: no evidence (*.mcap, *.bag, *.db3)"
+    )
     assert not (tmp_path / "x.json").exists()
 
 

@@ -6,7 +6,7 @@ import heapq
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
-from grader.checks.counter import StartParams, StepParams, begins_with, missed_the_first
+from grader.checks.counter import StartParams, StepParams, judge_start
 from grader.checks.listener import HearsParams
 from grader.checks.rate import RateParams, judged_rhythm, sleeps_explain, was_late
 from grader.checks.support.console_output import (
@@ -62,10 +62,9 @@ Mark = tuple[int, str]
 def start_figures(run: Run, params: StartParams) -> Iterator[CounterFigure]:
     """The beginning of the publisher that came first."""
     for count in counts(run, params.topic)[:1]:
-        right = begins_with(count, params.start) or run.foreign
-        known = right or missed_the_first(run, params.topic, count)
+        wrong = judge_start(count, run, params).status is Status.FAIL
         marks = (
-            [] if known else [(0, f"the first value is {significant(count.values[0])}, not {params.start}")]
+            [(0, f"the first value is {significant(count.values[0])}, not {params.start}")] if wrong else []
         )
         steps = [s for s in count.steps[:FIRST_VALUES] if s.change < -1]
         first = range(len(count.values))[:FIRST_VALUES]
