@@ -36,9 +36,9 @@ serve({
     "raised": (refuse, (KeyError,)),
     "hang": (loop, ()),
     "slow-in-c": (in_c, ()),
-    "memory": (lambda data: bytearray(b"x") * (80 << 20), ()),
+    "memory": (lambda data: bytearray(b"x") * (30 << 20), ()),
     "died": (lambda data: os._exit(7), ()),
-}, 0.3, 50 << 20)
+}, 0.3, 20 << 20)
 """
 
 
