@@ -1,4 +1,4 @@
-"""`make screenshots`: the pictures of the README, of a student's report and a class's page that are made for it.
+"""`make screenshots`: the README's pictures of a terminal, of a student's report and of a class's page.
 
 Two faults are put into a package, a class of fixtures gets made-up names, both are graded for real (ROS and Chromium
 have to be there), and `docs/images/` gets a picture of each.
@@ -18,6 +18,7 @@ from pathlib import Path
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from fixtures.make import declared, faulty_package
+from scripts.terminal_picture import draw_terminal
 from tests.browser.ground import chromium, missing
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -75,8 +76,10 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as temporary:
         folder = (options.keep or Path(temporary)).absolute()
         folder.mkdir(parents=True, exist_ok=True)
-        report, page = _student(folder), _class(folder, options.jobs)
         IMAGES.mkdir(parents=True, exist_ok=True)
+        report = _student(folder)
+        _draw_check(folder / "lab1")
+        page = _class(folder, options.jobs)
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
             _take_report(browser, report)
@@ -94,6 +97,15 @@ def _student(folder: Path) -> Path:
     return folder / "student" / "lab1" / "report.html"
 
 
+def _draw_check(package: Path) -> None:
+    """What its student sees in a terminal."""
+    program = (sys.executable, "-m", "grader", "check")
+    svg = draw_terminal("grader check", program, folder=package, environment={"PYTHONPATH": str(ROOT)})
+    path = IMAGES / "check.svg"
+    path.write_text(svg, encoding="utf-8")
+    _keep_small(path)
+
+
 def _class(folder: Path, jobs: str) -> Path:
     """The page of a class in which some faults are more frequent than others."""
     chance = random.Random(4)  # noqa: S311 - the same class each time
@@ -108,13 +120,17 @@ def _class(folder: Path, jobs: str) -> Path:
             source = CORRECT if kind < 0.3 else faulty_package(LAB, fault)
             name = f"{chance.choice(FIRST)} {chance.choice(LAST)}"
             rows.writerow([f"sc26{number:03}", source, name, f"Group {number % 6 + 1}"])
-    _grader("batch", roster.name, "--rubric", LAB, "--out", "class", "--jobs", jobs, within=folder)
+    faulty = faulty_package(LAB, OFTEN[0]).parent
+    allowed = ("--allow-local", str(CORRECT.parent), "--allow-local", str(faulty))
+    _grader("batch", roster.name, *allowed, "--rubric", LAB, "--out", "class", "--jobs", jobs, within=folder)
     return folder / "class" / "index.html"
 
 
 def _grader(*words: str, within: Path = ROOT) -> None:
-    """The exit code says that packages have faults; what else can go wrong leaves no page."""
-    subprocess.run([sys.executable, "-m", "grader", *words], cwd=within, check=False)
+    """Exit code 1 says that packages have faults."""
+    done = subprocess.run([sys.executable, "-m", "grader", *words], cwd=within, check=False)
+    if done.returncode > 1:
+        raise SystemExit(f"grader {words[0]} ended with {done.returncode}")
 
 
 def _take_report(browser: Browser, report: Path) -> None:
@@ -140,6 +156,10 @@ def _opened(browser: Browser, path: Path, width: int, height: int) -> Page:
 def _save(page: Page, name: str) -> None:
     path = IMAGES / name
     page.screenshot(path=path)
+    _keep_small(path)
+
+
+def _keep_small(path: Path) -> None:
     if path.stat().st_size > BYTES_MAX:
         raise SystemExit(f"{path} is larger than {BYTES_MAX} bytes")
     print(path)

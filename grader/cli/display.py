@@ -23,6 +23,7 @@ from rich.text import Text
 from grader.cli.output import say
 from grader.model.progress import Progress, StepState
 from grader.model.result import EarlyVerdict
+from grader.model.verdict import Status
 from grader.report.terminal import STYLES, mark
 from grader.report.text import visible
 from grader.untrusted_text import line, uncommanded
@@ -30,7 +31,7 @@ from grader.untrusted_text import line, uncommanded
 EARLY_TITLE = "Your files, before anything is built or run:"
 SO_FAR = "Provisional: building may change these."
 MESSAGE_CHARS = 300
-INDENT = 2
+INDENT, HANGING = 2, 4
 ESCAPE = 8
 """A line may become this much longer when characters in it are escaped."""
 REFRESH_HZ = 8
@@ -223,18 +224,24 @@ def print_early(
 
 
 def _rows(verdicts: tuple[EarlyVerdict, ...], encoding: str) -> Iterator[Text]:
+    """Yield what passes in one row, and a row for each other verdict."""
     yield Text(EARLY_TITLE, "bold")
-    words = [_word(verdict) for verdict in verdicts]
-    status_width = max(map(len, words))
-    name_width = max(len(visible(verdict.criterion.id)) for verdict in verdicts)
-    for verdict, word in zip(verdicts, words, strict=True):
+    passes = [v for v in verdicts if v.criterion.status is Status.PASS]
+    others = [v for v in verdicts if v.criterion.status is not Status.PASS]
+    if passes:
+        row = Text(" " * INDENT)
+        row.append(f"{mark(Status.PASS, encoding)} {len(passes)} pass", STYLES[Status.PASS])
+        row.append(f": {', '.join(visible(verdict.criterion.id) for verdict in passes)}")
+        yield row
+    name_width = max((len(visible(verdict.criterion.id)) for verdict in others), default=0)
+    for verdict in others:
         criterion = verdict.criterion
         row = Text(" " * INDENT)
-        row.append(f"{mark(criterion.status, encoding)} {word:{status_width}}", STYLES[criterion.status])
+        row.append(f"{mark(criterion.status, encoding)} {criterion.status.value}", STYLES[criterion.status])
         row.append(f"  {visible(criterion.id):{name_width}}  {line(criterion.message, MESSAGE_CHARS)}")
         yield row
         if criterion.missing and criterion.hint:
-            yield Text(f"{' ' * (INDENT + 2)}hint: {line(criterion.hint, MESSAGE_CHARS)}", "dim")
+            yield Text(f"{' ' * HANGING}hint: {line(criterion.hint, MESSAGE_CHARS)}", "dim")
     if not all(verdict.final for verdict in verdicts):
         yield Text(f"{' ' * INDENT}{SO_FAR}", "dim")
     yield Text()
@@ -242,10 +249,8 @@ def _rows(verdicts: tuple[EarlyVerdict, ...], encoding: str) -> Iterator[Text]:
 
 def _wrapped(row: Text, width: int) -> Iterator[Text]:
     """Return its lines as a terminal shows them, none of which a CI system takes for a command."""
-    for part in row.wrap(Console(width=width), width - ESCAPE, overflow="fold") or [row]:
+    parts = row.wrap(Console(width=width), width - ESCAPE - HANGING, overflow="fold") or [row]
+    for number, part in enumerate(parts):
         harmless = uncommanded(part.plain)
-        yield part if harmless == part.plain else Text(harmless, part.style)
-
-
-def _word(verdict: EarlyVerdict) -> str:
-    return verdict.criterion.status.value + ("" if verdict.final else " so far")
+        shown = part if harmless == part.plain else Text(harmless, part.style)
+        yield Text(" " * HANGING).append_text(shown) if number else shown

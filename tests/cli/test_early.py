@@ -30,8 +30,8 @@ FAILED = EarlyVerdict(
 )
 SHOWN = """\
 Your files, before anything is built or run:
-  ✓ pass         manifest  names lab1
-  ✗ fail so far  talker    has no executable bit
+  ✓ 1 pass: manifest
+  ✗ fail  talker  has no executable bit
     hint: chmod +x talker.py
   Provisional: building may change these.
 
@@ -111,7 +111,7 @@ def test_a_live_display_goes_on_below_them() -> None:
     with Live(steps, console=console, auto_refresh=False):
         steps.step("package", "done")
         steps.early(lambda: (PASSED, FAILED))
-    assert "names lab1" in out.getvalue()
+    assert "1 pass: manifest" in out.getvalue()
     assert "package" in out.getvalue()[out.getvalue().rindex("Provisional:") :]
 
 

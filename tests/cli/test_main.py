@@ -22,6 +22,7 @@ from grader.report.result_json import result_bytes
 from grader.ros_env import RosInstallation
 from grader.ros_packages import RosPackages
 from grader.rubric.find import rubric_ids
+from grader.rubric.load import load_rubric
 from tests.report.hostile import result
 from tests.rubric.samples import SOUND, spoiled
 
@@ -189,7 +190,8 @@ def test_validate_names_every_fault_of_every_file(tmp_path, capsys):
     sound = spoiled(tmp_path)
     assert run(["rubric", "validate", str(first), str(second), str(sound)]) == 2
     shown = capsys.readouterr()
-    assert shown.out == f"{sound}: ok, sample, 2 criteria, 100 points\n"
+    digest = load_rubric(str(sound)).digest
+    assert shown.out == f"{sound}: ok, sample, 2 criteria, 100 points\n  digest {digest}\n"
     assert shown.err.splitlines() == [
         f'grader: error: {first}:15: criteria[0].points: must be a number, not "x"',
         f"grader: error: {second}:12: criteria: the points add up to 90, not to 100",

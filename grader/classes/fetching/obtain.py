@@ -24,6 +24,7 @@ from grader.classes.fetching.mirror import (
     patiently,
     place_name,
 )
+from grader.classes.roster.folder import PLATFORMS
 from grader.errors import OutputError, SubmissionError
 from grader.intake import unreadable
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
@@ -111,11 +112,13 @@ class _Unreadable(Exception):
 
 
 def source_of(entry: Entry) -> Source:
-    """What the entry names. Raises UsageError, SubmissionError."""
+    """What the entry names; single files that a platform packed have lost their modes. Raises UsageError,
+    SubmissionError."""
     try:
-        return with_ref(parse_source(entry.source), entry.ref)
+        source = with_ref(parse_source(entry.source), entry.ref)
     except OSError as error:
         raise unreadable(printable(entry.source), error) from error
+    return replace(source, modes="lost") if entry.extra.get("platform") in PLATFORMS else source
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from grader.errors import UsageError
 from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable
 from grader.model.batch import Entry, Roster
 
+PLATFORMS = ("Moodle", "Canvas")
 IGNORED = {"__MACOSX", "Thumbs.db", "desktop.ini"}
 RECORDINGS = (".bag", ".mcap", ".db3")
 

@@ -45,7 +45,8 @@ def batch(
         Path,
         Argument(
             "ROSTER|FOLDER",
-            "a CSV file (id,source,...), a folder of submissions, or an export of GitHub Classroom or GitLab",
+            "a CSV file (id,source,...), a folder of submissions, the zip that Moodle or Canvas offers for download,"
+            " or an export of GitHub Classroom or GitLab",
         ),
     ],
     rubric: Annotated[str, RUBRIC],
@@ -107,13 +108,16 @@ def batch(
     with loading():
         from grader.classes.batch.run import BatchOptions
         from grader.classes.roster import read_roster
+        from grader.classes.roster.download import is_download, unpack_download
         from grader.cli import batches
         from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric)
+    out = out or DEFAULT_OUT
     local = batches.allowed_folders(allow_local, remote_only=remote_only)
-    named = batches.with_package(read_roster(roster, local), package or "")
+    listed = unpack_download(roster, out) if is_download(roster) else roster
+    named = batches.with_package(read_roster(listed, local), package or "")
     options = BatchOptions(
-        out=out or DEFAULT_OUT,
+        out=out,
         jobs=jobs or batches.default_jobs(loaded, static=static),
         sandbox=sandbox,
         static_only=static,

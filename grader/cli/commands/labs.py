@@ -102,13 +102,14 @@ def validate_rubrics(*, files: Annotated[Sequence[str], Argument("FILE", "rubric
     faults, hint = [], ""
     for file in files:
         try:
-            rubric = load_rubric(file).rubric
+            loaded = load_rubric(file)
         except RubricError as error:  # noqa: PERF203 - each file has its own
             faults += error.faults
             hint = hint or error.hint
         else:
-            points = number(rubric.max_points)
+            rubric, points = loaded.rubric, number(loaded.rubric.max_points)
             say(f"{file}: ok, {rubric.id}, {len(rubric.criteria)} criteria, {points} points")
+            say(f"  digest {loaded.digest}")
     if faults:
         raise RubricError(faults, hint=hint)
     return ExitCode.PASSED
