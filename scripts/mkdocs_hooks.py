@@ -1,7 +1,10 @@
-"""MkDocs hooks: links that leave docs/ go to the repository, where it has an address, and are plain words elsewhere."""
+"""MkDocs hooks: links that leave docs/ go to the repository, where it has an address, and are plain words elsewhere.
+A terminal's copy button copies the commands alone.
+"""
 
 from __future__ import annotations
 
+import html
 import re
 from pathlib import Path, PurePosixPath
 from posixpath import normpath
@@ -10,6 +13,9 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parent.parent
+TERMINAL = re.compile(r'<div class="highlight">(.*?)</div>', re.DOTALL)
+TAG = re.compile(r"<[^>]*>")
+PROMPT = "$ "
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)#\s]+)(#[^)\s]*)?\)")
 
 
@@ -29,3 +35,15 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, **_: ob
         return f"[{words}]({config.repo_url.rstrip('/')}/blob/main/{path}{anchor})"
 
     return LINK.sub(replaced, markdown)
+
+
+def on_page_content(content: str, **_: object) -> str:
+    """The page's HTML, in which `data-copy` says what a terminal's copy button copies."""
+
+    def with_commands(match: re.Match[str]) -> str:
+        lines = html.unescape(TAG.sub("", match[1])).splitlines()
+        commands = "\n".join(line.removeprefix(PROMPT) for line in lines if line.startswith(PROMPT))
+        copied = f' data-copy="{html.escape(commands)}"' if commands else ""
+        return f'<div class="highlight"{copied}>{match[1]}</div>'
+
+    return TERMINAL.sub(with_commands, content)

@@ -28,6 +28,8 @@ from grader.wording import hertz, plural, seconds, significant
 FLOOD_FACTOR = 5
 FLOOD_HZ = 500.0
 """No lab asks for so much: what is slower and even comes from a loop that sleeps, by a wrong number."""
+NUMBER_SHARE = 0.05
+"""So near is a rate that was measured to the number that its script asks for."""
 NEAR_SHARE = 0.25
 """A rate that is wrong by less than this share is measured once more before it costs anything."""
 LATE_P95_SHARE = 0.2
@@ -190,7 +192,11 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
     if in_bounds and even:
         return None
     other = _fell_silent(found, params) or _bursts(found, outside, even, params)
-    return other or _by_parameter(_wrong_mean(found, params), run, package, params)
+    if other is not None:
+        return other
+    wrong = _wrong_mean(found, params)
+    by_number = _by_number(wrong, found.mean_hz, run, package, params)
+    return by_number or _by_parameter(wrong, run, package, params)
 
 
 def _fell_silent(found: Rhythm, params: RateParams) -> Verdict | None:
@@ -223,6 +229,24 @@ def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
     ratio = found.mean_hz / params.rate_hz
     verdict = failed(message, hint=_rate_hint(ratio, nominal, even=found.is_even))
     return verdict.once() if abs(ratio - 1) < NEAR_SHARE else verdict
+
+
+def _by_number(
+    verdict: Verdict, mean_hz: float, run: Run, package: PackageFacts, params: RateParams
+) -> Verdict | None:
+    """Name the line where the node's script asks for the rate that was measured."""
+    scripts = {
+        life.start.script for c in run.student_channels(params.topic) if (life := life_of(run, c.callerid))
+    }
+    asked = [s for s in package.slips if s.kind == "rate-number" and s.file in scripts]
+    slip = next((s for s in asked if abs(float(s.message) / mean_hz - 1) < NUMBER_SHARE), None)
+    if slip is None:
+        return None
+    where = f"{slip.file}, line {slip.line}"
+    message = f"{verdict.message}; {where} asks for {slip.message} Hz"
+    hint = f"make it {significant(params.rate_hz)} Hz in {where}: {loop_rate(significant(params.rate_hz))}"
+    cited = (FileCitation(file=slip.file, line=slip.line),)
+    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
 
 
 def _by_parameter(verdict: Verdict, run: Run, package: PackageFacts, params: RateParams) -> Verdict:

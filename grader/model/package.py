@@ -141,13 +141,13 @@ class PythonSlip(Record):
     `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and nodes
     get none. `misspelt`: a name that the file does not define, beside one that it does. `no-clock`: it publishes
     and counts, and nothing in it can tell the time; that is a slip only where its messages are to tell it.
-    `rate-parameter`: no slip, but a loop whose rate is a parameter;
-    `message` is its name as written.
+    `rate-parameter` and `rate-number`: no slip, but a loop or a timer whose rate is a parameter, `message` its name as
+    written, or a number, `message` in Hz.
     """
 
     file: str
     line: int
-    kind: Literal["not-called", "input", "no-clock", "misspelt", "rate-parameter"]
+    kind: Literal["not-called", "input", "no-clock", "misspelt", "rate-parameter", "rate-number"]
     message: str
 
 

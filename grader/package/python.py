@@ -110,7 +110,7 @@ class _RawFault(Record):
 
 class _RawSlip(Record):
     line: int
-    kind: Literal["not-called", "input", "no-clock", "misspelt", "rate-parameter"]
+    kind: Literal["not-called", "input", "no-clock", "misspelt", "rate-parameter", "rate-number"]
     message: str
 
 

@@ -104,13 +104,14 @@ def visit_once(browser: Browser) -> Iterator[Visit]:
 
 
 @pytest.fixture
-def axe(browser: Browser) -> Callable[[Page], list[str]]:
-    """What axe has against a page as it is now, a line for each rule and place."""
+def axe(browser: Browser) -> Callable[..., list[str]]:
+    """What axe has against a page as it is now, a line for each rule and place; with tags, by the rules of these."""
     source = ground.AXE.read_text(encoding="utf-8")
 
-    def violations(page: Page) -> list[str]:
+    def violations(page: Page, *tags: str) -> list[str]:
         page.evaluate(source)
-        found = page.evaluate("axe.run({resultTypes: ['violations']})")
+        options = {"resultTypes": ["violations"], **({"runOnly": list(tags)} if tags else {})}
+        found = page.evaluate("(options) => axe.run(options)", options)
         return [
             f"{rule['id']}: {node['target']} {node['failureSummary']}"
             for rule in found["violations"]

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from lxml import html
 
+from scripts.mkdocs_hooks import on_page_content
 from scripts.pages import ROOT
 
 LOADS = (
@@ -27,7 +28,7 @@ FAULTS = {
 }
 
 
-def _built(repository: Path, site: Path) -> subprocess.CompletedProcess[str]:
+def build_site(repository: Path, site: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", site],
         cwd=repository,
@@ -42,7 +43,7 @@ def _built(repository: Path, site: Path) -> subprocess.CompletedProcess[str]:
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("site")
-    done = _built(ROOT, folder)
+    done = build_site(ROOT, folder)
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -90,6 +91,16 @@ def test_a_fault_of_a_page_ends_the_build(written: str, named: str, tmp_path: Pa
     (tmp_path / "mkdocs.yml").write_text(f"{kept}\nnav: [index.md]\n", encoding="utf-8")
     (tmp_path / "scripts").mkdir()
     shutil.copy(ROOT / "scripts" / "mkdocs_hooks.py", tmp_path / "scripts")
-    done = _built(tmp_path, tmp_path / "site")
+    done = build_site(tmp_path, tmp_path / "site")
     assert done.returncode == 1
     assert named in done.stderr
+
+
+def test_a_terminals_copy_button_copies_the_commands_alone() -> None:
+    shown = (
+        '<p>a</p><div class="highlight"><pre><code><span class="gp">$ </span>grep &quot;a&quot; *'
+        '\n<span class="go">found</span>\n<span class="gp">$ </span>ls\n</code></pre></div>'
+    )
+    box = html.fromstring(f"<main>{on_page_content(shown)}</main>").find("div")
+    assert box is not None
+    assert box.get("data-copy") == 'grep "a" *\nls'

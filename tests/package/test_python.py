@@ -120,6 +120,7 @@ def test_slips_are_found_and_named(tmp_path):
     (tmp_path / "own.py").write_text("def input():\n    pass\ninput()\n")
     slips = check_syntax(tmp_path, ["a.py", "own.py"]).slips
     assert [(s.file, s.line, s.kind) for s in slips] == [
+        ("a.py", 3, "rate-number"),
         ("a.py", 4, "not-called"),
         ("a.py", 5, "not-called"),
         ("a.py", 6, "input"),
@@ -128,7 +129,7 @@ def test_slips_are_found_and_named(tmp_path):
         ("a.py", 13, "not-called"),
         ("a.py", 14, "not-called"),
     ]
-    assert "`rate.sleep()`" in slips[1].message
+    assert "`rate.sleep()`" in slips[2].message
 
 
 @pytest.mark.parametrize(
@@ -149,6 +150,30 @@ def test_a_rate_that_is_a_parameter_is_known(tmp_path, rate, found):
     (tmp_path / "a.py").write_text(text)
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [(s.message, s.line) for s in slips if s.kind == "rate-parameter"] == found
+
+
+@pytest.mark.parametrize(
+    ("code", "found"),
+    [
+        ("r = rospy.Rate(5)", [("5", 2)]),
+        ("r = rospy.Rate(HZ)", [("7.5", 1)]),
+        ("r = rospy.Rate(1 / 0.4)", [("2.5", 2)]),
+        ("while True:\n    rospy.sleep(0.2)", [("5", 3)]),
+        ("while True:\n    time.sleep(2)", [("0.5", 3)]),
+        ("while True:\n    rospy.sleep(rospy.Duration(1.0 / HZ))", [("7.5", 3)]),
+        ("rospy.Timer(rospy.Duration(0.1), tell)", [("10", 2)]),
+        ("rospy.sleep(0.2)", []),
+        ("r = rospy.Rate(0)", []),
+        ("r = rospy.Rate(1 / 0)", []),
+        ("r = rospy.Rate(-3)", []),
+        ("r = rospy.Rate(True)", []),
+        ("r = rospy.Rate(a)", []),
+    ],
+)
+def test_a_rate_that_is_a_number_is_known(tmp_path, code, found):
+    (tmp_path / "a.py").write_text(f"HZ = 7.5; a = b; b = a\n{code}\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [(s.message, s.line) for s in slips if s.kind == "rate-number"] == found
 
 
 @pytest.mark.parametrize(

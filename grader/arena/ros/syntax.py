@@ -191,7 +191,7 @@ def slips(tree):
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             found.append({"line": node.lineno, "kind": "input", "message": message})
     found += misspelt(tree)
-    found += rate_parameters(tree)
+    found += loop_rates(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
     if published is not None and counts(tree) and not knows_time(tree):
         message = "the script counts, and reads no clock"
@@ -199,18 +199,48 @@ def slips(tree):
     return sorted(found, key=lambda slip: slip["line"])[:SLIPS_LIMIT]
 
 
-def rate_parameters(tree):
-    """Loops whose rate is a parameter that is read there, or given to a name once, with the parameter as written."""
-    bound = {}
+def loop_rates(tree):
+    """Rates of loops and timers: a parameter that is read there, its name as written; or a number, in Hz as text.
+
+    Either may have been given to a name once.
+    """
+    bound, looped = {}, set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
             bound.setdefault(ast.dump(node.targets[0]).replace("Store()", "Load()"), []).append(node.value)
+
+        elif isinstance(node, (ast.While, ast.For)):
+            looped.update(id(inner) for inner in ast.walk(node) if is_call(inner, "sleep"))
+
+    def given(node):
+        values = bound.get(ast.dump(node), [node])
+        return values[0] if len(values) == 1 else node
+
     for node in ast.walk(tree):
-        if is_call(node, "Rate") and node.args:
-            values = bound.get(ast.dump(node.args[0]), [node.args[0]])
-            name = read_parameter(values[0]) if len(values) == 1 else None
-            if name:
-                yield {"line": values[0].lineno, "kind": "rate-parameter", "message": name[:TEXT_LIMIT]}
+        timed = next((name for name in ("Rate", "sleep", "Timer") if is_call(node, name)), None)
+        if timed is None or not node.args or (timed == "sleep" and id(node) not in looped):
+            continue
+        value = given(node.args[0])
+        if is_call(value, "Duration") and value.args:
+            value = given(value.args[0])
+        name, number = read_parameter(value) if timed == "Rate" else None, constant(value, given)
+        if name:
+            yield {"line": value.lineno, "kind": "rate-parameter", "message": name[:TEXT_LIMIT]}
+        elif number:
+            hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
+            yield {"line": value.lineno, "kind": "rate-number", "message": hz}
+
+
+def constant(node, given, depth=4):
+    """The positive number that an expression of numbers comes to, None where it is something else."""
+    node = given(node)
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float) and 0 < node.value < 1e9:
+        return float(node.value)
+    if depth and isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Div, ast.Mult)):
+        left, right = constant(node.left, given, depth - 1), constant(node.right, given, depth - 1)
+        if left and right:
+            return left / right if isinstance(node.op, ast.Div) else left * right
+    return None
 
 
 def read_parameter(node):
