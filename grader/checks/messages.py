@@ -14,7 +14,7 @@ from grader.checks.support.clocks import ASK_AGAIN, WATCHED_S, clocks_at, wrong_
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.idioms import both
 from grader.checks.support.nodes import PublishedTopic
-from grader.checks.support.processes import early_end, is_flood, life_of, observed_until_ns
+from grader.checks.support.processes import early_end, is_flood, observed_until_ns, slips_of
 from grader.checks.support.text import (
     NUMBER,
     OTHER_WORDS_SHARE,
@@ -175,9 +175,7 @@ def _counted(package: PackageFacts, run: Run, channel: Channel, told: Sequence[f
     second they grow as the time does."""
     if any(after - before != 1 for before, after in pairwise(told)) or told[0] != int(told[0]):
         return None
-    one = life_of(run, channel.callerid)
-    script = one.start.script if one else None
-    slip = next((s for s in package.slips if s.kind == "no-clock" and s.file == script), None)
+    slip = next(iter(slips_of(package, run, channel.callerid, "no-clock")), None)
     if slip is None:
         return None
     message = f"the number in the messages counts them ({told[0]:.0f}, {told[1]:.0f}, …) and is not a time"

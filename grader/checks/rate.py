@@ -15,7 +15,7 @@ from grader.checks.support.idioms import LOOP, both, loop_rate
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, excused, lateness
 from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
-from grader.checks.support.processes import life_of, observed_until_ns
+from grader.checks.support.processes import observed_until_ns, slips_of
 from grader.checks.support.topics import Sender, cite, nothing_sent, sent_by, whole_until_ns
 from grader.checks.support.values import value_text
 from grader.evidence.run import Channel, Run
@@ -235,10 +235,8 @@ def _by_number(
     verdict: Verdict, mean_hz: float, run: Run, package: PackageFacts, params: RateParams
 ) -> Verdict | None:
     """Name the line where the node's script asks for the rate that was measured."""
-    scripts = {
-        life.start.script for c in run.student_channels(params.topic) if (life := life_of(run, c.callerid))
-    }
-    asked = [s for s in package.slips if s.kind == "rate-number" and s.file in scripts]
+    channels = run.student_channels(params.topic)
+    asked = [s for c in channels for s in slips_of(package, run, c.callerid, "rate-number")]
     slip = next((s for s in asked if abs(float(s.message) / mean_hz - 1) < NUMBER_SHARE), None)
     if slip is None:
         return None
@@ -253,9 +251,7 @@ def _by_parameter(verdict: Verdict, run: Run, package: PackageFacts, params: Rat
     """Say where the value comes from, if the rate of the node's loop is a parameter with another value than the asked
     one."""
     for channel in run.student_channels(params.topic):
-        life = life_of(run, channel.callerid)
-        script = life.start.script if life else None
-        slip = next((s for s in package.slips if s.kind == "rate-parameter" and s.file == script), None)
+        slip = next(iter(slips_of(package, run, channel.callerid, "rate-parameter")), None)
         name = resolved_param(slip.message, channel.callerid) if slip else ""
         value = params_on_server(run).get(name)
         if slip is None or value == params.rate_hz:

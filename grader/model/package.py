@@ -135,6 +135,18 @@ class SourceFile(Record):
     python_fault: Fault | None = None
 
 
+SlipKind = Literal[
+    "not-called",
+    "input",
+    "no-clock",
+    "misspelt",
+    "rate-parameter",
+    "rate-number",
+    "reset-value",
+    "reset-limit",
+]
+
+
 class PythonSlip(Record):
     """What is remarkable in a Python file that compiles, most of it slips that show only when the node runs.
 
@@ -142,12 +154,13 @@ class PythonSlip(Record):
     get none. `misspelt`: a name that the file does not define, beside one that it does. `no-clock`: it publishes
     and counts, and nothing in it can tell the time; that is a slip only where its messages are to tell it.
     `rate-parameter` and `rate-number`: no slip, but a loop or a timer whose rate is a parameter, `message` its name as
-    written, or a number, `message` in Hz.
+    written, or a number, `message` in Hz. `reset-value` and `reset-limit`: where a counter goes back, to the number
+    `message`, or when it reaches it.
     """
 
     file: str
     line: int
-    kind: Literal["not-called", "input", "no-clock", "misspelt", "rate-parameter", "rate-number"]
+    kind: SlipKind
     message: str
 
 

@@ -9,12 +9,11 @@ import time
 import unicodedata
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Literal
 
 from pydantic import Field
 
 from grader.limited_child import ChildLimits, run_limited
-from grader.model.package import Fault, PythonSlip
+from grader.model.package import Fault, PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.package.reading import printable
 
@@ -110,7 +109,7 @@ class _RawFault(Record):
 
 class _RawSlip(Record):
     line: int
-    kind: Literal["not-called", "input", "no-clock", "misspelt", "rate-parameter", "rate-number"]
+    kind: SlipKind
     message: str
 
 

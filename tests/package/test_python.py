@@ -177,6 +177,31 @@ def test_a_rate_that_is_a_number_is_known(tmp_path, code, found):
 
 
 @pytest.mark.parametrize(
+    ("code", "found"),
+    [
+        ("n = (n + 1) % 128", [("128", "reset-limit", 1)]),
+        (
+            "if n > 127:\n    n = 1",
+            [("127", "reset-limit", 1), ("1", "reset-value", 2)],
+        ),
+        (
+            "if 100 <= self.n:\n    self.n = 0",
+            [("100", "reset-limit", 1), ("0", "reset-value", 2)],
+        ),
+        ("if n > 127:\n    m = 1", []),
+        ("if n > 127:\n    n = m", []),
+        ("'%d' % n", []),
+        ("n %= 128", [("128", "reset-limit", 1)]),
+        ("n = n + 1 if n < 127 else 0", [("127", "reset-limit", 1), ("0", "reset-value", 1)]),
+    ],
+)
+def test_where_a_counter_goes_back_is_known(tmp_path, code, found):
+    (tmp_path / "a.py").write_text(code + "\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [(s.message, s.kind, s.line) for s in slips if s.kind.startswith("reset")] == found
+
+
+@pytest.mark.parametrize(
     ("value", "imported", "told"),
     [
         ("next(n)", "import itertools\nn = itertools.count()\n", True),

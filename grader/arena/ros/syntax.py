@@ -192,6 +192,7 @@ def slips(tree):
             found.append({"line": node.lineno, "kind": "input", "message": message})
     found += misspelt(tree)
     found += loop_rates(tree)
+    found += resets(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
     if published is not None and counts(tree) and not knows_time(tree):
         message = "the script counts, and reads no clock"
@@ -241,6 +242,39 @@ def constant(node, given, depth=4):
         if left and right:
             return left / right if isinstance(node.op, ast.Div) else left * right
     return None
+
+
+def resets(tree):
+    """Where a counter goes back: the number that it is set to in an `if` that asks for it, and the number in that `if`,
+    or behind a `%`.
+    """
+    for node in ast.walk(tree):
+        value, done, asked = None, (), []
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
+            asked = [node.right]
+        elif isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Mod):
+            asked = [node.value]
+        elif isinstance(node, ast.If):
+            done = [(one.targets[0], one.value) for one in node.body if isinstance(one, ast.Assign)]
+        elif isinstance(node, ast.Assign) and isinstance(node.value, ast.IfExp):
+            done = [(node.targets[0], node.value.body), (node.targets[0], node.value.orelse)]
+        if done:
+            test = list(ast.walk(node.test if isinstance(node, ast.If) else node.value.test))
+            names = {ast.dump(part) for part in test if isinstance(part, (ast.Name, ast.Attribute))}
+            values = [value for name, value in done if ast.dump(name).replace("Store()", "Load()") in names]
+            value = next((value for value in values if whole(value) is not None), None)
+            asked = test if value is not None else []
+        for part in asked:
+            if whole(part) is not None:
+                yield {"line": part.lineno, "kind": "reset-limit", "message": "%d" % whole(part)}
+        if value is not None:
+            yield {"line": value.lineno, "kind": "reset-value", "message": "%d" % whole(value)}
+
+
+def whole(node):
+    """A whole number as it is written, without a sign."""
+    number = isinstance(node, ast.Constant) and type(node.value) is int and node.value < 1 << 31
+    return node.value if number else None
 
 
 def read_parameter(node):

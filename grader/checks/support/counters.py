@@ -14,12 +14,12 @@ from pydantic import Field
 from grader.checks.support.exit_causes import explain_early_end, explain_traceback, process_tracebacks
 from grader.checks.support.idioms import loop_rate
 from grader.checks.support.nodes import PublishedTopic
-from grader.checks.support.processes import lives, observed_until_ns
+from grader.checks.support.processes import lives, observed_until_ns, slips_of
 from grader.checks.support.topics import losses, whole_until_ns
 from grader.evidence.run import Channel, Run
-from grader.model.package import PackageFacts
+from grader.model.package import PackageFacts, PythonSlip
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import plural, significant
 
 FLOOD_FACTOR = 3
@@ -233,7 +233,9 @@ def judge_wraps(
     turns, good, wrong = turns_of(count, run, params)
     bad = wrong[0] if wrong else None
     if bad is not None:
-        return _bad_turn(bad, turns, count, run, params), bad
+        turn = next((s for s in turns if s.before > params.maximum), bad) if bad.change > 0 else bad
+        written = slips_of(package, run, count.callerid, "reset-value", "reset-limit")
+        return _where_reset(_bad_turn(bad, turns, count, run, params), turn, written, params), bad
     last = good[-1] if good else None
     if len(good) >= params.wraps:
         message = f"after {significant(good[0].before)} comes {params.minimum}, {plural(len(good), 'time')}"
@@ -293,6 +295,19 @@ def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: Wra
         in_range and sum(_is_bad(s, params) for s in turns) == 1 and any(_is_good(s, params) for s in turns)
     )
     return verdict.once() if alone else verdict
+
+
+def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], params: WrapParams) -> Verdict:
+    """Name the line of the node's script that makes the counter go back as it was seen to."""
+    wrong_value = turn.after != params.minimum
+    kind, number, apart = ("reset-value", turn.after, 0) if wrong_value else ("reset-limit", turn.before, 1)
+    slip = next((s for s in written if s.kind == kind and abs(int(s.message) - number) <= apart), None)
+    if slip is None or turn.change > 0 or verdict.status is not Status.FAIL:
+        return verdict
+    does = f"sets it to {slip.message}" if wrong_value else f"resets it by the number {slip.message}"
+    message = f"{verdict.message}; {slip.file}, line {slip.line} {does}"
+    cited = (FileCitation(file=slip.file, line=slip.line),)
+    return verdict.model_copy(update={"message": message, "citations": cited})
 
 
 def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Literal["program", "flood", "lost"]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from grader.evidence.events import ProcessEvent
 from grader.evidence.run import Run
+from grader.model.package import PackageFacts, PythonSlip, SlipKind
 from grader.model.verdict import Verdict, unjudged
 from grader.wording import seconds, shorten
 
@@ -117,6 +118,12 @@ def life(run: Run, process: str) -> Life | None:
 def life_of(run: Run, node: str) -> Life | None:
     """Return the process that a node belongs to; None where it cannot be told, or is not the student's."""
     return life(run, next((e.processes[node] for _, e in reversed(run.graph) if node in e.processes), ""))
+
+
+def slips_of(package: PackageFacts, run: Run, callerid: str, *kinds: SlipKind) -> list[PythonSlip]:
+    """Return what is remarkable, of these kinds, in the script that the node runs."""
+    life = life_of(run, callerid)
+    return [s for s in package.slips if life is not None and s.kind in kinds and s.file == life.start.script]
 
 
 def early_end(run: Run) -> Life | None:
