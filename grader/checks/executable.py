@@ -80,7 +80,8 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
 
 def _judged(package: PackageFacts, build: Run, found: SourceFile, params: ExecutableParams) -> Verdict:
     remarks = package.hints_on(found.path)
-    obstacles = [*_shebang_obstacles(found), *_mode_obstacles(found, remarks)]
+    of_first_line = list(_shebang_obstacles(found))
+    obstacles = [*of_first_line, *_mode_obstacles(found, remarks)]
     moved = f"the handout puts it at {params.path}; move it there" if found.path != params.path else ""
     hint = moved or "; ".join(remarks)
     fault = _syntax_fault(found)
@@ -100,7 +101,9 @@ def _judged(package: PackageFacts, build: Run, found: SourceFile, params: Execut
             message, hint="hand in a git repository or a .tar.gz, which keep the executable bit"
         )
     measured = verdict.measured or f"{found.path}: {_mode(found)}, {_first_line(found)}"
-    return verdict.about(measured=measured, citations=verdict.citations or (_cite_shebang(found),))
+    only_mode = bool(obstacles) and not of_first_line
+    place = FileCitation(file=found.path) if only_mode else _cite_shebang(found)
+    return verdict.about(measured=measured, citations=verdict.citations or (place,))
 
 
 def _syntax_fault(file: SourceFile) -> Fault | None:
@@ -122,7 +125,7 @@ def _unparsed(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -> Verd
         f"{file.path} {where}: {fault.kind}: {fault.cause or fault.message}{others}",
         measured=f"{file.path}: {_mode(file)}, {_first_line(file)}{source}",
         hint="; ".join(fixes),
-        citations=(fault.place, *((_cite_shebang(file),) if obstacles else ())),
+        citations=(fault.place, *((_cite_shebang(file),) if any(_shebang_obstacles(file)) else ())),
     )
 
 

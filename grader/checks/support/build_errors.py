@@ -29,6 +29,15 @@ _CALLER = re.compile(r"^\s+(?P<file>[^:()]+):(?P<line>\d+) \(\w+\)$")
 CALL_STACK = "Call Stack (most recent call first):"
 CALLERS_MAX = 40
 SYSTEM = ("/usr/", "/opt/")
+_QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
+"""As compilers and linkers write them."""
+STANDARD = {
+    **dict.fromkeys(("cout", "cin", "cerr", "endl"), "iostream"),
+    **dict.fromkeys(("string", "to_string", "stoi"), "string"),
+    "vector": "vector",
+    "map": "map",
+}
+"""Names of C++'s standard library that are written without `std::`, with their headers."""
 
 
 class BuildError(NamedTuple):
@@ -76,8 +85,9 @@ def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | Non
 
 def explain_error_of_build(error: BuildError, package: PackageFacts, lines: Sequence[str]) -> Explained:
     """Return the error in a student's words, else as it was printed."""
+    text = error.text.translate(_QUOTES)
     for pattern, explain in _EXPLAINED:
-        if found := re.search(pattern, error.text):
+        if found := re.search(pattern, text):
             return explain(found, package, lines)
     return Explained(error.text, FIRST_ERROR_HINT)
 
@@ -248,6 +258,53 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
     )
 
 
+def _no_semicolon(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    where = f"of the statement before `{found[2]}`" if found[1] else "of that line"
+    return Explained(f"{found.string}: a `;` is missing", f"write a `;` at the end {where}")
+
+
+def _no_brace(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    return Explained(
+        f"{found.string}: a `}}` is missing", "write a `}` for each `{`; indentation shows which one lacks it"
+    )
+
+
+def _undeclared(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    name, near = found[1], found[2]
+    if name in STANDARD:
+        return Explained(found.string, f"write std::{name}, and #include <{STANDARD[name]}> at the top")
+    declare = f"declare {name} above that line, or include the header that does"
+    return Explained(
+        found.string, f"write {near} there, if that is what you mean; else {declare}" if near else declare
+    )
+
+
+def _no_member(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    return Explained(found.string, f"write {found[2]} in place of {found[1]}")
+
+
+def _unlinked(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    if found[1] == "main":
+        return Explained(
+            "a program has no `main` function",
+            "write `int main(int argc, char **argv)` in one of its sources",
+        )
+    name = found[1].partition("(")[0]
+    why = f"{name} is used, and nothing that is linked defines it"
+    return Explained(
+        why,
+        "write target_link_libraries(<program> ${catkin_LIBRARIES}) below add_executable(…); a function of your own"
+        " needs its .cpp file in add_executable(…)",
+    )
+
+
+def _main_twice(_found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    return Explained(
+        "two sources of one program have a `main` function",
+        "write an add_executable(…) of its own for each program",
+    )
+
+
 _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]], ...] = (
     (r'Could not find a package configuration file provided by "([\w-]+)"', _missing_package),
     (r"(add_\w+_files)\(\) directory not found: (\S+)", _missing_folder),
@@ -267,4 +324,11 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r'link libraries for target "([^"]+)" which is not built', _missing_target),
     (r"catkin_package\(\) DEPENDS on (?:the catkin package )?'([^']+)'", _depends),
     (r"(\w+)/(\w+)\.h: No such file or directory", _header_race),
+    (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
+    (r"expected '}' at end of input", _no_brace),
+    (r"'([^']+)' was not declared in this scope(?:; did you mean '([^']+)')?", _undeclared),
+    (r"'([^']+)' is not a member of .*; did you mean '([^']+)'", _no_member),
+    (r"has no member named '([^']+)'; did you mean '([^']+)'", _no_member),
+    (r"undefined reference to '([^']+)", _unlinked),
+    (r"multiple definition of 'main", _main_twice),
 )
