@@ -31,6 +31,10 @@ REFERENCE = "reference"
 CORRECT = Mutant.model_construct(summary="The reference solution.", expect={}, message={}, says={})
 TOGETHER = {
     "avoid-obstacles": ("build-unknown-component+node-named-otherwise+never-stops+too-slow",),
+    "cpp-and-python": (
+        "roscpp-not-declared+node-named-otherwise+last-of-two+alarm-not-executable+launch-starts-one",
+        "cpp-does-not-compile",
+    ),
     "eyantra-ros-basics": (
         "chatter-own-package+cmake-no-catkin-package+hello-print+load-yaml-find+turtlesim-colour-unread+web-chromium",
         "config-nesting+hello-ends+manifest-roscpp-missing+param-clobbers",
@@ -93,6 +97,11 @@ TOGETHER = {
         "goes-on+status-not-latched+launch-remapped",
         "restart-fails+too-fast",
         "ok-drives-slower",
+    ),
+    "two-packages": (
+        "field-misspelt+sensor-not-executable+sensor-too-slow+alarm-always+launch-other-package",
+        "build-unknown-component",
+        "station-missing",
     ),
     "unit-tests": ("build-unknown-component+forward-prints+name-not-defined+wrap-missing",),
     "york-ele00118m-lab7": (

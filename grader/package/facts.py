@@ -64,6 +64,7 @@ def read_package(
         hints=hints,
         slips=report.slips,
         interfaces=_interfaces(package.folder, _readable(entries)),
+        asked=package.asked,
     )
 
 

@@ -7,8 +7,9 @@ import re
 import sys
 import time
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from pydantic import Field
 
@@ -95,6 +96,21 @@ class SyntaxReport(Record):
     checked: tuple[str, ...] = ()
     faults: dict[str, Fault] = Field(default={})
     slips: tuple[PythonSlip, ...] = ()
+
+    def below(self, folder: str) -> SyntaxReport:
+        """Return the faults and slips of a package whose paths it has behind `folder` (`../lab_msgs/`), which is "" for
+        the one that it is of."""
+        faults = {one.file: one for one in _below(folder, self.faults.values())}
+        return SyntaxReport(faults=faults, slips=tuple(_below(folder, self.slips)))
+
+
+_Found = TypeVar("_Found", Fault, PythonSlip)
+
+
+def _below(folder: str, found: Iterable[_Found]) -> Iterator[_Found]:
+    for one in found:
+        if one.file.startswith(folder or one.file.removeprefix("../")):
+            yield one.model_copy(update={"file": one.file.removeprefix(folder)})
 
 
 class _RawFault(Record):

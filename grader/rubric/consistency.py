@@ -11,11 +11,12 @@ from typing import Any
 
 from grader.checks.registry import Check
 from grader.rubric.faults import model_faults
+from grader.rubric.model import ROSTEST_ENDING, ManualParams
 from grader.rubric.references import reference_faults
 from grader.rubric.served import served_faults
-from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
+from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.rubric.steps import given_steps, slash, step_faults
-from grader.wording import did_you_mean
+from grader.wording import did_you_mean, join_words
 
 TOTAL_POINTS = 100
 ANSWERS = "service-answers"
@@ -51,8 +52,37 @@ def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = 
     faults += _groups(rubric, criteria)
     faults += _gates(rubric, criteria)
     faults += _late(rubric)
+    faults += _packages(rubric, scenarios, criteria)
     faults += reference_faults(rubric, checks)
     return faults
+
+
+def _packages(
+    rubric: dict[str, Any], scenarios: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]
+) -> Iterator[Fault]:
+    """Each package is named once, none is the course's, and starts and criteria name those that there are."""
+    known = packages_in(rubric)
+    for index, name in as_texts(rubric.get("package")):
+        if name in known[:index]:
+            yield ("package", index), f'"{name}" is there twice'
+    for index, name in as_texts(rubric.get("packages")):
+        if name in known[1:]:
+            yield ("packages", index), f'"{name}" is one that students hand in: take it out of one of the two'
+    for path, one in criteria:
+        yield from _of_known(("criteria", path, "package"), one, known)
+    for scenario, one in scenarios.items():
+        for index, start in as_maps(as_map(one).get("start")):
+            at = ("scenarios", scenario, "start", index, "package")
+            yield from _of_known(at, start, known)
+            if start.get("package") is not None and start.get("program") is not None:
+                yield at, "is not for a program: that names its package itself"
+
+
+def _of_known(path: KeyPath, one: dict[str, Any], known: list[str]) -> Iterator[Fault]:
+    name = one.get("package")
+    if isinstance(name, str) and name not in known:
+        near = did_you_mean(name, known) or f": there is {join_words(known)}"
+        yield path, f'the lab has no package "{name}"{near}'
 
 
 def _check(
@@ -62,7 +92,7 @@ def _check(
     if not isinstance(name, str):
         return
     if name == MANUAL:
-        yield from (((*path, "with"), "a person needs no parameters") for _ in as_map(criterion.get("with")))
+        yield from model_faults(ManualParams, as_map(criterion.get("with")), (*path, "with"))
         return
     if name not in checks:
         near = did_you_mean(name, [*checks, MANUAL])
@@ -277,7 +307,12 @@ def _means(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
 
 
 def _has_tests(scenario: dict[str, Any]) -> bool:
-    return any(start.get("tests") is not None for _, start in as_maps(scenario.get("start")))
+    """Return whether it has tests, until whose end it lasts."""
+    starts = [start for _, start in as_maps(scenario.get("start"))]
+    return any(
+        start.get("tests") is not None or str(start.get("program")).endswith(ROSTEST_ENDING)
+        for start in starts
+    )
 
 
 def _starts(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:

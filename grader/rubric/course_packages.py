@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from grader.rubric.model import FOLDER_PATTERN
-from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
+from grader.rubric.model import FOLDER_PATTERN, ROSTEST_ENDING
+from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import did_you_mean
 
 MANIFEST = "package.xml"
@@ -22,7 +22,8 @@ IGNORED = frozenset({"build", "devel", "install", "__pycache__"})
 LAUNCH_ENDINGS = (".launch", ".launch.xml")
 SCRIPT = b"#!"
 _NAME = re.compile(rb"<name>\s*([\w-]+)\s*</name>")
-_TARGET = re.compile(r"add_executable\s*\(\s*\"?([\w.-]+)")
+_COMMENT = re.compile("<!--.*?-->", re.DOTALL)
+_TARGET = re.compile(r"(?:add_executable\s*\(\s*|\bOUTPUT_NAME\s+)\"?([\w.-]+)")
 
 
 def folder_files(folder: Path, name: str) -> dict[str, bytes]:
@@ -85,13 +86,25 @@ def read_starter(rubric: dict[str, Any], folder: Path) -> tuple[dict[str, bytes]
 def _programs(rubric: dict[str, Any], package: str, files: Mapping[str, bytes]) -> Iterator[Fault]:
     """Yield a fault for each program that the package does not have."""
     known = {path.rpartition("/")[2] for path, data in files.items() if data.startswith(SCRIPT)}
-    known |= {path.rpartition("/")[2] for path in files if path.endswith(LAUNCH_ENDINGS)}
+    known |= {path.rpartition("/")[2] for path in files if path.endswith((*LAUNCH_ENDINGS, ROSTEST_ENDING))}
     cmake = files.get(f"{package}/CMakeLists.txt", b"").decode(errors="replace")
     known |= set(_TARGET.findall(cmake))
     for path, program in _started(rubric):
         owner, _, name = program.partition("/")
         if owner == package and name not in known and "${" not in cmake:
             yield path, f'{package} has no program or launch file "{name}"{did_you_mean(name, known)}'
+        elif owner == package and name.endswith(ROSTEST_ENDING):
+            text = next(data for file, data in files.items() if file.endswith(f"/{name}")).decode(
+                errors="replace"
+            )
+            yield from ((path, fault) for fault in _started_by_test(rubric, name, _COMMENT.sub("", text)))
+
+
+def _started_by_test(rubric: dict[str, Any], name: str, text: str) -> Iterator[str]:
+    """Yield why a `.test` file cannot be used: where tests are, nothing of a student's runs."""
+    for own in packages_in(rubric):
+        if re.search(rf"""pkg\s*=\s*["']{own}["']|\$\(find {own}\)""", text):
+            yield f"{name} starts something of {own}: take it out, and start it in the scenario, before the tests"
 
 
 def _started(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:

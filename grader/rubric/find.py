@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from grader.errors import RubricError, UsageError
 from grader.files import atomic_write
-from grader.rubric.source import text_at
+from grader.rubric.source import texts_at
 from grader.wording import did_you_mean
 
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -25,13 +25,18 @@ BUILT_IN = "the grader"
 
 
 class LabFile(NamedTuple):
-    """A rubric by its id; `package` is empty where the file cannot be read. `source` says where it was found: a folder
+    """A rubric by its id; `packages` is empty where the file cannot be read. `source` says where it was found: a folder
     of the user's, or `the grader`."""
 
     id: str
     path: Path
-    package: str
+    packages: tuple[str, ...]
     source: str = BUILT_IN
+
+    @property
+    def package(self) -> str:
+        """The main one of its packages, "" where there is none."""
+        return next(iter(self.packages), "")
 
 
 def rubrics_folder() -> Path:
@@ -95,7 +100,7 @@ def known_labs() -> tuple[LabFile, ...]:
 @cache
 def _built_in(folder: Path) -> tuple[LabFile, ...]:
     paths = [folder / f"{name}.yaml" for name in rubric_ids()]
-    return tuple(LabFile(path.stem, path, _text(path, "package")) for path in paths)
+    return tuple(LabFile(path.stem, path, _texts(path, "package")) for path in paths)
 
 
 def locate(name_or_path: str) -> tuple[Path, str]:
@@ -131,16 +136,20 @@ def _rubrics_in(folder: Path) -> Iterator[LabFile]:
     except OSError:
         return
     for path in paths:
-        schema, package = _text(path, "schema"), _text(path, "package")
-        if schema.startswith(SCHEMA) or (not schema and package):
-            yield LabFile(_text(path, "id") or path.stem, path, package, str(folder))
+        schema, packages = _text(path, "schema"), _texts(path, "package")
+        if schema.startswith(SCHEMA) or (not schema and packages):
+            yield LabFile(_text(path, "id") or path.stem, path, packages, str(folder))
 
 
 def _text(path: Path, key: str) -> str:
+    return next(iter(_texts(path, key)), "")
+
+
+def _texts(path: Path, key: str) -> tuple[str, ...]:
     try:
-        return text_at(path, path.name, key)
+        return texts_at(path, path.name, key)
     except RubricError:  # named where the rubric is loaded
-        return ""
+        return ()
 
 
 def _written_down() -> tuple[Path, ...]:

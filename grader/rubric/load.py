@@ -4,26 +4,36 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping
+import re
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from grader.checks import Check
 from grader.errors import RubricError, UsageError
 from grader.model.record import Record
+from grader.model.result import RubricOrigin
 from grader.model.version import RUBRIC, UPDATE, Versioned
 from grader.rubric.consistency import cross_faults
+from grader.rubric.course import load_course, split_name
 from grader.rubric.faults import model_faults
 from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics_folder
 from grader.rubric.instructor import Beside, known_checks, read_instructor, run_checks_file
+from grader.rubric.made_up import draw_values, with_values
+from grader.rubric.made_up_faults import made_up_faults, of_sample, sample_data
 from grader.rubric.model import Criterion, Rubric
-from grader.rubric.source import Source, read_source
+from grader.rubric.source import Source, Value, as_map, read_source
+
+PIN = "#sha256:"
+"""Between a rubric's name and the digest that it must have."""
+ADDRESS = re.compile("https?://", re.IGNORECASE)
 
 
 class LoadedRubric(Record):
     """A rubric and where it came from; `digest` is the sha256 of the file's bytes, and of the instructor's files.
 
     `own` is the text of the instructor's file of checks: another process, to which this record is sent, runs it again.
-    `handed_out` holds the sha256 of each file of the starter.
+    `handed_out` holds the sha256 of each file of the starter. `origin` says where it came from, as far as that can be
+    said without a submission.
     """
 
     rubric: Rubric
@@ -31,6 +41,7 @@ class LoadedRubric(Record):
     digest: str
     own: bytes | None = None
     handed_out: frozenset[str] = frozenset()
+    origin: RubricOrigin = "elsewhere"
 
     @property
     def checks(self) -> dict[str, Check]:
@@ -40,6 +51,13 @@ class LoadedRubric(Record):
             return known_checks(folder, {})
         return known_checks(folder, run_checks_file(folder.resolve() / self.rubric.checks, self.own).checks)
 
+    def of_submission(self, digest: str) -> LoadedRubric:
+        """Return the rubric with the values that are made up for the submission whose content has this digest."""
+        if not self.rubric.made_up:
+            return self
+        rubric = with_values(self.rubric, draw_values(self.rubric, digest))
+        return self.model_copy(update={"rubric": rubric})
+
     @property
     def docs(self) -> dict[str, dict[str, str]]:
         """Of each of these checks the sections of its docstring, for reports."""
@@ -47,21 +65,90 @@ class LoadedRubric(Record):
 
 
 def load_rubric(name_or_path: str) -> LoadedRubric:
-    """Return the rubric of that id (of those that come with the grader), or in that file.
+    """Return the rubric of that id (of those that come with the grader), in that file, at that address, or of a
+    course's lab (`course.yaml#lab1`). `#sha256:…` behind it pins its digest, which an address needs.
 
-    Raises RubricError with every fault that it has.
+    Raises RubricError with every fault that it has, UsageError where it has another digest, or the course has no such
+    lab.
     """
-    path, name = locate(name_or_path)
+    name, pin = split_pin(name_or_path)
+    address = ADDRESS.match(name) is not None
+    of_course = None if address else split_name(name)
+    if of_course:
+        loaded = _load_of_course(*of_course)
+    else:
+        loaded = _load_file(*(_fetched(name, pin) if address else locate(name)))
+    if not pin:
+        return loaded
+    if pin != loaded.digest:
+        raise UsageError(
+            f"{name} is not the rubric that was pinned: its digest is sha256:{loaded.digest}, not sha256:{pin}",
+            hint="take the pinned file, or pin the digest that `grader rubric validate` prints for this one",
+        )
+    return loaded.model_copy(update={"origin": "pinned"})
+
+
+def _load_file(path: Path, name: str) -> LoadedRubric:
     source = read_source(path, name)
     refuse_newer(source, RUBRIC)
-    beside = read_instructor(source.data, path.parent)
-    faults = _faults(source, beside)
+    samples = sample_data(source.data)
+    beside = read_instructor(samples[0], path.parent)
+    faults = _faults(source, samples, beside)
     if faults:
         raise RubricError(faults)
-    rubric = share_points(Rubric.model_validate_json(json.dumps(source.data), strict=True))
+    rubric = share_points(Rubric.model_validate_json(json.dumps(samples[0]), strict=True))
+    if rubric.made_up:
+        rubric.remember(as_map(source.data), {})
     own = beside.files[rubric.checks] if rubric.checks is not None else None
     digest = _digest(source.raw, beside)
-    return LoadedRubric(rubric=rubric, path=path, digest=digest, own=own, handed_out=beside.handed_out)
+    return LoadedRubric(
+        rubric=rubric,
+        path=path,
+        digest=digest,
+        own=own,
+        handed_out=beside.handed_out,
+        origin="grader" if _comes_with_grader(path) else "elsewhere",
+    )
+
+
+def _fetched(url: str, pin: str) -> tuple[Path, str]:
+    from grader.rubric.download import fetch_rubric  # noqa: PLC0415 - slow to import, and seldom needed
+
+    return fetch_rubric(url, pin), url
+
+
+def split_pin(text: str) -> tuple[str, str]:
+    """Return a rubric's name and the digest behind it, "" where none is given. Raises UsageError for half a one."""
+    name, mark, digest = str(text).rpartition(PIN)
+    if not mark:
+        return str(text), ""
+    if not re.fullmatch("[0-9a-f]{64}", digest.lower()):
+        raise UsageError(
+            f"{text}: {PIN} is followed by 64 hexadecimal digits", hint="`grader rubric validate` prints them"
+        )
+    return name, digest.lower()
+
+
+def _comes_with_grader(path: Path) -> bool:
+    return path.resolve().is_relative_to(rubrics_folder().resolve())
+
+
+def _load_of_course(file: Path, name: str) -> LoadedRubric:
+    """The course's deadline and late policy take the place of the rubric's, and leave its digest: nothing is judged by
+    them."""
+    found = load_course(file)
+    lab = found.lab(name)
+    rubric_name, pin = split_pin(lab.rubric)
+    beside = found.beside(rubric_name)
+    loaded = load_rubric(f"{beside}{PIN if pin else ''}{pin}" if beside.is_file() else lab.rubric)
+    terms = {"deadline": lab.deadline, "late": found.late(name)}
+    rubric = loaded.rubric.model_copy(
+        update={key: value for key, value in terms.items() if value is not None}
+    )
+    if found.course.late_days and rubric.deadline is None:
+        hint = f"give the lab {name} a deadline"
+        raise UsageError(f"{file}: late days need a deadline, and {lab.rubric} has none", hint=hint)
+    return loaded.model_copy(update={"rubric": rubric})
 
 
 def share_points(rubric: Rubric) -> Rubric:
@@ -120,7 +207,8 @@ def all_rubrics() -> tuple[LoadedRubric, ...]:
 
 def find_rubric_for_package(name: str) -> str | None:
     """Return the id of the rubric for a package of that name, or None. Raises UsageError where there are several."""
-    found = [lab for lab in known_labs() if lab.package.lower() == name.lower()]
+    asking = [lab for lab in known_labs() if name.lower() in map(str.lower, lab.packages)]
+    found = [lab for lab in asking if lab.package.lower() == name.lower()] or asking
     if len(found) > 1:
         labs = ", ".join(lab.id if lab.source == BUILT_IN else f"{lab.id} ({lab.path})" for lab in found)
         raise UsageError(
@@ -134,17 +222,19 @@ def packages_of_labs() -> dict[str, str]:
     return {lab.id: lab.package for lab in known_labs()}
 
 
-def _faults(source: Source, beside: Beside) -> list[str]:
+def _faults(source: Source, samples: Sequence[Value], beside: Beside) -> list[str]:
     if not isinstance(source.data, dict):
         return [
             source.fault((), "a rubric is a map of keys and values, beginning with schema: grader.rubric/1")
         ]
-    found = [
-        *source.faults,
-        *model_faults(Rubric, source.data),
-        *cross_faults(source.data, beside.known, complete=beside.own.complete),
-        *beside.faults,
-    ]
+    found = [*source.faults, *made_up_faults(source.data), *beside.faults]
+    for sample in samples:
+        faults = [
+            *model_faults(Rubric, sample),
+            *cross_faults(sample, beside.known, complete=beside.own.complete),
+        ]
+        known = {path for path, _ in found} if sample is not samples[0] else set()
+        found += [one for one in of_sample(faults, source.data, as_map(sample)) if one[0] not in known]
     unique = dict.fromkeys(found)
     told = [source.fault(*fault) for fault in sorted(unique, key=lambda fault: source.line(fault[0]))]
     file = Path(source.name).parent / str(source.data.get("checks"))
@@ -161,13 +251,14 @@ def started(rubric: Rubric, only: Collection[str] | None = None) -> Rubric:
     return rubric.model_copy(update={"scenarios": scenarios})
 
 
-def files_of(rubric: Rubric) -> frozenset[str]:
-    """Return the names of the scripts, launch files and other files that the rubric asks for, without folders."""
-    paths = [
-        path for s in rubric.scenarios.values() for p in s.start for path in (p.script, p.launch, p.load)
-    ]
+def files_of(rubric: Rubric, package: str) -> frozenset[str]:
+    """Return the names of the scripts, launch files and other files that the rubric asks for in one of its packages,
+    without folders."""
+    starts = [p for s in rubric.scenarios.values() for p in s.start if rubric.package_of(p) == package]
+    paths = [path for p in starts for path in (p.script, p.launch, p.load)]
     names = {PurePosixPath(path).name for path in paths if path is not None}
-    return frozenset(names.union(*(names_in(criterion) for criterion in rubric.criteria)))
+    criteria = [c for c in rubric.criteria if rubric.package_of(c) == package]
+    return frozenset(names.union(*(names_in(criterion) for criterion in criteria)))
 
 
 def names_in(criterion: Criterion) -> set[str]:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
 from hashlib import sha256
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, AwareDatetime, Field
+from pydantic import AfterValidator, AwareDatetime, Field, PrivateAttr
+from typing_extensions import Self
 
 from grader.model.record import Record
 from grader.model.repair import DEFAULT_SHARES, RepairKind
+from grader.rubric.made_up import MadeUp, Value
 
 Seconds = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -17,6 +20,7 @@ NAME_PATTERN = r"^[a-z][a-z0-9-]*$"
 PROGRAM_PATTERN = r"^[A-Za-z][\w-]*/[\w.-]+$"
 TYPE_PATTERN = r"^[A-Za-z]\w*/[A-Za-z]\w*$"
 PACKAGE_PATTERN = r"^[A-Za-z]\w*$"
+ROSTEST_ENDING = ".test"
 FOLDER_PATTERN = r"^[A-Za-z][\w-]*$"
 MESSAGES_MAX = 10_000
 LINE_CHARS_MAX = 1_000
@@ -57,7 +61,8 @@ class Start(Record):
     """A YAML file that `rosparam load` puts on the parameter server."""
     program: Annotated[str, Field(pattern=PROGRAM_PATTERN)] | None = None
     """A node of another package, as `rosrun` takes it (`turtlesim/turtlesim_node`), or a launch file of one
-    (`course_sim/world.launch`). It is the grader's, and what it does never counts as the student's."""
+    (`course_sim/world.launch`), or its tests for rostest (`course_sim/world.test`), until whose end the run goes on.
+    It is the grader's, and what it does never counts as the student's."""
     built: bool = False
     """Start every program that the build made (`add_executable`), as processes `<name>/<program>`."""
     tests: str | None = None
@@ -67,6 +72,13 @@ class Start(Record):
     """Arguments, as for `rosrun` or `roslaunch`: `["_rate:=5", "robot:=burger"]`."""
     after: Name | None = None
     """The name of an earlier start: this one waits until a node of that one is registered."""
+    package: str | None = None
+    """Which of the lab's packages has the file or the programs, where students hand in several; null: the first."""
+
+    @property
+    def is_rostest(self) -> bool:
+        """Whether it is an instructor's tests, which the check `rostest` judges."""
+        return self.program is not None and self.program.endswith(ROSTEST_ENDING)
 
 
 class Param(Record):
@@ -458,8 +470,9 @@ class Scenario(Record):
             left_out["serves"] = True
         if not any(call.definition for call in self.calls):
             left_out["calls"] = {"__all__": {"definition"}}
-        if not any(start.tests for start in self.start):
-            left_out["start"] = {"__all__": {"tests"}}
+        unset = {key for key in ("tests", "package") if not any(getattr(start, key) for start in self.start)}
+        if unset:
+            left_out["start"] = {"__all__": unset}
         return sha256(self.model_dump_json(exclude=left_out).encode()).hexdigest()
 
 
@@ -478,6 +491,9 @@ class Criterion(Record):
     """Taken off where the check fails; the total is never less than 0."""
     check: str
     """The check that judges it, or `manual` where a person gives the points."""
+    package: str | None = None
+    """Which of the lab's packages it judges, where students hand in several; null: that of the process that `with`
+    names, or of all the processes of its scenario, else the first."""
     parameters: Annotated[dict[str, Any], Field(alias="with", default_factory=dict)]
     """The check's own parameters."""
     scenario: Name | None = None
@@ -495,6 +511,15 @@ class Criterion(Record):
     def extra(self) -> float:
         """What it can change beside the rubric's 100 points: a bonus, or minus a penalty."""
         return self.bonus or -(self.penalty or 0.0)
+
+
+class ManualParams(Record):
+    """What a criterion that a person decides is about."""
+
+    files: Annotated[
+        tuple[Annotated[str, Field(min_length=1, max_length=200)], ...], Field(max_length=20)
+    ] = ()
+    """The files that `grader review` shows beside it, by name, path or pattern (`scripts/*.py`); none: all programs."""
 
 
 class Group(Record):
@@ -557,8 +582,9 @@ class Rubric(Record):
     """What people read."""
     version: str
     """The rubric's own version, as text."""
-    package: str
-    """The name of the package that students hand in."""
+    package_: Annotated[str | Annotated[tuple[str, ...], Field(min_length=1)], Field(alias="package")]
+    """The name of the package that students hand in; of several, `[lab_msgs, lab_nodes]`, the first is the main one,
+    without which nothing is graded."""
     handout: str = ""
     """Where the handout is, or what it is called."""
     pass_mark: Annotated[float, Field(ge=0)] | None = None
@@ -587,10 +613,49 @@ class Rubric(Record):
     """How criteria's points are given together, by the group's name."""
     gates: tuple[Gate, ...] = ()
     """Criteria without which the whole is worth less."""
+    made_up: Annotated[dict[Name, MadeUp], Field(default_factory=dict)]
+    """Values that are made up for each submission, by the names by which scenarios and criteria use them."""
     scenarios: dict[Name, Scenario]
     """The runs, by name."""
     criteria: Annotated[tuple[Criterion, ...], Field(min_length=1)]
     """What is judged, in the order of the report."""
+    _written: dict[str, Any] = PrivateAttr(default_factory=dict)
+    _values: dict[str, Value] = PrivateAttr(default_factory=dict)
+
+    @property
+    def written(self) -> dict[str, Any]:
+        """Its data as the file has them, where it makes values up."""
+        return self._written
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """The made-up values that stand in it; none where they are samples."""
+        return self._values
+
+    def remember(self, written: Mapping[str, Any], values: Mapping[str, Value]) -> Self:
+        """Keep what it was made of; return it."""
+        self._written, self._values = dict(written), dict(values)
+        return self
+
+    @property
+    def package(self) -> str:
+        """The package that students hand in; of several, the main one."""
+        return self.package_names[0]
+
+    @property
+    def package_names(self) -> tuple[str, ...]:
+        """The packages that students hand in, the main one first."""
+        return (self.package_,) if isinstance(self.package_, str) else self.package_
+
+    def package_of(self, one: Criterion | Start) -> str:
+        """Return the name of the package that a criterion judges, or that a start's files are of."""
+        if one.package is not None or isinstance(one, Start):
+            return one.package or self.package
+        scenario = self.scenarios.get(one.scenario or "")
+        starts = [s for s in scenario.start if s.program is None] if scenario is not None else []
+        process = str(one.parameters.get("process")).partition("/")[0]
+        found = {self.package_of(s) for s in [s for s in starts if s.name == process] or starts}
+        return found.pop() if len(found) == 1 else self.package
 
     def share_of(self, kind: RepairKind) -> float:
         """Return the share of its points, 0 to 1, that a criterion earns on a copy with such a repair."""

@@ -13,8 +13,8 @@ from typing import Any
 from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.ros_packages import TypeKind, ros_packages
-from grader.rubric.model import PROGRAM_PATTERN, TYPE_PATTERN, Until
-from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
+from grader.rubric.model import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
+from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import closest, did_you_mean, join_words
 
 PUBLISHED_BY = {
@@ -67,7 +67,7 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
     """A program, or a type of messages or services. The student's own package may have any type."""
     if not isinstance(value, str):
         return
-    own = {str(rubric.get("package")), *(name for _, name in as_texts(rubric.get("packages")))}
+    own = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
     fault = ""
     if to == "program" and not re.fullmatch(PROGRAM_PATTERN, value):
         fault = f'name its package too, like turtlesim/turtlesim_node, not "{value}"'
@@ -250,6 +250,12 @@ LISTED: Mapping[str, tuple[str, Callable[[dict[str, Any]], Iterable[str]]]] = {
     ),
     "sent": ("no probe of {name} sends on {value}{instead}", _sent),
     "action": ("no step of {name} sends a goal to {value}{instead}", _actions),
+    "rostest": (
+        '{name} starts no .test file as "{value}"{instead}',
+        lambda scenario: [
+            str(s.get("name")) for s in _starts(scenario) if str(s.get("program")).endswith(ROSTEST_ENDING)
+        ],
+    ),
     "served": ("the grader does not offer {value} in {name}{instead}: add it to serves", _served),
 }
 """Of what a scenario has to list: what is said where it does not, and where to look."""

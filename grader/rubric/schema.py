@@ -12,12 +12,28 @@ from pydantic import Field, create_model
 
 from grader.checks import HEADINGS, Check
 from grader.checks.parameter_docs import inner_records
-from grader.checks.registry import NoParams
 from grader.model.record import Record, field_docstrings
 from grader.rubric.consistency import MANUAL
 from grader.rubric.instructor import known_checks
-from grader.rubric.model import Criterion, Rubric
+from grader.rubric.model import Criterion, ManualParams, Rubric
 
+WITHOUT_PLACES = ("Criterion", "Gate", "Group", "Late", "MadeUp", "Needs")
+"""Records in which no made-up value stands."""
+INSIDE = ("items", "additionalProperties")
+PLACE = {
+    "description": "A made-up value, or a text with one in it.",
+    "anyOf": [
+        {
+            "type": "object",
+            "properties": {
+                "made_up": {"type": "string", "description": "Its name in the rubric's `made_up`."}
+            },
+            "required": ["made_up"],
+            "additionalProperties": False,
+        },
+        {"type": "string", "pattern": r"\{made_up: ?[\w-]+\}"},
+    ],
+}
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -33,7 +49,25 @@ def rubric_schema(checks: Mapping[str, Check] | None = None) -> dict[str, Any]:
     _describe(model, schema)
     for record in inner_records(model):
         _describe(record, schema["$defs"].get(record.__name__, {}))
+    for name, record_schema in schema["$defs"].items():
+        if not name.startswith(WITHOUT_PLACES):
+            keys = record_schema.get("properties", {})
+            keys |= {key: _with_places(found) for key, found in keys.items()}
+    schema["$defs"]["Place"] = PLACE
     return {"$schema": DIALECT, **schema, "title": "A rubric of grader"}
+
+
+def _with_places(found: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of a value in which a made-up one may stand for each number, text or choice."""
+    about = {name: found[name] for name in ("title", "description", "default") if name in found}
+    kinds = found.get("anyOf", [{name: one for name, one in found.items() if name not in about}])
+    inner = [dict(kind) for kind in kinds]
+    for kind in inner:
+        kind |= {name: _with_places(kind[name]) for name in INSIDE if isinstance(kind.get(name), dict)}
+        kind |= {name: [_with_places(one) for one in kind[name]] for name in kind.keys() & {"prefixItems"}}
+    if any(kind.get("type", "array") not in {"array", "object", "null"} or "enum" in kind for kind in kinds):
+        inner.append({"$ref": "#/$defs/Place"})
+    return about | ({"anyOf": inner} if len(inner) > 1 else inner[0])
 
 
 def _describe(record: type[Record], schema: dict[str, Any]) -> None:
@@ -61,7 +95,7 @@ def _criterion(check: Check) -> type[Criterion]:
 def _manual() -> type[Criterion]:
     fields: dict[str, Any] = {
         "check": (Literal[MANUAL], ...),
-        "parameters": (NoParams, Field(alias="with", default_factory=NoParams)),
+        "parameters": (ManualParams, Field(alias="with", default_factory=ManualParams)),
     }
     docs = "A person gives the points."
     return create_model("Criterion_manual", __base__=Criterion, __doc__=docs, **fields)

@@ -80,7 +80,7 @@ def dotted(path: KeyPath) -> str:
 
 def read_source(path: Path, name: str, form: Form = RUBRIC) -> Source:
     """Return the file's data. Raises RubricError where it is no YAML of that form."""
-    return source_of(_read(path, name, form), name, form)
+    return source_of(read_bytes(path, name, form), name, form)
 
 
 def source_of(raw: bytes, name: str, form: Form) -> Source:
@@ -93,14 +93,22 @@ def source_of(raw: bytes, name: str, form: Form) -> Source:
     return _compose(text, raw, name, form)
 
 
-def text_at(path: Path, name: str, key: str) -> str:
-    """Return what a file says at one key of its first level, read no further; empty where it says nothing there.
+def packages_in(rubric: dict[str, Any]) -> list[str]:
+    """Return the packages that students hand in, as a rubric names them: one, or a list."""
+    given = rubric.get("package")
+    return [name for _, name in as_texts(given)] if isinstance(given, list) else [str(given)]
+
+
+def texts_at(path: Path, name: str, key: str) -> tuple[str, ...]:
+    """Return the text, or the list of texts, that a file has at one key of its first level, read no further; none where
+    it has nothing there.
 
     Raises RubricError where the file cannot be read up to there.
     """
     found, is_key, depth = "", False, 0
+    texts: list[str] | None = None
     try:
-        for event in yaml.parse(_read(path, name, RUBRIC), Loader=yaml.SafeLoader):
+        for event in yaml.parse(read_bytes(path, name, RUBRIC), Loader=yaml.SafeLoader):
             begins = isinstance(event, yaml.CollectionStartEvent)
             if depth == 0 and isinstance(event, yaml.SequenceStartEvent):
                 break
@@ -108,15 +116,22 @@ def text_at(path: Path, name: str, key: str) -> str:
                 is_key = not is_key
                 value = str(event.value) if isinstance(event, yaml.ScalarEvent) else ""
                 if found == key and not is_key:
-                    return value
+                    if not isinstance(event, yaml.SequenceStartEvent):
+                        return (value,) if value else ()
+                    texts = []
                 found = value
+            elif texts is not None and isinstance(event, yaml.ScalarEvent):
+                texts.append(str(event.value))
             depth += begins - isinstance(event, yaml.CollectionEndEvent)
+            if texts is not None and depth == 1:
+                break
     except yaml.YAMLError as error:
         raise RubricError([f"{name}: is not YAML"]) from error
-    return ""
+    return tuple(texts or ())
 
 
-def _read(path: Path, name: str, form: Form) -> bytes:
+def read_bytes(path: Path, name: str, form: Form) -> bytes:
+    """Return what the file holds. Raises RubricError where it cannot be read, or is larger than the form allows."""
     try:
         with path.open("rb") as file:
             raw = file.read(form.bytes_max + 1)
@@ -150,6 +165,13 @@ def _compose(text: str, raw: bytes, name: str, form: Form) -> Source:
         if loader is not None:
             loader.dispose()
     return Source(name=name, raw=raw, data=data, lines=reader.lines, faults=reader.faults)
+
+
+def compose(text: str) -> yaml.Node | None:
+    """Return the nodes of a YAML text, with their places in it; None of an empty one. Raises YAMLError."""
+    loader, node = _load_nodes(text)
+    loader.dispose()
+    return node
 
 
 def _load_nodes(text: str) -> tuple[yaml.SafeLoader, yaml.Node | None]:

@@ -227,3 +227,37 @@ def test_never_raises(tmp_path_factory, noise, at):
 @given(st.text(alphabet='if()endforach"${}[=]#\\;\n x', max_size=60))
 def test_never_raises_on_what_looks_like_cmake(tmp_path_factory, text):
     assert facts_of(tmp_path_factory.getbasetemp(), text).source == "parser"
+
+
+@pytest.mark.parametrize(
+    ("lines", "name", "folder"),
+    [
+        ("", "lab1_node", ""),
+        ('set_target_properties(lab1_node PROPERTIES OUTPUT_NAME node PREFIX "")', "node", ""),
+        ('set_target_properties(lab1_node PROPERTIES PREFIX "" OUTPUT_NAME node)', "node", ""),
+        ('set_target_properties(lab1_node PROPERTIES LINK_FLAGS "" OUTPUT_NAME node)', "node", ""),
+        ("set_target_properties(a lab1_node PROPERTIES PREFIX my_ SUFFIX .bin)", "my_lab1_node.bin", ""),
+        ("set_property(TARGET lab1_node PROPERTY OUTPUT_NAME node)", "node", ""),
+        ("set_property(SOURCE lab1_node PROPERTY OUTPUT_NAME node)", "lab1_node", ""),
+        ("set_target_properties(lab1_node PROPERTIES RUNTIME_OUTPUT_NAME b OUTPUT_NAME a)", "b", ""),
+        ("set_target_properties(other PROPERTIES OUTPUT_NAME a)", "lab1_node", ""),
+        (
+            "set_target_properties(lab1_node PROPERTIES RUNTIME_OUTPUT_DIRECTORY /x/bin)",
+            "lab1_node",
+            "/x/bin",
+        ),
+    ],
+)
+def test_a_program_has_the_name_that_its_target_s_properties_give_it(lines, name, folder, tmp_path):
+    facts = facts_of(tmp_path, f"project(lab1)\nadd_executable(${{PROJECT_NAME}}_node a.cpp)\n{lines}\n")
+    (found,) = facts.executables
+    assert (found.target, found.name, found.folder) == ("lab1_node", name, folder)
+    assert found.is_called(name)
+    assert not found.is_called(f"{name}2")
+
+
+def test_a_name_that_only_cmake_knows_may_be_any(tmp_path):
+    text = "add_executable(talker a.cpp)\nset_target_properties(talker PROPERTIES OUTPUT_NAME my_${UNKNOWN}_node)"
+    (found,) = facts_of(tmp_path, text).executables
+    assert found.is_called("my_talker_node")
+    assert not found.is_called("talker")

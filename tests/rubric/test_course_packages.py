@@ -78,6 +78,21 @@ def test_each_fault_with_its_line(tmp_path: Path, program: str, packages: str, f
     assert any(one.startswith(f"lab.yaml:{fault}") for one in found), found
 
 
+def test_a_test_file_that_starts_a_students_node_is_a_fault(tmp_path: Path) -> None:
+    path = lab(tmp_path, "course_sim/tank.test")
+    file = tmp_path / "course_sim" / "test" / "tank.test"
+    file.parent.mkdir()
+    file.write_text(
+        '<launch><!-- <node pkg="lab1"/> --><test pkg="course_sim" type="tank.py" test-name="t"/></launch>'
+    )
+    load_rubric(str(path))
+    file.write_text('<launch><node name="talker" pkg="lab1" type="talker.py"/></launch>')
+    (fault,) = faults(path)
+    assert fault.startswith(
+        "lab.yaml:11: scenarios.real.start[0].program: tank.test starts something of lab1: take"
+    )
+
+
 def test_a_manifest_with_another_name_is_a_fault(tmp_path: Path) -> None:
     path = lab(tmp_path)
     (tmp_path / "course_sim" / "package.xml").write_text(MANIFEST.replace("course_sim", "sim"))

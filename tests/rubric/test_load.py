@@ -8,7 +8,7 @@ from grader.errors import RubricError
 from grader.judging.judge import MANUAL
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import all_rubrics, find_rubric_for_package, load_rubric
-from grader.rubric.source import text_at
+from grader.rubric.source import texts_at
 from tests.rubric.samples import SOUND, faults, spoiled
 
 NAME = "must be lower-case letters, digits and hyphens, beginning with a letter"
@@ -144,7 +144,11 @@ def test_three_faults_are_all_named_with_file_and_line(tmp_path):
         ),
         ("package: lab1\n", "package: lab1\ndigits: 9\n", "6: digits: must be at most 3, not 9"),
         ("package: lab1\n", "package: lab1\n12: x\n", "1: 12 in line 6 is no text: put the key in quotes"),
-        ("package: lab1\n", "package: [lab1]\n", "5: package: must be text, not a list"),
+        (
+            "package: lab1\n",
+            "package: [1]\n",
+            "5: package: must be text, not a list, or must be text, not 1: put it in quotes",
+        ),
         (
             "  real:\n",
             "  Real Run:\n",
@@ -254,24 +258,26 @@ def test_the_rubric_of_a_package():
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("a: {package: no}\nb: [package, x]\nc: package\npackage: lab1\nrest: {", "lab1"),
-        ("package: {name: lab1}\n", ""),
-        ("? [package]\n: x\n? package\n: lab1\n", "lab1"),
-        ("- package\n- lab1\n", ""),
-        ("", ""),
+        ("a: {package: no}\nb: [package, x]\nc: package\npackage: lab1\nrest: {", ("lab1",)),
+        ("package: [a, b]\nrest: {", ("a", "b")),
+        ("package:\n  - a\n  - b\n", ("a", "b")),
+        ("package: {name: lab1}\n", ()),
+        ("? [package]\n: x\n? package\n: lab1\n", ("lab1",)),
+        ("- package\n- lab1\n", ()),
+        ("", ()),
     ],
 )
 def test_one_key_is_read_without_the_rest_of_the_file(text, found, tmp_path):
     path = tmp_path / "lab.yaml"
     path.write_text(text)
-    assert text_at(path, path.name, "package") == found
+    assert texts_at(path, path.name, "package") == found
 
 
 def test_a_file_that_is_no_yaml_up_to_the_key_says_so(tmp_path):
     path = tmp_path / "lab.yaml"
     path.write_text("a: [\n")
     with pytest.raises(RubricError, match=r"lab\.yaml: is not YAML"):
-        text_at(path, path.name, "package")
+        texts_at(path, path.name, "package")
 
 
 def test_a_person_may_give_the_points(tmp_path):

@@ -107,6 +107,12 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
         ),
         pytest.param(
             "check: logs, with: {text: a}",
+            "check: rostest, with: {process: turtlesim}",
+            '39: criteria[9].with.process: launch starts no .test file as "turtlesim": there is none',
+            id="tests-that-are-no-tests",
+        ),
+        pytest.param(
+            "check: logs, with: {text: a}",
             "check: file-left, with: {file: run.bag}",
             '39: criteria[9].with.file: launch keeps no file "run.bag": there is none; add it to its keeps',
             id="file-that-is-not-kept",

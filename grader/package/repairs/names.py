@@ -199,8 +199,7 @@ def _repair_params(files: Files, launch: LaunchFile, wanted: Wanted) -> None:
 
 
 def _programs(package: PackageFacts) -> set[str]:
-    calls = package.cmake.calls if package.cmake is not None else ()
-    return {call.args[0] for call in calls if call.name == "add_executable" and call.args}
+    return {one.name for one in package.cmake.executables} if package.cmake is not None else set()
 
 
 def _repair_node(files: Files, launch: LaunchFile, node: LaunchNode, wanted: Wanted) -> None:

@@ -44,20 +44,23 @@ TOPICS_OF = {
 """What a program that a scenario starts has for the student's nodes: a rubric need not name it."""
 
 
-def wanted_of(rubric: Rubric) -> Wanted:
-    """Return what the rubric's scenarios and criteria name."""
+def wanted_of(rubric: Rubric, package: str = "") -> Wanted:
+    """Return what the rubric's scenarios and criteria name in one of its packages, the main one if none is given."""
+    package = package or rubric.package
+    criteria = [one for one in rubric.criteria if rubric.package_of(one) == package]
     found: dict[str, dict[str, None]] = {}
-    for field, name in (*_of_scenarios(rubric), *_of_criteria(rubric.criteria)):
+    for field, name in (*_of_scenarios(rubric, package), *_of_criteria(criteria)):
         if isinstance(name, str) and name and "*" not in name:
             found.setdefault(field, {})[name] = None
-    return Wanted(package=rubric.package, **{field: tuple(names) for field, names in found.items()})
+    return Wanted(package=package, **{field: tuple(names) for field, names in found.items()})
 
 
-def _of_scenarios(rubric: Rubric) -> Iterator[tuple[str, Any]]:
+def _of_scenarios(rubric: Rubric, package: str) -> Iterator[tuple[str, Any]]:
     for scenario in rubric.scenarios.values():
         for start in scenario.start:
             yield from _each("topics", TOPICS_OF.get(start.program or ""))
-            yield from (("scripts", start.script), ("launch_files", start.launch), ("files", start.load))
+            if rubric.package_of(start) == package:
+                yield from (("scripts", start.script), ("launch_files", start.launch), ("files", start.load))
         for param in scenario.params:
             yield from (("params", param.name), ("files", param.file))
             yield from _each("params", param.also)

@@ -1,0 +1,264 @@
+"""Values that are made up for each submission: declared once in a rubric, placed wherever it has `{made_up: NAME}`.
+
+    rubric as written, values → plain rubric: what records and judges meets no value that is not there yet
+
+A submission's values follow from its content, so that a program with these numbers in it is another submission, with
+other values. The evidence has those that a run was recorded with.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from decimal import Decimal
+from random import Random
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+from pydantic import Field
+
+from grader.errors import EvidenceError
+from grader.model.record import Record
+from grader.rubric.source import KeyPath, as_map, as_maps, as_texts
+from grader.wording import join_words
+
+if TYPE_CHECKING:
+    from grader.evidence.run import Run
+    from grader.rubric.model import Criterion, Rubric
+
+Value: TypeAlias = bool | int | float | str
+KEY = "made_up"
+"""The key of a rubric, of a place in it, and of the evidence's metadata."""
+PLACES = ("with", "hint", "reproduce")
+"""The keys of a criterion in which made-up values may stand."""
+CONSONANTS = "bcdfghjkmnpqrstvwxz"
+GIVEN = {
+    "params": "the parameter {}",
+    "set_param": "the parameter {}",
+    "probes": "the messages on {}",
+    "publish": "the messages on {}",
+    "calls": "the request to {}",
+    "call": "the request to {}",
+    "serves": "the answer of {}",
+    "action": "the goal of {}",
+    "type": "the standard input of {}",
+    "transform": "the transform of {}",
+}
+"""Parts of a scenario in which a program meets a value, and what a student reads of them."""
+NAMED = ("name", "topic", "service", "action", "process", "child")
+"""The keys of these parts that name them."""
+_IN_TEXT = re.compile(r"\{made_up: ?([\w-]+)\}")
+
+
+class MadeUp(Record):
+    """A value that is made up for each submission. Give `from` and `to`, `one_of`, `letters`, `sum` or `product`.
+
+    It stands wherever a scenario, or a criterion's `with`, `hint` or `reproduce`, has `{made_up: NAME}`, in a text too:
+    `args: ["_rate:={made_up: rate}"]`.
+    """
+
+    from_: Annotated[int | float | None, Field(alias="from")] = None
+    """The least that it can be. It is a whole number where this and `step` are."""
+    to: int | float | None = None
+    """The most that it can be."""
+    step: Annotated[int | float, Field(gt=0)] = 1
+    """The values lie so far apart, from `from` on."""
+    one_of: tuple[Value, ...] = ()
+    """It is one of these."""
+    letters: Annotated[int | None, Field(ge=3, le=40)] = None
+    """It is a text of so many letters."""
+    sum: tuple[str | int | float, ...] = ()
+    """It is the sum of these, numbers and names of values above it: `[a, b]`."""
+    product: tuple[str | int | float, ...] = ()
+    """It is the product of these: `[rate, 2]`."""
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it can be counted with."""
+        return self.letters is None and not any(isinstance(value, bool | str) for value in self.one_of)
+
+    @property
+    def count(self) -> int:
+        """How many values a range has."""
+        low, high, step = (Decimal(repr(n or 0)) for n in (self.from_, self.to, self.step))
+        return max(0, int((high - low) // step) + 1)
+
+    def value(self, above: Mapping[str, Value], choose: Callable[[int], int]) -> Value:
+        """Return a value; `choose` gives the place of one of so many, `above` has those that are declared above it."""
+        if self.letters is not None:
+            return "".join(CONSONANTS[choose(len(CONSONANTS))] for _ in range(self.letters))
+        if self.one_of:
+            return self.one_of[choose(len(self.one_of))]
+        if self.from_ is not None:
+            return _number(Decimal(repr(self.from_)) + choose(self.count) * Decimal(repr(self.step)))
+        parts = [above[p] if isinstance(p, str) else p for p in self.sum or self.product]
+        total = Decimal(0 if self.sum else 1)
+        for part in (Decimal(repr(part)) for part in parts):
+            total = total + part if self.sum else total * part
+        return _number(total)
+
+
+def _number(exact: Decimal) -> int | float:
+    """A whole number only where it was made of such: `1.0` stays a decimal."""
+    exponent = exact.as_tuple().exponent
+    return int(exact) if isinstance(exponent, int) and exponent >= 0 else float(exact)
+
+
+# --- Values -----------------------------------------------------------------------------------------------------------
+
+
+def draw_values(rubric: Rubric, digest: str) -> dict[str, Value]:
+    """Return the values of the submission whose content has this digest; they stay when the rubric's words change."""
+    values: dict[str, Value] = {}
+    for name, one in rubric.made_up.items():
+        seeded = Random(f"{rubric.id} {name} {digest}")  # noqa: S311 - to be the same on every machine
+        values[name] = one.value(values, seeded.randrange)
+    return values
+
+
+def with_values(rubric: Rubric, values: Mapping[str, Value]) -> Rubric:
+    """Return the rubric with these values in their places. Raises ValidationError where one does not fit there."""
+    if not rubric.made_up:
+        return rubric
+    placed = type(rubric).model_validate_json(json.dumps(place_values(rubric.written, values)), strict=True)
+    criteria = {c.id: c.model_dump(include={"parameters", "hint", "reproduce"}) for c in placed.criteria}
+    update = {
+        "scenarios": {name: placed.scenarios[name] for name in rubric.scenarios},
+        "criteria": tuple(c.model_copy(update=criteria[c.id]) for c in rubric.criteria),
+    }
+    return rubric.model_copy(update=update).remember(rubric.written, values)
+
+
+def as_recorded(rubric: Rubric, runs: Mapping[str, Run]) -> Rubric:
+    """Return the rubric with the values that the runs were recorded with. Raises EvidenceError where they do not fit.
+
+    A value that was declared since is drawn.
+    """
+    if not rubric.made_up:
+        return rubric
+    recorded = [run.metadata for run in runs.values()]
+    digest = next((one["submission.digest"] for one in recorded if one.get("submission.digest")), "")
+    values = draw_values(rubric, digest)
+    try:
+        for known in (json.loads(one[KEY]) for one in recorded if one.get(KEY)):
+            values |= {name: value for name, value in known.items() if name in values}
+        return with_values(rubric, values)
+    except (ValueError, AttributeError) as error:  # no JSON, no map, no value that fits
+        message = "the values that were made up for this run do not fit the rubric"
+        raise EvidenceError(message, hint="grade the submission again") from error
+
+
+def values_of(rubric: Rubric, criterion: Criterion) -> dict[str, Value]:
+    """Return the values that a criterion is judged by: its own, and those of its run."""
+    if not rubric.values:
+        return {}
+    written, scenario = _written(rubric, criterion)
+    names = names_in([scenario, *(written.get(key) for key in PLACES)])
+    return {name: value for name, value in rubric.values.items() if name in names}
+
+
+def tell_made_up(rubric: Rubric, criterion: Criterion, hint: str, seen: str) -> str:
+    """Return a hint in which made-up values that the criterion asks for have their names, so that no one writes them
+    into the code, with where the run gives them. What was `seen` the program has got, and needs no words."""
+    if not rubric.values:
+        return hint
+    written, scenario = _written(rubric, criterion)
+    told = []
+    for name in sorted(names_in(written.get("with"))):
+        value = as_text(rubric.values[name])
+        of_value = re.compile(rf"(?<![\w.:-])(?<!line ){re.escape(value)}(?!\w|\.\d)")
+        if of_value.search(seen):
+            continue
+        hint = of_value.sub(f"<{name}>", hint)
+        parts = set(made_of(name, as_map(rubric.written.get(KEY))))
+        comes = "follows from" if parts else "comes with"
+        found = join_words(given_in(scenario, {name, *parts}, rubric.values))
+        told.append(f"<{name}> is made up for each submission, {value} here, and {comes} {found}")
+    return "; ".join(filter(None, (hint, *told)))
+
+
+def _written(rubric: Rubric, criterion: Criterion) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A criterion and its scenario as the rubric has them."""
+    criteria = (one for _, one in as_maps(rubric.written.get("criteria")))
+    own: dict[str, Any] = next((one for one in criteria if one.get("id") == criterion.id), {})
+    return own, as_map(as_map(rubric.written.get("scenarios")).get(criterion.scenario or ""))
+
+
+# --- Places -----------------------------------------------------------------------------------------------------------
+
+
+def place_values(
+    written: Mapping[str, Any], values: Mapping[str, Value], keys: Iterable[str] = PLACES
+) -> dict[str, Any]:
+    """Return a rubric's data with the values in its scenarios, and in these `keys` of its criteria."""
+    placed = {key: place(part, values) if key == "scenarios" else part for key, part in written.items()}
+    for index, criterion in as_maps(written.get("criteria")):
+        own = {key: place(part, values) if key in keys else part for key, part in criterion.items()}
+        placed["criteria"] = [*placed["criteria"][:index], own, *placed["criteria"][index + 1 :]]
+    return placed
+
+
+def place(part: Any, values: Mapping[str, Value]) -> Any:  # noqa: ANN401 - any part of a rubric
+    """Return a part of a rubric's data with the values in their places; others stay as they are written."""
+    if is_place(part):
+        return values.get(part[KEY], part)
+    if isinstance(part, dict):
+        return {place(key, values): place(value, values) for key, value in part.items()}
+    if isinstance(part, list):
+        return [place(value, values) for value in part]
+    if isinstance(part, str):
+        return _IN_TEXT.sub(lambda found: as_text(values.get(found[1], found[0])), part)
+    return part
+
+
+def is_place(part: object) -> bool:
+    """Return whether a made-up value stands there."""
+    return isinstance(part, dict) and part.keys() == {KEY} and isinstance(part[KEY], str)
+
+
+def as_text(value: Value) -> str:
+    """Return a value as it stands in a text: `14`, `0.5`, `true`."""
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def places(part: object, path: KeyPath = ()) -> Iterator[tuple[KeyPath, str]]:
+    """Yield where made-up values stand in a part of a rubric's data, and their names."""
+    if isinstance(part, dict) and is_place(part):
+        yield path, part[KEY]
+    elif isinstance(part, dict | list):
+        for key, value in part.items() if isinstance(part, dict) else enumerate(part):
+            yield from ((path, name) for name in _IN_TEXT.findall(str(key)))
+            yield from places(value, (*path, key))
+    elif isinstance(part, str):
+        yield from ((path, name) for name in _IN_TEXT.findall(part))
+
+
+def names_in(part: object) -> set[str]:
+    """Return the names of the values that stand in a part of a rubric's data."""
+    return {name for _, name in places(part)}
+
+
+def made_of(name: str, declared: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the names of the values that a sum or a product is made of."""
+    above: dict[str, Any] = {}
+    for other, one in declared.items():
+        if other == name:
+            parts = [part for key in ("sum", "product") for _, part in as_texts(as_map(one).get(key))]
+            yield from (found for part in parts for found in (part, *made_of(part, above)))
+        above[other] = one
+
+
+def given_in(scenario: Mapping[str, Any], names: set[str], values: Mapping[str, Value]) -> list[str]:
+    """Return where a scenario, as it is written, gives programs one of these values."""
+    parts = [(key, part) for key in GIVEN for _, part in as_maps(scenario.get(key))]
+    for _, step in as_maps(scenario.get("steps")):
+        parts += [(kind, as_map(part)) for kind, part in step.items() if kind in GIVEN]
+    found = [
+        GIVEN[kind].format(place(next((part[key] for key in NAMED if key in part), ""), values))
+        for kind, part in parts
+        if names & names_in(part)
+    ]
+    for _, start in as_maps(scenario.get("start")):
+        args = [arg for _, arg in as_texts(start.get("args")) if names & names_in(arg)]
+        found += [f"the argument {place(arg, values)}" for arg in args]
+    return list(dict.fromkeys(found))
