@@ -6,9 +6,10 @@ import json
 import os
 import shlex
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from grader.arena.base_workspace import NAME as BASE_NAME
@@ -20,6 +21,7 @@ from grader.arena.workspace import read_member, run_in_place
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.files import READ_MAX, read_untrusted
+from grader.model.record import Record
 from grader.package.cmake import written_calls
 from grader.package.python import REPORT_BYTES_MAX
 from grader.ros_env import DUMP_BYTES, excess_of, keep_ros_variables, parse_env
@@ -39,13 +41,23 @@ DUMP = """for name in $(compgen -e); do printf '%s=%s\\0' "$name" "${!name}"; do
 """As `env -0` does, which could not even be started where a variable is too large for the kernel."""
 
 
+class CMakeTrace(Record):
+    """A package's part of CMake's trace, as a copy that no student's process can reach; `root` is its folder as CMake
+    saw it."""
+
+    trace: Path | None
+    root: str
+
+
 class BuildOutcome(RunCost):
-    """`trace` and `syntax` are copies that no student's process can reach; `root` is the package as CMake saw it."""
+    """`trace` and `syntax` are copies that no student's process can reach; `root` is the package as CMake saw it.
+    `others` are the traces of the lab's other packages, by the lab's names for them."""
 
     ok: bool
     trace: Path | None
     root: str
     syntax: Path | None
+    others: dict[str, CMakeTrace]
 
 
 async def build(
@@ -55,9 +67,10 @@ async def build(
     answers: Iterable[str],
     *,
     last_run: bool = False,
+    answers_of: Mapping[str, Iterable[str]] = MappingProxyType({}),
 ) -> tuple[ProcessEnvironment, BuildOutcome]:
-    """Run `catkin_make`, then `rosrun` on each script of `answers` as handed in; what they print is evidence.
-    `python_files` are compiled by ROS's own Python, and not run.
+    """Run `catkin_make`, then `rosrun` on each script of `answers` as handed in (`answers_of`: of the lab's other
+    packages); what they print is evidence. `python_files` are compiled by ROS's own Python, and not run.
 
     Returns the place with the built workspace's environment. Raises ArenaError where the arena fails.
     """
@@ -75,8 +88,10 @@ async def build(
         await arena.wait(lambda: "syntax" in arena.exit_codes, STEP_S)
         ok = arena.exit_codes.get("catkin_make") == 0
         built = await _with_setup(place, arena) if ok else place.from_source()
-        for script in answers:
-            await _answer(built, arena, script)
+        for package, scripts in ((None, answers), *answers_of.items()):
+            own = built.of(package)
+            for script in scripts if own else ():
+                await _answer(own or built, arena, script)
         if wants_base and ended:
             await arena.wait(lambda: BASE_NAME in arena.exit_codes, BASE_S)
         outcome = "complete" if ended else "timeout"
@@ -90,11 +105,15 @@ async def build(
         run_in_place(place.workspace, place.sandbox)
     trace, too_much = _trace(place)
     _note_excess(writer, built.built.too_much, too_much)
+    others = {name: own for name in place.workspace.others if (own := place.of(name)) is not None}
     return built, BuildOutcome(
         ok=ok,
         trace=trace,
         root=place.package_folder,
         syntax=_kept(place, SYNTAX),
+        others={
+            name: CMakeTrace(trace=_trace(one)[0], root=one.package_folder) for name, one in others.items()
+        },
         cpu_s=arena.cpu_s,
         student_cpu_s=arena.student_cpu_s,
     )
@@ -103,8 +122,10 @@ async def build(
 def _catkin_make(place: ProcessEnvironment) -> list[str]:
     """With a trace of every `CMakeLists.txt` and of the package's own `.cmake` files; those in its folder are picked
     from it."""
-    package = place.workspace.repaired / place.workspace.folder
-    included = sorted(p.relative_to(package).as_posix() for p in package.rglob("*.cmake"))[:INCLUDED_MAX]
+    own = (place.workspace, *place.workspace.others.values())
+    packages = [one.repaired / one.folder for one in own]
+    found = {p.relative_to(folder).as_posix() for folder in packages for p in folder.rglob("*.cmake")}
+    included = sorted(found)[:INCLUDED_MAX]
     return [
         *catkin_make(place), "--trace-expand", "--trace-format=json-v1",
         *(f"--trace-source={name}" for name in ("CMakeLists.txt", *included)),
@@ -175,7 +196,7 @@ def _trace(place: ProcessEnvironment) -> tuple[Path | None, str]:
     source = workspace.built / "src" / workspace.folder
     written = written_calls(data[:READ_MAX], source, place.package_folder)
     too_large = f"CMake's trace is more than {READ_MAX >> 20} MB" if len(data) > READ_MAX else ""
-    return _written(place, TRACE, written.trace), too_large or written.too_much
+    return _written(place, f"{workspace.folder}-{TRACE}", written.trace), too_large or written.too_much
 
 
 def _kept(place: ProcessEnvironment, name: str) -> Path | None:

@@ -88,7 +88,8 @@ SOURCES_MAX, SOURCE_BYTES_MAX = 200, 256 << 10
 @dataclass(frozen=True, kw_only=True)
 class ProcessEnvironment:
     """`folder` is this submission's own, `env` what the built workspace's `setup.bash` adds. `sees_course`: processes
-    see the packages that the rubric brings along, if it does."""
+    see the packages that the rubric brings along, if it does. `missing` are those of the lab's packages, by name, that
+    were not handed in."""
 
     folder: Path
     ros: RosInstallation
@@ -98,6 +99,15 @@ class ProcessEnvironment:
     package: str
     env: dict[str, str] = field(default_factory=dict)
     sees_course: bool = True
+    missing: frozenset[str] = frozenset()
+
+    def of(self, package: str | None) -> ProcessEnvironment | None:
+        """Return the same for one of the lab's packages, by its name in the rubric, None for the main one; None where
+        it was not handed in."""
+        if package in self.missing:
+            return None
+        workspace = self.workspace.others.get(package or "")
+        return replace(self, workspace=workspace, package=workspace.name) if workspace else self
 
     @property
     def course(self) -> Path:
@@ -202,9 +212,10 @@ class ProcessEnvironment:
         return tuple(dict.fromkeys(found))
 
     def has_line(self, pattern: re.Pattern[bytes]) -> bool:
-        """Return whether a Python file of the package has it."""
-        own = self.workspace.repaired / self.workspace.folder
-        files = [path for path in islice(own.rglob("*.py"), SOURCES_MAX) if path.is_file()]
+        """Return whether a Python file of the lab's packages has it."""
+        packages = (self.workspace, *self.workspace.others.values())
+        paths = (path for one in packages for path in (one.repaired / one.folder).rglob("*.py"))
+        files = [path for path in islice(paths, SOURCES_MAX) if path.is_file()]
         return any(pattern.search(read_untrusted(path, SOURCE_BYTES_MAX) or b"") for path in files)
 
     def package_file(self, file: str) -> Path | None:

@@ -19,7 +19,7 @@ from typing_extensions import Self
 
 from grader.arena.admission import Admission, shared_folder
 from grader.arena.asynchronous import Stop, run_together, run_until_signal
-from grader.arena.build import BUILD_EXPECTED_S, build
+from grader.arena.build import BUILD_EXPECTED_S, CMakeTrace, build
 from grader.arena.course_workspace import copy_course, provide_course
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
@@ -165,7 +165,7 @@ class Recorder:
         about = self._metadata()
         with EvidenceWriter(path, scenario=PACKAGE, clock="real", warp=1.0, metadata=about) as writer:
             await self._build(self._make_place(folder), writer, last=last)
-            write_files(writer, self._submission.package.folder, recording.facts)
+            write_files(writer, self._submission, recording.facts)
             for event in not_attached(recording.facts):
                 writer.event("/grader/actor", time.time_ns(), event)
         recording.files.append(path)
@@ -173,13 +173,19 @@ class Recorder:
     async def _build(self, place: ProcessEnvironment, writer: EvidenceWriter, *, last: bool) -> None:
         self._progress.step("build", "waiting", WAITING, BUILD_EXPECTED_S)
         recording = self.recording
-        faulty = [script for script in self._scripts() if _needs_answer(recording.facts, script)]
-        files = python_paths(recording.facts)
+        facts = recording.facts
+        faulty, *more = (
+            [script for script in self._scripts(one) if _needs_answer(one, script)]
+            for one in (facts, *facts.also)
+        )
+        answers_of = dict(zip((one.asked for one in facts.also), more, strict=True))
         async with self._admission.run(), self._admission.start():
             self._progress.step("build", "running", "catkin_make", BUILD_EXPECTED_S)
             try:
                 await provide_course(place)
-                self._place, outcome = await build(place, writer, files, faulty, last_run=last)
+                self._place, outcome = await build(
+                    place, writer, _python_files(place, facts), faulty, last_run=last, answers_of=answers_of
+                )
             except ArenaError as error:
                 if not last:
                     raise
@@ -190,48 +196,47 @@ class Recorder:
                 return
         recording.add(outcome)
         report = _syntax_report(outcome.syntax, writer)
-        recording.facts = with_build_facts(
-            recording.facts,
-            cmake_trace=outcome.trace,
-            cmake_root=outcome.root,
-            python_faults=report.faults if report else None,
-            python_slips=report.slips if report else None,
+        also = tuple(
+            _with_build_facts(one, outcome.others[one.asked], report, _above(place, one))
+            for one in facts.also
         )
+        told = _with_build_facts(facts, CMakeTrace(trace=outcome.trace, root=outcome.root), report, "")
+        recording.facts = told.model_copy(update={"also": also})
         self._progress.step("build", *(("done", "") if outcome.ok else ("failed", "catkin_make failed")))
 
     def _make_place(self, folder: Path) -> ProcessEnvironment:
         folder.mkdir()
         folder.chmod(0o711)
+        facts = self.recording.facts
         with _readable_by_all():
             prepare(folder, self._ros)
             workspace = make_workspace(
                 folder,
                 self._submission,
-                self.recording.facts,
-                self._scripts(),
+                facts,
+                self._scripts(facts),
                 self._sandbox,
                 course=self._rubric.packages,
+                scripts_of={one.asked: self._scripts(one) for one in facts.also},
             )
             if self._beside is not None:
                 copy_course(self._beside, self._rubric.packages, folder / "course")
-        named = self.recording.facts.manifest or self._submission.package
         return ProcessEnvironment(
             folder=folder,
             ros=self._ros,
             sandbox=self._sandbox,
             limits=self._limits,
             workspace=workspace,
-            package=named.name,
+            package=workspace.name,
+            missing=frozenset(self._rubric.package_names[1:]) - {one.asked for one in facts.also},
         )
 
-    def _scripts(self) -> list[str]:
-        """Return the paths, in this package, of the scripts that the scenarios start."""
-        paths = [
-            f.path for f in sorted(self.recording.facts.files, key=lambda f: (f.path.count("/"), f.path))
-        ]
-        wanted = {
-            s.script for scenario in self._rubric.scenarios.values() for s in scenario.start if s.script
-        }
+    def _scripts(self, facts: PackageFacts) -> list[str]:
+        """Return the paths, in one of the packages, of the scripts that the scenarios start."""
+        paths = [f.path for f in sorted(facts.files, key=lambda f: (f.path.count("/"), f.path))]
+        package = facts.asked or self._rubric.package
+        starts = [start for scenario in self._rubric.scenarios.values() for start in scenario.start]
+        wanted = {s.script for s in starts if s.script and self._rubric.package_of(s) == package}
         names = {Path(path).name: path for path in reversed(paths)}
         matches = (script if script in paths else names.get(Path(script).name) for script in sorted(wanted))
         return [match for match in matches if match is not None]
@@ -283,6 +288,30 @@ def _syntax_report(path: Path | None, writer: EvidenceWriter) -> SyntaxReport | 
         writer.event("/grader/actor", time.time_ns(), event)
         return None
     return None if said is None else read_syntax_report(said)
+
+
+def _above(place: ProcessEnvironment, facts: PackageFacts) -> str:
+    """Return what goes before a path of another package, from the main one's folder in the workspace."""
+    return f"../{place.workspace.others[facts.asked].folder}/" if facts.asked else ""
+
+
+def _python_files(place: ProcessEnvironment, facts: PackageFacts) -> list[str]:
+    """Return the files that ROS's Python is to compile, from the main package's folder in the workspace."""
+    return [_above(place, one) + path for one in (facts, *facts.also) for path in python_paths(one)]
+
+
+def _with_build_facts(
+    facts: PackageFacts, cmake: CMakeTrace, report: SyntaxReport | None, above: str
+) -> PackageFacts:
+    """Return the facts refined by what the build showed of this package, whose paths stand behind `above`."""
+    own = report.below(above) if report else None
+    return with_build_facts(
+        facts,
+        cmake_trace=cmake.trace,
+        cmake_root=cmake.root,
+        python_faults=own.faults if own else None,
+        python_slips=own.slips if own else None,
+    )
 
 
 @contextmanager

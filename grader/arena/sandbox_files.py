@@ -22,7 +22,7 @@ STANDINS = "/run/grader/standins"
 RECORD, RECORD_INSIDE = "lib/rosbag/record", "/run/grader/rosbag-record"
 RECORD_SHIM = "grader-rosbag-record"
 COURSE = "/run/grader/course"
-FUNCTIONS = "grader-functions.py"
+FUNCTIONS, ROSTESTS = "grader-functions.py", "grader-rostests.py"
 ROS_SIDE = Path(__file__).parent / "ros"
 TERMINALS = (
     "gnome-terminal", "konsole", "lxterminal", "mate-terminal", "rxvt", "terminator", "tilix", "urxvt",
@@ -77,6 +77,7 @@ def prepare(place: Path, ros: RosInstallation) -> None:
         (shims / name).symlink_to(ros.python)
     shutil.copyfile(ROS_SIDE / "syntax.py", shims / "grader-syntax.py")
     shutil.copyfile(ROS_SIDE / "functions.py", shims / FUNCTIONS)
+    shutil.copyfile(ROS_SIDE / "rostests.py", shims / ROSTESTS)
     _program(shims, "terminal.sh", "grader-terminal", TERMINALS)
     _program(shims, "open.sh", "grader-open", BROWSERS)
     _program(shims, "answers.sh", "grader-reachable", ASKING)

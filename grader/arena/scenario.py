@@ -14,7 +14,7 @@ from pathlib import Path
 from grader.arena.admission import Admission, Leave
 from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.run_state import describe_wait, find_outcome, next_look_s, waits
-from grader.arena.sandbox_files import FUNCTIONS
+from grader.arena.sandbox_files import FUNCTIONS, ROSTESTS
 from grader.arena.scenario_inputs import OVER, make_shots, settings
 from grader.arena.session import ArenaSession
 from grader.arena.static_recorder import RunCost
@@ -42,6 +42,8 @@ HELD_S = 0.1
 UP_S, SETTLE_S = 5.0, 0.2
 """A process is up when its nodes have registered and nothing changes for a moment; some never are."""
 BUILT_PROGRAMS_MAX = 20
+ALONE_S, ROSTEST_LOOK_S = 5.0, 0.5
+"""So long an instructor's tests go on after the last of the student's processes, and how often that is looked at."""
 
 
 def expected_s(scenario: Scenario) -> float:
@@ -127,7 +129,8 @@ async def _run(
                 await _await_node(start.after, scenario, arena, tell)
             arena.start(spec)
         await runner.run()
-        if scenario.steps or any(start.tests for start in scenario.start):
+        await _await_rostests(scenario, arena, tell)
+        if scenario.steps or any(start.tests or start.is_rostest for start in scenario.start):
             arena.live.steps_over(time.monotonic())
             if runner.stopped_all or (arena.live.running and not waits(scenario.until)):
                 return "complete", ""
@@ -149,6 +152,18 @@ async def _await_node(process: str, scenario: Scenario, arena: ArenaSession, tel
         if left_s <= 0:
             return
         await arena.wait(lambda: process in live.ended, left_s)
+
+
+async def _await_rostests(scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
+    """Until the tests of `.test` files are over. Once all of the student's processes have ended, they have little left
+    to wait for."""
+    live, names = arena.live, {start.name for start in scenario.start if start.is_rostest}
+    until_s = live.started_s + scenario.until.limit_s
+    while names & live.helpers and time.monotonic() < until_s + live.lost_s:
+        tell("the instructor's tests are running")
+        if live.ended and not live.running:
+            until_s = min(until_s, time.monotonic() + ALONE_S)
+        await arena.wait(lambda: not names & live.helpers, ROSTEST_LOOK_S)
 
 
 async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple[str, str]:
@@ -194,10 +209,14 @@ async def _look_at_connections(arena: ArenaSession) -> None:
 
 
 def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int]) -> Iterator[Spec]:
-    """Return how `rosrun`, `roslaunch` or `rosparam` would start it; nothing for a file that is not in the package.
+    """Return how `rosrun`, `roslaunch` or `rosparam` would start it; nothing for a file that is not in its package.
 
     `numbers` are those of the run's processes.
     """
+    found = place.of(start.package)
+    if found is None:
+        return
+    place = found
     if start.launch is not None:
         yield place.spec(start.name, ["roslaunch", place.package, start.launch, *start.args])
     elif start.load is not None:
@@ -206,7 +225,10 @@ def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int
             yield place.spec(start.name, ["rosparam", "load", f"{place.package_folder}/{file}"], script=file)
     elif start.program is not None:
         package, _, program = start.program.partition("/")
-        argv = ["roslaunch" if program.endswith(LAUNCH_ENDINGS) else "rosrun", package, program, *start.args]
+        how = ["roslaunch" if program.endswith(LAUNCH_ENDINGS) else "rosrun"]
+        if start.is_rostest:
+            how = ["python3", f"{place.shims}/{ROSTESTS}"]
+        argv = [*how, package, program, *start.args]
         yield replace(place, env={}).spec(start.name, argv, role="grader", copy=False)
     elif start.tests is not None:
         argv = ["python3", f"{place.shims}/{FUNCTIONS}", place.package_folder]

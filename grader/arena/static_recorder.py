@@ -82,12 +82,15 @@ def metadata(submission: Submission, recording: Recording, limits: RunLimits) ->
     }
 
 
-def write_files(writer: EvidenceWriter, folder: Path, facts: PackageFacts) -> None:
-    """Write the facts of the package in `folder`, and its text files, into the evidence."""
+def write_files(writer: EvidenceWriter, submission: Submission, facts: PackageFacts) -> None:
+    """Write the facts of the submission's packages, and their text files, into the evidence. Those of other packages
+    than the main one are named as they lie from its folder: `../lab_msgs/msg/Reading.msg`."""
     now_ns = time.time_ns()
     writer.package(facts, now_ns)
-    for name, data in attachments(folder, facts):
-        writer.attach(name, data, now_ns, "text/plain")
+    packages = zip((submission.package, *submission.also), (facts, *facts.also), strict=True)
+    for package, own in packages:
+        for name, data in attachments(package.folder, own):
+            writer.attach(f"{facts.way_to(own)}/{name}" if own.asked else name, data, now_ns, "text/plain")
 
 
 def attachments(folder: Path, facts: PackageFacts) -> Iterable[tuple[str, bytes]]:
@@ -100,6 +103,11 @@ def attachments(folder: Path, facts: PackageFacts) -> Iterable[tuple[str, bytes]
 
 def not_attached(facts: PackageFacts) -> Iterable[ActorEvent]:
     """What `attachments` leaves out, as limits that were met."""
+    for other in facts.also:
+        yield from (
+            event.model_copy(update={"actor": f"{other.asked}: {event.actor}"})
+            for event in not_attached(other)
+        )
     texts = _texts(facts)
     for file in texts[:ATTACHED_FILES_MAX]:
         if file.size_bytes > ATTACHED_BYTES_MAX:
@@ -172,5 +180,5 @@ class StaticRecorder:
         limits = RunLimits().shared_by(len(self._rubric.scenarios))
         about = {**metadata(self._submission, recording, limits), "not_run": self._reason}
         with EvidenceWriter(path, scenario=PACKAGE, clock="real", warp=1.0, metadata=about) as writer:
-            write_files(writer, self._submission.package.folder, recording.facts)
+            write_files(writer, self._submission, recording.facts)
         recording.files.append(path)

@@ -13,10 +13,13 @@ import re
 import shutil
 import stat
 import tarfile
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
+from types import MappingProxyType
+
+from pydantic import Field
 
 from grader.arena.sandbox import Sandbox
 from grader.arena.sandbox_files import BROWSERS, LARGE, SHIMS
@@ -53,7 +56,8 @@ _ODD = re.compile(rb"[0-9]{21}|GNU\.sparse")
 
 class Workspace(Record):
     """`built` is the catkin workspace to build (`src/` in it), `repaired` the `src/` that runs; `folder` is the
-    package's folder name in both, `repairs` what was fixed, by path. `kept` is for what the build hands over. Files
+    package's folder name in both, `name` what ROS calls it, `repairs` what was fixed, by path. `others` are the same
+    for the lab's other packages, by the lab's names for them. `kept` is for what the build hands over. Files
     of more than 4 MB are not copied into each run: they lie in `large`, and links lead there; `copied_bytes` is the
     rest."""
 
@@ -62,7 +66,9 @@ class Workspace(Record):
     large: Path
     kept: Path
     folder: str
+    name: str = ""
     repairs: dict[str, tuple[str, ...]]
+    others: dict[str, Workspace] = Field(default={})
     copied_bytes: int = 0
 
 
@@ -74,15 +80,18 @@ def make_workspace(
     sandbox: Sandbox,
     *,
     course: Collection[str] = (),
+    scripts_of: Mapping[str, Iterable[str]] = MappingProxyType({}),
 ) -> Workspace:
-    """Copy the packages twice below `place`; `scripts` are the paths that get their repairs in the second copy.
-    A copy of a package of the `course` is left out: the course's own counts."""
+    """Copy the packages twice below `place`; `scripts` are the paths that get their repairs in the second copy,
+    `scripts_of` those of the lab's other packages. A copy of a package of the `course` is left out: the course's own
+    counts."""
     workspace = Workspace(
         built=place / "ws",
         repaired=place / "run" / "src",
         large=place / "run" / "large",
         kept=place / "kept",
         folder=_folder_name(submission.package),
+        name=(facts.manifest or submission.package).name,
         repairs={},
     )
     workspace.kept.mkdir()
@@ -90,17 +99,36 @@ def make_workspace(
     for package in needed_packages(submission, course):
         for source_tree in (workspace.built / "src", workspace.repaired):
             copier.copy(package, source_tree / _folder_name(package))
-    package_copy = workspace.repaired / workspace.folder
-    repairs = {path: tuple(_repair(package_copy / path, facts.file(path))) for path in scripts}
-    for file in facts.files:
-        _give_python(package_copy / file.path, file, SHIMS if sandbox.bubblewrap else str(place / "bin"))
-        _give_browsers(package_copy / file.path, file)
-    if facts.manifest is None:
-        _replace_manifest(package_copy / "package.xml", workspace.folder)
+    shims = SHIMS if sandbox.bubblewrap else str(place / "bin")
+    workspace = workspace.model_copy(update={"copied_bytes": copier.copied_bytes})
+    workspace = _with_repairs(workspace, facts, scripts, shims)
+    others = {
+        source.asked: _with_repairs(
+            workspace.model_copy(
+                update={"folder": _folder_name(source), "name": (other.manifest or source).name}
+            ),
+            other,
+            scripts_of.get(source.asked, ()),
+            shims,
+        )
+        for source, other in zip(submission.also, facts.also, strict=True)
+    }
     if not sandbox.bubblewrap:
         for path in (workspace.built, place / "home"):
             give_to(path, sandbox.uid)
-    return workspace.model_copy(update={"repairs": repairs, "copied_bytes": copier.copied_bytes})
+    return workspace.model_copy(update={"others": others})
+
+
+def _with_repairs(workspace: Workspace, facts: PackageFacts, scripts: Iterable[str], shims: str) -> Workspace:
+    """Repair the copy of a package that runs, and return its workspace with what was repaired."""
+    package_copy = workspace.repaired / workspace.folder
+    repairs = {path: tuple(_repair(package_copy / path, facts.file(path))) for path in scripts}
+    for file in facts.files:
+        _give_python(package_copy / file.path, file, shims)
+        _give_browsers(package_copy / file.path, file)
+    if facts.manifest is None:
+        _replace_manifest(package_copy / "package.xml", workspace.folder)
+    return workspace.model_copy(update={"repairs": repairs})
 
 
 def run_in_place(workspace: Workspace, sandbox: Sandbox) -> None:
@@ -112,9 +140,11 @@ def run_in_place(workspace: Workspace, sandbox: Sandbox) -> None:
 
 
 def needed_packages(submission: Submission, course: Collection[str] = ()) -> list[SourcePackage]:
-    """The lab's package and its dependencies within the submission, the lab's first; none of the `course`'s."""
-    others = {p.name: p for p in submission.packages if p.name not in {submission.package.name, *course}}
-    needed = [submission.package]
+    """The lab's packages and their dependencies within the submission, the lab's first; none of the `course`'s."""
+    needed = [submission.package, *submission.also]
+    others = {
+        p.name: p for p in submission.packages if p.name not in {*(one.name for one in needed), *course}
+    }
     for package in needed:
         manifest, _ = read_manifest(package.folder)
         names = sorted({d.name for d in manifest.dependencies} & others.keys()) if manifest else ()

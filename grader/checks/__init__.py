@@ -51,6 +51,7 @@ FAMILIES = (
     "services",
     "calls",
     "actions",
+    "rostest",
     "connections",
     "two_copies",
     "robot_path",

@@ -15,11 +15,11 @@ from grader.checks.support.build_errors import (
 )
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.processes import Life, lives
-from grader.checks.support.scripts import cmake_calls, paths_by_name
+from grader.checks.support.scripts import cmake_calls, is_elsewhere, paths_by_name, programs
 from grader.checks.support.text import bare, near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
-from grader.model.package import CMakeCall, PackageFacts
+from grader.model.package import Executable, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, seconds
@@ -125,6 +125,14 @@ def _stopped_build(build: Run, took: str) -> Verdict:
 def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> Verdict:
     lines = [c.line for _, c in build.console if c.process == CATKIN_MAKE]
     error = first_error(lines, package)
+    if error is None or error.place is None:
+        # all of the lab's packages are built together, and the first error may be another one's
+        found = ((one, first_error(lines, one)) for one in package.also)
+        other = next((one for one, its in found if its is not None and its.place is not None), None)
+        if other is not None:
+            alone = other.model_copy(update={"also": ()})
+            verdict = _broken_build(alone, build, exit_code).moved(package.way_to(other))
+            return verdict.model_copy(update={"message": f"{other.name}: {verdict.message}"})
     told = explain_error_of_build(error, package, lines) if error else None
     place = error.place if error else None
     line = f"{place.file}:{place.line}: " if error and place and error.kind == "cmake" else ""
@@ -193,17 +201,17 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     expected = f"{verdict.expected}; each program of add_executable starts"
     if verdict.status is not Status.PASS:
         return verdict.about(expected=expected)
-    programs = [one for one in lives(run) if "/" in one.name]
-    made = {call.args[0]: call for call in _made(package)}
-    if made and not programs:
+    started = [one for one in lives(run) if "/" in one.name]
+    made = {one.name: one for one in _made(package)}
+    if made and not started:
         return _not_started(package, made).about(expected=expected)
-    broken = list(_broken(package, run, programs))
-    measured = f"{verdict.measured}; programs: {join_words(_name(p) for p in programs) or 'none'}"
+    broken = list(_broken(package, run, started))
+    measured = f"{verdict.measured}; programs: {join_words(_name(p) for p in started) or 'none'}"
     if not broken:
-        message = f"{verdict.message}{_how_they_went(programs)}"
+        message = f"{verdict.message}{_how_they_went(started)}"
         return passed(message, expected=expected, measured=measured)
     first = broken[0]
-    calls = (made[b.program] for b in broken if b.program in made)
+    calls = (made[b.program].call for b in broken if b.program in made)
     cited = tuple(FileCitation(file=call.file, line=call.line) for call in calls)
     start = cite(run, "/grader/process", first.life.start_ns, first.life.end_ns)
     return failed(
@@ -215,25 +223,39 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     )
 
 
-def _made(package: PackageFacts) -> Iterator[CMakeCall]:
-    """Yield the calls that make programs of sources."""
-    for call in cmake_calls(package, "add_executable"):
-        if len(call.args) > 1 and not NO_PROGRAM & set(call.args[1:3]):
-            yield call
+def _made(package: PackageFacts) -> Iterator[Executable]:
+    """Yield the programs that are made of sources."""
+    for one in programs(package):
+        if len(one.call.args) > 1 and not NO_PROGRAM & set(one.call.args[1:3]):
+            yield one
 
 
-def _not_started(package: PackageFacts, made: dict[str, CMakeCall]) -> Verdict:
-    """No program came out where `rosrun` looks: catkin sets that place in `catkin_package()`."""
+def _not_started(package: PackageFacts, made: dict[str, Executable]) -> Verdict:
+    """No program came out where `rosrun` looks: catkin sets that place in `catkin_package()`, and a property of the
+    target another one."""
+    away = next((one for one in made.values() if is_elsewhere(one, package)), None)
+    if away is not None:
+        call = away.named or away.call
+        return failed(
+            f"catkin_make succeeded, but rosrun finds no {away.name}: {call.file}, line {call.line}, puts it into "
+            f"{shown(away.folder)}",
+            measured="built, not where rosrun looks",
+            hint="take RUNTIME_OUTPUT_DIRECTORY out: catkin puts programs into lib/<package>",
+            citations=(FileCitation(file=call.file, line=call.line),),
+        )
     set_at = next(iter(cmake_calls(package, "catkin_package")), None)
-    early = [c for c in made.values() if set_at and c.file == set_at.file and c.line < set_at.line]
+    calls = {name: one.call for name, one in made.items()}
+    early = {
+        name: c for name, c in calls.items() if set_at and c.file == set_at.file and c.line < set_at.line
+    }
     if not early:
         message = f"catkin_make succeeded, but no program was started ({join_words(made)})"
         return inconclusive(message, measured="built, not started", hint="grade again")
     message = (
-        f"catkin_make succeeded, but rosrun finds no {join_words((c.args[0] for c in early), 'or')}: "
+        f"catkin_make succeeded, but rosrun finds no {join_words(early, 'or')}: "
         "add_executable(…) stands above catkin_package(…)"
     )
-    cited = tuple(FileCitation(file=c.file, line=c.line) for c in early)
+    cited = tuple(FileCitation(file=c.file, line=c.line) for c in early.values())
     hint = "move add_executable(…) below catkin_package(…), which says where programs go"
     return failed(message, measured="built, not where rosrun looks", hint=hint, citations=cited)
 

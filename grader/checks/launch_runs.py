@@ -259,10 +259,12 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRun
 def _wanted(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Iterator[Wanted]:
     for script in params.scripts:
         yield from (Wanted(node, own=True) for node in _of_script(package, file, run, script))
+    own = {package.name, *(one.name for one in package.also)}
     for name in params.nodes:
-        yield from (Wanted(node, own=node.pkg == package.name) for node in _named(file, name)[:1])
+        yield from (Wanted(node, own=node.pkg in own) for node in _named(file, name)[:1])
     for program in params.programs:
-        yield Wanted(nodes_of_program(file, program)[0], own=False)
+        node = nodes_of_program(file, program)[0]
+        yield Wanted(node, own=node.pkg in own)
 
 
 def _of_script(package: PackageFacts, file: LaunchFile, run: Run, script: str) -> list[LaunchNode]:

@@ -15,7 +15,7 @@ from grader.checks.support.launch import (
     read_launch,
     refusals,
 )
-from grader.checks.support.scripts import add_hint, find_script
+from grader.checks.support.scripts import add_hint, find_script, programs
 from grader.checks.support.text import near_names
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
@@ -80,7 +80,7 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
     name = PurePosixPath(script).name
     if nodes_of_script(package, file, script) and _exists(package, name):
         return None
-    if not _exists(package, name):
+    if not _exists(package, name) and not any(name in {one.target, one.name} for one in programs(package)):
         message = f"there is no {name} in the package that a <node> could start"
         return unjudged(message, hint=add_hint(script))
     meant = (_slip_for(package, node, name) for node in file.brings if _is_meant(node, name))

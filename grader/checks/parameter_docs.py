@@ -31,6 +31,7 @@ REFERRED = {
     "action": "action of the scenario's steps",
     "kept": "file that the scenario keeps",
     "served": "service that the scenario offers",
+    "rostest": "`.test` file of the scenario",
     "watched_s": "number",
 }
 REQUIRED = "required"

@@ -36,7 +36,8 @@ class Refers:
     `package/program` of another package. `message`, `service`: a type. `field`: a field's type. `sent`: a topic on
     which the scenario's probes send. `published`: a topic on which the student publishes. `set`: a parameter that the
     scenario sets. `action`: an action to which its steps send goals. `kept`: a file that it keeps. `served`: a service
-    that the grader offers in it. `watched_s`: so long the scenario has to last.
+    that the grader offers in it. `rostest`: a start of a `.test` file in it. `watched_s`: so long the scenario has to
+    last.
     """
 
     to: Literal[
@@ -52,6 +53,7 @@ class Refers:
         "action",
         "kept",
         "served",
+        "rostest",
         "watched_s",
     ]
 

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from grader.checks import CHECKS, Check
 from grader.evidence.run import Run
-from grader.judging.facts import NOT_RUN, PACKAGE_RUN, Facts
+from grader.judging.facts import NOT_RUN, PACKAGE_RUN, Facts, views_of
 from grader.judging.judge import Requirements, result_of, verdict_of
 from grader.judging.starter import tell_unchanged
 from grader.model.package import PackageFacts
@@ -87,10 +87,21 @@ class _Judging:
 
     def _facts(self, asked: set[str]) -> Facts:
         """`asked` comes to hold what was looked at that the build makes more precise, or that only a build gives."""
-        files = tuple(_Watched(file, asked, REFINED_OF_FILES) for file in self._package.files)
-        package = _Watched(self._package.model_copy(update={"files": files}), asked, REFINED)
+        main, others = views_of(self._rubric, self._package)
         runs = {PACKAGE_RUN: cast("Run", _Watched(UNBUILT, asked))}
-        return Facts(rubric=self._rubric, runs=runs, package=cast("PackageFacts", package))
+        return Facts(
+            rubric=self._rubric,
+            runs=runs,
+            package=_watched(main, asked),
+            others={name: _watched(package, asked) for name, package in others.items()},
+        )
+
+
+def _watched(package: PackageFacts, asked: set[str]) -> PackageFacts:
+    files = tuple(_Watched(file, asked, REFINED_OF_FILES) for file in package.files)
+    also = tuple(_watched(other, asked) for other in package.also)
+    seen = package.model_copy(update={"files": files, "also": also})
+    return cast("PackageFacts", _Watched(seen, asked, REFINED))
 
 
 class _Watched:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
 
@@ -21,7 +21,8 @@ from grader.evidence.run import Run
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, unjudged
-from grader.rubric.model import Criterion, Rubric, Scenario
+from grader.rubric.model import Criterion, Rubric, Scenario, Start
+from grader.wording import join_words
 
 NOT_RUN = "not_run"
 NO_PACKAGE = PackageFacts(
@@ -32,11 +33,18 @@ PACKAGE_RUN = "package"
 
 @dataclass(frozen=True, kw_only=True)
 class Facts:
-    """Everything that one submission's evidence says. `package` is None where no package was recorded."""
+    """Everything that one submission's evidence says. `package` is the main one, None where no package was recorded;
+    `others` are those that the lab asks for besides, by its names for them."""
 
     rubric: Rubric
     runs: Mapping[str, Run]
     package: PackageFacts | None
+    others: Mapping[str, PackageFacts] = field(default_factory=dict)
+
+    def package_of(self, one: Criterion | Start) -> PackageFacts | None:
+        """Return the package that a criterion judges, or that a start's files are of; None where it is not there."""
+        name = self.rubric.package_of(one)
+        return self.package if name == self.rubric.package else self.others.get(name)
 
     def of(self, check: Check, criterion: Criterion, params: Record) -> dict[str, object] | Verdict:
         """Return the facts by the names that the check asks for, or the verdict where one of them is not there."""
@@ -52,10 +60,14 @@ class Facts:
             found["run"] = run
         if "evidence" in check.facts:
             found["evidence"] = self._evidence(criterion)
-        if {"package", "build"} & (set(check.facts) - found.keys()) and self.package is None:
+        asked = {"package", "build"} & (set(check.facts) - found.keys())
+        package = self.package_of(criterion)
+        if asked and self.package is None:
             return self._no_package()
-        if self.package is not None:
-            found |= {"package": self.package, "build": self.runs[PACKAGE_RUN]}
+        if asked and package is None:
+            return self._not_here(self.rubric.package_of(criterion))
+        if package is not None:
+            found |= {"package": package, "build": self.runs[PACKAGE_RUN]}
         return {name: found[name] for name in check.facts}
 
     def _evidence(self, criterion: Criterion) -> Evidence:
@@ -64,6 +76,17 @@ class Facts:
             found[PACKAGE_RUN] = self.runs[PACKAGE_RUN]
         package = self.package or self._no_package()
         return Evidence(found, scenario=criterion.scenario, package=package)
+
+    def _not_here(self, name: str) -> Verdict:
+        """Return the verdict where one of several packages was not handed in."""
+        known = (self.package, *self.others.values())
+        found = join_words(one.name for one in known if one is not None)
+        return unjudged(
+            f"package {name} is not here; packages found: {found}",
+            expected=f"a package {name}",
+            measured=f"no package {name}",
+            hint=f"hand in {name} too, beside {self.rubric.package}: its folder, with the package.xml that names it",
+        )
 
     def _no_package(self) -> Verdict:
         if not any(run.foreign for run in self.runs.values()):
@@ -99,7 +122,11 @@ class Facts:
     def _without_program(self, run: Run, scenario: str) -> Verdict | None:
         """Return the verdict where a program that the rubric starts beside the student's failed."""
         known = self.rubric.scenarios.get(scenario)
-        programs = {start.name: start.program for start in known.start if start.program} if known else {}
+        programs = (
+            {start.name: start.program for start in known.start if start.program and not start.is_rostest}
+            if known
+            else {}
+        )
         failure = failed_program(run, programs)
         if not failure:
             return None
@@ -112,8 +139,12 @@ class Facts:
         known = self.rubric.scenarios.get(scenario)
         if known is None or self.package is None or known.recording is not None:
             return None
-        there = {PurePosixPath(f.path).name for f in self.package.launch_files}
-        read = [read_launch(self.package, s.launch) for s in known.start if s.launch in there]
+        packages = {start.name: self.package_of(start) for start in known.start}
+        read = [
+            read_launch(package, s.launch)
+            for s in known.start
+            if s.launch and (package := packages[s.name]) and s.launch in _launch_names(package)
+        ]
         found = next((one for one in read if isinstance(one, Verdict)), None)
         if found is None and known.until.connected:
             found = next(
@@ -136,16 +167,20 @@ class Facts:
         known = self.rubric.scenarios.get(scenario)
         if known is None or self.package is None or known.recording is not None:
             return False
-        launch_files = {PurePosixPath(f.path).name for f in self.package.launch_files}
         return not any(
-            (s.script and find_script(self.package, s.script)) or (s.launch and s.launch in launch_files)
+            (s.script and find_script(package, s.script)) or (s.launch and s.launch in _launch_names(package))
             for s in known.start
+            if (package := self.package_of(s)) is not None
         )
 
     def _nothing_started(self, scenario: str) -> Run:
         recorded = self.runs[PACKAGE_RUN]
         clock = self.rubric.scenarios[scenario].clock
         return replace(recorded, scenario=scenario, clock=clock, processes=(), console=(), graph=())
+
+
+def _launch_names(package: PackageFacts) -> set[str]:
+    return {PurePosixPath(file.path).name for file in package.launch_files}
 
 
 def _not_in_messages(run: Run) -> Verdict:
@@ -163,7 +198,18 @@ def try_facts(rubric: Rubric, runs: Mapping[str, Run]) -> Facts:
         package = PackageFacts.read_json(recorded.package_json)
     except ValidationError:
         return Facts(rubric=rubric, runs=runs, package=None)
-    return Facts(rubric=rubric, runs=runs, package=package)
+    main, others = views_of(rubric, package)
+    return Facts(rubric=rubric, runs=runs, package=main, others=others)
+
+
+def views_of(rubric: Rubric, package: PackageFacts) -> tuple[PackageFacts, dict[str, PackageFacts]]:
+    """Return the main package, and the others that are here by the lab's names for them. Each knows of all that the lab
+    asks for; those that are not here have no files."""
+    here = {one.asked for one in package.also}
+    missing = (name for name in rubric.package_names[1:] if name not in here)
+    absent = (NO_PACKAGE.model_copy(update={"name": name, "asked": name}) for name in missing)
+    main, *others = package.model_copy(update={"also": (*package.also, *absent)}).views()
+    return main, {one.asked: one for one in others if one.asked in here}
 
 
 def with_recordings(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from graphlib import TopologicalSorter
 from pathlib import PurePath
 from traceback import extract_tb
+from types import MappingProxyType
 from typing import NamedTuple
 
 from grader.checks import CHECKS, Check
@@ -30,6 +31,7 @@ from grader.judging.starter import tell_unchanged
 from grader.judging.summary import leave_out, round_half_up
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive
+from grader.rubric.made_up import Value, as_recorded, tell_made_up, values_of
 from grader.rubric.model import Criterion, Rubric
 
 MANUAL = "manual"
@@ -45,7 +47,8 @@ def judge(
 
     `checks` are the grader's and the rubric's own (`LoadedRubric.checks`), `handed_out` the sha256 of the starter's
     files (`LoadedRubric.handed_out`). The same evidence and rubric always give
-    equal results; nothing that is wrong with the evidence raises.
+    equal results; nothing that is wrong with the evidence raises, but EvidenceError where values that were made up for
+    the runs do not fit the rubric.
     """
     return judge_all_runs(rubric, runs, checks, handed_out).criteria
 
@@ -64,6 +67,7 @@ def judge_all_runs(
     handed_out: Collection[str] = (),
 ) -> Judgement:
     """Judge the first runs, then what repeated runs and a repaired copy say besides."""
+    rubric = as_recorded(rubric, runs)
     first, repeated, repaired = split_runs(runs)
     facts = try_facts(rubric, first)
     verdicts = judge_facts(rubric, facts, checks)
@@ -80,7 +84,10 @@ def judge_all_runs(
         verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=built)
     build = first.get(PACKAGE_RUN)
     shown = {name: show_lines(verdict, build) for name, verdict in verdicts.items()} if build else verdicts
-    results = tuple(result_of(c, shown[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
+    results = tuple(
+        result_of(c, shown[c.id], rubric.digits, uses.get(c.id), values_of(rubric, c))
+        for c in rubric.criteria
+    )
     package = facts.package
     if package is not None:
         results = tuple(tell_unchanged(result, rubric, package, handed_out) for result in results)
@@ -93,9 +100,17 @@ def judge_facts(rubric: Rubric, facts: Facts, checks: Mapping[str, Check] = CHEC
     criteria = {c.id: c for c in rubric.criteria}
     requirements = Requirements(rubric, checks)
     for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
-        verdict = verdict_of(criteria[name], facts, checks)
+        verdict = _with_made_up(rubric, criteria[name], verdict_of(criteria[name], facts, checks))
         requirements.verdicts[name] = requirements.apply(criteria[name], verdict)
     return requirements.verdicts
+
+
+def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Verdict:
+    """Return a verdict on what is wrong with where the values come from that the criterion asks for."""
+    if verdict.status not in {Status.FAIL, Status.PARTIAL} or verdict.unjudged:
+        return verdict
+    hint = tell_made_up(rubric, criterion, verdict.hint, verdict.measured)
+    return verdict if hint == verdict.hint else verdict.model_copy(update={"hint": hint})
 
 
 def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
@@ -115,13 +130,25 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
             if isinstance(asked, Verdict)
             else heed_losses(check, asked, _sound(check.function(**asked)))
         )
-        return said_for_node(found, criterion, facts)
+        return _named(said_for_node(found, criterion, facts), criterion, facts)
     except NotRecorded as missing:
         return missing.verdict
     except EvidenceError as error:
         return inconclusive(error.message, hint=error.hint)
     except Exception as error:  # noqa: BLE001 - whatever goes wrong in a check must not cost a student a mark
         return _broken(check, error)
+
+
+def _named(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
+    """Return a verdict on another package than the main one with its name, and files as they lie from the main one's
+    folder."""
+    main, package = facts.package, facts.package_of(criterion)
+    if main is None or package is None or package is main:
+        return verdict
+    of_package = verdict.moved(main.way_to(package))
+    if not verdict.status.is_lost or package.name in verdict.message.partition(";")[0]:
+        return of_package
+    return of_package.model_copy(update={"message": f"{package.name}: {verdict.message}"})
 
 
 def _sound(verdict: object) -> Verdict:
@@ -148,6 +175,7 @@ class Requirements:
     """Applies `requires`: give it each criterion's verdict after those of the criteria that it requires."""
 
     def __init__(self, rubric: Rubric, checks: Mapping[str, Check]) -> None:
+        self._rubric = rubric
         self._criteria = {c.id: c for c in rubric.criteria}
         self._checks = checks
         self._roots: dict[str, str] = {}
@@ -190,6 +218,8 @@ class Requirements:
         """
         verdict, check = self.verdicts[required], self._checks.get(self._criteria[required].check)
         repaired = check is not None and check.run_anyway and criterion.scenario is not None
+        if repaired and check is not None and check.name == "build" and self._is_compiled(criterion):
+            repaired = False
         beside = (
             found.cause not in {"", verdict.cause} and self._criteria[required].scenario == criterion.scenario
         )
@@ -197,6 +227,14 @@ class Requirements:
         if beside and not named and not _lines(verdict) & _lines(found):
             return False
         return verdict.status.is_lost and (verdict.unjudged or not repaired)
+
+    def _is_compiled(self, criterion: Criterion) -> bool:
+        """Return whether it is about a program that only a build makes: a script runs from its source."""
+        scenario = self._rubric.scenarios.get(criterion.scenario or "")
+        starts = scenario.start if scenario is not None else ()
+        process = str(criterion.parameters.get("process")).partition("/")[0]
+        about = [start for start in starts if start.name == process and not start.is_rostest] or starts
+        return any(start.built or (start.script and not PurePath(start.script).suffix) for start in about)
 
 
 def _lines(verdict: Verdict) -> set[Citation]:
@@ -221,7 +259,11 @@ def _without_cause(verdict: Verdict) -> str:
 
 
 def result_of(
-    criterion: Criterion, verdict: Verdict, digits: int, repaired: Repaired | None = None
+    criterion: Criterion,
+    verdict: Verdict,
+    digits: int,
+    repaired: Repaired | None = None,
+    made_up: Mapping[str, Value] = MappingProxyType({}),
 ) -> CriterionResult:
     """Return the report's line of a criterion, with the points of its verdict."""
     earned = repaired is not None and not repaired.charged and verdict.score >= repaired.share
@@ -243,6 +285,7 @@ def result_of(
         citations=verdict.citations,
         blocked_by=verdict.blocked_by,
         repaired=repaired,
+        made_up=dict(made_up),
     )
 
 

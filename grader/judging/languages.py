@@ -6,7 +6,7 @@ import re
 from pathlib import PurePosixPath
 
 from grader.checks.support.idioms import Language, in_language
-from grader.checks.support.scripts import cmake_calls, find_script
+from grader.checks.support.scripts import find_script, programs
 from grader.checks.support.text import texts_in
 from grader.evidence.run import Run
 from grader.judging.facts import Facts
@@ -35,7 +35,7 @@ def _language_of(verdict: Verdict, criterion: Criterion, facts: Facts) -> Langua
     if scenario is None or facts.package is None:
         return "python"
     asked = set(texts_in(criterion.parameters))
-    known = _languages(facts.package, scenario, run)
+    known = _languages(facts, scenario, run)
     graph = run.graph if run else ()
     publishing = {node for _, event in graph for topic in asked for node in event.publishers.get(topic, ())}
     for nodes in (set(re.findall(r"[\w/-]+", verdict.message)), asked, publishing, known):
@@ -45,17 +45,23 @@ def _language_of(verdict: Verdict, criterion: Criterion, facts: Facts) -> Langua
     return None if known else "python"
 
 
-def _languages(package: PackageFacts, scenario: Scenario, run: Run | None) -> dict[str, Language]:
+def _languages(facts: Facts, scenario: Scenario, run: Run | None) -> dict[str, Language]:
     """What each process and each node of the scenario is written in, by its name."""
     found: dict[str, Language] = {}
     for start in scenario.start:
+        package = facts.package_of(start)
+        if package is None:
+            continue
         if start.built:
             found[start.name] = "cpp"
         elif start.script:
             found[start.name] = _written_in(package, start.script)
         for launch in package.launch_files:
             own = [n for n in launch.brings if PurePosixPath(launch.path).name == start.launch and n.type]
-            found |= {n.full_name: _written_in(package, str(n.type)) for n in own if n.pkg == package.name}
+            packages = {one.name: one for one in (*package.also, package)}
+            found |= {
+                n.full_name: _written_in(packages[n.pkg], str(n.type)) for n in own if n.pkg in packages
+            }
     for _, event in run.graph if run else ():
         for node, process in event.processes.items():
             name = process.partition("/")[0]
@@ -67,5 +73,5 @@ def _written_in(package: PackageFacts, path: str) -> Language:
     file, name = find_script(package, path), PurePosixPath(path)
     if file is not None and file.python:
         return "python"
-    built = {call.args[0] for call in cmake_calls(package, "add_executable") if call.args}
-    return "cpp" if name.stem in built or name.suffix in SOURCES else "python"
+    built = any(name.stem == one.target or one.is_called(name.name) for one in programs(package))
+    return "cpp" if built or name.suffix in SOURCES else "python"

@@ -73,7 +73,8 @@ def was_built(runs: Mapping[str, Run]) -> bool:
 
 def needs_build(package: PackageFacts | None) -> bool:
     """Return whether its nodes need what the build makes: messages, programs, modules. Scripts run without."""
-    paths = [PurePosixPath(file.path) for file in package.files] if package is not None else []
+    packages = (package, *package.also) if package is not None else ()
+    paths = [PurePosixPath(file.path) for one in packages for file in one.files]
     return any(path.suffix in MADE_BY_BUILDS or path.name == "setup.py" for path in paths)
 
 

@@ -134,8 +134,9 @@ def _decided(criterion: CriterionResult, override: Override, digits: int) -> Cri
     status = Status.PASS if points >= criterion.full else Status.PARTIAL if points > least else Status.FAIL
     author = f" by {override.author}" if override.author else ", decided by a person"
     comment = f": {override.comment}" if override.comment else ""
+    answer = f"; to your request: {override.answer}" if override.answer else ""
     of = f" of {criterion.full:g}" if criterion.extra >= 0 else ""
-    message = f"{points:g}{of} points{author}{comment}"
+    message = f"{points:g}{of} points{author}{comment}{answer}"
     return criterion.model_copy(update={"status": status, "points": points, "message": message})
 
 
@@ -151,18 +152,28 @@ def lateness(points: float, rubric: Rubric, handed_in: HandedIn | None) -> Laten
     """Return what is left of `points`, and why. None where there is no deadline.
 
     The deadline is that of `handed_in`, which holds the extension already; where it has none, the rubric's with the
-    extension. What no one dates counts as in time.
+    extension. Late days move it by as many as it takes. What no one dates counts as in time.
     """
     given = handed_in or HandedIn()
     deadline = given.deadline or deadline_of(rubric, given.extension_days) or given.before
     if deadline is None:
         return None
-    late = _late_by(given.at, deadline, rubric.late)
-    left, text = _cost(points, rubric, late) if late else (points, _in_time(given, deadline))
+    used = min(given.late_days, -(-_late_by(given.at, deadline, rubric.late) // UNITS["day"]))
+    moved = (deadline.astimezone(timezone.utc) + used * UNITS["day"]).astimezone(deadline.tzinfo)
+    late = _late_by(given.at, moved, rubric.late)
+    left, text = _cost(points, rubric, late) if late else (points, _in_time(given, moved))
+    if used:
+        days = plural(used, "late day")
+        text = (
+            f"{days} used, then {text}"
+            if late
+            else f"in time with {days} of {given.late_days} that were left"
+        )
     fields = {name: getattr(given, name) for name in HandedIn.model_fields}
     return Lateness(
-        **{**fields, "deadline": deadline},
+        **{**fields, "deadline": moved},
         late_s=late.total_seconds(),
+        late_days_used=used,
         points_before=points,
         points=left,
         text=text,

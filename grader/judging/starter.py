@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 from collections.abc import Collection, Iterator
 from pathlib import PurePosixPath
 
@@ -27,10 +28,16 @@ def tell_unchanged(
     criterion = next(c for c in rubric.criteria if c.id == result.id)
     cited = {one.file for one in result.citations if isinstance(one, FileCitation)}
     names = names_in(criterion).union(_programs(criterion, rubric, package))
+    own = rubric.package_of(criterion) if rubric.package_of(criterion) != rubric.package else ""
     unchanged = [
-        file.path
-        for file in package.files
-        if file.sha256 in handed_out and (file.path in cited or _is_named(file.path, names))
+        path
+        for one in (package, *package.also)
+        for file in one.files
+        if file.sha256 in handed_out
+        and (
+            (path := posixpath.normpath(f"{package.way_to(one)}/{file.path}")) in cited
+            or (_is_named(path, names) and one.asked == own)
+        )
     ]
     if not unchanged:
         return result
@@ -53,9 +60,10 @@ def _programs(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> It
     for start in [one for one in starts if one.name == process] or starts:
         if start.script is not None:
             yield PurePosixPath(start.script).name
-        for launch in package.launch_files:
+        for launch in (file for one in (package, *package.also) for file in one.launch_files):
             if (
                 start.launch is not None
                 and PurePosixPath(launch.path).name == PurePosixPath(start.launch).name
             ):
-                yield from (node.type for node in launch.brings if node.pkg == package.name and node.type)
+                names = {one.name for one in (package, *package.also)}
+                yield from (node.type for node in launch.brings if node.pkg in names and node.type)

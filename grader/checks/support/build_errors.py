@@ -135,6 +135,8 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
     name = found[1]
     near = get_close_matches(name, (*ALWAYS_THERE, *known_packages()), 1, ONE_EDIT)
     declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
+    if any(one.name == name and not one.files for one in package.also):
+        return Explained(f"it needs the package {name}, which is not here", f"hand in {name} too")
     if name in ROS_2:
         return Explained(f"it needs {name}, which is of ROS 2", f"take {name} out: this lab is for ROS 1")
     if name in known_packages() or (name in declared and not near):

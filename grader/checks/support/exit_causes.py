@@ -260,12 +260,11 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     place = _place(found, package)
     slip = _slip(found)
     cause, hint = slip or CAUSES.get(found.kind, ("", "fix the line that is named"))
-    if (
-        any(f"'{package.name}{inner}'" in found.message for inner in ("", ".msg", ".srv"))
-        and package.interfaces
-    ):
+    maker = next((one for one in (package, *package.also) if _makes(one, found.message)), None)
+    if maker is not None:
+        whose = "the package's own messages" if maker is package else f"the messages of {maker.name}"
         hint = (
-            "the build makes the package's own messages: list them in add_message_files(…) or "
+            f"the build makes {whose}: list them in add_message_files(…) or "
             "add_service_files(…), call generate_messages(…), and build again"
         )
     if lacking := _lacking(found, package):
@@ -282,6 +281,12 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(found.text)}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else ())
+
+
+def _makes(package: PackageFacts, message: str) -> bool:
+    """Return whether the build makes the module that the message names."""
+    named = any(f"'{package.name}{inner}'" in message for inner in ("", ".msg", ".srv"))
+    return named and bool(package.interfaces)
 
 
 def _slip(found: Traceback) -> tuple[str, str] | None:
@@ -326,7 +331,11 @@ def _lacking(found: Traceback, package: PackageFacts) -> str:
     match = _NO_MODULE.search(found.message) if found.kind == "ModuleNotFoundError" else None
     # roslib.load_manifest, which rosbuild needed, asks for the ROS package itself
     name = found.message if found.kind == "ResourceNotFound" else match[1] if match else ""
-    own = {package.name, *(f.path.rpartition("/")[2].removesuffix(".py") for f in package.files)}
+    own = {
+        package.name,
+        *(one.name for one in package.also),
+        *(f.path.rpartition("/")[2].removesuffix(".py") for f in package.files),
+    }
     declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
     return name if name not in own | ROS_2 and (name in known_packages() or name in declared) else ""
 

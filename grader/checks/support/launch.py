@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
@@ -16,11 +17,13 @@ from grader.checks.support.scripts import (
     chmod_hint,
     cmake_calls,
     find_script,
+    is_elsewhere,
     paths_by_name,
+    programs,
 )
 from grader.checks.support.text import bare, near_names, shown
 from grader.evidence.run import Run
-from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
+from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, unjudged
 from grader.wording import join_words
 
@@ -127,7 +130,7 @@ def has_program(package: PackageFacts, name: str) -> bool:
     """A file of that name, or a program that CMake builds under it."""
     if "/" not in name and find_script(package, name) is not None:
         return True
-    return any(c.args[:1] == (name,) for c in cmake_calls(package, "add_executable"))
+    return any(one.is_called(name) and not is_elsewhere(one, package) for one in programs(package))
 
 
 def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip | None:
@@ -145,8 +148,8 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
         )
     if UNRESOLVED in pkg + name:
         return None
-    if pkg == package.name:
-        return None if has_program(package, name) else _no_program(package, node)
+    if owner := _owner(package, node):
+        return None if has_program(owner, name) else _no_program(owner, node, (package, *package.also))
     if near_names(package.name, [pkg]) or f"[{pkg}/{name}]" in said or _folder(package) == pkg:
         slip = _slip(node, f"there is no {name} in a package {pkg}", f'write pkg="{package.name}"')
         # Where the launch file has the name of the folder or of project(…), the manifest is at fault.
@@ -201,20 +204,36 @@ def _may_be(written: str | None, name: str) -> bool:
     return written == name or (UNRESOLVED in (written or "") and "$(find" not in (written or ""))
 
 
-def _no_program(package: PackageFacts, node: LaunchNode) -> Slip:
+def _no_program(package: PackageFacts, node: LaunchNode, of_lab: Sequence[PackageFacts]) -> Slip:
+    """`package` is the one that the node names, `of_lab` are all that the lab asks for."""
     name = str(node.type)
-    why = f"there is no {name} in the package"
+    why = f"there is no {name} in the package{f' {package.name}' if len(of_lab) > 1 else ''}"
+    if other := next((one for one in of_lab if has_program(one, name)), None):
+        return _slip(node, f"{why}; it is in {other.name}", f'write pkg="{other.name}"')
     plain = PurePosixPath(name).name
     if plain != name and has_program(package, plain):
         return _slip(node, f"{why}: type is the file's name without its folder", f'write type="{plain}"')
     if found := find_script(package, f"{plain}.py"):
         return _slip(node, f'{why}: type="{name}" lacks the .py of {found.path}', f'write type="{plain}.py"')
+    if made := next((one for one in programs(package) if name in {one.target, one.name}), None):
+        return _named_otherwise(package, node, made, why)
     suffix = PurePosixPath(plain).suffix
     names = [n for n in _program_names(package) if n != name]
     near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
     if near:
         return _slip(node, f"{why}; there is {join_words(near)}", f'write type="{near[0]}"')
     return _slip(node, why, "type is the script's whole file name, with its ending")
+
+
+def _named_otherwise(package: PackageFacts, node: LaunchNode, made: Executable, why: str) -> Slip:
+    """CMake gives the target's program another name, or puts it where nothing looks for it."""
+    call = made.named or made.call
+    where = f"{call.file}, line {call.line},"
+    if is_elsewhere(made, package):
+        why = f"{why}: {where} puts it into {shown(made.folder)}, where roslaunch does not look"
+        return _slip(node, why, f"take RUNTIME_OUTPUT_DIRECTORY out of line {call.line} of {call.file}")
+    why = f"{why}: {where} names the program of the target {made.target} {shown(made.name)}"
+    return _slip(node, why, f'write type="{made.name}"')
 
 
 def _program_names(package: PackageFacts) -> list[str]:
@@ -319,8 +338,19 @@ def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
 
 
 def own_script(package: PackageFacts, node: LaunchNode) -> SourceFile | None:
-    """Return the file of the package that the node runs."""
-    return find_script(package, str(node.type)) if node.pkg == package.name else None
+    """Return the file of the package that the node runs; one of another of the lab's packages by its path from here."""
+    owner = _owner(package, node)
+    script = find_script(owner, str(node.type)) if owner is not None else None
+    if script is None or owner is None or owner is package:
+        return script
+    path = posixpath.normpath(f"{package.way_to(owner)}/{script.path}")
+    fault = script.python_fault and script.python_fault.model_copy(update={"file": path})
+    return script.model_copy(update={"path": path, "python_fault": fault})
+
+
+def _owner(package: PackageFacts, node: LaunchNode) -> PackageFacts | None:
+    """Return the lab's package that the node is of; None for one of ROS's."""
+    return next((one for one in (package, *package.also) if one.name == node.pkg), None)
 
 
 def not_executable(*paths: str) -> Absence:
@@ -344,8 +374,10 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         or any(PurePosixPath(f.file).name == PurePosixPath(script.path).name for f in t.frames)
     ]
     if found:
-        end = explain_traceback(found[-1], package)
-        return Absence(f"it died: {end.cause}", end.hint, True, end.citations, end.of_machine)
+        owner = _owner(package, node) or package
+        end = explain_traceback(found[-1], owner)
+        cited = tuple(one.below(package.way_to(owner)) for one in end.citations)
+        return Absence(f"it died: {end.cause}", end.hint, True, cited, end.of_machine)
     if script is not None and script.python_fault is not None:
         fault = script.python_fault
         why = f"it died: {fault.kind}: {fault.cause or fault.message}"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.model.package import CMakeCall, PackageFacts, SourceFile
+from grader.model.package import CMakeCall, Executable, PackageFacts, SourceFile
 
 PYTHON = "catkin_install_python"
 NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
@@ -68,7 +68,10 @@ def is_product(path: str) -> bool:
 
 
 def path_in_package(package: PackageFacts, file: str) -> str | None:
-    """Return the longest of the package's paths with which an absolute path ends; None where there is none."""
+    """Return the longest of the package's paths with which an absolute path ends; None where there is none, or where it
+    lies in another of the lab's packages."""
+    if any(f"/{other.name}/" in file for other in package.also):
+        return None
     return max((f.path for f in package.files if f"/{file}".endswith(f"/{f.path}")), key=len, default=None)
 
 
@@ -97,6 +100,17 @@ def chmod_hint(*paths: str) -> str:
 def cmake_calls(package: PackageFacts, *names: str) -> tuple[CMakeCall, ...]:
     """Return the calls of these commands, in order."""
     return tuple(c for c in package.cmake.calls if c.name in names) if package.cmake else ()
+
+
+def programs(package: PackageFacts) -> tuple[Executable, ...]:
+    """Return the programs that CMake makes, in the order of their calls."""
+    return package.cmake.executables if package.cmake else ()
+
+
+def is_elsewhere(program: Executable, package: PackageFacts) -> bool:
+    """Return whether it surely goes to a folder in which `rosrun` does not look."""
+    folder = program.folder
+    return bool(folder) and "$" not in folder and not is_found(folder, package)
 
 
 def installed(package: PackageFacts) -> Iterator[Installed]:

@@ -25,7 +25,9 @@ SETTINGS = (
     "kernel/sysrq",
 )
 LISTENS, TIME_WAIT = "0A", "06"
-KEPT = re.compile(r"(?:root|home/[^/]+)/\.cache(?:/grader(?P<base>/workspace-[0-9a-f]{32}\.tar)?)?")
+KEPT = re.compile(
+    r"(?:root|home/[^/]+)/\.cache(?:/grader(?P<base>/(?:workspace|course)-[0-9a-f]{32}\.tar)?)?"
+)
 LOCKS = re.compile(str(RUNTIME).lstrip("/") + r"/ros-lab-grader(?P<file>/(turn|runs|lateness|start-\d+))?")
 LOCK_BYTES_MAX = 1024
 BASE_MEMBERS = re.compile(r"grader-known(/[a-z_]+ [a-z-]+)?|build/CMakeCache\.txt|build/CMakeFiles/[\w./]+")
@@ -66,7 +68,7 @@ def _walk(world: World, results: Path) -> Iterator[tuple[str, Entry]]:
 
 def _keeps(path: str, name: str, descriptor: int, found: os.stat_result) -> bool:
     """What graders share: locks without content, and the base workspace with nothing in it but what belongs there; the
-    oldest of many base workspaces goes."""
+    oldest of many base workspaces and course packages goes."""
     kept, lock = KEPT.fullmatch(path), LOCKS.fullmatch(path)
     if lock is not None:
         plain = stat.S_ISREG(found.st_mode) if lock["file"] else stat.S_ISDIR(found.st_mode)
