@@ -1,0 +1,5 @@
+"""What of a class is published, and how it gets to the students.
+
+`publish` freezes results as students may read them; `send` returns them in one of the `forms`, each of which is a
+module here. `published.jsonl` and `sent.jsonl` in the class's folder say what was published and sent, and when.
+"""

@@ -1,0 +1,181 @@
+"""The registry of forms in which feedback is returned.
+
+A new form is a module beside this one with a `Sender`, and an entry in `FORMS`: the command line, the documentation and
+the tests read it from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Literal
+
+from grader.errors import NotSent
+from grader.untrusted_text import line
+
+if TYPE_CHECKING:  # the parser of the command line reads the names of forms, and must start fast
+    from typing_extensions import Self
+
+    from grader.model.batch import Entry
+    from grader.model.publication import Publication
+
+WhenUnsure = Literal["again", "look", "ask"]
+TEXT, PAGE = "report.md", "report.html"
+SUBJECT_CHARS = 200
+NEWLINE = "\n"
+
+
+class Unsure(NotSent):
+    """Nobody knows whether it was sent."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Feedback:
+    """What one student gets: `title` is the lab's, `folder` holds the reports, `last_place` says where this form
+    sent the one before."""
+
+    entry: Entry
+    publication: Publication
+    name: str
+    title: str
+    folder: Path
+    commit: str = ""
+    last_place: str = ""
+
+    @property
+    def text(self) -> str:
+        """The report as Markdown. Raises NotSent."""
+        return self._read(TEXT).decode("utf-8", "replace")
+
+    @property
+    def page(self) -> bytes:
+        """The report as one HTML file. Raises NotSent."""
+        return self._read(PAGE)
+
+    @property
+    def subject(self) -> str:
+        """`Lab 1: 85 of 100 points`, in one visible line. Raises NotSent."""
+        return line(f"{self.title}: {self.text.partition(NEWLINE)[0].lstrip('# ')}", SUBJECT_CHARS)
+
+    def _read(self, name: str) -> bytes:
+        try:
+            return (self.folder / name).read_bytes()
+        except OSError as error:
+            message = f"{self.folder / name}: cannot be read: {error.strerror}"
+            raise NotSent(message, hint=f"grader publish DIR --only {self.entry.id}") from error
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What the command line says. `folder` is the class's, `out` where files go, empty for a place in `folder`.
+    `told` gets a line where a server is waited for."""
+
+    folder: Path
+    out: Path | None = None
+    smtp: str = ""
+    sender: str = ""
+    branch: str = ""
+    issues: bool = False
+    public: bool = False
+    told: Callable[[str], None] = lambda _: None
+
+
+class Sender:
+    """Sends by one form, inside of a `with` block. Files appear when the block ends without an exception.
+
+    `together`: what is sent is one file, so that all of it is sent or nothing. `unsure` says what becomes of
+    feedback of which nobody knows whether it was sent: it is sent `again`, since that does no harm; the sender can
+    `look`; or a person has to (`ask`).
+    """
+
+    together = False
+    unsure: WhenUnsure = "again"
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        del kind, error, trace
+
+    def place(self, feedback: Feedback) -> str:
+        """Return where it will go. Raises NotSent if that is not known."""
+        raise NotImplementedError
+
+    def show(self, feedback: Feedback) -> str:
+        """Return what the student will read, for `--dry-run`."""
+        return feedback.text
+
+    def send(self, feedback: Feedback, *, look: bool = False) -> str:
+        """Send it and return where it went. With `look`, it may have been sent before. Raises NotSent."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Form:
+    """`sender` is `module:class` in this package; `purpose` is a line for people; `options` are those it takes."""
+
+    name: str
+    sender: str
+    purpose: str
+    options: frozenset[str] = frozenset()
+
+    def open(self, settings: Settings) -> Sender:
+        """Return the sender. Raises UsageError if a setting is missing, HostError if a server cannot be reached."""
+        module, _, name = self.sender.partition(":")
+        made: Sender = getattr(import_module(f"{__package__}.{module}"), name)(settings)
+        return made
+
+
+_FORMS = (
+    Form(
+        name="folder",
+        sender="folder:Folder",
+        purpose="a folder for each student, with `report.md` and `report.html`",
+        options=frozenset({"--out"}),
+    ),
+    Form(
+        name="moodle",
+        sender="archives:Moodle",
+        purpose="Moodle's zip of feedback files, with `report.html` for each student",
+        options=frozenset({"--out"}),
+    ),
+    Form(
+        name="canvas",
+        sender="archives:Canvas",
+        purpose="Canvas' zip for re-upload: the reports under the names of the submitted files",
+        options=frozenset({"--out"}),
+    ),
+    Form(
+        name="email",
+        sender="mail:Mail",
+        purpose="a mail to each student: as files, or through a server with `--smtp`",
+        options=frozenset({"--out", "--smtp", "--from"}),
+    ),
+    Form(
+        name="git",
+        sender="branch:Branch",
+        purpose="a branch `feedback` in each student's repository",
+        options=frozenset({"--branch"}),
+    ),
+    Form(
+        name="github",
+        sender="github:GitHub",
+        purpose="a comment on the commit that was graded, or an issue",
+        options=frozenset({"--issues", "--public"}),
+    ),
+    Form(
+        name="gitlab",
+        sender="gitlab:GitLab",
+        purpose="a comment on the commit that was graded, or an issue",
+        options=frozenset({"--issues", "--public"}),
+    ),
+)
+FORMS: Mapping[str, Form] = {form.name: form for form in _FORMS}

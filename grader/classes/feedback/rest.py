@@ -1,0 +1,345 @@
+"""JSON over HTTP as forges speak it: a token for one server, limits that are respected, and comments made once.
+
+`Comments` is what GitHub and GitLab have in common: a comment on the commit that was graded, or an issue, which later
+feedback is added to. Each body ends with a mark that says what it is, so that a comment can be found of which nobody
+knows whether it was made.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from http.client import HTTPException
+from typing import Any
+from urllib.error import HTTPError, URLError
+from urllib.parse import unquote, urljoin, urlsplit
+from urllib.request import HTTPRedirectHandler, Request, build_opener
+
+from grader import __version__
+from grader.classes.feedback.forms import Feedback, Sender, Unsure
+from grader.errors import GraderError, HostError, NotSent, UsageError
+from grader.intake.source import parse_source
+from grader.untrusted_text import line
+
+TIMEOUT_S = 60.0
+TRIES = 4
+PAUSE_S = 1.0
+"""Between two things that are written: GitHub asks for it."""
+WAIT_S, WAIT_MAX_S = 60.0, 3900.0
+ANSWER_BYTES_MAX = 16 << 20
+SAID_CHARS = 300
+PAGES_MAX = 50
+_SCP = re.compile(r"(?:[\w.+-]+@)?(?P<host>[\w.-]+):(?P<path>(?!/).+)")
+_ISSUE = re.compile(r"/(?:issues|work_items)/(\d+)")
+_LOCAL = {"localhost", "127.0.0.1", "::1"}
+
+
+class Refused(Exception):
+    """The server answered with an error. `text` is what it said."""
+
+    def __init__(self, status: int, text: str) -> None:
+        super().__init__(f"{status} {text}")
+        self.status, self.text = status, text
+
+
+class Broken(Exception):
+    """No answer came, or one that says nothing of whether the request was carried out."""
+
+
+class _NoRedirect(HTTPRedirectHandler):
+    """A redirect could carry the token to another server."""
+
+    def redirect_request(self, *_args: object, **_words: object) -> None:
+        """Follow none."""
+
+
+@dataclass(frozen=True)
+class _Answer:
+    status: int
+    headers: Mapping[str, str]
+    data: bytes
+
+
+class Api:
+    """The server at `base`, for who knows the token in `headers`. `told` gets a line where something is waited for."""
+
+    def __init__(
+        self,
+        base: str,
+        headers: Mapping[str, str],
+        told: Callable[[str], None],
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        parts = urlsplit(base)
+        if parts.scheme != "https" and not (parts.scheme == "http" and parts.hostname in _LOCAL):
+            raise UsageError(f"{line(base, 200)}: a token is sent by https:// only")
+        self.base = base.rstrip("/")
+        self._headers = {
+            "User-Agent": f"ros-lab-grader/{__version__}",
+            "Accept": "application/json",
+            **headers,
+        }
+        self._told, self._sleep = told, sleep
+        self._opener = build_opener(_NoRedirect)
+        self._next_write = 0.0
+
+    def get(self, path: str) -> Any:  # noqa: ANN401 - JSON
+        """Return what is there. Raises Refused, Broken."""
+        for failed in range(1, TRIES):
+            with suppress(Broken):
+                return self._ask("GET", path, None)
+            self._sleep(2.0**failed)
+        return self._ask("GET", path, None)
+
+    def pages(self, path: str) -> Iterator[dict[str, Any]]:
+        """Yield the records of a list, page by page."""
+        for page in range(1, PAGES_MAX + 1):
+            found = self.get(f"{path}{'&' if '?' in path else '?'}per_page=100&page={page}")
+            yield from (record for record in found if isinstance(record, dict))
+            if len(found) < 100:
+                return
+
+    def post(self, path: str, data: Mapping[str, object]) -> Any:  # noqa: ANN401 - JSON
+        """Return what was made. Raises Refused; Broken where nobody knows whether it was made."""
+        self._sleep(max(0.0, self._next_write - time.monotonic()))
+        try:
+            return self._ask("POST", path, json.dumps(data).encode())
+        finally:
+            self._next_write = time.monotonic() + PAUSE_S
+
+    def _ask(self, method: str, path: str, data: bytes | None) -> Any:  # noqa: ANN401 - JSON
+        url, limited, moved = f"{self.base}{path}", 0, 0
+        while True:
+            answer = self._answer(method, url, data)
+            if answer.status < 300:
+                return _json(answer.data)
+            if answer.status in (301, 302, 307, 308) and moved < 3:
+                url, moved = self._moved(url, answer), moved + 1
+                continue
+            wait_s = _wait_s(answer, limited)
+            if wait_s is None or limited >= TRIES:
+                if answer.status >= 500:
+                    raise Broken(f"{answer.status} {_said(answer)}")
+                raise Refused(answer.status, _said(answer))
+            if wait_s > WAIT_MAX_S:
+                raise HostError(
+                    f"{self.base}: too many requests, for {wait_s / 60:.0f} minutes",
+                    hint="the same command continues then",
+                )
+            limited += 1
+            self._told(f"{urlsplit(self.base).hostname}: too many requests: waiting {wait_s:.0f} s")
+            self._sleep(wait_s)
+
+    def _answer(self, method: str, url: str, data: bytes | None) -> _Answer:
+        headers = {**self._headers, **({"Content-Type": "application/json"} if data is not None else {})}
+        request = Request(url, data=data, method=method, headers=headers)  # noqa: S310 - checked above
+        try:
+            with self._opener.open(request, timeout=TIMEOUT_S) as response:
+                return _Answer(response.status, _lower(response.headers), response.read(ANSWER_BYTES_MAX))
+        except HTTPError as error:
+            with error:
+                return _Answer(error.code, _lower(error.headers), error.read(ANSWER_BYTES_MAX))
+        except (URLError, OSError, HTTPException) as error:
+            reason = error.reason if isinstance(error, URLError) else error
+            raise Broken(line(str(reason) or type(error).__name__, SAID_CHARS)) from error
+
+    def _moved(self, url: str, answer: _Answer) -> str:
+        """Return where a repository that was renamed is, on the same server."""
+        there = urljoin(url, answer.headers.get("location", ""))
+        if urlsplit(there)[:2] != urlsplit(url)[:2]:
+            raise Refused(answer.status, "it is on another server now")
+        return there
+
+
+def _lower(headers: Any) -> dict[str, str]:  # noqa: ANN401 - a message of http.client
+    return {name.lower(): value for name, value in headers.items()}
+
+
+def _json(data: bytes) -> Any:  # noqa: ANN401 - JSON
+    try:
+        return json.loads(data or b"null")
+    except ValueError as error:
+        raise Broken("the answer is no JSON") from error
+
+
+def _said(answer: _Answer) -> str:
+    try:
+        found = json.loads(answer.data)
+        said = found.get("message") or found.get("error") if isinstance(found, dict) else ""
+    except ValueError:
+        said = ""
+    return line(said if isinstance(said, str) else json.dumps(said), SAID_CHARS)
+
+
+def _wait_s(answer: _Answer, times: int) -> float | None:
+    """Return how long a server that has too much to do wants to be left alone; None if that is not what it says."""
+    headers = answer.headers
+    exhausted = "0" in (headers.get("x-ratelimit-remaining"), headers.get("ratelimit-remaining"))
+    limited = "rate limit" in _said(answer).lower() or "retry-after" in headers or exhausted
+    if answer.status != 429 and not (answer.status in (403, 503) and limited):
+        return None
+    if (after := headers.get("retry-after", "")).isdecimal():
+        return float(after)
+    reset = headers.get("x-ratelimit-reset") or headers.get("ratelimit-reset") or ""
+    if exhausted and reset.isdecimal():
+        return max(1.0, float(reset) - time.time() + 1)
+    return WAIT_S * 2.0**times
+
+
+def host_and_path(address: str) -> tuple[str, str]:
+    """Return the server and the path of a repository's address, `org/name`. Raises NotSent."""
+    try:
+        source = parse_source(address)
+    except GraderError as error:
+        raise NotSent(error.message, hint=error.hint) from error
+    if not source.remote:
+        raise NotSent(
+            "no repository on a server was submitted", hint="return it by another form: --form folder"
+        )
+    found = _SCP.fullmatch(source.url) if "://" not in source.url else None
+    parts = urlsplit(source.url)
+    host = found["host"] if found else parts.netloc.rpartition("@")[2]
+    if not found and parts.scheme not in ("http", "https"):
+        host = parts.hostname or ""
+    path = unquote(found["path"] if found else parts.path).strip("/").removesuffix(".git")
+    return host.lower(), path
+
+
+class Comments(Sender):
+    """A forge on which comments are made. `server` is the host in addresses of its repositories."""
+
+    unsure = "look"
+    name = server = token = ""
+    api: Api
+
+    def place(self, feedback: Feedback) -> str:
+        """Return the commit, or the repository whose issue it will be. Raises NotSent."""
+        path = self.path(feedback)
+        if self.settings.issues:
+            return f"{self.server}/{path}: {feedback.last_place or 'a new issue'}"
+        if not feedback.commit:
+            raise NotSent("no commit is known that was graded", hint="--issues opens an issue instead")
+        return f"{self.server}/{path}: commit {feedback.commit[:12]}"
+
+    def path(self, feedback: Feedback) -> str:
+        """Return the repository's path on this server. Raises NotSent."""
+        host, path = host_and_path(feedback.entry.source)
+        if host != self.server or "/" not in path:
+            raise NotSent(f"its repository is not on {self.server}: {line(feedback.entry.source, 200)}")
+        return path
+
+    def show(self, feedback: Feedback) -> str:
+        """Return the comment."""
+        return self.body(feedback)
+
+    def body(self, feedback: Feedback) -> str:
+        """Return the comment, with the mark that says what it is."""
+        return f"{feedback.text.rstrip()}\n\n{mark(feedback)}\n"
+
+    def send(self, feedback: Feedback, *, look: bool = False) -> str:
+        """Make the comment or the issue; return its address."""
+        path = self.path(feedback)
+        try:
+            if not self.settings.public and self.is_public(path):
+                raise NotSent(
+                    "everybody can read this repository, and so the feedback",
+                    hint="--public returns it all the same",
+                )
+            return self._once(feedback, path, look=look)
+        except Refused as error:
+            raise self._error(error, feedback) from error
+        except Broken as error:
+            raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
+
+    def _once(self, feedback: Feedback, path: str, *, look: bool) -> str:
+        """Make it, and look whether it is there where that is not known."""
+        for left in reversed(range(TRIES)):
+            if look and (found := self._found(feedback, path)):
+                return found
+            try:
+                return self._make(feedback, path)
+            except Broken as error:
+                look = True
+                if not left:
+                    raise Unsure(
+                        f"{self.server}: {error}", hint="the same command looks, and tries it again"
+                    ) from error
+        raise AssertionError
+
+    def _make(self, feedback: Feedback, path: str) -> str:
+        body = self.body(feedback)
+        if not self.settings.issues:
+            return self.comment(path, feedback.commit, body)
+        issue = _ISSUE.search(feedback.last_place)
+        if issue:
+            try:
+                return self.reply(path, int(issue[1]), body)
+            except Refused as error:
+                if error.status not in (404, 410):
+                    raise
+        return self.open_issue(path, feedback.subject, body)
+
+    def _found(self, feedback: Feedback, path: str) -> str:
+        issue = _ISSUE.search(feedback.last_place)
+        if not self.settings.issues:
+            found = self.comments(path, feedback.commit)
+        else:
+            found = self.issues(path, int(issue[1]) if issue else None)
+        return next((address for address, body in found if mark(feedback) in body), "")
+
+    def _error(self, error: Refused, feedback: Feedback) -> GraderError:
+        if error.status == 401:
+            return HostError(
+                f"{self.server} does not take the token: {error.text}", hint=f"set {self.token} again"
+            )
+        hints = {
+            403: "the token needs the right to write there",
+            404: "check the address, and what the token may see",
+            410: "issues are switched off there",
+        }
+        where = self.place(feedback)
+        return NotSent(
+            f"{where}: {self.name} says {error.status} {error.text}".rstrip(),
+            hint=hints.get(error.status, ""),
+        )
+
+    @abstractmethod
+    def is_public(self, path: str) -> bool:
+        """Return whether everybody can read the repository, or everybody with an account."""
+
+    @abstractmethod
+    def comment(self, path: str, commit: str, body: str) -> str:
+        """Comment on a commit; return the comment's address."""
+
+    @abstractmethod
+    def comments(self, path: str, commit: str) -> Iterator[tuple[str, str]]:
+        """Yield the address and the text of each comment on a commit."""
+
+    @abstractmethod
+    def open_issue(self, path: str, title: str, body: str) -> str:
+        """Open an issue; return its address."""
+
+    @abstractmethod
+    def reply(self, path: str, issue: int, body: str) -> str:
+        """Comment on an issue; return the comment's address."""
+
+    @abstractmethod
+    def issues(self, path: str, issue: int | None) -> Iterator[tuple[str, str]]:
+        """Yield the address and the text of each issue and of the comments on that one."""
+
+
+def mark(feedback: Feedback) -> str:
+    """Return what is in the comment for the grader alone."""
+    return f"<!-- ros-lab-grader feedback {feedback.publication.digest} -->"
+
+
+def required_token(name: str, value: str) -> str:
+    """Return a token of the environment. Raises UsageError."""
+    if not value.strip() or not value.strip().isascii() or not value.strip().isprintable():
+        raise UsageError(f"{name} holds no token", hint=f"export {name}=… with the right to write comments")
+    return value.strip()

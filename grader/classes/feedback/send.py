@@ -1,0 +1,250 @@
+"""Returns feedback to a class, one student after the other; what is interrupted goes on where it stopped.
+
+published.jsonl → `select` → to be sent │ sent before │ not known → `deliver` → sent.jsonl
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+
+from grader.classes.batch.folder import BatchFolder
+from grader.classes.batch.run import alone
+from grader.classes.feedback.forms import Feedback, Form, Sender, Unsure
+from grader.classes.feedback.publish import (
+    FOLDER,
+    Freezing,
+    Published,
+    check_only,
+    freeze,
+    history_words,
+    plan,
+    publication_of,
+    read_published,
+    refuse_other_rubric,
+)
+from grader.classes.feedback.sent import SentLog
+from grader.errors import NotSent, UsageError
+from grader.files import temporary_folder
+from grader.intake import safe_name
+from grader.model.batch import Entry
+from grader.model.publication import Publication
+from grader.report.view import hidden_ids
+from grader.results import read_result
+from grader.rubric.load import LoadedRubric
+from grader.workers import WorkerEnded, run_each
+
+UNKNOWN = "nobody knows whether it was sent: the run before was stopped in that moment"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """Whose feedback is sent: of these ids, of what was published after a time.
+
+    With `again` it is sent to those who have it, too. With `drafts`, the class's rubric, results are taken as they are
+    now, published or not.
+    """
+
+    only: Sequence[str] = ()
+    changed_since: datetime | None = None
+    again: bool = False
+    drafts: LoadedRubric | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Selection:
+    """`todo` is to be sent. `before` were sent already, `unpublished` are drafts; `older` were published earlier than
+    asked for."""
+
+    todo: tuple[Feedback, ...]
+    before: tuple[str, ...] = ()
+    older: tuple[str, ...] = ()
+    unpublished: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """Why one student got nothing."""
+
+    id: str
+    message: str
+    hint: str = ""
+
+
+@dataclass(kw_only=True)
+class Delivery:
+    """What became of a selection."""
+
+    sent: list[str] = field(default_factory=list)
+    failures: list[Failure] = field(default_factory=list)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Class:
+    """What every part of a run knows. `jobs` is how many reports are written side by side."""
+
+    folder: BatchFolder
+    published: Published
+    log: SentLog
+    wanted: Wanted
+    jobs: int
+
+
+@contextmanager
+def selected(
+    folder: BatchFolder, form: Form, wanted: Wanted, *, jobs: int
+) -> Iterator[tuple[Selection, SentLog]]:
+    """Hold the class's feedback and give what is to be sent, and the log of what was.
+
+    Raises UsageError if nothing is published, or for an unknown id; Busy if other feedback is being sent.
+    """
+    published = read_published(folder.path)
+    if not published.history and wanted.drafts is None:
+        raise UsageError(
+            f"{folder.path}: nothing of this class is published, so there is nothing to return",
+            hint=f"grader publish {folder.path}; or --drafts to return results as they are now",
+        )
+    check_only(folder, wanted.only)
+    place = folder.path / FOLDER if published.history else folder.path
+    with alone(place, "other feedback is being sent, or a class published,"), temporary_folder("run") as room:
+        log = SentLog(folder.path, form.name)
+        about = _Class(
+            folder=folder, published=read_published(folder.path), log=log, wanted=wanted, jobs=jobs
+        )
+        yield _select(about, room), log
+
+
+def _select(about: _Class, room: Path) -> Selection:
+    names = check_only(about.folder, about.wanted.only)
+    entries = [entry for entry in about.folder.run.entries if safe_name(entry.id) in names]
+    published = about.published
+    if about.wanted.drafts is None:
+        made = {e.id: (p[-1], published.folder(p[-1])) for e in entries if (p := published.of(e))}
+    else:
+        made = _drafts(about, about.wanted.drafts, room)
+    todo, before, older, unpublished = list[Feedback](), list[str](), list[str](), list[str]()
+    since = about.wanted.changed_since
+    for entry in entries:
+        if entry.id not in made:
+            unpublished.append(entry.id)
+            continue
+        publication, place = made[entry.id]
+        if since is not None and publication.at <= since:
+            older.append(entry.id)
+        elif about.log.state(publication) == "sent" and not about.wanted.again:
+            before.append(entry.id)
+        else:
+            todo.append(_feedback(about, entry, publication, place))
+    return Selection(
+        todo=tuple(todo), before=tuple(before), older=tuple(older), unpublished=tuple(unpublished)
+    )
+
+
+def _feedback(about: _Class, entry: Entry, publication: Publication, place: Path) -> Feedback:
+    result = read_result(place)
+    return Feedback(
+        entry=entry,
+        publication=publication,
+        name=safe_name(entry.id),
+        title=about.folder.run.title,
+        folder=place,
+        commit=(result.submission.commit if result else None) or "",
+        last_place=about.log.last_place(entry.id),
+    )
+
+
+def _drafts(about: _Class, rubric: LoadedRubric, room: Path) -> dict[str, tuple[Publication, Path]]:
+    """Return the reports of results as they are now, written into `room`, by the student's id."""
+    refuse_other_rubric(about.folder, rubric)
+    wanted = [
+        Freezing(
+            publication=publication_of(step.entry, step.result),
+            result=step.result,
+            evidence=about.folder.folder_of(step.entry),
+            into=room / safe_name(step.entry.id),
+            changes=history_words(about.published.of(step.entry)),
+            hidden=hidden_ids(rubric.rubric),
+        )
+        for step in plan(about.folder, about.published, about.wanted.only)
+        if step.result is not None and step.state != "draft"
+    ]
+    jobs = min(about.jobs, len(wanted))
+    for failed in filter(None, run_each(partial(_freeze_draft, rubric), wanted, jobs, ended=_freezing_ended)):
+        raise NotSent(failed)
+    return {one.publication.id: (one.publication, one.into) for one in wanted}
+
+
+def _freeze_draft(rubric: LoadedRubric, job: Freezing) -> str:
+    """In a worker."""
+    freeze(rubric, job)
+    return ""
+
+
+def _freezing_ended(job: Freezing, error: WorkerEnded) -> str:
+    return f"{job.publication.id}: the process that wrote its report {error.reason}"
+
+
+def faults(sender: Sender, selection: Selection) -> Iterator[Failure]:
+    """Yield whose feedback cannot be sent as things are."""
+    return filter(None, (_fault(sender, feedback) for feedback in selection.todo))
+
+
+def _fault(sender: Sender, feedback: Feedback) -> Failure | None:
+    try:
+        sender.place(feedback)
+    except NotSent as error:
+        return Failure(id=feedback.entry.id, message=error.message, hint=error.hint)
+    return None
+
+
+def deliver(
+    sender: Sender,
+    selection: Selection,
+    log: SentLog,
+    delivery: Delivery,
+    *,
+    again: bool,
+    told: Callable[[str], None],
+) -> None:
+    """Send what was selected, and write down in `delivery` what became of it; `told` gets a line for each.
+
+    What costs one student costs no other. Raises GraderError for what would meet all, and KeyboardInterrupt.
+    """
+    together: list[Publication] = []
+    place = ""
+    with sender:
+        for feedback in selection.todo:
+            publication = feedback.publication
+            try:
+                place = _send(sender, feedback, log, again=again)
+            except NotSent as error:
+                delivery.failures.append(Failure(id=publication.id, message=error.message, hint=error.hint))
+                if not isinstance(error, Unsure):
+                    log.add([publication], "failed", message=error.message)
+                told(f"{publication.id}: not sent: {error.message}")
+                continue
+            if sender.together:
+                together.append(publication)
+            else:
+                log.add([publication], "sent", place=place)
+                delivery.sent.append(publication.id)
+                told(f"{publication.id}: {place}")
+    if together:
+        log.add(together, "sent", place=place)
+        delivery.sent += [publication.id for publication in together]
+        told(place)
+
+
+def _send(sender: Sender, feedback: Feedback, log: SentLog, *, again: bool) -> str:
+    publication = feedback.publication
+    is_unsure = log.state(publication) == "sending"
+    if is_unsure and sender.unsure == "ask" and not again:
+        raise Unsure(UNKNOWN, hint=f"ask the student; --only {publication.id} --again sends it once more")
+    sender.place(feedback)  # what has no address is not begun
+    if sender.unsure != "again":
+        log.add([publication], "sending")
+    return sender.send(feedback, look=is_unsure)

@@ -1,0 +1,114 @@
+"""The commands for a whole course: grade and publish its labs, see how far they are, and write its gradebook."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+from grader.cli.declare import INSTRUCTORS, Argument, Flag, Option, command, loading
+from grader.cli.options import CLASS_EXIT_CODES, PUBLISH_EXIT_CODES, STATIC, JsonFlag, SandboxOption, count
+from grader.errors import ExitCode
+
+COURSE = Argument("COURSE", "the course's file, course.yaml")
+LAB = Argument("NAME", "the lab's name in that file")
+
+
+@command("course status", group=INSTRUCTORS)
+def status(*, course: Annotated[Path, COURSE], as_json: JsonFlag = False) -> ExitCode:
+    """List the labs of a course: what is graded, open, published and sent, and the next command for each."""
+    with loading():
+        from grader.cli import course as of_course
+    return of_course.print_status(course, as_json=as_json)
+
+
+@command("course grade", group=INSTRUCTORS, exit_codes=CLASS_EXIT_CODES, runs_code=True)
+def grade(
+    *,
+    course: Annotated[Path, COURSE],
+    lab: Annotated[str, LAB],
+    jobs: Annotated[
+        int | None,
+        Option("--jobs", "N", "how many at a time (default: four per core, with --static one)", count),
+    ] = None,
+    only: Annotated[
+        Sequence[str],
+        Option(
+            "--only", "WHICH", "failed, inconclusive, changed, or ids: grade these again, keep all others"
+        ),
+    ] = (),
+    allow_local: Annotated[
+        Sequence[Path],
+        Option(
+            "--allow-local",
+            "DIR",
+            "let the roster name paths below DIR too, not only below its own folder; may be repeated",
+            repeated=True,
+        ),
+    ] = (),
+    static: Annotated[bool, STATIC] = False,
+    sandbox: SandboxOption = "auto",
+    as_json: JsonFlag = False,
+) -> ExitCode:
+    """Grade one lab of a course as `grader batch` does, with the deadline, late policy and attempts of the course.
+
+    The same command continues one that was stopped.
+    """
+    with loading():
+        from grader.cli import course as of_course
+    return of_course.grade_lab(
+        course,
+        lab,
+        of_course.Asked(
+            jobs=jobs, only=only, allow_local=allow_local, static=static, sandbox=sandbox, as_json=as_json
+        ),
+    )
+
+
+@command("course publish", group=INSTRUCTORS, exit_codes=PUBLISH_EXIT_CODES)
+def publish(
+    *,
+    course: Annotated[Path, COURSE],
+    lab: Annotated[str, LAB],
+    dry_run: Annotated[bool, Flag("--dry-run", "only show what would be published and sent")] = False,
+    author: Annotated[
+        str | None, Option("--author", "NAME", "who publishes (default: git config user.name)")
+    ] = None,
+) -> ExitCode:
+    """Publish one lab of a course, and return it to the students by the course's form of feedback."""
+    with loading():
+        from grader.cli import course as of_course
+    return of_course.publish_lab(course, lab, dry_run=dry_run, author=author)
+
+
+@command("course gradebook", group=INSTRUCTORS)
+def gradebook(
+    *,
+    course: Annotated[Path, COURSE],
+    form: Annotated[
+        Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"],
+        Option("--form", "", "its format; canvas, moodle and blackboard import theirs"),
+    ],
+    out: Annotated[
+        str, Option("--out", "FILE", "where to write it; - is stdout (default: beside the course file)")
+    ] = "",
+    template: Annotated[
+        Path | None,
+        Option("--template", "FILE", "the platform's own export, to be filled in with the points"),
+    ] = None,
+    column: Annotated[str, Option("--column", "NAME", "the platform's name for the column of points")] = "",
+    per_lab: Annotated[bool, Flag("--per-lab", "add a column for each lab, on a platform")] = False,
+    drafts: Annotated[
+        bool, Flag("--drafts", "take results as they are now, also where others are published")
+    ] = False,
+) -> ExitCode:
+    """Write a course's gradebook: each lab's points, and 0 to 100 for all labs by their weights.
+
+    It has what is published; of a lab of which nothing is published, it has results as they are now, and says so.
+    """
+    with loading():
+        from grader.cli import course as of_course
+    return of_course.write_gradebook_of(
+        course,
+        of_course.Wanted(
+            form=form, out=out, template=template, column=column, per_lab=per_lab, drafts=drafts
+        ),
+    )

@@ -1,0 +1,112 @@
+"""The commands that end a class's marking: publish the results, and return them to the students."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from grader.classes.feedback.forms import FORMS
+from grader.cli.declare import INSTRUCTORS, Argument, Flag, Option, command, loading
+from grader.cli.options import BATCH_FOLDER, FEEDBACK_EXIT_CODES, PUBLISH_EXIT_CODES, JsonFlag
+from grader.errors import ExitCode
+
+CLASS = Argument("DIR", BATCH_FOLDER)
+VARIABLES = """variables:
+  GRADER_SMTP_USER, GRADER_SMTP_PASSWORD  log in at the mail server
+  GRADER_SMTP_FROM                        as --from
+  GITHUB_TOKEN, GITHUB_SERVER_URL         the token for GitHub, and its server (default: https://github.com)
+  GITLAB_TOKEN, CI_SERVER_URL             the token for GitLab, and its server (default: https://gitlab.com)
+
+"""
+
+
+@command("publish", group=INSTRUCTORS, exit_codes=PUBLISH_EXIT_CODES)
+def publish(
+    *,
+    folder: Annotated[Path, CLASS],
+    only: Annotated[
+        Sequence[str],
+        Option("--only", "ID", "publish these alone, also where they are not settled"),
+    ] = (),
+    dry_run: Annotated[
+        bool, Flag("--dry-run", "only show what would be published, and what changes")
+    ] = False,
+    show_hidden: Annotated[bool, Flag("--show-hidden", "show students the hidden criteria, too")] = False,
+    author: Annotated[
+        str | None, Option("--author", "NAME", "who publishes (default: git config user.name)")
+    ] = None,
+    as_json: JsonFlag = False,
+) -> ExitCode:
+    """Publish a class's results: gradebooks and feedback have them from then on.
+
+    Results are drafts until then, and changes after it are drafts until it is run again.
+    """
+    with loading():
+        from grader.cli import returning
+    return returning.publish(
+        folder, only, dry_run=dry_run, show_hidden=show_hidden, author=author, as_json=as_json
+    )
+
+
+@command("feedback", group=INSTRUCTORS, notes=VARIABLES, exit_codes=FEEDBACK_EXIT_CODES)
+def feedback(
+    *,
+    folder: Annotated[Path, CLASS],
+    form: Annotated[str, Option("--form", "", "how it gets to the students", choices=tuple(FORMS))],
+    dry_run: Annotated[
+        bool, Flag("--dry-run", "show one of them, and who could get nothing; send nothing")
+    ] = False,
+    only: Annotated[Sequence[str], Option("--only", "ID", "send to these alone")] = (),
+    changed_since: Annotated[
+        str | None, Option("--changed-since", "TIME", "send only what was published after TIME")
+    ] = None,
+    again: Annotated[bool, Flag("--again", "send what was sent before, too")] = False,
+    drafts: Annotated[bool, Flag("--drafts", "send results as they are now, published or not")] = False,
+    out: Annotated[
+        Path | None, Option("--out", "PATH", "the folder, zip or folder of mails to write (default: in DIR)")
+    ] = None,
+    smtp: Annotated[
+        str,
+        Option(
+            "--smtp", "URL", "email: send through smtp://HOST:587 (STARTTLS) or smtps://HOST (default: files)"
+        ),
+    ] = "",
+    sender: Annotated[str, Option("--from", "ADDRESS", "email: the address to send from")] = "",
+    branch: Annotated[str, Option("--branch", "NAME", "git: the branch (default: feedback)")] = "",
+    issues: Annotated[
+        bool,
+        Flag("--issues", "github, gitlab: an issue for each student in place of a comment on the commit"),
+    ] = False,
+    public: Annotated[
+        bool, Flag("--public", "github, gitlab: also in repositories that everybody can read")
+    ] = False,
+) -> ExitCode:
+    """Return what is published to the students, each result once.
+
+    A failure costs one student, not the run; the same command goes on where it was stopped.
+    """
+    with loading():
+        from grader.classes.feedback.forms import Settings
+        from grader.classes.feedback.send import Wanted
+        from grader.cli import returning
+        from grader.cli.output import say_beside
+    given = {
+        "--out": out is not None,
+        "--smtp": bool(smtp),
+        "--from": bool(sender),
+        "--branch": bool(branch),
+        "--issues": issues,
+        "--public": public,
+    }
+    returning.check_options(FORMS[form], given)
+    settings = Settings(
+        folder=folder,
+        out=out,
+        smtp=smtp,
+        sender=sender,
+        branch=branch,
+        issues=issues,
+        public=public,
+        told=say_beside,
+    )
+    wanted = Wanted(only=only, changed_since=returning.parse_since(changed_since), again=again)
+    return returning.send(folder, FORMS[form], settings, wanted, drafts=drafts, dry_run=dry_run)

@@ -1,0 +1,186 @@
+"""What `grader publish` and `grader feedback` print, and their exit codes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+from grader.classes.batch.folder import BatchFolder, open_batch
+from grader.classes.feedback import publish as publishing
+from grader.classes.feedback.forms import Form, Settings
+from grader.classes.feedback.publish import Publishing, Step, plan, read_published, refuse_other_rubric
+from grader.classes.feedback.send import Delivery, Failure, Selection, Wanted, deliver, faults, selected
+from grader.classes.review.serve import git_user
+from grader.classes.roster.entries import parse_time
+from grader.cli.output import say, say_beside, say_document, say_json
+from grader.errors import ExitCode, UsageError
+from grader.model.result import AUTHOR_CHARS
+from grader.portable import cores
+from grader.report.view import hidden_ids
+from grader.rubric.load import load_rubric
+from grader.untrusted_text import line, visible
+from grader.wording import first_few, number, plural
+
+NAMES_SHOWN = 10
+SHOWN_CHARS = 8000
+
+
+def publish(
+    folder: Path, only: Sequence[str], *, dry_run: bool, show_hidden: bool, author: str | None, as_json: bool
+) -> ExitCode:
+    """Publish a class, or show what would be published; print what became of it."""
+    batch = open_batch(folder)
+    batch.refuse_newer()
+    rubric = load_rubric(batch.run.rubric_source)
+    refuse_other_rubric(batch, rubric)
+    if dry_run:
+        steps = tuple(plan(batch, read_published(folder), only))
+    else:
+        by = line(git_user() if author is None else author, AUTHOR_CHARS)
+        hidden = frozenset[str]() if show_hidden else hidden_ids(rubric.rubric)
+        how = Publishing(by=by, hidden=hidden, only=only, jobs=cores())
+        steps = publishing.publish(batch, rubric, how)
+    if as_json:
+        say_json([_step_json(step) for step in steps])
+    else:
+        for text in _step_lines(batch, steps, dry_run=dry_run):
+            say(text)
+    return _publish_code(steps)
+
+
+def _publish_code(steps: Sequence[Step]) -> ExitCode:
+    if any(step.failed or (step.state == "draft" and not _waits(step)) for step in steps):
+        return ExitCode.NOT_GRADED
+    return ExitCode.INCONCLUSIVE if any(step.state == "draft" for step in steps) else ExitCode.PASSED
+
+
+def _waits(step: Step) -> bool:
+    return step.result is not None and step.result.status == "inconclusive"
+
+
+def _step_json(step: Step) -> dict[str, object]:
+    return {
+        "id": step.entry.id,
+        "state": "failed" if step.failed else step.state,
+        "points": step.result.points if step.result else None,
+        "changes": list(step.changes),
+        "why": step.why,
+    }
+
+
+def _step_lines(batch: BatchFolder, steps: Sequence[Step], *, dry_run: bool) -> Iterator[str]:
+    for step in steps:
+        if step.failed:
+            yield f"{step.entry.id}: not published: {step.why}"
+        elif step.state == "draft":
+            yield f"{step.entry.id}: stays a draft: {step.why}"
+        elif step.state == "changed":
+            first, *more = step.changes
+            yield f"{step.entry.id}: {first}"
+            yield from (f"    {change}" for change in more)
+    counts = Counter("failed" if step.failed else step.state for step in steps)
+    words = {
+        "new": "would be published" if dry_run else "published",
+        "changed": "would be published again, with changes" if dry_run else "published again, with changes",
+        "same": "published before and not changed",
+        "draft": "left as drafts",
+        "failed": "could not be published",
+    }
+    yield (
+        ", ".join(f"{counts[name]} {said}" for name, said in words.items() if counts[name])
+        or "no submissions"
+    )
+    if counts["draft"]:
+        yield "  hint: --only ID publishes a draft as it is"
+    if counts["new"] + counts["changed"] and not dry_run:
+        yield f"{batch.path / publishing.FILE}; grader feedback {batch.path} --form … returns it to the students"
+
+
+def check_options(form: Form, given: Mapping[str, bool]) -> None:
+    """Raise UsageError for an option that the form does not take."""
+    for name, is_given in given.items():
+        if is_given and name not in form.options:
+            takes = ", ".join(sorted(form.options))
+            raise UsageError(f"--form {form.name} does not take {name}", hint=f"it takes {takes}")
+
+
+def parse_since(text: str | None) -> datetime | None:
+    """Parse the value of `--changed-since`. Raises UsageError."""
+    found = parse_time(text) if text is not None else None
+    if text is not None and found is None:
+        hint = "write it like 2026-11-20T23:59:00+01:00"
+        raise UsageError(f"--changed-since {line(text, 80)} is not a time", hint=hint)
+    return found
+
+
+def send(
+    folder: Path, form: Form, settings: Settings, wanted: Wanted, *, drafts: bool, dry_run: bool
+) -> ExitCode:
+    """Return a class's feedback, or show one of it; print what became of each student's."""
+    batch = open_batch(folder)
+    if drafts:
+        wanted = replace(wanted, drafts=load_rubric(batch.run.rubric_source))
+    with selected(batch, form, wanted, jobs=cores()) as (selection, log):
+        sender = form.open(settings)
+        if dry_run:
+            return _show(form, selection, list(faults(sender, selection)), settings)
+        delivery = Delivery()
+        try:
+            if selection.todo:
+                deliver(sender, selection, log, delivery, again=wanted.again, told=say)
+        except BaseException:
+            done = len(delivery.sent)
+            say_beside(f"{done} of {len(selection.todo)} sent; the same command continues")
+            raise
+        _end(form, selection, delivery)
+    return ExitCode.NOT_GRADED if delivery.failures else ExitCode.PASSED
+
+
+def _show(form: Form, selection: Selection, failures: Sequence[Failure], settings: Settings) -> ExitCode:
+    failed = {failure.id for failure in failures}
+    first = next((one for one in selection.todo if one.entry.id not in failed), None)
+    if first is not None:
+        sender = form.open(settings)
+        say(f"{first.entry.id} → {sender.place(first)}")
+        shown = visible(sender.show(first), lines=True)
+        cut = f"{shown[:SHOWN_CHARS]}\n… and {len(shown) - SHOWN_CHARS} more characters\n"
+        text = shown if len(shown) <= SHOWN_CHARS else cut
+        say_document(
+            lambda ascii_only: text.encode("ascii", "backslashreplace").decode() if ascii_only else text
+        )
+    _say_failures(failures)
+    ready = len(selection.todo) - len(failures)
+    say(", ".join([f"{ready} would be sent by {form.name}", *_others(selection), *_failed(failures)]))
+    return ExitCode.NOT_GRADED if failures else ExitCode.PASSED
+
+
+def _end(form: Form, selection: Selection, delivery: Delivery) -> None:
+    _say_failures(delivery.failures)
+    sent = [f"{len(delivery.sent)} sent by {form.name}"]
+    say(", ".join([*sent, *_others(selection), *_failed(delivery.failures)]))
+    if selection.unpublished:
+        say(f"  not published: {first_few(selection.unpublished, NAMES_SHOWN)}")
+
+
+def _say_failures(failures: Sequence[Failure]) -> None:
+    if failures:
+        say_beside(f"{plural(len(failures), 'student')} got nothing:")
+    for failure in failures:
+        hint = f" ({failure.hint})" if failure.hint else ""
+        say_beside(f"  {failure.id}: {failure.message}{hint}")
+
+
+def _others(selection: Selection) -> Iterator[str]:
+    counts = {
+        "sent before": selection.before,
+        "published earlier than that": selection.older,
+        "not published": selection.unpublished,
+    }
+    return (f"{number(len(names))} {said}" for said, names in counts.items() if names)
+
+
+def _failed(failures: Sequence[Failure]) -> list[str]:
+    return [f"{len(failures)} could not be sent"] if failures else []
