@@ -256,7 +256,8 @@ def started(roster: Path, out: Path, *more: str) -> subprocess.Popen[bytes]:
         str(out),
         *more,
     ]
-    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    with out.with_suffix(".stderr").open("wb") as said:
+        return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=said)
 
 
 def wait_for_results(out: Path, count: int, process: subprocess.Popen[bytes]) -> None:
@@ -288,6 +289,8 @@ def test_a_batch_that_is_stopped_goes_on_where_it_stopped(tmp_path, signal_numbe
     if signal_number == signal.SIGINT:
         assert run_of(out)["state"] == "interrupted"
         assert len(book(out)) == 60
+        said = out.with_suffix(".stderr").read_text()
+        assert f"{len(stamps(out))} of 60 done; the same command continues" in said
     before = stamps(out)
     assert 10 <= len(before) < 60
     assert batch(roster, out) == 0

@@ -89,7 +89,8 @@ def test_points_that_a_new_rubric_gives(tmp_path, capsys) -> None:
     rubric = changed(tmp_path / "new.yaml", ("rate_hz: 10", "rate_hz: 20"))
     assert run(["regrade", str(out), "--rubric", str(rubric)]) == 1
     shown = capsys.readouterr().out
-    assert "chatter-rate: pass 10 -> fail 0" in shown
+    assert "chatter-rate: pass 10 -> fail 0, 2 submissions: ada, bob\n" in shown
+    assert "\nfewer points for 2: ada 100 -> 85, bob 100 -> 85\n" in shown
     assert "2 of 2 judged again, 2 changed" in shown
     rows = rows_of(out / "changes.csv")
     assert {row["id"] for row in rows} == {"ada", "bob"}

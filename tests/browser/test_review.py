@@ -121,6 +121,23 @@ def test_by_keyboard_alone(opened, out) -> None:
     assert overrides_of(out)["dana"]["style"]["comment"] == "jk: too long"
 
 
+def test_one_criterion_by_keyboard_alone(opened, out) -> None:
+    page = opened("criteria")
+    page.keyboard.press("j")
+    page.keyboard.press("Enter")
+    for name in ("ada", "dana"):
+        expect(page.get_by_role("heading", level=1)).to_have_text(name)
+        page.wait_for_load_state()
+        page.keyboard.press("?")
+        expect(page.get_by_role("dialog")).to_be_visible()
+        page.keyboard.press("Escape")
+        page.keyboard.press("e")
+        page.keyboard.type("8")
+        page.keyboard.press("Enter")
+    expect(page.get_by_role("heading", level=1)).to_have_text("eve")
+    assert [overrides_of(out)[name]["style"]["points"] for name in ("ada", "dana")] == [8, 8]
+
+
 @pytest.mark.full
 def test_save_then_next(opened) -> None:
     page = opened("s/ada/?show=manual")
@@ -236,7 +253,11 @@ LOOKS = [(size, dark) for size in (DESKTOP, PHONE) for dark in (False, True)]
 @pytest.mark.full
 def test_the_pages_are_clean(opened, axe, validate, tmp_path) -> None:
     kept = []
-    for path, size, dark in [(path, *look) for path in ("", "s/dana/", "s/fay/", "s/gus/") for look in LOOKS]:
+    for path, size, dark in [
+        (path, *look)
+        for path in ("", "criteria", "s/dana/?c=style", "s/dana/", "s/fay/", "s/gus/")
+        for look in LOOKS
+    ]:
         page = opened(path, size=size, dark=dark)
         page.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
         assert axe(page) == []

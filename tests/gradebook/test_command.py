@@ -65,7 +65,8 @@ def test_to_stdout(batch: Path, capsysbinary: pytest.CaptureFixture[bytes]) -> N
     out, said = capsysbinary.readouterr()
     assert [line.split(b",")[0] for line in out.splitlines()] == [b"id", b"ada", b"bob", b"cem"]
     assert b"\x1b" not in out
-    assert said == b""
+    assert said.startswith(b"grader: csv: these are drafts: nothing of this class is published yet")
+    assert said.count(b"\n") == 1
     assert set(batch.iterdir()) == before
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
+import subprocess
+import sys
 from datetime import date, datetime, timedelta, timezone
 from pathlib import Path
 
@@ -12,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from grader.classes.overrides import FILE, read_overrides, write
-from grader.classes.overrides.write import write_override
+from grader.classes.overrides.write import write_override, write_overrides
 from grader.errors import Busy, OutputError, RubricError, UsageError
 from grader.model.result import Override
 from tests.overrides.samples import IDS, rubric
@@ -283,3 +286,79 @@ def test_any_changes_one_after_another(tmp_path, changes):
     assert read_overrides(path, rubric(), ids) == {name: found for name, found in expected.items() if found}
     for comment in (*outside, *hers):
         assert comment in path.read_text()
+
+
+@pytest.mark.full
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(CHANGES)
+def test_changes_in_one_go_say_what_they_say_one_by_one(tmp_path, changes):
+    (tmp_path / "one").mkdir(exist_ok=True)
+    (tmp_path / "go").mkdir(exist_ok=True)
+    one_by_one, in_one_go = file(tmp_path / "one"), file(tmp_path / "go")
+    changed(one_by_one, *changes)
+    write_overrides(in_one_go, changes)
+    ids = [*IDS, "new one"]
+    assert read_overrides(in_one_go, rubric(), ids) == read_overrides(one_by_one, rubric(), ids)
+
+
+def test_a_class_in_one_go_is_one_write(tmp_path, monkeypatch):
+    path = file(tmp_path)
+    names = [f"s{i:03}" for i in range(300)]
+    syncs = []
+    monkeypatch.setattr(os, "fsync", syncs.append)
+    write_overrides(path, [(name, "style", MILLER) for name in names])
+    assert len(syncs) == 1
+    assert path.read_text().startswith(KEPT)
+    assert read_overrides(path, rubric(), [*IDS, *names])["s299"] == {"style": MILLER}
+    write_overrides(path, [(name, "style", None) for name in names])
+    assert path.read_text() == KEPT
+    assert len(syncs) == 2
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from grader.classes.overrides.write import write_overrides
+from grader.model.result import Override
+
+def kill(*_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+def kill_after(function):
+    return lambda *given: (function(*given), kill())
+
+path, where = Path(sys.argv[1]), sys.argv[2]
+if where == "before the flush":
+    os.fsync = kill
+if where == "after the flush":
+    os.fsync = kill_after(os.fsync)
+if where == "before the rename":
+    Path.replace = kill
+if where == "after the rename":
+    Path.replace = kill_after(Path.replace)
+write_overrides(path, [(name, "style", Override(points=2)) for name in ("alice", "bob", "Zoë Müller")])
+"""
+
+
+@pytest.mark.parametrize(
+    ("where", "written"),
+    [
+        ("before the flush", False),
+        ("after the flush", False),
+        ("before the rename", False),
+        ("after the rename", True),
+    ],
+)
+def test_a_writer_that_is_killed_has_written_all_or_nothing(tmp_path, where, written):
+    path = file(tmp_path)
+    before = read_overrides(path, rubric(), IDS)
+    done = subprocess.run([sys.executable, "-c", KILLED, path, where], check=False, timeout=60)
+    assert done.returncode == -signal.SIGKILL
+    found = read_overrides(path, rubric(), IDS)
+    names = ("alice", "bob", "Zoë Müller")
+    if written:
+        assert [found[name]["style"].points for name in names] == [2, 2, 2]
+    else:
+        assert found == before
+    write_override(path, "bob", "style", MILLER)  # no lock is left behind
+    assert read_overrides(path, rubric(), IDS)["bob"]["style"] == MILLER

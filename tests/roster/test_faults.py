@@ -117,6 +117,11 @@ def test_a_quote_that_never_ends_in_the_last_row(tmp_path: Path) -> None:
     assert roster.faults[0].id == "bob"
 
 
+def test_a_row_with_a_bad_source_keeps_its_name_group_and_mail(tmp_path: Path) -> None:
+    fault = read(tmp_path, "id,name,group,source,Email\nada,Ada L,two,nowhere/at/all,a@x.edu\n").faults[0]
+    assert (fault.id, fault.name, fault.group, fault.extra) == ("ada", "Ada L", "two", {"Email": "a@x.edu"})
+
+
 def test_quotes_without_end_in_every_row_are_told_up_to_a_limit(tmp_path: Path) -> None:
     roster = read(tmp_path, "id,source\n" + '"a","b"c\n' * 100)
     assert len(roster.faults) == 51

@@ -136,7 +136,7 @@ def test_starter_code_that_is_not_there_is_refused(class_folder, capsys) -> None
 def test_without_the_extra_it_says_what_to_install(class_folder, capsys, monkeypatch) -> None:
     monkeypatch.setattr(comparison, "find_spec", lambda _name: None)
     assert grader(["similar", str(class_folder)]) == 2
-    assert "pip install 'ros-lab-grader[similarity]'" in capsys.readouterr().err
+    assert "-m pip install 'copydetect>=" in capsys.readouterr().err
     assert not (class_folder / "similarity.json").exists()
 
 

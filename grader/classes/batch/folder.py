@@ -11,7 +11,7 @@ from grader.classes.gradebook import Book, Row
 from grader.errors import UsageError
 from grader.files import atomic_write
 from grader.intake import safe_name
-from grader.model.batch import MISSING, ROSTER, BatchRun, CriterionInfo, Entry
+from grader.model.batch import MISSING, ROSTER, UNPUBLISHED, BatchRun, CriterionInfo, Entry
 from grader.model.result import (
     CriterionResult,
     EnvironmentInfo,
@@ -29,6 +29,11 @@ from grader.untrusted_text import json_text
 
 RUN = "run.json"
 BYTES_MAX = 64 << 20
+HINTS = {
+    MISSING: "run `grader batch` again: it goes on where it stopped",
+    ROSTER: "correct the roster",
+    UNPUBLISHED: "publish it with `grader publish`",
+}
 
 
 @dataclass(frozen=True)
@@ -71,16 +76,22 @@ class BatchFolder:
         for entry in self.run.entries:
             known.add(safe_name(entry.id).casefold())
             result = self.earlier(entry)
-            yield Row(entry=entry, result=result or self._without(entry, MISSING, "not graded yet"))
+            yield Row(entry=entry, result=result or self.empty_result(entry, MISSING, "not graded yet"))
         for fault in self.run.faults:
             if fault.id is not None and safe_name(fault.id).casefold() not in known:
                 known.add(safe_name(fault.id).casefold())
-                entry = Entry(id=fault.id, source="", where=fault.where)
-                yield Row(entry=entry, result=self._without(entry, ROSTER, str(fault)))
+                entry = Entry(
+                    id=fault.id,
+                    source="",
+                    where=fault.where,
+                    name=fault.name,
+                    group=fault.group,
+                    extra=fault.extra,
+                )
+                yield Row(entry=entry, result=self.empty_result(entry, ROSTER, str(fault)))
 
-    def _without(self, entry: Entry, kind: str, message: str) -> GradingResult:
-        again = "run `grader batch` again: it goes on where it stopped"
-        hint = "correct the roster" if kind == ROSTER else again
+    def empty_result(self, entry: Entry, kind: str, message: str) -> GradingResult:
+        """Return a result of status `error` that says why there is no other one, by one of the keys of `HINTS`."""
         return GradingResult(
             submission=SubmissionInfo(
                 id=safe_name(entry.id), source=entry.source, commit=None, digest="", package=""
@@ -92,7 +103,7 @@ class BatchFolder:
             criteria=tuple(map(_not_judged, self.run.criteria)),
             environment=EnvironmentInfo(grader=__version__, ros="", python="", sandbox=""),
             timing=TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0),
-            error=ErrorInfo(kind=kind, message=message, hint=hint),
+            error=ErrorInfo(kind=kind, message=message, hint=HINTS[kind]),
         )
 
 

@@ -14,6 +14,7 @@ from grader.judging import judge
 from grader.model.result import CriterionResult
 from grader.results import EVIDENCE, RESULT
 from grader.rubric.load import LoadedRubric
+from grader.rubric.made_up import as_recorded
 from grader.rubric.model import Rubric
 from grader.workers import WorkerEnded, run_each
 
@@ -70,7 +71,8 @@ def _judge_one(rubric: LoadedRubric, fitting: bool, folder: Path) -> Judged:
 
 def fitting_runs(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
     """Return the runs that were recorded with the rubric's present scenarios; evidence that does not say counts."""
-    digests = {name: scenario.digest for name, scenario in rubric.scenarios.items()}
+    scenarios = as_recorded(rubric, runs).scenarios
+    digests = {name: scenario.digest for name, scenario in scenarios.items()}
     return {
         name: run
         for name, run in runs.items()

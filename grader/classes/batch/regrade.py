@@ -73,11 +73,14 @@ class Regraded:
         """What changed, in the new rubric's order."""
         if self.before is None or self.after is None:
             return ()
-        old = {c.id: c for c in self.before.criteria}
-        new = {c.id: c for c in self.after.criteria}
-        names = [*new, *(name for name in old if name not in new)]
-        found = (Change(criterion=n, before=old.get(n), after=new.get(n)) for n in names)
-        return tuple(change for change in found if _differs(change))
+        return tuple(filter(_differs, pairs(self.before, self.after)))
+
+
+def pairs(before: GradingResult, after: GradingResult) -> Iterator[Change]:
+    """Yield every criterion of two results, changed or not, in the order of the later one."""
+    old, new = ({c.id: c for c in result.criteria} for result in (before, after))
+    names = [*new, *(name for name in old if name not in new)]
+    return (Change(criterion=name, before=old.get(name), after=new.get(name)) for name in names)
 
 
 def _differs(change: Change) -> bool:
@@ -126,6 +129,7 @@ def _regrade_one(
     automatic = before.model_copy(
         update={
             "rubric": describe_rubric(rubric, "")["rubric"],
+            "rubric_origin": before.rubric_origin if rubric.digest == before.rubric.digest else rubric.origin,
             "criteria": judged.criteria,
             "status": overall_status(judged.criteria),
             **total_fields(rubric.rubric, judged.criteria),

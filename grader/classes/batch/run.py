@@ -21,6 +21,7 @@ from grader.classes.fetching import prefetch
 from grader.classes.gradebook import write_gradebook
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
+from grader.classes.overrides.bank import FILE as BANK
 from grader.errors import Busy, GraderError, UsageError
 from grader.files import check_writable, keep_private, lock, make_folder
 from grader.intake import safe_name, without_password
@@ -37,7 +38,20 @@ from grader.untrusted_text import line
 
 GRADEBOOK, RESULTS, INDEX = "gradebook.csv", "results.jsonl", "index.html"
 RESERVED = frozenset(
-    {RUN, GRADEBOOK, RESULTS, INDEX, OVERRIDES, "similarity.json", "similarity.csv", "changes.csv"}
+    {
+        *(
+            RUN,
+            GRADEBOOK,
+            RESULTS,
+            INDEX,
+            OVERRIDES,
+            BANK,
+            "similarity.json",
+            "similarity.csv",
+            "changes.csv",
+        ),
+        *("published.jsonl", "sent.jsonl", "feedback", "mails"),
+    }
 )
 
 
@@ -290,8 +304,8 @@ def _counts(folder: BatchFolder, rubric: Rubric, kept: int) -> Counts:
 
 
 @contextmanager
-def alone(out: Path) -> Iterator[None]:
-    """Hold a batch's folder. Raises Busy if another batch does."""
+def alone(out: Path, who: str = "another batch works") -> Iterator[None]:
+    """Hold a batch's folder. Raises Busy, which says `who` does, if another program holds it."""
     descriptor = os.open(out, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         held = True
@@ -299,7 +313,7 @@ def alone(out: Path) -> Iterator[None]:
             held = lock(descriptor)
         if not held:
             raise Busy(
-                f"another batch works in {out} just now",
+                f"{who} in {out} just now",
                 hint="wait until it has ended, or choose another --out",
             )
         yield

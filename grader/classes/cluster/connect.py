@@ -19,6 +19,7 @@ from typing import Any
 
 from grader.classes.cluster import worker
 from grader.errors import HostError, UsageError
+from grader.installable import install_extra
 from grader.ros_env import INSTALL_HINT
 
 CONNECT_S = 15.0
@@ -32,7 +33,6 @@ LOGGERS = (
 )
 TLS = tuple(f"DASK_DISTRIBUTED__COMM__TLS__{name}" for name in ("CA_FILE", "CLIENT__CERT", "CLIENT__KEY"))
 LOCAL = "local"
-EXTRA = 'pip install "ros-lab-grader[cluster]"'
 ENCRYPTED = ("tls", "wss")
 """Of Dask's protocols, those in which both ends show certificates."""
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://(\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]@]+):[0-9]{1,5}/?")
@@ -61,7 +61,7 @@ def check_address(text: str, *, insecure: bool = False) -> str:
         import cryptography  # noqa: F401, PLC0415 - only to know that it is there: `local` makes certificates
         import distributed  # noqa: F401, PLC0415 - as above
     except ImportError as error:
-        raise UsageError(f"--cluster needs Dask: {error}", hint=EXTRA) from error
+        raise UsageError(f"--cluster needs Dask: {error}", hint=install_extra("cluster")) from error
     return text
 
 

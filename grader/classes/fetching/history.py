@@ -12,7 +12,7 @@ from grader.errors import SubmissionError
 from grader.intake.names import printable
 from grader.model.batch import Entry
 from grader.model.result import HandedIn
-from grader.wording import plural
+from grader.wording import join_words, plural
 
 _RECORD = re.compile(r"(?P<hash>[0-9a-f]{40,64}) (?P<seconds>-?\d+)?(?: (?P<zone>[+-]\d{4}))?")
 _EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
@@ -97,7 +97,11 @@ def _zone(text: str | None) -> timezone:
 def limit_of(rule: Rule, entry: Entry) -> Limit | None:
     """Return the time after which nothing of this entry counts; None where there is no such time."""
     days = entry.extension_days
-    more = f" (with {plural(days, 'day')} of extension)" if days else ""
+    added = [f"{plural(days, 'day')} of extension"] if days else []
+    if rule.before is None and entry.late_days:
+        days += entry.late_days
+        added.append(f"up to {plural(entry.late_days, 'late day')}")
+    more = f" (with {join_words(added)})" if added else ""
     if rule.before is not None:
         return Limit(later(rule.before, days), "the time asked for", more)
     if rule.deadline is None:
@@ -126,6 +130,7 @@ def not_chosen(rule: Rule, entry: Entry, at: datetime | None = None, note: str =
         by="roster" if entry.submitted_at else "commit" if said else "nobody",
         deadline=later(rule.deadline, entry.extension_days) if rule.deadline else None,
         extension_days=entry.extension_days,
+        late_days=entry.late_days,
         note=note,
     )
 

@@ -64,8 +64,9 @@ def cells(book: Book, row: Row) -> Iterator[Cell]:
     """What stands below each name of `header`."""
     entry, result = row.entry, row.result
     yield from (entry.id, entry.name, entry.group, result.status)
-    yield from (result.points, result.max_points or book.max_points)
-    yield result.late.points_before if result.late else result.points
+    graded = result.status != "error"
+    yield from (result.points if graded else None, result.max_points or book.max_points)
+    yield (result.late.points_before if result.late else result.points) if graded else None
     yield late_text(result)
     found = criterion_points(result)
     yield from (found.get(criterion.id) for criterion in book.criteria)

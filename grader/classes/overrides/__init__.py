@@ -8,17 +8,21 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Collection, Mapping
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TypeAlias
 
+from grader.classes.overrides.bank import FILE as BANK
+from grader.classes.overrides.bank import Bank, bounds, read_bank, resolve
 from grader.errors import RubricError
 from grader.intake.names import safe_name
-from grader.model.result import Override
+from grader.model.result import Override, WrittenOverride
 from grader.model.version import OVERRIDES
 from grader.rubric.faults import model_faults, shown
 from grader.rubric.load import refuse_newer
 from grader.rubric.model import Rubric
-from grader.rubric.source import Fault, Form, Source, as_map, read_source
+from grader.rubric.source import Fault, Form, Source, as_map, read_bytes, source_of
 from grader.wording import did_you_mean
 
 FILE = "overrides.yaml"
@@ -37,22 +41,54 @@ Overrides: TypeAlias = Mapping[str, Mapping[str, Override]]
 """By the submission's id as the roster has it, then by criterion."""
 
 
+Written: TypeAlias = Mapping[str, Mapping[str, WrittenOverride]]
+"""The same as the file has it."""
+
+
 def read_overrides(path: Path, rubric: Rubric, ids: Collection[str]) -> Overrides:
     """What people decided about the submissions of these ids; nothing where there is no such file.
 
-    In the file a submission may go by its id, or by the name of its folder of results. Raises RubricError with every
-    fault.
+    In the file a submission may go by its id, or by the name of its folder of results. Comments that it names are those
+    of `comments.yaml` beside it. Raises RubricError with every fault.
     """
+    bank = read_bank(path.with_name(BANK), rubric)
+    return resolve_all(read_written(path, rubric, ids, bank), rubric, bank)
+
+
+def resolve_all(written: Written, rubric: Rubric, bank: Bank) -> Overrides:
+    """Return what all of them come to."""
+    criteria = {criterion.id: criterion for criterion in rubric.criteria}
+    return {
+        name: {of: resolve(one, criteria[of], bank) for of, one in found.items()}
+        for name, found in written.items()
+    }
+
+
+def read_written(path: Path, rubric: Rubric, ids: Collection[str], bank: Bank) -> Written:
+    """Return what the file has. Raises RubricError as `read_overrides` does."""
     if not os.path.lexists(path):
         return {}
-    source = read_source(path, str(path), FORM)
+    source = parse(read_bytes(path, str(path), FORM), str(path))
     refuse_newer(source, OVERRIDES)
-    reading = _Reading(source, rubric, ids)
+    reading = _Reading(source, rubric, ids, bank)
     reading.read()
     if reading.faults:
         told = sorted(dict.fromkeys(reading.faults), key=lambda fault: source.line(fault[0]))
         raise RubricError([source.fault(*fault) for fault in told], hint=HINT)
     return reading.found
+
+
+def parse(raw: bytes, name: str) -> Source:
+    """Return the data of such a file, called `name`. Raises RubricError. The last ones are kept: who writes reads."""
+    try:
+        return replace(_parsed(raw), name=name)
+    except RubricError:
+        return source_of(raw, name, FORM)  # raises it with that name
+
+
+@lru_cache(maxsize=2)
+def _parsed(raw: bytes) -> Source:
+    return source_of(raw, FILE, FORM)
 
 
 def folder_key(name: str) -> str:
@@ -63,11 +99,11 @@ def folder_key(name: str) -> str:
 class _Reading:
     """Goes through the file, and collects what is sound in `found` and the rest in `faults`."""
 
-    def __init__(self, source: Source, rubric: Rubric, ids: Collection[str]) -> None:
-        self._source = source
-        self._points = {c.id: (min(0.0, c.extra), c.points + max(0.0, c.extra)) for c in rubric.criteria}
+    def __init__(self, source: Source, rubric: Rubric, ids: Collection[str], bank: Bank) -> None:
+        self._source, self._bank = source, bank
+        self._points = {c.id: bounds(c) for c in rubric.criteria}
         self._ids = {folder_key(name): name for name in ids}
-        self.found: dict[str, dict[str, Override]] = {}
+        self.found: dict[str, dict[str, WrittenOverride]] = {}
         self.faults: list[Fault] = list(source.faults)
 
     def read(self) -> None:
@@ -102,15 +138,21 @@ class _Reading:
             faults = self._faults(key, criterion, given)
             self.faults += faults
             if not faults and name is not None:
-                override = Override.model_validate_json(json.dumps(_given(given)), strict=True)
+                override = WrittenOverride.model_validate_json(json.dumps(_given(given)), strict=True)
                 self.found.setdefault(name, {})[criterion] = override
 
     def _faults(self, key: str, criterion: str, given: object) -> list[Fault]:
         path = (key, criterion)
-        found = model_faults(Override, _given(given), path)
+        comments = as_map(given).get("comments")
+        found = model_faults(WrittenOverride if comments else Override, _given(given), path)
         if criterion not in self._points:
             near = did_you_mean(criterion, self._points)
             return [(path, f'there is no criterion "{criterion}"{near}'), *found]
+        known = self._bank.get(criterion, {})
+        for name in comments if isinstance(comments, list) else ():
+            if isinstance(name, str) and name not in known:
+                near = did_you_mean(name, known)
+                found.append(((*path, "comments"), f'there is no comment "{name}" of it in {BANK}{near}'))
         points, (least, most) = as_map(given).get("points"), self._points[criterion]
         if isinstance(points, int | float) and not isinstance(points, bool):
             if points > most:
@@ -127,5 +169,5 @@ def _given(value: object) -> object:
     return {
         key: item
         for key, item in value.items()
-        if item is not None or key not in {"comment", "author", "date"}
+        if item is not None or key not in {"comment", "author", "date", "comments", "answer", "together"}
     }

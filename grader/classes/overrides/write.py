@@ -1,4 +1,4 @@
-"""One override written into `overrides.yaml`; everything else in the file stays as it was written.
+"""Overrides written into `overrides.yaml`; everything else in the file stays as it was written.
 
 The text is changed in place by cutting and inserting pieces (`Splice`): writing parsed YAML again would lose comments.
 """
@@ -8,27 +8,41 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from copy import deepcopy
+from datetime import date
 from decimal import Decimal
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
 
-from grader.classes.overrides import FORM, SCHEMA, SCHEMA_KEY, folder_key
+from grader.classes.overrides import SCHEMA_KEY, folder_key, parse
 from grader.errors import Busy, RubricError, UsageError
 from grader.files import atomic_write, lock, open_lock, unwritable
-from grader.model.result import Override
-from grader.rubric.source import as_map, source_of
+from grader.model.result import BankComment, Override, WrittenOverride
+from grader.model.version import COMMENTS, OVERRIDES
+from grader.rubric.source import as_map, compose
 
 WAIT_S, LOOK_S = 30.0, 0.02
 
 
-def write_override(path: Path, submission: str, criterion: str, override: Override | None) -> None:
-    """Put one override into the file, which need not exist, or take it out (None). Several writers wait for each other.
+Entry = Override | WrittenOverride | BankComment
+Change = tuple[str, str, Entry | None]
+"""A submission, a criterion, and what is to stand there; None takes it out. Of a comment: its criterion and its id."""
 
+
+def write_override(path: Path, submission: str, criterion: str, override: Entry | None) -> None:
+    """Put one override into the file, or take it out (None). Raises as `write_overrides` does."""
+    write_overrides(path, [(submission, criterion, override)])
+
+
+def write_overrides(path: Path, changes: Iterable[Change]) -> None:
+    """Make all of these changes in the file, which need not exist, or none. Several writers wait for each other.
+
+    The file may be one of comments, which is written in the same way.
+    The file is replaced once, so a writer that is killed leaves it as it was before or as it is to be.
     Raises RubricError where the file has faults already, UsageError where it is written in a way that cannot be
     changed here, OutputError where it cannot be written, Busy where another writer does not come to its end.
     """
@@ -36,9 +50,10 @@ def write_override(path: Path, submission: str, criterion: str, override: Overri
     with _alone(path):
         raw = _read(path)
         mode = path.stat().st_mode & 0o777 if path.exists() else None
-        new = _changed(path, raw, submission, criterion, _fields(override)).encode()
-        if new != raw:
-            atomic_write(path, new)
+        wanted = {(name, criterion): given for name, criterion, given in changes}  # of two for one, the last
+        data = _changed(path, raw, [(*of, _fields(given)) for of, given in wanted.items()]).encode()
+        if data != raw:
+            atomic_write(path, data)
             if mode is not None:
                 path.chmod(mode)
 
@@ -76,38 +91,45 @@ def _read(path: Path) -> bytes:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
 
 
-def _fields(override: Override | None) -> Fields | None:
+def _fields(entry: Entry | None) -> Fields | None:
     """As the file's data have them; what is empty is left out."""
-    if override is None:
+    if entry is None:
         return None
-    date = override.date.isoformat() if override.date else None
-    given = {"points": override.points, "comment": override.comment, "author": override.author, "date": date}
-    return {name: value for name, value in given.items() if value is not None and value != ""}
+    given = {name: getattr(entry, name) for name in type(entry).model_fields}
+    given |= {name: value.isoformat() for name, value in given.items() if isinstance(value, date)}
+    given |= {name: list(value) for name, value in given.items() if isinstance(value, tuple)}
+    return {name: value for name, value in given.items() if value is not None and value not in ("", [])}
 
 
-def _changed(path: Path, raw: bytes, submission: str, criterion: str, fields: Fields | None) -> str:
+def _changed(path: Path, raw: bytes, changes: Sequence[tuple[str, str, Fields | None]]) -> str:
     """The file's new text, which is read back and compared before it counts."""
     before = _data(path, raw)
-    if submission == SCHEMA_KEY:
+    if any(submission == SCHEMA_KEY for submission, _, _ in changes):
         raise UsageError(
             f"a submission cannot be called {SCHEMA_KEY} in {path}", hint="rename it in the roster"
         )
-    key = next((k for k in before if k != SCHEMA_KEY and folder_key(k) == folder_key(submission)), submission)
-    text = raw.decode("utf-8-sig")
-    new = edited(text, before, key, criterion, fields)
+    called = {folder_key(key): key for key in reversed(before) if key != SCHEMA_KEY}
+    edits = [
+        Edit(called.setdefault(folder_key(submission), submission), criterion, fields)
+        for submission, criterion, fields in changes
+    ]
+    new = edited(raw.decode("utf-8-sig"), before, edits)
     try:
-        sound = _plain(_data(path, new.encode())) == _plain(_expected(before, key, criterion, fields))
+        sound = _plain(_data(path, new.encode())) == _plain(_expected(before, edits))
     except RubricError:
         sound = False
     if not sound:
-        message = f"{path}: {criterion} of {submission} is written in a way that cannot be changed here"
+        what = (
+            f"{changes[0][1]} of {changes[0][0]}" if len(changes) == 1 else f"one of {len(changes)} overrides"
+        )
+        message = f"{path}: {what} is written in a way that cannot be changed here"
         raise UsageError(message, hint="change it by hand")
     return new
 
 
 def _data(path: Path, raw: bytes) -> dict[str, Any]:
     """Raises RubricError where the file is no sound map."""
-    source = source_of(raw, str(path), FORM)
+    source = parse(raw, str(path))
     faults = [source.fault(*fault) for fault in source.faults]
     if not isinstance(source.data, dict):
         faults.append(source.fault((), "must be a map from submissions to criteria"))
@@ -116,14 +138,15 @@ def _data(path: Path, raw: bytes) -> dict[str, Any]:
     return as_map(source.data)
 
 
-def _expected(before: dict[str, Any], key: str, criterion: str, fields: Fields | None) -> dict[str, Any]:
-    after = deepcopy(before)
-    if fields is not None:
-        there = as_map(as_map(after.get(key)).get(criterion))
-        others = {name: value for name, value in there.items() if name not in Override.model_fields}
-        after[key] = {**as_map(after.get(key)), criterion: {**others, **fields}}
-    elif criterion in as_map(after.get(key)):
-        del after[key][criterion]
+def _expected(before: dict[str, Any], edits: Iterable[Edit]) -> dict[str, Any]:
+    after = {key: dict(value) if isinstance(value, dict) else value for key, value in before.items()}
+    for key, criterion, fields in edits:
+        if fields is not None:
+            there = as_map(as_map(after.get(key)).get(criterion))
+            others = {name: value for name, value in there.items() if name not in KNOWN}
+            after[key] = {**as_map(after.get(key)), criterion: {**others, **fields}}
+        elif criterion in as_map(after.get(key)):
+            del after[key][criterion]
     return after
 
 
@@ -134,25 +157,54 @@ def _plain(data: dict[str, Any]) -> dict[str, Any]:
 
 
 PLAIN_KEY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.@-]*")
+KNOWN = frozenset({*WrittenOverride.model_fields, *BankComment.model_fields})
 Fields = dict[str, Any]
 """An override as the file's data have it, what is empty left out."""
 
 
-def edited(text: str, before: Mapping[str, Any], key: str, criterion: str, fields: Fields | None) -> str:
-    """`before` are the text's data, `key` is what the submission is called there; None takes the override out.
+class Edit(NamedTuple):
+    """What is to be changed: `submission` is what it is called in the file; None takes the override out."""
+
+    submission: str
+    criterion: str
+    fields: Fields | None
+
+
+def edited(text: str, before: Mapping[str, Any], edits: Iterable[Edit]) -> str:
+    """`before` are the text's data.
 
     Where the text uses what this does not know (anchors, say), the new one may hold other data than it should.
     """
-    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    left = list(edits)
+    while left:
+        text, left = _pass(text, before, left)
+    return text
+
+
+def _pass(text: str, before: Mapping[str, Any], edits: Sequence[Edit]) -> tuple[str, list[Edit]]:
+    """Change each submission once, and return what is left to do; a map in braces is changed in one place at a time."""
+    root = compose(text)
     if not isinstance(root, yaml.MappingNode):
-        return text if fields is None else spliced(text, [_first(text, key, criterion, fields)])
-    submission = _pair(root, key)
-    if submission is None:
-        return text if fields is None else spliced(text, [_added(text, root, key, _entry(criterion, fields))])
-    if fields is None:
-        return spliced(text, _without(text, root, submission, criterion))
-    now = as_map(before.get(key)).get(criterion)
-    return spliced(text, _with(text, submission, now, criterion, fields))
+        first = next((i for i, edit in enumerate(edits) if edit.fields is not None), None)
+        if first is None:
+            return text, []
+        return spliced(text, [_first(text, edits[first])]), [*edits[:first], *edits[first + 1 :]]
+    pairs = {key.value: (key, value) for key, value in root.value if isinstance(key, yaml.ScalarNode)}
+    splices, new, later, done = list[Splice](), list[Edit](), list[Edit](), set[str]()
+    for edit in edits:
+        if edit.submission in done or (root.flow_style and done):
+            later.append(edit)
+            continue
+        done.add(edit.submission)
+        found = pairs.get(edit.submission)
+        if found is not None and edit.fields is None:
+            splices += _without(text, root, found, edit.criterion)
+        elif found is not None and edit.fields is not None:
+            now = as_map(before.get(edit.submission)).get(edit.criterion)
+            splices += _with(text, found, now, edit.criterion, edit.fields)
+        elif edit.fields is not None:
+            new.append(edit)
+    return spliced(text, [*splices, *([_added(text, root, new)] if new else [])]), later
 
 
 def _without(text: str, root: yaml.MappingNode, submission: Pair, criterion: str) -> list[Splice]:
@@ -176,23 +228,29 @@ def _pair(node: yaml.Node, key: str) -> Pair | None:
     return next(((k, v) for k, v in pairs if isinstance(k, yaml.ScalarNode) and k.value == key), None)
 
 
-def _first(text: str, key: str, criterion: str, fields: Fields) -> Splice:
+def _first(text: str, edit: Edit) -> Splice:
     """The first override of a file that is empty, or holds comments only."""
-    lines = [f"{_key(key)}:", f"  {_entry(criterion, fields)}"]
-    return block_lines(text, len(text), 0, lines if text.strip() else [f"{SCHEMA_KEY}: {SCHEMA}", *lines])
+    lines = _lines(edit)
+    schema = COMMENTS if "text" in (edit.fields or {}) else OVERRIDES
+    return block_lines(text, len(text), 0, lines if text.strip() else [f"{SCHEMA_KEY}: {schema}", *lines])
 
 
-def _added(text: str, root: yaml.MappingNode, key: str, entry: str) -> Splice:
-    """One more submission."""
+def _added(text: str, root: yaml.MappingNode, edits: Iterable[Edit]) -> Splice:
+    """More submissions."""
     if root.flow_style or not root.value:
-        return add_pairs(text, root, [f"{_key(key)}: {{{entry}}}"])
-    return add_pairs(text, root, [f"{_key(key)}:", f"  {entry}"])
+        entries = [f"{_key(e.submission)}: {{{_entry(e.criterion, e.fields or {})}}}" for e in edits]
+        return add_pairs(text, root, entries)
+    return add_pairs(text, root, [line for edit in edits for line in _lines(edit)])
+
+
+def _lines(edit: Edit) -> list[str]:
+    return [f"{_key(edit.submission)}:", f"  {_entry(edit.criterion, edit.fields or {})}"]
 
 
 def _updated(text: str, found: Pair, now: object, fields: Fields) -> list[Splice]:
     """Only what changed, so that comments inside of it stay; the whole where something is to go."""
     node, current = found[1], as_map(now)
-    gone = [name for name in Override.model_fields if current.get(name) is not None and name not in fields]
+    gone = [name for name in current if current[name] is not None and name in KNOWN and name not in fields]
     if not isinstance(node, yaml.MappingNode) or not node.value or gone:
         return [set_value(text, found, _flow(fields))]
     splices, new = [], []
@@ -214,17 +272,21 @@ def _flow(fields: Fields) -> str:
 
 
 def _scalar(name: str, value: object) -> str:
-    if name == "points":
+    if isinstance(value, float):
         return f"{Decimal(repr(value)).normalize():f}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_key, value))}]"
     return str(value) if name == "date" else _quoted(str(value))
 
 
+@lru_cache(maxsize=4096)
 def _key(text: str) -> str:
     """Plain where every reader of YAML takes it for a text."""
     plain = PLAIN_KEY.fullmatch(text) and yaml.safe_load(text) == text
     return text if plain else _quoted(text)
 
 
+@lru_cache(maxsize=4096)
 def _quoted(text: str) -> str:
     return str(yaml.safe_dump(text, default_style='"', allow_unicode=True, width=10**9)).rstrip("\n")
 
@@ -242,9 +304,11 @@ class Splice(NamedTuple):
 
 def spliced(text: str, splices: Iterable[Splice]) -> str:
     """Return the text with all of these made; they do not overlap."""
-    for start, end, piece in sorted(splices, reverse=True):
-        text = text[:start] + piece + text[end:]
-    return text
+    pieces, at = [], 0
+    for start, end, piece in sorted(splices):
+        pieces += [text[at:start], piece]
+        at = end
+    return "".join([*pieces, text[at:]])
 
 
 def end_of(text: str, node: yaml.Node) -> int:
@@ -253,7 +317,10 @@ def end_of(text: str, node: yaml.Node) -> int:
         last = node.value[-1]
         key, value = last if isinstance(last, tuple) else (last, last)
         return max(end_of(text, key), end_of(text, value))
-    return len(text[: node.end_mark.index].rstrip())
+    end = node.end_mark.index
+    while end and text[end - 1].isspace():
+        end -= 1
+    return int(end)
 
 
 def set_value(text: str, pair: Pair, written: str) -> Splice:

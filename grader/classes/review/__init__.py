@@ -5,8 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 
 from grader.errors import UsageError
-
-INSTALL = "pip install 'ros-lab-grader[review]'"
+from grader.installable import install_extra
 
 
 def require_library() -> None:
@@ -14,5 +13,6 @@ def require_library() -> None:
     missing = [name for name in ("flask", "waitress") if find_spec(name) is None]
     if missing:
         raise UsageError(
-            f"reviewing a class needs packages that are not installed: {', '.join(missing)}", hint=INSTALL
+            f"reviewing a class needs packages that are not installed: {', '.join(missing)}",
+            hint=install_extra("review"),
         )

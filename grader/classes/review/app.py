@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import datetime
 from importlib.resources import files
 from typing import BinaryIO
@@ -10,6 +11,7 @@ from typing import BinaryIO
 from flask import (
     Flask,
     Response,
+    current_app,
     get_template_attribute,
     jsonify,
     redirect,
@@ -24,8 +26,25 @@ from markupsafe import Markup, escape
 from werkzeug.exceptions import Forbidden, HTTPException, NotFound
 from werkzeug.wrappers import Response as AnyResponse
 
+from grader.classes.batch.reports import figures_in
 from grader.classes.gradebook import Row
-from grader.classes.review.cards import MANUAL, Cards, Draft, Wrong, author_of, card, cards, override_of
+from grader.classes.overrides.bank import bounds
+from grader.classes.review.cards import (
+    MANUAL,
+    Cards,
+    Decided,
+    Draft,
+    Known,
+    Wrong,
+    author_of,
+    bank_comment_of,
+    card,
+    cards,
+    comment_name,
+    override_of,
+    points_words,
+)
+from grader.classes.review.code import CodeFile, code_of
 from grader.classes.review.guard import (
     FRAMED,
     REPORTS,
@@ -36,14 +55,15 @@ from grader.classes.review.guard import (
     reports_of,
 )
 from grader.classes.review.session import Conflict, ReviewSession, plain
-from grader.classes.review.submissions import FILTERS, Item, place_of
+from grader.classes.review.submissions import Item, across, alike, place_of
 from grader.errors import GraderError, RubricError
-from grader.model.result import Override
+from grader.model.result import AppliedOverride, WrittenOverride
+from grader.report.html.page import render_html
 from grader.report.html.shell import environment, style
 from grader.report.sentences import SIGNS
 from grader.report.view import of_points
 from grader.rubric.model import Criterion
-from grader.wording import number
+from grader.wording import number, plural
 
 
 class _Pages(Flask):
@@ -66,10 +86,13 @@ def create_app(review: ReviewSession, *, port: int, token: str, author: str) -> 
     app.extensions["review"] = review
     guard(app, port=port, token=token)
     app.jinja_env.filters.update(number=number, of_points=of_points, verbatim=escape)
-    app.jinja_env.globals.update(SIGNS=SIGNS, FILTERS=FILTERS)
+    app.jinja_env.globals.update(SIGNS=SIGNS, points_words=points_words)
     app.context_processor(lambda: {"csrf": session.get("csrf", ""), "author": _author(author)})
     view = _Views(review, author)
     app.add_url_rule("/", view_func=view.listing)
+    app.add_url_rule("/criteria", view_func=view.criteria)
+    app.add_url_rule("/comments", view_func=view.comments)
+    app.add_url_rule("/comments/<criterion>", view_func=view.comment, methods=["POST"])
     app.add_url_rule("/author", view_func=view.name, methods=["POST"])
     app.add_url_rule("/look.css", view_func=view.look)
     app.add_url_rule("/review.js", view_func=view.script)
@@ -90,13 +113,28 @@ class _Views:
 
     def listing(self) -> str:
         """All submissions, or those that a filter shows."""
-        items = self._session.submissions.items()
+        items = self._session.items()
         place = place_of(items, request.args)
         return render_template(
             "list.html",
+            said=self._said,
+            titles={c.id: c.title for c in self._session.rubric.rubric.criteria},
             run=self._session.submissions.batch().run,
             place=place,
             items=place.shown,
+            troubles=self._troubles(),
+        )
+
+    def criteria(self) -> str:
+        """Each criterion with how many submissions wait for a decision on it."""
+        items = self._session.items()
+        named = [(c.id, c.title) for c in self._session.rubric.rubric.criteria]
+        return render_template(
+            "criteria.html",
+            run=self._session.submissions.batch().run,
+            place=place_of((), {}),
+            found=across(items, named),
+            progress=self._session.progress().most_common(),
             troubles=self._troubles(),
         )
 
@@ -115,10 +153,12 @@ class _Views:
         if asked is None:
             raise NotFound("The rubric has no such criterion.")
         form = request.form
-        typed = Draft(points=form.get("points", ""), comment=form.get("comment", ""))
+        chosen = form.getlist("bank")
+        typed = Draft(points=form.get("points", ""), comment=form.get("comment", ""), comments=chosen)
+        typed = replace(typed, answer=form.get("answer", ""))
         try:
             override = self._wanted(asked)
-            waits = self._session.save(item, criterion, override, form.get("seen", ""))
+            waits = self._saved_as(item, criterion, override)
         except Conflict:
             return self._not_saved(item, criterion, _draft(typed, conflict=True), 409)
         except Wrong as wrong:
@@ -130,6 +170,47 @@ class _Views:
             )
         return self._saved(item, criterion, waits)
 
+    def _saved_as(self, item: Item, criterion: str, wanted: WrittenOverride | None) -> str:
+        """Save it for one, or for all that are alike; return what is to be said of that."""
+        do, session = request.form.get("do"), self._session
+        if do == "undo" and (one := session.decisions().written.get(item.entry.id, {}).get(criterion)):
+            return f"{plural(session.undo_together(criterion, one.together), 'submission')} taken back"
+        line = item.lines.get(criterion)
+        if do == "alike" and wanted is not None and line is not None:
+            return plural(session.save_together(criterion, line.diagnosis, wanted), "submission")
+        return session.save(item, criterion, wanted, request.form.get("seen", ""))
+
+    def comments(self) -> str:
+        """All comments of the bank, each with a form, and one for a new one."""
+        return self._bank_page(request.args.get("c", ""), "")
+
+    def comment(self, criterion: str) -> AnyResponse:
+        """Change a comment for all that have it, or add one."""
+        asked = next((c for c in self._session.rubric.rubric.criteria if c.id == criterion), None)
+        if asked is None:
+            raise NotFound("The rubric has no such criterion.")
+        form, (least, most) = request.form, bounds(asked)
+        known = self._session.decisions().bank.get(criterion, {})
+        if form.get("id") and form["id"] not in known:
+            raise NotFound("There is no such comment any more.")
+        try:
+            wanted = bank_comment_of(form.get("text", ""), form.get("points", ""), least=least, most=most)
+            name = form.get("id", "") or comment_name(wanted.text, known)
+            many = self._session.save_comment(criterion, name, wanted)
+        except Wrong as wrong:
+            return Response(self._bank_page(criterion, str(wrong)), 400)
+        return Response(self._bank_page(criterion, f"saved {_now()}: {plural(many, 'submission')} with it"))
+
+    def _bank_page(self, criterion: str, told: str) -> str:
+        return render_template(
+            "comments.html",
+            run=self._session.submissions.batch().run,
+            place=place_of((), {}),
+            criteria=[c for c in self._session.rubric.rubric.criteria if c.id == criterion or not criterion],
+            bank=self._session.decisions().bank,
+            told=told,
+        )
+
     def name(self) -> AnyResponse:
         """Remember who decides."""
         try:
@@ -138,15 +219,17 @@ class _Views:
             raise Forbidden(str(wrong)) from wrong
         if SCRIPT in request.headers:
             return jsonify(author=session["author"], said=f"saved {_now()}")
-        item = self._session.submissions.item(request.form.get("key", ""))
+        item = self._session.item(request.form.get("key", ""))
         keep = place_of((), request.form).kept
         return redirect(
-            url_for("submission", key=item.key, **keep) if item else url_for("listing", **keep), 303
+            url_for("submission", key=item.address, **keep) if item else url_for("listing", **keep), 303
         )
 
     def report(self, key: str, name: str) -> Response:
         """One of the reports, for the frame in the page."""
         item = self._item(key)
+        if item.alias:
+            return self._report_without_names(item, name)
         response = sent(open_report(self._session.path / item.key, name), REPORTS.get(name, ""))
         response.headers["Content-Security-Policy"] = FRAMED
         return response
@@ -154,8 +237,28 @@ class _Views:
     def evidence(self, key: str, name: str) -> Response:
         """A recording, to be kept."""
         item = self._item(key)
+        if item.alias:
+            raise NotFound(HIDDEN)
         file = open_evidence(self._session.path / item.key, name)
         return sent(file, "application/octet-stream", download=f"{item.key}-{name}")
+
+    def _report_without_names(self, item: Item, name: str) -> Response:
+        row, _, _ = self._row(item, {})
+        if name != "report.html" or row.result.error is not None:
+            raise NotFound(HIDDEN)
+        rubric, mask = self._session.rubric, self._session.mask(item, self._commit(item))
+        figures = figures_in(self._session.path / item.key, row.result, rubric.rubric)
+        shown = mask.record(figures) if mask and figures else None
+        page = render_html(row.result, rubric.rubric, shown, docs=rubric.docs)
+        return Response(page, mimetype="text/html", headers={"Content-Security-Policy": FRAMED})
+
+    def _commit(self, item: Item) -> str | None:
+        row = self._session.submissions.row(item.key)
+        return row.result.submission.commit if row else None
+
+    def _said(self, item: Item, text: str) -> str:
+        mask = self._session.mask(item, None)
+        return mask.text(text) if mask else text
 
     def look(self) -> Response:
         """Return the style of all pages."""
@@ -166,66 +269,110 @@ class _Views:
         return Response(_own("review.js"), mimetype="text/javascript")
 
     def _item(self, key: str) -> Item:
-        item = self._session.submissions.item(key)
+        item = self._session.item(key)
         if item is None:
             raise NotFound("The class has no such submission.")
         return item
 
-    def _wanted(self, asked: Criterion) -> Override | None:
-        form = request.form
-        if form.get("do") == "remove":
+    def _wanted(self, asked: Criterion) -> WrittenOverride | None:
+        form, (least, most) = request.form, bounds(asked)
+        if form.get("do") in {"remove", "undo"}:
             return None
+        known = self._session.decisions().bank.get(asked.id, {})
         return override_of(
             form.get("points", ""),
             form.get("comment", ""),
             _author(self._default_author),
-            least=min(0.0, asked.extra),
-            most=asked.points + max(0.0, asked.extra),
+            least=least,
+            most=most,
             reason=asked.check != MANUAL,
+            answer=form.get("answer", ""),
+            comments=[name for name in dict.fromkeys(form.getlist("bank")) if name in known],
         )
 
     def _page(self, item: Item, drafts: Mapping[str, Draft]) -> str:
         row, found, troubles = self._row(item, drafts)
         folder = self._session.path / item.key
         there = reports_of(folder)
+        items = self._session.items()
+        place = place_of(items, request.values, at=item.key)
+        ids = [criterion.id for criterion in row.result.criteria]
         return render_template(
             "submission.html",
             run=self._session.submissions.batch().run,
             item=item,
             row=row,
-            cards=found,
-            place=place_of(self._session.submissions.items(), request.values, at=item.key),
+            cards=found.only(place.criterion) if place.criterion in ids else found,
+            place=place,
+            alike={name: len(alike(items, name, line.diagnosis)) for name, line in item.lines.items()},
+            code=self._code(item, place.criterion) if place.criterion in ids else (),
+            anchor=f"#criterion-{ids.index(place.criterion) + 1}" if place.criterion in ids else "",
             waits=self._session.waits(item),
             troubles=troubles,
             report=next((name for name in ("report.html", "report.md") if name in there), ""),
-            files=[name for name in there if name not in {"report.html", "result.json"}],
-            evidence=evidence_of(folder),
+            files=[name for name in there if name not in {"report.html", "result.json"} and not item.alias],
+            evidence=evidence_of(folder) if not item.alias else [],
         )
+
+    def _code(self, item: Item, criterion: str) -> list[CodeFile]:
+        asked = next(c for c in self._session.rubric.rubric.criteria if c.id == criterion)
+        row = self._session.submissions.row(item.key)
+        result = next((c for c in row.result.criteria if c.id == criterion), None) if row else None
+        if result is None:
+            return []
+        mask = self._session.mask(item, self._commit(item))
+        hide = mask.text if mask else str
+        return code_of(self._session.path / item.key, asked, result, self._session.starter, hide)
 
     def _row(self, item: Item, drafts: Mapping[str, Draft]) -> tuple[Row, Cards, list[str]]:
         """The submission as it counts now, its cards, and what is in the way of saving."""
         row = self._session.submissions.row(item.key) or Row(entry=item.entry, result=None)
         rubric = self._session.rubric.rubric
         try:
-            overrides = self._session.overrides()
-            result = self._session.result(item, overrides)
+            found = self._session.decisions()
+            result = self._session.result(item, found.come_to)
             row = row.model_copy(update={"result": result}) if result else row
-            decided, troubles = overrides.get(item.entry.id, {}), self._troubles()
+            known, troubles = self._known(item), self._troubles()
         except RubricError as error:
-            decided = {o.criterion: plain(o) for o in row.result.overrides}
+            known = Known(decided={o.criterion: as_written(o) for o in row.result.overrides}, bank={})
             troubles = ["Nothing can be saved until overrides.yaml is fixed:", *error.faults]
-        return row, cards(row, rubric, decided, drafts), troubles
+            troubles = troubles[:1] if self._session.blind else troubles
+        mask = self._session.mask(item, row.result.submission.commit)
+        if mask:
+            without = mask.result(row.result, item.title)
+            if without is None:
+                raise NotFound(HIDDEN)
+            row = row.model_copy(update={"result": without})
+        return row, cards(row, rubric, known, drafts), troubles
+
+    def _known(self, item: Item) -> Known:
+        found, name = self._session.decisions(), item.entry.id
+        come_to, written = found.come_to.get(name, {}), found.written.get(name, {})
+        decided = {of: Decided(written=written[of], override=come_to[of]) for of in written}
+        asked = self._session.requests().found.get(name, {})
+        if mask := self._session.mask(item, None):
+            asked = {
+                of: tuple(replace(one, text=mask.text(one.text)) for one in ones)
+                for of, ones in asked.items()
+            }
+        return Known(decided=decided, bank=found.bank, requests=asked)
 
     def _troubles(self) -> list[str]:
-        found = []
+        faults = self._session.requests().faults
+        found = (
+            [f"{len(faults)} rows of requests.csv are left out"]
+            if faults and self._session.blind
+            else [*faults[:10]]
+        )
         if self._session.batch_runs():
             found.append(
                 "A batch is running in this folder. What you decide is kept; reports and gradebook follow "
                 "when it has ended."
             )
-        if self._session.background.trouble and not found:
+        if self._session.background.trouble and not self._session.batch_runs():
             found.append(
-                f"The gradebook is not written yet; it will be tried again: {self._session.background.trouble}"
+                "The gradebook is not written yet; it will be tried again"
+                + ("" if self._session.blind else f": {self._session.background.trouble}")
             )
         return found
 
@@ -238,29 +385,40 @@ class _Views:
     def _saved(self, item: Item, criterion: str, waits: str) -> AnyResponse:
         at = _now()
         go_on = request.form.get("do") == "next"
-        place = place_of(self._session.submissions.items(), request.form, at=item.key)
+        place = place_of(self._session.items(), request.form, at=item.key)
+        to = url_for("submission", key=place.after, **place.kept) if go_on and place.after else ""
+        if go_on and place.criterion and not to:
+            to = url_for("criteria")
         if SCRIPT in request.headers:
-            to = url_for("submission", key=place.after, **place.kept) if go_on and place.after else ""
             said = f"saved {at}" + (f"; {waits}" if waits else "")
             return jsonify(self._parts(item, criterion, None) | {"said": said, "go": to})
-        if go_on and place.after:
-            return redirect(url_for("submission", key=place.after, **place.kept), 303)
-        back = url_for("submission", key=item.key, saved=criterion, at=at, **place.kept)
+        if to:
+            return redirect(to, 303)
+        back = url_for("submission", key=item.address, saved=criterion, at=at, **place.kept)
         return redirect(f"{back}#c-{criterion}", 303)
 
     def _parts(self, item: Item, criterion: str, draft: Draft | None) -> dict[str, object]:
         """What of a card changes, as a script puts it in place."""
         row, _, _ = self._row(item, {})
-        decided = self._session.overrides().get(item.entry.id, {})
-        one = card(row, self._session.rubric.rubric, criterion, decided, {criterion: draft} if draft else {})
+        drafts = {criterion: draft} if draft else {}
+        one = card(row, self._session.rubric.rubric, criterion, self._known(item), drafts)
         return {
             "head": str(get_template_attribute("parts.html", "head")(one)),
             "notes": str(get_template_attribute("parts.html", "notes")(one)),
             "seen": one.seen,
             "decided": one.override is not None,
+            "together": bool(one.together),
             "total": f"{number(row.result.points)} of {number(row.result.max_points)}",
             "status": one.criterion.status.value,
         }
+
+
+def as_written(applied: AppliedOverride) -> Decided:
+    """Return a decision of a result, where the file itself cannot be read."""
+    written = WrittenOverride(
+        points=applied.points, comment=applied.comment, author=applied.author, date=applied.date
+    )
+    return Decided(written=written, override=plain(applied))
 
 
 def _author(default: str) -> str:
@@ -268,7 +426,7 @@ def _author(default: str) -> str:
 
 
 def _draft(typed: Draft, *, error: str = "", conflict: bool = False) -> Draft:
-    return Draft(points=typed.points, comment=typed.comment, error=error, conflict=conflict)
+    return replace(typed, error=error, conflict=conflict)
 
 
 def _now() -> str:
@@ -279,6 +437,8 @@ def _own(name: str) -> Markup:
     return Markup(files(__package__).joinpath("look", name).read_text(encoding="utf-8"))  # noqa: S704 - ours
 
 
+FAULTS_SHOWN = 10
+HIDDEN = "It is not shown while names are hidden."
 SCRIPT = "X-Asked-By"
 """The header with which our script asks: it is answered with what changed, as JSON."""
 
@@ -300,7 +460,11 @@ def with_code(response: Response, code: int) -> Response:
 
 def graders(error: GraderError) -> AnyResponse:
     """What the grader says is wrong."""
-    return _told(500, "This did not work", f"{error.message}. {error.hint}".strip(), again=False)
+    blind = current_app.extensions["review"].blind
+    text = (
+        "The grader says why to those who see names." if blind else f"{error.message}. {error.hint}".strip()
+    )
+    return _told(500, "This did not work", text, again=False)
 
 
 def failed(error: HTTPException) -> AnyResponse:

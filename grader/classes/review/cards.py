@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import date
+from itertools import chain, count
 
 from grader.classes.gradebook import Row
+from grader.classes.review.requests import Request
 from grader.classes.review.session import mark
-from grader.model.result import AUTHOR_CHARS, COMMENT_CHARS, AppliedOverride, CriterionResult, Override
+from grader.model.result import (
+    AUTHOR_CHARS,
+    BANK_CHARS,
+    COMMENT_CHARS,
+    AppliedOverride,
+    BankComment,
+    CriterionResult,
+    Override,
+    WrittenOverride,
+)
 from grader.model.verdict import Status
 from grader.report.sentences import SIGNS
 from grader.rubric.model import Rubric
@@ -26,6 +37,8 @@ class Draft:
 
     points: str = ""
     comment: str = ""
+    comments: Sequence[str] = ()
+    answer: str = ""
     conflict: bool = False
     error: str = ""
     saved: str = ""
@@ -33,15 +46,36 @@ class Draft:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Decided:
+    """A decision: what stands in `overrides.yaml`, and what it comes to."""
+
+    written: WrittenOverride
+    override: Override
+
+
+@dataclass(frozen=True, kw_only=True)
 class Card:
-    """One criterion with its form. `override` is what stands in `overrides.yaml`, `applied` what the result has."""
+    """One criterion with its form. `decided` is what stands in `overrides.yaml`, `applied` what the result has, `bank`
+    the comments that there are."""
 
     criterion: CriterionResult
     manual: bool
     hidden: bool
-    override: Override | None
+    decided: Decided | None
     applied: AppliedOverride | None
     draft: Draft | None
+    bank: Mapping[str, BankComment]
+    requests: Sequence[Request] = ()
+
+    @property
+    def override(self) -> Override | None:
+        """What the decision comes to."""
+        return self.decided.override if self.decided else None
+
+    @property
+    def together(self) -> str:
+        """The word of all that were decided with it in one go."""
+        return self.decided.written.together if self.decided else ""
 
     @property
     def sign(self) -> str:
@@ -57,14 +91,31 @@ class Card:
         """For the form's field."""
         if self.draft and self.draft.typed:
             return self.draft.points
-        return plain(self.override.points) if self.override else ""
+        points = self.decided.written.points if self.decided else None
+        if self.requests and not self.decided and not self.criterion.status.is_open:
+            points = self.criterion.points
+        return "" if points is None else plain(points)
 
     @property
     def comment(self) -> str:
         """For the form's field."""
         if self.draft and self.draft.typed:
             return self.draft.comment
-        return self.override.comment if self.override else ""
+        return self.decided.written.comment if self.decided else ""
+
+    @property
+    def answer(self) -> str:
+        """For the form's field."""
+        if self.draft and self.draft.typed:
+            return self.draft.answer
+        return self.decided.written.answer if self.decided else ""
+
+    @property
+    def comments(self) -> Sequence[str]:
+        """The ids of the bank's comments that are chosen."""
+        if self.draft and self.draft.typed:
+            return self.draft.comments
+        return self.decided.written.comments if self.decided else ()
 
     @property
     def said(self) -> str:
@@ -89,10 +140,25 @@ class Cards:
     decided: Sequence[Card]
     rest: Sequence[Card]
 
+    def only(self, criterion: str) -> Cards:
+        """Return that criterion's card alone, as one that waits or is decided, so that it is not folded."""
+        decided = [one for one in self.decided if one.criterion.id == criterion]
+        waiting = [one for one in (*self.waiting, *self.rest) if one.criterion.id == criterion]
+        return Cards(waiting=waiting, decided=decided, rest=())
 
-def cards(row: Row, rubric: Rubric, decided: Mapping[str, Override], drafts: Mapping[str, Draft]) -> Cards:
+
+@dataclass(frozen=True, kw_only=True)
+class Known:
+    """What people decided about a submission, what its student asks, and the bank's comments, all by criterion."""
+
+    decided: Mapping[str, Decided]
+    bank: Mapping[str, Mapping[str, BankComment]]
+    requests: Mapping[str, Sequence[Request]] = field(default_factory=dict)
+
+
+def cards(row: Row, rubric: Rubric, known: Known, drafts: Mapping[str, Draft]) -> Cards:
     """Return the cards of a submission."""
-    found = [card(row, rubric, name, decided, drafts) for name in (c.id for c in row.result.criteria)]
+    found = [card(row, rubric, name, known, drafts) for name in (c.id for c in row.result.criteria)]
     whole = row.result.error is None
     mine = [c for c in found if c.override is not None]
     waiting = [c for c in found if c.override is None and _waits(c, whole=whole)]
@@ -100,13 +166,7 @@ def cards(row: Row, rubric: Rubric, decided: Mapping[str, Override], drafts: Map
     return Cards(waiting=waiting, decided=mine, rest=sorted(others, key=_nothing_lost))
 
 
-def card(
-    row: Row,
-    rubric: Rubric,
-    criterion: str,
-    decided: Mapping[str, Override],
-    drafts: Mapping[str, Draft],
-) -> Card:
+def card(row: Row, rubric: Rubric, criterion: str, known: Known, drafts: Mapping[str, Draft]) -> Card:
     """One of them; the result has a criterion of that id."""
     result = row.result
     asked = next((c for c in rubric.criteria if c.id == criterion), None)
@@ -114,7 +174,9 @@ def card(
         criterion=next(c for c in result.criteria if c.id == criterion),
         manual=asked is not None and asked.check == MANUAL,
         hidden=asked is not None and asked.visibility == "hidden",
-        override=decided.get(criterion),
+        decided=known.decided.get(criterion),
+        bank=known.bank.get(criterion, {}),
+        requests=known.requests.get(criterion, ()),
         applied=next((o for o in result.overrides if o.criterion == criterion), None),
         draft=drafts.get(criterion),
     )
@@ -148,10 +210,38 @@ class Wrong(Exception):
 
 
 def override_of(
-    points: str, comment: str, author: str, *, least: float = 0.0, most: float, reason: bool
-) -> Override:
-    """Raises Wrong. A `reason` is asked for where a check has judged."""
-    text = points.strip()
+    points: str,
+    comment: str,
+    author: str,
+    *,
+    least: float = 0.0,
+    most: float,
+    reason: bool,
+    comments: Sequence[str] = (),
+    answer: str = "",
+) -> WrittenOverride:
+    """Raises Wrong. A `reason` is asked for where a check has judged; an `answer` is one, and comments of the bank are,
+    which stand for points too."""
+    value = None if comments and not points.strip() else _points(points, least, most)
+    written, answered = clean(comment), clean(answer)
+    if (many := max(len(written), len(answered))) > COMMENT_CHARS:
+        raise Wrong(f"At most {COMMENT_CHARS} characters, please: there are {many}.")
+    if reason and not written and not comments and not answered:
+        raise Wrong("Say why: the student sees the reason beside the points.")
+    if len(comments) > COMMENTS_MAX:
+        raise Wrong(f"At most {COMMENTS_MAX} comments, please.")
+    return WrittenOverride(
+        points=value,
+        comment=written,
+        author=author,
+        date=date.today(),  # noqa: DTZ011 - the person's day
+        comments=tuple(comments),
+        answer=answered,
+    )
+
+
+def _points(typed: str, least: float, most: float) -> float:
+    text = typed.strip()
     if not text:
         raise Wrong("How many points?")
     if not POINTS.fullmatch(text) or (text.startswith("-") and least >= 0):
@@ -161,12 +251,38 @@ def override_of(
         raise Wrong(f"It has at most {number(most)} points.")
     if value < least:
         raise Wrong(f"It has at least {number(least)} points.")
-    written = clean(comment)
-    if len(written) > COMMENT_CHARS:
-        raise Wrong(f"At most {COMMENT_CHARS} characters, please: there are {len(written)}.")
-    if reason and not written:
-        raise Wrong("Say why: the student sees the reason beside the points.")
-    return Override(points=value, comment=written, author=author, date=date.today())  # noqa: DTZ011 - the person's day
+    return value
+
+
+COMMENTS_MAX = 10
+CHANGE = re.compile(r"[+-](?:\d{1,6}(?:[.,]\d{0,9})?|[.,]\d{1,9})", re.ASCII)
+
+
+def bank_comment_of(text: str, points: str, *, least: float, most: float) -> BankComment:
+    """Return the comment of a form: `7` are points, `-2` and `+1` a change, nothing is neither. Raises Wrong."""
+    written, typed = clean(text), points.strip()
+    if not written:
+        raise Wrong("What should it say?")
+    if len(written) > BANK_CHARS:
+        raise Wrong(f"At most {BANK_CHARS} characters, please: there are {len(written)}.")
+    if CHANGE.fullmatch(typed):
+        return BankComment(text=written, change=float(typed.replace(",", ".")))
+    return BankComment(text=written, points=_points(typed, least, most) if typed else None)
+
+
+def comment_name(text: str, known: Collection[str]) -> str:
+    """Return a short id for a comment, made of its first words, that no other one has."""
+    words = re.findall(r"[a-z0-9]+", unicodedata.normalize("NFKD", text).casefold())
+    first = "-".join(words[:4])[:30].strip("-") or "comment"
+    names = chain([first], (f"{first}-{number}" for number in count(2)))
+    return next(name for name in names if name not in known)
+
+
+def points_words(comment: BankComment) -> str:
+    """Return `7`, `-2` or nothing."""
+    if comment.change is not None:
+        return f"{comment.change:+g}"
+    return "" if comment.points is None else plain(comment.points)
 
 
 def author_of(text: str) -> str:

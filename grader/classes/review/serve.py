@@ -13,6 +13,7 @@ import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from html import escape
+from importlib import import_module
 from pathlib import Path
 
 from waitress.server import create_server
@@ -32,7 +33,8 @@ GIT_S = 5
 def serve(review: ReviewSession, *, port: int, author: str, opened: Callable[[str], None]) -> bool:
     """Serve `review` until interrupted; `opened` is given the address with its token. Port 0 is any that is free.
 
-    Gives whether all that follows a decision is written. Raises UsageError where the port cannot be had.
+    Gives whether all that follows a decision is written. Raises UsageError where the port cannot be had. What a
+    report's figures need is loaded while the first page is read, so that no one waits for it at the first decision.
     """
     with _bound(port) as listening:
         token = secrets.token_urlsafe(TOKEN_BYTES)
@@ -49,6 +51,7 @@ def serve(review: ReviewSession, *, port: int, author: str, opened: Callable[[st
         review.start()
         try:
             opened(f"http://{HOST}:{number}/?token={token}")
+            threading.Thread(target=import_module, args=("rosbags.typesys",), daemon=True).start()
             server.run()
         except KeyboardInterrupt:
             pass

@@ -7,27 +7,38 @@ from __future__ import annotations
 
 import fcntl
 import os
+import secrets
 import threading
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
 from grader.classes.batch.reports import Settler, rewrite
 from grader.classes.batch.run import GRADEBOOK, alone, ids_of, write_books
-from grader.classes.overrides import FILE, Overrides, read_overrides
-from grader.classes.overrides.write import write_override
+from grader.classes.feedback.publish import read_published
+from grader.classes.overrides import FILE, Overrides, Written, read_written, resolve_all
+from grader.classes.overrides.bank import FILE as BANK
+from grader.classes.overrides.bank import Bank, read_bank, resolve
+from grader.classes.overrides.write import write_override, write_overrides
 from grader.classes.review.background import BackgroundWriter, Pace
-from grader.classes.review.submissions import Item, Stamp, Submissions, stamp_of
-from grader.errors import Busy, GraderError, UsageError
+from grader.classes.review.blind import Mask, aliases, mask_of
+from grader.classes.review.requests import FILE as REQUESTS
+from grader.classes.review.requests import Requests, read_requests
+from grader.classes.review.submissions import Item, Submissions, alike, stamp_of
+from grader.errors import Busy, GraderError, RubricError, UsageError
 from grader.files import unwritable
-from grader.model.batch import State
-from grader.model.result import GradingResult, Override
+from grader.model.batch import Entry, State
+from grader.model.result import BankComment, GradingResult, Override, WrittenOverride
+from grader.report.class_page.gather import salt_in, words_in
 from grader.results import RESULT, read_result
-from grader.rubric.load import LoadedRubric, load_rubric
+from grader.rubric.load import LoadedRubric, load_rubric, read_beside_rubric
 
-PATIENCE_S = 0.3
+PATIENCE_S = 0.1
 OTHER_RUBRIC = "the class has been graded by another rubric since: end this review and start it again"
 
 OLDER_RESULT = (
@@ -50,6 +61,15 @@ def open_session(path: Path, pace: Pace | None = None) -> ReviewSession:
     return ReviewSession(path, rubric, pace or Pace())
 
 
+@dataclass(frozen=True, kw_only=True)
+class Decisions:
+    """What stands in `overrides.yaml`, what it comes to, and the comments of `comments.yaml`."""
+
+    written: Written
+    come_to: Overrides
+    bank: Bank
+
+
 class ReviewSession:
     """Safe to use from several threads, and beside other sessions and batches of the same class."""
 
@@ -59,13 +79,32 @@ class ReviewSession:
         self.submissions = Submissions(path)
         self.background = BackgroundWriter(self._follow, pace)
         self._saving, self._writing, self._guard = threading.Lock(), threading.Lock(), threading.Lock()
-        self._overrides: tuple[tuple[Stamp, tuple[str, ...]], Overrides] | None = None
+        self._decisions: tuple[object, Decisions] | None = None
+        self._requests: tuple[object, Requests] | None = None
+        self.share: Callable[[Entry], bool] = lambda _: True
+        """Which submissions the pages list."""
+        self.blind = False
+        """Whether names are hidden until a submission is published."""
+        self._aliases: tuple[object, Mapping[str, str], frozenset[str]] | None = None
         self._pending: set[str] = set()
         self._caught_up = False
         self._books_behind = False
 
+    @cached_property
+    def starter(self) -> dict[str, bytes]:
+        """The files that the course hands out, by path; none where they are not there any more."""
+        folder = self.rubric.rubric.starter
+        if folder is None:
+            return {}
+        with suppress(RubricError):
+            files = read_beside_rubric(self.rubric)
+            return {name: data for name, data in files.items() if name.startswith(f"{folder}/")}
+        return {}
+
     def start(self) -> None:
-        """Begin to follow; what was decided while no one reviewed is looked at first."""
+        """Begin to follow; what was decided while no one reviewed is looked at first. All results are read once, so
+        that no page waits for that."""
+        self.submissions.items()
         self.background.start()
         self.background.changed()
 
@@ -74,18 +113,90 @@ class ReviewSession:
         return self.background.close()
 
     def overrides(self) -> Overrides:
-        """What `overrides.yaml` says now. Raises RubricError where it has faults."""
-        ids = tuple(ids_of(self.submissions.batch().run))
-        stamp = (stamp_of(self.path / FILE), ids)
+        """What `overrides.yaml` and `comments.yaml` come to now. Raises RubricError where they have faults."""
+        return self.decisions().come_to
+
+    def decisions(self) -> Decisions:
+        """Return what both files say now. Raises RubricError where they have faults."""
+        rubric, ids = self.rubric.rubric, tuple(ids_of(self.submissions.batch().run))
+        stamp = (stamp_of(self.path / FILE), stamp_of(self.path / BANK), ids)
         with self._guard:
-            found = self._overrides
+            found = self._decisions
         if found is None or found[0] != stamp:
-            found = (stamp, read_overrides(self.path / FILE, self.rubric.rubric, ids))
+            bank = read_bank(self.path / BANK, rubric)
+            written = read_written(self.path / FILE, rubric, ids, bank)
+            come_to = resolve_all(written, rubric, bank)
+            found = (stamp, Decisions(written=written, come_to=come_to, bank=bank))
             with self._guard:
-                self._overrides = found
+                self._decisions = found
         return found[1]
 
-    def save(self, item: Item, criterion: str, override: Override | None, seen: str) -> str:
+    def items(self) -> tuple[Item, ...]:
+        """Return every submission of the share, with what was decided since its result was written."""
+        items = self._unnamed(item for item in self.submissions.items() if self.share(item.entry))
+        with suppress(RubricError):
+            decided, asked = self.overrides(), self.requests().found
+            return tuple(
+                item.with_decisions(decided.get(item.entry.id, {})).with_requests(
+                    asked.get(item.entry.id, ()), decided.get(item.entry.id, {})
+                )
+                for item in items
+            )
+        return items
+
+    def requests(self) -> Requests:
+        """Return what students ask, as `requests.csv` says now."""
+        ids = tuple(ids_of(self.submissions.batch().run))
+        stamp = (stamp_of(self.path / REQUESTS), ids)
+        with self._guard:
+            found = self._requests
+        if found is None or found[0] != stamp:
+            criteria = [criterion.id for criterion in self.rubric.rubric.criteria]
+            found = (stamp, read_requests(self.path / REQUESTS, ids, criteria))
+            with self._guard:
+                self._requests = found
+        return found[1]
+
+    def item(self, address: str) -> Item | None:
+        """Return the submission of an address; None where the class has none."""
+        if not self.blind:
+            return self.submissions.item(address)
+        items = self._unnamed(self.submissions.items())
+        return next((item for item in items if item.address == address), None)
+
+    def mask(self, item: Item, commit: str | None) -> Mask | None:
+        """Return what takes a submission's names out of its texts; None where they are not hidden."""
+        return mask_of(item.entry, commit or "", self._names()[1]) if item.alias else None
+
+    def _unnamed(self, items: Iterable[Item]) -> tuple[Item, ...]:
+        """Return them in another order and without names, but for those that are published."""
+        if not self.blind:
+            return tuple(items)
+        called, published = self._names()[0], read_published(self.path)
+        pairs = [(called[item.entry.id], item) for item in items]
+        pairs.sort(key=lambda pair: int(pair[0].rpartition("-")[2]))
+        return tuple(item if published.of(item.entry) else replace(item, alias=to) for to, item in pairs)
+
+    def _names(self) -> tuple[Mapping[str, str], frozenset[str]]:
+        """Return what each submission is called, and the words that most sources have."""
+        batch = self.submissions.batch()
+        if self._aliases is None or self._aliases[0] is not batch:
+            entries = [item.entry for item in self.submissions.items()]
+            times = Counter(w for e in entries for w in set(words_in(e.source, e.ref or "")))
+            most = max(1, len(entries) // 2)
+            common = frozenset(word for word, count in times.items() if count > most)
+            called = aliases([entry.id for entry in entries], salt_in(self.path))
+            self._aliases = (batch, called, common)
+        return self._aliases[1:]
+
+    def progress(self) -> Counter[str]:
+        """Return how many criteria each marker decided, by name."""
+        with suppress(RubricError):
+            decided = self.overrides()
+            return Counter(one.author for found in decided.values() for one in found.values())
+        return Counter()
+
+    def save(self, item: Item, criterion: str, wanted: WrittenOverride | None, seen: str) -> str:
         """Put a decision in place of the one that was `seen` (its `mark`), or take that out (None).
 
         Gives in a line why the submission's files do not say so yet; empty where they do.
@@ -93,18 +204,68 @@ class ReviewSession:
         Raises Conflict where another one stands there by now, and what `write_override` raises; then nothing changed.
         """
         name = item.entry.id
+        asked = next(c for c in self.rubric.rubric.criteria if c.id == criterion)
         with self._saving, reviewing(self.path):
-            now = self.overrides().get(name, {}).get(criterion)
-            if not alike(now, override):
+            found = self.decisions()
+            now = found.come_to.get(name, {}).get(criterion)
+            if not same(now, resolve(wanted, asked, found.bank) if wanted else None):
                 if mark(now) != seen:
                     raise Conflict(now)
-                write_override(self.path / FILE, name, criterion, override)
+                write_override(self.path / FILE, name, criterion, wanted)
         with self._guard:
             self._pending.add(item.key)
             self._books_behind = True
         waits = self._settled_soon(item)
         self.background.changed()
         return waits
+
+    def save_together(self, criterion: str, diagnosis: str, wanted: WrittenOverride) -> int:
+        """Decide the same for all submissions of one diagnosis that no one has decided; return how many these are.
+
+        All are written at once, with a word by which they can be taken back at once.
+        """
+        wanted = wanted.model_copy(update={"together": secrets.token_hex(6)})
+        with self._saving, reviewing(self.path):
+            those = alike(self.items(), criterion, diagnosis)
+            self._write_together(those, criterion, wanted)
+        return len(those)
+
+    def undo_together(self, criterion: str, word: str) -> int:
+        """Take out what was decided in one go and not changed since; return how many these are."""
+        with self._saving, reviewing(self.path):
+            written = self.decisions().written
+            those = [
+                item
+                for item in self.submissions.items()
+                if (one := written.get(item.entry.id, {}).get(criterion)) is not None
+                and word
+                and one.together == word
+            ]
+            self._write_together(those, criterion, None)
+        return len(those)
+
+    def _write_together(self, items: Sequence[Item], criterion: str, wanted: WrittenOverride | None) -> None:
+        write_overrides(self.path / FILE, [(item.entry.id, criterion, wanted) for item in items])
+        self._follow_soon({item.key for item in items})
+
+    def save_comment(self, criterion: str, name: str, comment: BankComment) -> int:
+        """Put a comment into `comments.yaml`, or change it there for all that have it; return how many have it."""
+        with self._saving, reviewing(self.path):
+            written = self.decisions().written
+            write_override(self.path / BANK, criterion, name, comment)
+            having = {
+                item.key
+                for item in self.submissions.items()
+                if (one := written.get(item.entry.id, {}).get(criterion)) and name in one.comments
+            }
+            self._follow_soon(having)
+        return len(having)
+
+    def _follow_soon(self, keys: set[str]) -> None:
+        with self._guard:
+            self._pending |= keys
+            self._books_behind = True
+        self.background.changed()
 
     def result(self, item: Item, overrides: Overrides) -> GradingResult | None:
         """Return a submission's result as it counts with these overrides; None where it has none."""
@@ -253,7 +414,7 @@ def plain(override: Override) -> Override:
     return Override(**{name: getattr(override, name) for name in Override.model_fields})
 
 
-def alike(one: Override | None, other: Override | None) -> bool:
+def same(one: Override | None, other: Override | None) -> bool:
     """Return whether both say the same, whenever it was said."""
     if one is None or other is None:
         return one is other

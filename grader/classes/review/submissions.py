@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -12,25 +13,54 @@ from grader.classes.batch.folder import RUN, BatchFolder, open_batch
 from grader.classes.gradebook import Row
 from grader.intake import safe_name
 from grader.model.batch import MISSING, ROSTER, Entry
-from grader.model.result import GradingResult
+from grader.model.result import GradingResult, Override
 from grader.model.verdict import Status
+from grader.report.class_page.gather import reduced
 from grader.results import RESULT
+from grader.untrusted_text import line
 
 FILTERS = {
     "manual": "Waiting for points",
     "inconclusive": "Inconclusive",
     "error": "Errors",
     "changed": "Look again",
+    "asked": "Requests",
     "all": "All",
 }
-ALL = "all"
+FILTERS_OF_ONE = {
+    "open": "Open",
+    "lost": "Lost",
+    "decided": "Decided",
+    "changed": "Look again",
+    "asked": "Requests",
+    "all": "All",
+}
+"""Those of a list of one criterion across the class."""
+ALL, ASKED = "all", "asked"
 Stamp = tuple[int, int, int] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """What a list shows of one criterion of a submission; `kinds` are the filters that show it, `diagnosis` is alike
+    for what checks found alike, and `said` is how this one's check put it. `waits`
+    says whether it would be open without a decision."""
+
+    status: Status
+    points: float
+    full: float
+    kinds: frozenset[str]
+    diagnosis: str
+    said: str
+    author: str
+    waits: bool
 
 
 @dataclass(frozen=True, kw_only=True)
 class Item:
     """One submission in the list. `key` names its folder and stands in addresses, `kinds` are the filters that show it,
-    `open` counts the criteria that no one has decided, by status."""
+    `open` counts the criteria that no one has decided, by status; `lines` has what is to be said of each criterion.
+    `alias` stands in place of its id and names while these are hidden."""
 
     key: str
     entry: Entry
@@ -41,6 +71,28 @@ class Item:
     kinds: frozenset[str]
     late: bool
     gradable: bool
+    lines: Mapping[str, Line]
+    alias: str = ""
+
+    @property
+    def address(self) -> str:
+        """What it is called in addresses."""
+        return self.alias or self.key
+
+    @property
+    def title(self) -> str:
+        """What it is called in pages."""
+        return self.alias.replace("-", " ").capitalize() or self.entry.id
+
+    @property
+    def name(self) -> str:
+        """Whose it is; empty where names are hidden."""
+        return "" if self.alias else self.entry.name
+
+    @property
+    def group(self) -> str:
+        """The group's name; empty where names are hidden."""
+        return "" if self.alias else self.entry.group
 
     @property
     def state(self) -> tuple[str, str]:
@@ -55,10 +107,39 @@ class Item:
             self.status, ("pass", "graded")
         )
 
-    def fits(self, kind: str, words: str) -> bool:
+    def kinds_of(self, criterion: str) -> frozenset[str]:
+        """Return the filters that show it, in the list of one criterion where there is one."""
+        if not criterion:
+            return self.kinds
+        one = self.lines.get(criterion)
+        return one.kinds if one else frozenset()
+
+    def with_requests(self, asked: Collection[str], decided: Mapping[str, Override]) -> Item:
+        """Return it with the student's requests about these criteria; those that are answered do not wait any more."""
+        waiting = [name for name in asked if name not in decided or not decided[name].answer]
+        lines = {
+            name: replace(self.lines[name], kinds=self.lines[name].kinds | {ASKED})
+            for name in waiting
+            if name in self.lines
+        }
+        return replace(self, kinds=self.kinds | {ASKED}, lines={**self.lines, **lines}) if waiting else self
+
+    def with_decisions(self, decided: Mapping[str, Override]) -> Item:
+        """Return it as the list shows it with these decisions, which its result may not have yet."""
+        changed = {}
+        for name, one in self.lines.items():
+            now = decided.get(name)
+            if (now is not None) == ("decided" in one.kinds):
+                continue
+            kinds = one.kinds - {"open", "decided", "changed"} | ({"decided"} if now else set())
+            kinds |= {"open"} if one.waits and not now else set()
+            changed[name] = replace(one, kinds=kinds, author=now.author if now else "")
+        return replace(self, lines={**self.lines, **changed}) if changed else self
+
+    def fits(self, kind: str, words: str, criterion: str = "") -> bool:
         """Return whether a filter shows it and its id, name or group has these words."""
-        entry = self.entry
-        return kind in self.kinds and words.casefold() in f"{entry.id} {entry.name} {entry.group}".casefold()
+        shown = kind in self.kinds_of(criterion)
+        return shown and words.casefold() in f"{self.title} {self.name} {self.group}".casefold()
 
 
 class Submissions:
@@ -67,36 +148,37 @@ class Submissions:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._lock = threading.Lock()
-        self._run: tuple[Stamp, BatchFolder] | None = None
+        self._run: tuple[Stamp, BatchFolder, Mapping[str, BatchFolder]] | None = None
         self._items: dict[str, tuple[object, Item]] = {}
 
     def batch(self) -> BatchFolder:
         """Return the batch's folder as `run.json` says now. Raises UsageError where that cannot be read."""
-        stamp = stamp_of(self.path / RUN)
-        with self._lock:
-            if self._run is None or self._run[0] != stamp:
-                self._run = (stamp, open_batch(self.path))
-            return self._run[1]
+        return self._read()[0]
 
     def items(self) -> tuple[Item, ...]:
         """Every submission; those that the roster itself keeps from being graded come last."""
-        return tuple(self._item(batch) for batch in _each(self.batch()))
+        return tuple(self._item(key, one) for key, one in self._read()[1].items())
 
     def item(self, key: str) -> Item | None:
         """Return the submission of that folder; None where the class has none."""
-        found = self._one(key)
-        return self._item(found) if found else None
+        one = self._read()[1].get(key)
+        return self._item(key, one) if one else None
 
     def row(self, key: str) -> Row | None:
         """Return the same with its result; one of status `error` stands for a result that is not there."""
-        found = self._one(key)
-        return next(found.rows()) if found else None
+        one = self._read()[1].get(key)
+        return next(one.rows()) if one else None
 
-    def _one(self, key: str) -> BatchFolder | None:
-        return next((one for one in _each(self.batch()) if _key(one) == key), None)
+    def _read(self) -> tuple[BatchFolder, Mapping[str, BatchFolder]]:
+        """Return the batch, and by its key each submission as if there were no other."""
+        stamp = stamp_of(self.path / RUN)
+        with self._lock:
+            if self._run is None or self._run[0] != stamp:
+                batch = open_batch(self.path)
+                self._run = (stamp, batch, dict(_each(batch)))
+            return self._run[1:]
 
-    def _item(self, one: BatchFolder) -> Item:
-        key = _key(one)
+    def _item(self, key: str, one: BatchFolder) -> Item:
         run = one.run
         made_of = (stamp_of(self.path / key / RESULT), run.entries, run.faults, run.rubric)
         with self._lock:
@@ -108,8 +190,8 @@ class Submissions:
         return found[1]
 
 
-def _each(batch: BatchFolder) -> Iterator[BatchFolder]:
-    """The batch as if it had one submission only, for each of them."""
+def _each(batch: BatchFolder) -> Iterator[tuple[str, BatchFolder]]:
+    """Yield for each submission its key, and the batch as if it had no other."""
     run = batch.run
     ones: list[tuple[str, dict[str, Any]]] = [
         *((entry.id, {"entries": (entry,), "faults": ()}) for entry in run.entries),
@@ -117,14 +199,10 @@ def _each(batch: BatchFolder) -> Iterator[BatchFolder]:
     ]
     known: set[str] = set()
     for name, update in ones:
-        if safe_name(name).casefold() not in known:
-            known.add(safe_name(name).casefold())
-            yield BatchFolder(batch.path, run.model_copy(update=update))
-
-
-def _key(one: BatchFolder) -> str:
-    names = [*(entry.id for entry in one.run.entries), *(fault.id or "" for fault in one.run.faults)]
-    return safe_name(names[0])
+        key = safe_name(name)
+        if key.casefold() not in known:
+            known.add(key.casefold())
+            yield key, BatchFolder(batch.path, run.model_copy(update=update))
 
 
 def item_of(row: Row) -> Item:
@@ -145,7 +223,41 @@ def item_of(row: Row) -> Item:
         kinds=_kinds(result, waiting),
         late=result.late is not None and result.late.late_s > 0,
         gradable=kind not in {MISSING, ROSTER},
+        lines=_lines(result),
     )
+
+
+_diagnosis = lru_cache(maxsize=20_000)(reduced)
+
+
+def _lines(result: GradingResult) -> dict[str, Line]:
+    """What is to be said of each criterion; of what could not be graded, only what a person has decided."""
+    decided = {override.criterion: override for override in result.overrides}
+    found = {}
+    for criterion in result.criteria:
+        by = decided.get(criterion.id)
+        if result.error is not None and by is None and criterion.status is not Status.MANUAL:
+            continue
+        kinds = {
+            "open": by is None and criterion.status.is_open and criterion.counts,
+            "lost": criterion.status.is_lost,
+            "decided": by is not None,
+            "changed": by is not None and by.changed,
+            ALL: True,
+        }
+        automatic = by.automatic if by else criterion
+        said = line(automatic.message, SAID_CHARS)
+        found[criterion.id] = Line(
+            status=criterion.status,
+            points=criterion.points,
+            full=criterion.full,
+            kinds=frozenset(kind for kind, holds in kinds.items() if holds),
+            diagnosis=_diagnosis(said) if automatic.status.is_lost else "",
+            said=said,
+            author=by.author if by else "",
+            waits=automatic.status.is_open and criterion.counts,
+        )
+    return found
 
 
 def _kinds(result: GradingResult, waiting: dict[Status, int]) -> frozenset[str]:
@@ -169,18 +281,20 @@ def stamp_of(path: Path) -> Stamp:
 
 
 WORDS_CHARS = 100
+SAID_CHARS = 300
 
 
 @dataclass(frozen=True, kw_only=True)
 class Navigation:
     """`shown` are the submissions that the filter `kind` and the words `q` show, `counts` how many each filter has.
 
-    `before` and `after` are the keys of the neighbours of the submission one is at, empty where there is none; it need
-    not be shown itself, as it may have left the filter by what was decided. `position` counts from 1, 0 for that.
+    `before` and `after` are the addresses of the neighbours of the submission one is at, empty where there is none; it
+    need not be shown itself, as it may have left the filter by what was decided. `position` counts from 1, 0 for that.
     """
 
     kind: str
     q: str
+    criterion: str
     shown: Sequence[Item]
     counts: Mapping[str, int]
     total: int
@@ -191,27 +305,68 @@ class Navigation:
     @property
     def kept(self) -> dict[str, Any]:
         """What addresses carry so that one stays in the same list."""
-        given = {"show": "" if self.kind == ALL else self.kind, "q": self.q}
+        given = {"c": self.criterion, "show": "" if self.kind == ALL else self.kind, "q": self.q}
         return {name: value for name, value in given.items() if value}
+
+    @property
+    def filters(self) -> Mapping[str, str]:
+        """The filters that there are, with what they are called."""
+        return FILTERS_OF_ONE if self.criterion else FILTERS
 
 
 def place_of(items: Sequence[Item], asked: Mapping[str, str], *, at: str = "") -> Navigation:
     """Return the place that an address or a form asks for; what it asks for and is not known is left out."""
+    criterion = asked.get("c", "")
+    criterion = criterion if any(criterion in item.lines for item in items) else ""
+    filters = FILTERS_OF_ONE if criterion else FILTERS
     kind = asked.get("show", ALL)
-    kind = kind if kind in FILTERS else ALL
+    kind = kind if kind in filters else ALL
     q = asked.get("q", "").strip()[:WORDS_CHARS]
-    shown = [item for item in items if item.fits(kind, q)]
+    shown = [item for item in items if item.fits(kind, q, criterion)]
     here = next((i for i, item in enumerate(items) if item.key == at), -1)
     ahead = {item.key for item in items[:here]} if here > 0 else set()
-    left = [item.key for item in shown if item.key in ahead]
-    right = [item.key for item in shown if item.key not in ahead and item.key != at]
+    left = [item.address for item in shown if item.key in ahead]
+    right = [item.address for item in shown if item.key not in ahead and item.key != at]
     return Navigation(
         kind=kind,
         q=q,
+        criterion=criterion,
         shown=shown,
-        counts={name: sum(name in item.kinds for item in items) for name in FILTERS},
+        counts={name: sum(name in item.kinds_of(criterion) for item in items) for name in filters},
         total=len(items),
         before=left[-1] if left else "",
         after=right[0] if right else "",
         position=len(left) + 1 if any(item.key == at for item in shown) else 0,
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Across:
+    """One criterion across the class: how many submissions each filter has, and the address of the first open one,
+    empty where none is open."""
+
+    id: str
+    title: str
+    counts: Mapping[str, int]
+    first: str
+
+
+def across(items: Sequence[Item], criteria: Iterable[tuple[str, str]]) -> list[Across]:
+    """Return this of each of these criteria (id, title), those with most open ones first."""
+    found = []
+    for name, title in criteria:
+        kinds = [(item.address, item.kinds_of(name)) for item in items]
+        counts = {kind: sum(kind in those for _, those in kinds) for kind in FILTERS_OF_ONE}
+        first = next((address for address, those in kinds if "open" in those), "")
+        found.append(Across(id=name, title=title, counts=counts, first=first))
+    return sorted(found, key=lambda one: -one.counts["open"])
+
+
+def alike(items: Iterable[Item], criterion: str, diagnosis: str) -> list[Item]:
+    """Return those with that diagnosis of the criterion that no one has decided and that are open or lost."""
+    lines = ((item, item.lines.get(criterion)) for item in items)
+    return [
+        item
+        for item, one in lines
+        if one and one.diagnosis == diagnosis and one.kinds & {"open", "lost"} and "decided" not in one.kinds
+    ]

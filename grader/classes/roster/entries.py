@@ -6,8 +6,8 @@ import difflib
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
@@ -37,7 +37,10 @@ def _found(row: Row, names: dict[str, str], table: Table, path: Path, local: Loc
     faults = tuple(_faults(fields, base, local))
     extra = {column: field for column, field in row.fields.items() if column not in names}
     entry = None if faults else _entry(fields, extra, where, base)
-    return Found(where=where, id=fields.get("id", ""), entry=entry, faults=faults)
+    name, group = fields.get("name", ""), fields.get("group", "")
+    return Found(
+        where=where, id=fields.get("id", ""), entry=entry, faults=faults, name=name, group=group, extra=extra
+    )
 
 
 def _faults(fields: dict[str, str], base: Path, local: Local) -> Iterator[str]:
@@ -79,30 +82,43 @@ ID_BYTES_MAX = 255
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
-    """One submission, or what was meant for one. `id` is empty where it has none, `entry` None where it has faults."""
+    """One submission, or what was meant for one. `id` is empty where it has none, `entry` None where it has faults;
+    `name`, `group` and `extra` are what is known of the student even then."""
 
     where: str
     id: str = ""
     entry: Entry | None = None
     faults: tuple[str, ...] = ()
+    name: str = ""
+    group: str = ""
+    extra: Mapping[str, str] = field(default_factory=dict)
 
 
 def gather(file: Path, found: Sequence[Found], *, columns: tuple[str, ...] = ()) -> Roster:
     """The first of those that share an id stays; each later one is a fault that says where the first is."""
     times = Counter(_key(one.id) for one in found)
     first: dict[str, str] = {}
-    entries, faults = [], []
+    entries: list[Entry] = []
+    again: list[Entry] = []
+    faults: list[RosterFault] = []
     for one in found:
         key = _key(one.id)
         wrong = [*one.faults, *id_faults(one.id)]
-        if key and key in first:
+        sound = not wrong
+        is_again = bool(key) and key in first
+        if is_again:
             wrong.append(f"id: {brief(one.id)} is there already, in {first[key]}")
         first.setdefault(key, one.where)
         own = one.id if key and times[key] == 1 and not any(id_faults(one.id)) else None
-        faults += [RosterFault(where=one.where, id=own, text=text) for text in wrong]
-        if not wrong and one.entry is not None:
-            entries.append(one.entry)
-    return Roster(file=str(file), entries=tuple(entries), columns=columns, faults=tuple(faults))
+        faults += [
+            RosterFault(where=one.where, id=own, text=text, name=one.name, group=one.group, extra=one.extra)
+            for text in wrong
+        ]
+        if sound and one.entry is not None:
+            (again if is_again else entries).append(one.entry)
+    return Roster(
+        file=str(file), entries=tuple(entries), columns=columns, faults=tuple(faults), again=tuple(again)
+    )
 
 
 def id_faults(submission_id: str) -> Iterator[str]:
@@ -135,17 +151,17 @@ KNOWN = (*REQUIRED, *OPTIONAL)
 NEARLY = 0.82
 
 
-def known_columns(table: Table, path: Path) -> dict[str, str]:
+def known_columns(table: Table, path: Path, required: Sequence[str] = REQUIRED) -> dict[str, str]:
     """The name of each column that means something. Raises UsageError where one is missing, or is there twice."""
     names = {column: _plain(column) for column in table.columns}
-    missing = [name for name in REQUIRED if name not in names.values()]
+    missing = [name for name in required if name not in names.values()]
     where = f"{path}:{table.line}"
     if missing:
         there = ", ".join(brief(column) for column in table.columns if column) or "none"
         meant = "; ".join(meant for _, meant in near_misses(table.columns))
         raise UsageError(
             f"{where}: no column {' and no column '.join(missing)}; there are: {there}",
-            hint=meant or "the first line names the columns: id,source",
+            hint=meant or f"the first line names the columns: {','.join(required)}",
         )
     written = [names[column] if names[column] in KNOWN else column for column in table.columns if column]
     double = next((name for name in written if written.count(name) > 1), None)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from grader.errors import HostError, SubmissionError, UsageError
 from grader.files import atomic_write, temporary_folder
+from grader.installable import install_extra
 from grader.intake import IntakeLimits
 from grader.intake.archive import unpack
 from grader.model.record import Record
@@ -16,7 +17,6 @@ from grader.report.text import csv_text, json_text
 from grader.workers import Worker, WorkerEnded, WorkerLimits
 
 THRESHOLD = 0.8
-INSTALL = "pip install 'ros-lab-grader[similarity]'"
 LIMITS = WorkerLimits(memory_bytes=6 << 30, cpu_s=1800, wall_s=1800)
 REASON_CHARS = 200
 HEAD = (
@@ -65,7 +65,9 @@ def compare(
 def require_library() -> None:
     """Raise UsageError if the extra is not installed."""
     if find_spec("copydetect") is None:
-        raise UsageError("comparing submissions needs copydetect, which is not installed", hint=INSTALL)
+        raise UsageError(
+            "comparing submissions needs copydetect, which is not installed", hint=install_extra("similarity")
+        )
 
 
 def _unpack(path: Path, into: Path) -> Path:

@@ -6,7 +6,7 @@ const told = (form, text, bad) => {
   place.classList.toggle("bad", Boolean(bad));
 };
 
-const typed = (form) => JSON.stringify([...form.querySelectorAll("input:not([type=hidden]), textarea")].map((field) => field.value));
+const typed = (form) => JSON.stringify([...form.querySelectorAll("input:not([type=hidden]), textarea")].map((field) => (field.type === "checkbox" ? field.checked : field.value)));
 
 const settle = (form) => {
   form.dataset.at = typed(form);
@@ -25,6 +25,7 @@ const put = (form, answer) => {
   card.dataset.status = answer.status;
   form.elements.seen.value = answer.seen;
   form.querySelector("[value=remove]").hidden = !answer.decided;
+  form.querySelector("[value=undo]").hidden = !answer.together;
   document.getElementById("total").textContent = answer.total;
 };
 
@@ -44,8 +45,12 @@ const send = async (form, submitter) => {
       form.closest(".card")?.querySelector(".notes").scrollIntoView({ block: "nearest" });
       return;
     }
-    if (body.get("do") === "remove" && typed(form) === before) form.querySelectorAll("input[type=text], textarea").forEach((field) => { field.value = ""; });
-    if (body.get("do") === "remove" || typed(form) === before) settle(form);
+    const gone = ["remove", "undo"].includes(body.get("do"));
+    if (gone && typed(form) === before) {
+      form.querySelectorAll("input[type=text], textarea").forEach((field) => { field.value = ""; });
+      form.querySelectorAll("input[type=checkbox]").forEach((field) => { field.checked = false; });
+    }
+    if (gone || typed(form) === before) settle(form);
     told(form, answer.said);
     if (answer.author !== undefined) document.querySelector(".author").textContent = answer.author || "no name";
     const anew = document.getElementById("anew");
@@ -59,7 +64,7 @@ const send = async (form, submitter) => {
 };
 
 document.addEventListener("submit", (event) => {
-  if (event.target.method !== "post") return;
+  if (event.target.method !== "post" || "plain" in event.target.dataset) return;
   event.preventDefault();
   send(event.target, event.submitter);
 });
@@ -91,16 +96,26 @@ const step = (by) => {
 const STEPS = { j: 1, ArrowRight: 1, k: -1, ArrowLeft: -1 };
 
 document.addEventListener("keydown", (event) => {
-  const field = event.target.closest("input, textarea, select");
+  const field = event.target.closest("input:not([type=checkbox]), textarea, select");
   if (field && event.key === "Escape") field.blur();
   if (field && event.key === "Enter" && (event.ctrlKey || event.metaKey) && field.form) field.form.requestSubmit(field.form.querySelector("[value=save]"));
-  if (field || event.ctrlKey || event.metaKey || event.altKey || event.shiftKey || event.defaultPrevented) return;
+  if (field || event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
+  const help = document.getElementById("keys");
+  if (event.key === "?" && !help.open) help.showModal();
+  if (event.shiftKey || help?.open) return;
   const listing = document.body.classList.contains("listing");
   const by = STEPS[event.key] || (listing && { ArrowDown: 1, ArrowUp: -1 }[event.key]);
   if (by) {
     event.preventDefault();
     step(by);
   }
+  const on = document.body.classList.contains("by-criterion") && document.querySelector("form.decide [value=next]");
+  if (event.key === "Enter" && on && !event.target.closest("a, button, summary")) {
+    event.preventDefault();
+    on.form.requestSubmit(on);
+  }
+  const comment = /^[1-9]$/.test(event.key) && document.querySelectorAll("form.decide")[0]?.querySelectorAll("[name=bank]")[event.key - 1];
+  if (comment) comment.click();
   if (event.key === "e") {
     const first = document.querySelector(".decisions form.decide input[type=text]");
     if (first && first.offsetParent) {
