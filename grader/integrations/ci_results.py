@@ -15,7 +15,9 @@ from grader.errors import ExitCode, GraderError, OutputError, PackageNotFound, S
 from grader.files import atomic_write, make_folder
 from grader.model.result import GradingResult
 from grader.report.forms import FORMS, ReportInput
-from grader.report.view import arrange
+from grader.report.markdown import render_markdown
+from grader.report.sentences import RUBRIC_FROM
+from grader.report.view import arrange, hidden_ids
 from grader.rubric.model import Rubric
 from grader.wording import number
 
@@ -76,6 +78,17 @@ class Graded:
     folder: Path
     prefix: str
 
+    @property
+    def title(self) -> str:
+        """The outcome in a few words; a rubric that the student can change is never a plain pass."""
+        judged = self.outcome not in (Outcome.NOT_GRADED, Outcome.WRONG_INPUT)
+        theirs = judged and self.result.rubric_origin == "submission"
+        return (
+            f"{TITLES[self.outcome]}, by a rubric {RUBRIC_FROM['submission']}"
+            if theirs
+            else TITLES[self.outcome]
+        )
+
 
 def outcome_of_error(error: GraderError) -> Outcome:
     """Return the outcome of a job without any result."""
@@ -106,6 +119,18 @@ def points_to_pass(rubric: Rubric, points: float) -> str:
         return "to pass, every visible criterion has to be met"
     needed = rubric.pass_mark * points / (rubric.max_points or 1)
     return f"to pass, it takes {number(needed)}"
+
+
+def summarize(graded: Graded) -> str:
+    """Return the report as Markdown, of what was asked for alone: with one verdict, that of the job."""
+    if graded.counted is graded.result:
+        report = graded.folder / "report.md"
+        return report.read_text(encoding="utf-8") if report.is_file() else ""
+    mark, rubric = graded.rubric.pass_mark, graded.rubric
+    if mark is not None:
+        share = graded.counted.max_points / (rubric.max_points or 1)
+        rubric = rubric.model_copy(update={"pass_mark": mark * share})
+    return render_markdown(graded.counted, rubric, hidden=len(hidden_ids(rubric)))
 
 
 def _describe_error(result: GradingResult) -> tuple[str, str]:

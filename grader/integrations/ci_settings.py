@@ -34,7 +34,7 @@ MARK_HINT = "write points (12.5) or a percentage of the visible points (60%)"
 class Settings:
     """`lab` is a rubric's id or file, or None if the package's name decides. `package` is the name of the package to
     grade in place of the lab's, or "". `fail_on` holds the outcomes that fail the job. `out` is the
-    folder for the reports."""
+    folder for the reports, `repository` the student's checkout, as the system names it."""
 
     lab: str | None
     path: Path
@@ -44,6 +44,7 @@ class Settings:
     static: bool
     sandbox: SandboxMode
     out: Path
+    repository: Path | None = None
 
 
 def read_settings(variables: Mapping[str, str]) -> Settings:
@@ -54,6 +55,7 @@ def read_settings(variables: Mapping[str, str]) -> Settings:
     def given(name: str) -> str:
         return variables.get(f"GRADER_{name}", "").strip()
 
+    workspace = variables.get("GITHUB_WORKSPACE") or variables.get("CI_PROJECT_DIR")
     return Settings(
         lab=given("LAB") or None,
         path=Path(given("PATH") or "."),
@@ -63,6 +65,7 @@ def read_settings(variables: Mapping[str, str]) -> Settings:
         static=_yes(given("STATIC")),
         sandbox=_sandbox(given("SANDBOX")),
         out=Path(given("OUT") or OUT),
+        repository=Path(workspace) if workspace else None,
     )
 
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from grader.errors import GraderError, OutputError
-from grader.integrations.ci_results import TITLES, Graded, Outcome, outcome_of_error
+from grader.integrations.ci_results import TITLES, Graded, Outcome, outcome_of_error, summarize
 from grader.report.annotations import EACH_MAX, github_annotation, render_annotations
 from grader.report.classroom import render_classroom
 from grader.report.findings import Severity
@@ -42,13 +42,11 @@ class GitHub:
 
     def tell(self, graded: Graded) -> None:
         """Write the annotations, summary and outputs of a result. Raises OutputError."""
-        result = graded.result.model_copy(update={"error": None})  # it is in `text`, with whose fault it is
+        result = graded.counted.model_copy(update={"error": None})  # it is in `text`, with whose fault it is
         text = "\n".join(part for part in (graded.message, graded.hint) if part)
-        _print(github_annotation(_severity(graded), TITLES[graded.outcome], text))
+        _print(github_annotation(_severity(graded), graded.title, text))
         _print(render_annotations(result, graded.prefix, each_max=EACH_MAX - 1))
-        report = graded.folder / "report.md"
-        summary = report.read_text(encoding="utf-8") if report.is_file() else ""
-        self._add(self._summary, f"{_heading(graded.outcome, graded.message)}\n\n{summary}\n")
+        self._add(self._summary, f"{_heading(graded.title, graded.message)}\n\n{summarize(graded)}\n")
         self._write_outputs(_values(graded))
 
     def tell_error(self, error: GraderError) -> None:
@@ -57,7 +55,8 @@ class GitHub:
         text = "\n".join(part for part in (error.message, error.hint) if part)
         _print(github_annotation(Severity.ERROR, TITLES[outcome], text))
         self._add(
-            self._summary, f"{_heading(outcome, error.message)}\n\n{markdown(line(error.hint, LINE_CHARS))}\n"
+            self._summary,
+            f"{_heading(TITLES[outcome], error.message)}\n\n{markdown(line(error.hint, LINE_CHARS))}\n",
         )
         self._write_outputs({"status": outcome.value, "passed": "false"})
 
@@ -91,19 +90,20 @@ def _values(graded: Graded) -> dict[str, str]:
         "max-points": number(graded.counted.max_points),
         "status": graded.outcome.value,
         "passed": str(passed).lower(),
+        "rubric-origin": graded.result.rubric_origin or "",
         "report": str(report) if report.is_file() else "",
         "result": encoded,
     }
 
 
 def _severity(graded: Graded) -> Severity:
-    if graded.outcome is Outcome.PASSED:
+    if graded.outcome is Outcome.PASSED and graded.result.rubric_origin != "submission":
         return Severity.NOTICE
     return Severity.ERROR if graded.fails else Severity.WARNING
 
 
-def _heading(outcome: Outcome, text: str) -> str:
-    return f"**{TITLES[outcome]}:** {markdown(line(text, LINE_CHARS))}"
+def _heading(title: str, text: str) -> str:
+    return f"**{title}:** {markdown(line(text, LINE_CHARS))}"
 
 
 def _print(text: str) -> None:

@@ -33,6 +33,7 @@ class GitLab:
                 "GRADER_POINTS": number(graded.counted.points) if counted else "",
                 "GRADER_MAX_POINTS": number(graded.counted.max_points),
                 "GRADER_STATUS": graded.outcome.value,
+                "GRADER_RUBRIC_ORIGIN": graded.result.rubric_origin or "",
             }
         )
 

@@ -88,6 +88,37 @@ def test_the_container_can_hold_a_sandbox_and_reaches_nothing_else(runner, docke
     assert all(path.startswith(str(runner.temp)) for path in writable)
 
 
+CURL = """#!/bin/sh
+printf '%s\\n' "$*" >"{notes}"
+while [ "$1" != --output ]; do shift; done
+[ "{code}" -ne 0 ] || printf 'a rubric' >"$2"
+exit {code}
+"""
+
+
+@pytest.mark.parametrize("code", [0, 22])
+def test_a_rubric_by_its_address_is_fetched_before_the_container_that_has_no_network(
+    runner, docker, tmp_path, code
+):
+    place, asked = docker
+    place()
+    curl = tmp_path / "bin" / "curl"
+    curl.write_text(CURL.format(notes=tmp_path / "curl", code=code))
+    curl.chmod(0o755)
+    digest = "a" * 64
+    ran = runner.use(container="always", lab=f"https://course.example/lab1.yaml#sha256:{digest}")
+    words = (tmp_path / "curl").read_text()
+    assert words.endswith("-- https://course.example/lab1.yaml\n")
+    assert "--proto =https" in words
+    if code:
+        assert (ran.code, ran.outputs["status"], asked("run")) == (3, "not-graded", []), ran.log
+        return
+    ((arguments, variables),) = asked("run")
+    file, _, pin = variables["GRADER_LAB"].partition("#")
+    assert pin == f"sha256:{digest}"
+    assert f"type=bind,source={file},target={file},readonly" in arguments
+
+
 def test_an_image_of_the_courses_own_is_not_built(runner, docker):
     place, asked = docker
     place()

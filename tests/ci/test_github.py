@@ -26,6 +26,7 @@ def test_a_package_without_mistakes_passes(runner):
     assert ran.annotations("error") == []
     assert ran.summary.startswith("**Passed:** 20 of 20 points that can be judged from the files alone")
     assert {path.name for path in ran.artifact.iterdir()} >= {*REPORTS, "evidence", "console.log"}
+    assert "ot settled" not in ran.log + ran.summary
     assert ran.outputs["report"] == f"{ran.artifact}/report.html"
     assert ran.outputs["results"] == str(ran.artifact)
     seen = reporter(ran.outputs["result"])
@@ -253,3 +254,33 @@ def test_nodes_are_run_and_every_report_is_kept(runner):
     assert "numeric-rate: 0/5 points" in "".join(told.get("title", "") for _, told, _ in ran.heard)
     assert (ran.artifact / "evidence" / "talker.mcap").is_file()
     assert "sandbox: " in ran.log
+
+
+FORGED = """schema: grader.rubric/1
+id: leeds-comp3631-lab1
+title: Lab 1
+version: "1"
+package: lab1
+scenarios: {}
+criteria:
+  - {id: there, title: There is a package, points: 100, check: manifest, with: {name: lab1}}
+"""
+
+
+def test_a_rubric_of_the_students_own_is_no_plain_pass_and_a_pinned_one_is_the_courses(runner):
+    package = handed_in(runner.workspace)
+    (package / "src" / "numeric_talker.py").unlink()
+    (runner.workspace / "lab.yaml").write_text(FORGED)
+    ran = runner.use(static="true", lab="lab.yaml")
+    assert (ran.code, ran.outputs["status"], ran.outputs["rubric-origin"]) == (0, "passed", "submission"), (
+        ran.log
+    )
+    assert ran.annotations("notice") == []
+    assert ran.annotations("warning")[0].startswith("Passed, by a rubric from the student's repository: ")
+    assert ran.summary.startswith("**Passed, by a rubric from the student's repository:**")
+    assert "(from the student's repository)" in ran.log
+
+    pinned = "c" * 64
+    ran = runner.use(static="true", lab=f"lab.yaml#sha256:{pinned}")
+    assert (ran.code, ran.outputs["status"]) == (2, "wrong-input"), ran.log
+    assert f"not sha256:{pinned}" in ran.annotations("error")[0]

@@ -60,7 +60,7 @@ def test_no_security_fault_is_known_of_the_workflows(tmp_path):
     """The examples name this action by its tag: users of hashes are told how. Everything else is pinned."""
     (tmp_path / "zizmor.yml").write_text(
         "rules:\n  unpinned-uses:\n    config:\n      policies:\n"
-        "        OWNER/ros-lab-grader: ref-pin\n        classroom-resources/*: ref-pin\n        '*': hash-pin\n"
+        "        OWNER/ros-lab-grader: ref-pin\n        '*': hash-pin\n"
     )
     assert (
         _faults(

@@ -1,0 +1,279 @@
+"""Is a result what it says? Its evidence is judged again, and everything that does not fit is named.
+
+    result.json, evidence/ → judge again by the rubric → criterion by criterion, total
+    SHA256SUMS, .sig       → who signed, and which files are not what was signed
+    another result.json    → what a student's own run and the official one have in common
+
+Nothing is run, and nothing is written.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from grader import __version__
+from grader.errors import EvidenceError
+from grader.evidence.reader import load_evidence
+from grader.evidence.run import Run
+from grader.judging import judge
+from grader.judging.settle import settle
+from grader.judging.summary import overall_status, total_fields
+from grader.model.result import Automatic, CriterionResult, GradingResult, Lateness
+from grader.report.result_json import result_text
+from grader.report.sentences import RUBRIC_FROM
+from grader.report.view import hidden_ids, without_hidden
+from grader.results import EVIDENCE, RESULT, read_result_file
+from grader.rubric.load import LoadedRubric
+from grader.signing import Signature, changed_files, read_signature
+from grader.wording import number, plural
+
+About = Literal["rubric", "result", "evidence", "signature", "code", "grader"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """What was found about a part. With `wrong`, the result is not to be trusted for it."""
+
+    about: About
+    text: str
+    wrong: bool = True
+
+
+def result_folders(paths: list[Path]) -> list[Path]:
+    """Return the folders of the results that these stand for: `result.json`, its folder, or a folder of such folders.
+
+    Raises EvidenceError where there is none.
+    """
+    found = []
+    for path in paths:
+        folder = path.parent if path.is_file() else path
+        inside = (
+            [folder] if (folder / RESULT).is_file() else sorted(p.parent for p in folder.glob(f"*/{RESULT}"))
+        )
+        if not inside:
+            raise EvidenceError(
+                f"{path}: there is no {RESULT}", hint="give the folder of a submission's results"
+            )
+        found += inside
+    return found
+
+
+def read_whole(folder: Path) -> GradingResult:
+    """Read the result in a folder. Raises EvidenceError where it cannot be read."""
+    try:
+        result = read_result_file(folder / RESULT)
+    except OSError as error:
+        raise EvidenceError(f"{folder / RESULT} cannot be read: {error.strerror}") from error
+    if result is None:
+        raise EvidenceError(
+            f"{folder / RESULT} is not a result", hint="it was damaged, or is not the grader's"
+        )
+    return result
+
+
+def verify(folder: Path, rubric: LoadedRubric, allowed: Path | None) -> list[Finding]:
+    """Judge the evidence in a result's folder again, and return what was found about result, rubric, evidence and
+    signature. Raises EvidenceError where there is nothing to judge."""
+    result = read_whole(folder)
+    if result.error is not None:
+        raise EvidenceError(
+            f"{folder}: it was not graded, so there is nothing to judge: {result.error.message}"
+        )
+    found = [*_rubric_findings(result, rubric), *_signature_findings(folder, allowed)]
+    try:
+        runs = load_evidence([folder / EVIDENCE])
+    except EvidenceError as error:
+        return [*found, Finding(about="evidence", text=error.message)]
+    return [*found, *_evidence_findings(result, runs), *_result_findings(result, runs, rubric)]
+
+
+def _rubric_findings(result: GradingResult, rubric: LoadedRubric) -> Iterator[Finding]:
+    used, lab = result.rubric, rubric.rubric
+    if (used.id, used.digest) == (lab.id, rubric.digest):
+        words = f"{lab.id}, digest {rubric.digest[:12]}"
+        yield Finding(about="rubric", text=f"{words} ({RUBRIC_FROM[rubric.origin]})", wrong=False)
+        return
+    origin = RUBRIC_FROM[result.rubric_origin]
+    words = f"it was judged by {used.id} with digest sha256:{used.digest}{f' ({origin})' if origin else ''}"
+    yield Finding(about="rubric", text=f"{words}, not by {lab.id} with digest sha256:{rubric.digest}")
+
+
+def _signature_findings(folder: Path, allowed: Path | None) -> Iterator[Finding]:
+    """Unsigned, or signed by a key without a name, is wrong only where signers are asked for."""
+    signature = read_signature(folder, allowed)
+    yield Finding(
+        about="signature",
+        text=_signature_words(signature, asked=allowed is not None),
+        wrong=signature.state == "bad" or (allowed is not None and signature.state != "good"),
+    )
+    if signature.state == "unsigned":
+        return
+    for name, what in sorted(changed_files(folder).items()):
+        text = (
+            f"{name} was {what} since it was signed"
+            if what != "missing"
+            else f"{name} was signed, and is gone"
+        )
+        yield Finding(about="result" if name == RESULT else "evidence", text=text)
+
+
+def _signature_words(signature: Signature, *, asked: bool) -> str:
+    if signature.state == "unsigned":
+        return "not signed: if result and evidence were changed together, nobody sees it"
+    if signature.state == "bad":
+        return "SHA256SUMS is not what was signed"
+    if signature.state == "good":
+        return f"signed by {signature.by}"
+    who = "none of the allowed signers" if asked else "whose, --allowed-signers says"
+    return f"signed with the {signature.by}, {who}"
+
+
+def _evidence_findings(result: GradingResult, runs: Mapping[str, Run]) -> Iterator[Finding]:
+    """Evidence says whose it is, and of which files."""
+    for key, said in (("commit", result.submission.commit or ""), ("digest", result.submission.digest)):
+        other = {
+            run.metadata.get(f"submission.{key}", said) for name, run in runs.items() if "/" not in name
+        } - {said}
+        if other:
+            text = (
+                f"it is of a submission with the {key} {min(other)[:40] or 'none'}, not {said[:40] or 'none'}"
+            )
+            yield Finding(about="evidence", text=text)
+
+
+def _result_findings(
+    result: GradingResult, runs: Mapping[str, Run], rubric: LoadedRubric
+) -> Iterator[Finding]:
+    again = _judge_again(result, runs, rubric)
+    before, after = ({c.id: c for c in one.criteria} for one in (result, again))
+    differing = []
+    for name in dict.fromkeys((*before, *after)):
+        text = _difference(before.get(name), after.get(name))
+        differing += [f"{name}: {text}"] if text else []
+    for said, now in zip(result.overrides, again.overrides, strict=False):
+        if _verdict(said.automatic) != _verdict(now.automatic):
+            words = f"{_verdict(said.automatic)}; the evidence gives {_verdict(now.automatic)}"
+            differing.append(f"{said.criterion}: before a person decided, result.json says {words}")
+    late = _unknown_terms(result, rubric)
+    for key in ("status", "points", "max_points", "gate"):
+        told = late.points_before if late and key == "points" else getattr(result, key)
+        if told != (now := getattr(again, key)):
+            differing.append(f"{key}: result.json says {told}, it comes to {now}")
+    if late:
+        cost = f"{number(late.points_before)} points before, {number(result.points)} after"
+        words = f"{late.text} ({cost}), by a deadline that this rubric does not have: course.yaml#LAB has it"
+        fits = late.points == result.points <= late.points_before
+        yield Finding(about="rubric", text=words, wrong=not fits)
+    yield from (Finding(about="result", text=text) for text in differing)
+    yield from _remarks(result, again)
+    if not differing:
+        judged = plural(len(before), "criterion", "criteria")
+        text = f"{judged} and {number(result.points)} points, as the evidence gives"
+        yield Finding(about="result", text=text, wrong=False)
+
+
+def _unknown_terms(result: GradingResult, rubric: LoadedRubric) -> Lateness | None:
+    """Return what being late cost by a course's terms, which its labs' rubrics do not have."""
+    return None if rubric.rubric.deadline or rubric.rubric.late else result.late
+
+
+def _remarks(result: GradingResult, again: GradingResult) -> Iterator[Finding]:
+    """What changes no points. Words differ from one build of the grader to the next."""
+    texts = {c["id"]: c for c in json.loads(result_text(again))["criteria"]}
+    said = {c["id"]: c for c in json.loads(result_text(result))["criteria"]}
+    other = [name for name in said if name in texts and said[name] != texts[name]]
+    if other:
+        text = f"worded otherwise, by another build of the grader or by hand: {', '.join(other)}"
+        yield Finding(about="result", text=text, wrong=False)
+    if result.environment.grader != __version__:
+        text = f"graded by {result.environment.grader}, judged again by {__version__}"
+        yield Finding(about="grader", text=text, wrong=False)
+    if result.overrides:
+        who = ", ".join(sorted({o.author or "someone unnamed" for o in result.overrides}))
+        text = f"people decided {plural(len(result.overrides), 'criterion', 'criteria')}: {who}"
+        yield Finding(about="result", text=text, wrong=False)
+
+
+def _judge_again(result: GradingResult, runs: Mapping[str, Run], rubric: LoadedRubric) -> GradingResult:
+    """Return what the evidence comes to with what people decided and what being late costs, as the result has them."""
+    lab = rubric.rubric
+    criteria = judge(lab, runs, rubric.checks, rubric.handed_out)
+    fresh = {
+        "criteria": criteria,
+        "status": overall_status(criteria),
+        **total_fields(lab, criteria),
+        "max_points": lab.max_points,
+        "overrides": (),
+        "handed_in": None,
+        "late": None,
+    }
+    automatic = result.model_copy(update=fresh)
+    if result.overrides or result.handed_in or result.late:
+        automatic = settle(
+            automatic,
+            lab,
+            overrides={override.criterion: override for override in result.overrides},
+            handed_in=result.handed_in,
+            before=result.overrides,
+        )
+    shown = {criterion.id for criterion in result.criteria}
+    return automatic if shown & hidden_ids(lab) else without_hidden(automatic, lab)
+
+
+def _difference(before: CriterionResult | None, after: CriterionResult | None) -> str:
+    if before is None or after is None:
+        return "the rubric has no such criterion" if after is None else "it is missing in result.json"
+    old, new = (f"{_verdict(c)} of {number(c.max_points)} points" for c in (before, after))
+    return "" if old == new else f"result.json says {old}; the evidence gives {new}: {after.message}"
+
+
+def _verdict(of: CriterionResult | Automatic) -> str:
+    """Return `pass, 20`."""
+    return f"{of.status.value}, {number(of.points)}"
+
+
+def compare(own: GradingResult, official: GradingResult) -> list[Finding]:
+    """Return what differs between a student's own result and the official one: code, rubric, grader, and criteria."""
+    return [*_compare_causes(own, official), *_compare_criteria(own, official)]
+
+
+def _compare_causes(own: GradingResult, official: GradingResult) -> Iterator[Finding]:
+    same = own.submission.digest == official.submission.digest
+    commits = " and ".join((one.submission.commit or "no commit")[:12] for one in (own, official))
+    words = "the same files were graded" if same else f"other files were graded ({commits})"
+    yield Finding(about="code", text=words, wrong=not same)
+    if (own.rubric.id, own.rubric.digest) != (official.rubric.id, official.rubric.digest):
+        used = [f"{one.rubric.id} {one.rubric.digest[:12]}" for one in (own, official)]
+        origin = f" ({RUBRIC_FROM[own.rubric_origin]})" if own.rubric_origin else ""
+        yield Finding(about="rubric", text=f"own run by {used[0]}{origin}, official by {used[1]}")
+    for name, one, other in zip(
+        ("grader", "ROS", "sandbox"),
+        (own.environment.grader, own.environment.ros, own.environment.sandbox),
+        (official.environment.grader, official.environment.ros, official.environment.sandbox),
+        strict=True,
+    ):
+        if one != other:
+            yield Finding(
+                about="grader", text=f"{name}: {one or 'none'}, official: {other or 'none'}", wrong=False
+            )
+
+
+def _compare_criteria(own: GradingResult, official: GradingResult) -> Iterator[Finding]:
+    mine = {criterion.id: criterion for criterion in own.criteria}
+    for theirs in official.criteria:
+        ours = mine.get(theirs.id)
+        if ours is None:
+            yield Finding(about="result", text=f"{theirs.id}: only in the official result", wrong=False)
+        elif (ours.status, ours.points) != (theirs.status, theirs.points):
+            old, new = (f"{_verdict(c)} of {number(c.max_points)}" for c in (ours, theirs))
+            yield Finding(
+                about="result", text=f"{theirs.id}: own run {old}; official {new}: {theirs.message}"
+            )
+    for name in mine.keys() - {criterion.id for criterion in official.criteria}:
+        yield Finding(about="result", text=f"{name}: only in the own run", wrong=False)
+    points = [f"{number(one.points)} of {number(one.max_points)}" for one in (own, official)]
+    yield Finding(about="result", text=f"own run {points[0]} points, official {points[1]}", wrong=False)
