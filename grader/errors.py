@@ -8,6 +8,7 @@
     │   ├── PackageNotFound     3   no package of the lab in it
     │   └── Unreachable         3   it could not be fetched: the network, the server, no git or no room here
     ├── EvidenceError           3   an evidence file cannot be read
+    ├── NotSent                 3   feedback could not be sent to one student
     ├── InternalError           3   the grader itself failed
     └── HostError               3   this machine cannot do what is asked
         ├── RosMissing          3   no ROS 1 here
@@ -95,6 +96,12 @@ class EvidenceError(GraderError):
     """Evidence or a result cannot be read, or a newer grader wrote it."""
 
     kind = "evidence"
+
+
+class NotSent(GraderError):
+    """Feedback could not be sent to one student; the others get theirs."""
+
+    kind = "feedback"
 
 
 class InternalError(GraderError):

@@ -33,6 +33,7 @@ from grader.model.result import (
     ErrorInfo,
     GradingResult,
     RubricInfo,
+    RubricOrigin,
     SubmissionInfo,
     TimingInfo,
 )
@@ -73,6 +74,7 @@ class GradingContext:
     keep_hidden: bool
     timing: Callable[[], TimingInfo]
     submission: SubmissionInfo | None = None
+    rubric_origin: RubricOrigin | None = None
 
 
 @contextmanager
@@ -183,6 +185,7 @@ def _write_error_result(fault: GraderError, context: GradingContext) -> str:
             if fault.blame != "submission" and results.complete:
                 return f"the result of an earlier run stays as it is: {folder / RESULT}"
             result = error_result(fault, submission, context.rubric, context.timing())
+            result = result.model_copy(update={"rubric_origin": context.rubric_origin})
             results.evidence.rmdir()
             rubric, hidden = context.rubric.rubric, context.keep_hidden
             write_reports(result, results.new, console="", rubric=rubric, keep_hidden=hidden)

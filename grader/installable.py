@@ -1,8 +1,9 @@
-"""ROS packages, Python modules and messages that exist: where the grading machine has them not, it lacks them."""
+"""What can be installed: ROS packages, Python modules and messages that exist, and the grader's own extras."""
 
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
@@ -62,3 +63,19 @@ def install_command(name: str, ros: str = "") -> str:
     if packages and not ros:
         return f"apt-get install {' '.join(packages)}"
     return f"apt-get install ros-{ros or 'noetic'}-{name.replace('_', '-')}, from ROS's own repository"
+
+
+def install_extra(extra: str) -> str:
+    """Return the command that adds what an extra of the grader needs (`review`) to the environment that it runs in."""
+    from importlib.metadata import requires  # noqa: PLC0415 - slow to load, and few need it
+
+    from packaging.requirements import Requirement  # noqa: PLC0415 - as above
+
+    needs = map(Requirement, requires("ros-lab-grader") or ())
+    names = " ".join(
+        f"'{need.name}{need.specifier}'"
+        for need in needs
+        if need.marker and need.marker.evaluate({"extra": extra}) and not need.marker.evaluate({"extra": ""})
+    )
+    pipx = Path(sys.prefix, "pipx_metadata.json").is_file()
+    return f"pipx inject ros-lab-grader {names}" if pipx else f"{sys.executable} -m pip install {names}"

@@ -16,6 +16,7 @@ call `grade`.
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -34,7 +35,7 @@ from grader.files import make_folder, temporary_folder
 from grader.installable import ON_THE_MACHINE
 from grader.intake import open_recorded, open_recording, open_submission
 from grader.intake.choose import Wanted
-from grader.intake.source import Source
+from grader.intake.source import Source, local_path
 from grader.judging import judge
 from grader.judging.early import judge_files
 from grader.judging.judge import judge_all_runs
@@ -61,6 +62,8 @@ from grader.report.view import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
 from grader.ros_packages import look_for
 from grader.rubric.load import LoadedRubric, files_of, needs_package, needs_ros, started
+from grader.rubric.made_up import KEY
+from grader.rubric.origin import origin_of
 from grader.rubric.rates import rates_of, watched_of
 from grader.wording import join_words
 
@@ -92,8 +95,8 @@ class GradeOptions:
     `tidy` first finishes what killed graders left beside the submission's folder; a batch does that once for all.
     `find_earlier` is called when the submission is open: a result that it returns stays, and nothing is run. `settle`
     turns the automatic result into the one that counts: overrides and deadlines. `reused` is evidence by scenario that
-    still holds: these scenarios are not run again. `stop` ends the runs in order, from another thread; then
-    `arena.asynchronous.Stopped` is raised.
+    still holds: these scenarios are not run again. `repository` is the student's, around the submission, where it is
+    known. `stop` ends the runs in order, from another thread; then `arena.asynchronous.Stopped` is raised.
     """
 
     sandbox: SandboxMode = "auto"
@@ -106,6 +109,7 @@ class GradeOptions:
     find_earlier: Callable[[SubmissionInfo], GradingResult | None] = lambda _: None
     settle: Callable[[GradingResult], GradingResult] = lambda result: result
     reused: Mapping[str, Path] = field(default_factory=dict)
+    repository: Path | None = None
     stop: Stop | None = None
 
 
@@ -132,7 +136,9 @@ def grade(
         wait_for_children(),
         open_source(source, rubric, options, progress) as submission,
     ):
+        rubric = rubric.of_submission(submission.digest)
         context.submission = submission_info(submission)
+        context.rubric_origin = origin_of(rubric, (local_path(source), options.repository))
         earlier = options.find_earlier(context.submission)
         if earlier is not None:
             return earlier
@@ -148,7 +154,7 @@ def grade(
             result = options.settle(
                 assemble_result(
                     context.submission, rubric, runs, criteria, recording=recording, timing=timing
-                )
+                ).model_copy(update={"rubric_origin": context.rubric_origin})
             )
             if options.files:
                 write(result, results, rubric, runs, keep_hidden=options.keep_hidden)
@@ -166,6 +172,7 @@ def record(
                 f"{submission.source}: there is nothing to run in it", hint="grade it, or judge it"
             )
         facts = read_facts(submission, progress)
+        rubric = rubric.of_submission(submission.digest)
         with Results(out / submission.id) as results:
             evidence = results.evidence
             with make_recorder(
@@ -210,8 +217,9 @@ def open_source(
 
 
 def wanted_package(rubric: Rubric, asked: str) -> Wanted:
-    """Return what the intake has to look for: the lab's package, or the one that was `asked` for."""
-    return Wanted(name=rubric.package, files=files_of(rubric), asked=asked)
+    """Return what the intake has to look for: the lab's packages, in place of the main one what was `asked` for."""
+    main, *others = (Wanted(name=name, files=files_of(rubric, name)) for name in rubric.package_names)
+    return replace(main, asked=asked, others=tuple(others))
 
 
 def submission_info(submission: Submission | RecordedSubmission) -> SubmissionInfo:
@@ -318,6 +326,8 @@ def read_facts(submission: Submission, progress: Progress) -> PackageFacts:
     """Return what the files say; nothing of them is executed."""
     progress.step("package", "running", "reading its files")
     facts = read_package(submission.package, hints=submission.hints)
+    if submission.also:
+        facts = facts.model_copy(update={"also": tuple(map(read_package, submission.also))})
     progress.step("package", "done")
     return facts
 
@@ -357,6 +367,7 @@ def make_recorder(
     from grader.arena.recording import Recorder  # noqa: PLC0415 - see LATER
 
     refuse_missing(rubric.rubric)
+    made_up = {KEY: json.dumps(rubric.rubric.values)} if rubric.rubric.values else {}
     return Recorder(
         submission,
         facts,
@@ -369,7 +380,7 @@ def make_recorder(
         progress=progress,
         recorded=options.reused,
         stop=options.stop,
-        about=about,
+        about={**made_up, **(about or {})},
     )
 
 

@@ -7,9 +7,11 @@ business of `judging`, what a repair is of `package.repairs`.
 from __future__ import annotations
 
 import json
+import posixpath
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from grader.files import temporary_folder
@@ -18,7 +20,7 @@ from grader.model.package import PackageFacts
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
-from grader.model.submission import Submission
+from grader.model.submission import SourcePackage, Submission
 from grader.package.manifest import parse_manifest
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.editing import MANIFEST, read_data
@@ -48,7 +50,13 @@ def choose_repairs(
     blocked = [c for c in of_files if by_id[c.id].blocked_by or c.check == BUILD]
     if not lost and not blocked:
         return (), ()
-    found = find_repairs(submission.package.folder, facts, wanted_of(rubric))
+    found = list(find_repairs(submission.package.folder, facts, wanted_of(rubric)))
+    for package, own in zip(submission.also, facts.also, strict=True):
+        way = facts.way_to(own)
+        found += [
+            one.with_paths(partial(posixpath.join, way))
+            for one in find_repairs(package.folder, own, wanted_of(rubric, own.asked))
+        ]
     counting = [one for one in found if rubric.share_of(one.kind) > 0]
     chosen = [one for one in counting if one.kind not in DONE_BEFORE_RUNS][:REPAIRS_MAX]
     built = built or not needs_build(facts)
@@ -66,27 +74,43 @@ def choose_repairs(
 def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator[Submission | None]:
     """Return the submission with a repaired copy of its package, there for as long as the block runs; None where a file
     turns out to be none that can be repaired."""
-    package = submission.package
     with temporary_folder("repaired") as folder:
-        copy = folder / package.folder.name
-        shutil.copytree(
-            package.folder, copy, symlinks=True, ignore=_left_out(package.folder, package.left_out)
-        )
-        executable = dict(package.executable)
-        for repair in repairs:
-            try:
-                apply_repair(copy, repair)
-            except (NotRepairable, OSError):
-                yield None
-                return
-            if repair.kind == "executable-bit":
-                executable[repair.file] = True
-            elif repair.kind == "file-name" and repair.before in executable:
-                executable[repair.after] = executable.pop(repair.before)
-        manifest, _ = parse_manifest(read_data(copy, MANIFEST) or b"")
-        name = manifest.name if manifest is not None else package.name
-        repaired = package.model_copy(update={"name": name, "folder": copy, "executable": executable})
-        yield submission.model_copy(update={"package": repaired})
+        try:
+            main = _repaired(submission.package, folder / "main", [r for r in repairs if not _is_of_other(r)])
+            also = tuple(
+                _repaired(package, folder / package.asked, _of(submission, package, repairs))
+                for package in submission.also
+            )
+        except (NotRepairable, OSError):
+            yield None
+            return
+        yield submission.model_copy(update={"package": main, "also": also})
+
+
+def _is_of_other(repair: Repair) -> bool:
+    return repair.file.startswith("../")
+
+
+def _of(submission: Submission, package: SourcePackage, repairs: Sequence[Repair]) -> list[Repair]:
+    """Return the repairs of a package beside the main one, with paths from its own folder."""
+    way = posixpath.relpath(package.path, submission.package.path) + "/"
+    return [r.with_paths(lambda path: path.removeprefix(way)) for r in repairs if r.file.startswith(way)]
+
+
+def _repaired(package: SourcePackage, folder: Path, repairs: Sequence[Repair]) -> SourcePackage:
+    """Return a copy of the package in `folder` with the repairs. Raises NotRepairable, OSError."""
+    copy = folder / package.folder.name
+    shutil.copytree(package.folder, copy, symlinks=True, ignore=_left_out(package.folder, package.left_out))
+    executable = dict(package.executable)
+    for repair in repairs:
+        apply_repair(copy, repair)
+        if repair.kind == "executable-bit":
+            executable[repair.file] = True
+        elif repair.kind == "file-name" and repair.before in executable:
+            executable[repair.after] = executable.pop(repair.before)
+    manifest, _ = parse_manifest(read_data(copy, MANIFEST) or b"")
+    name = manifest.name if manifest is not None else package.name
+    return package.model_copy(update={"name": name, "folder": copy, "executable": executable})
 
 
 def dump_repairs(repairs: Sequence[Repair]) -> str:

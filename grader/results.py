@@ -30,7 +30,8 @@ from grader.portable import close, open_folder
 NEW, READY = ".grader-new", ".grader-ready"
 NAMES, REPLACED = "names.json", "replaced"
 EVIDENCE, RESULT = "evidence", "result.json"
-PARTS = (RESULT, EVIDENCE, "report.md", "report.html", "junit.xml", "console.log")
+SUMS, SIGNATURE = "SHA256SUMS", "SHA256SUMS.sig"
+PARTS = (RESULT, EVIDENCE, "report.md", "report.html", "junit.xml", "console.log", SUMS, SIGNATURE)
 COMPLETE = ("graded", "inconclusive")
 ATTEMPTS = 10
 

@@ -22,7 +22,7 @@ ros_extras=(
 )
 # Program to find on PATH, and the package that has it (`ip` is for the tests of hostile submissions). The grader does
 # without those of the second line, and so do its tests: those of pages are skipped.
-tools=(bwrap:bubblewrap git:git cmake:cmake make:make g++:g++ ip:iproute2)
+tools=(bwrap:bubblewrap git:git cmake:cmake make:make g++:g++ ip:iproute2 ssh-keygen:openssh-client)
 browser_tools=(chromium:chromium node:nodejs npm:npm)
 shell_tools=(zsh:zsh fish:fish man:man-db groff:groff-base mandoc:mandoc)
 debootstrap=mmdebstrap # makes the bare Debian of the tests in fresh roots, which only root can run

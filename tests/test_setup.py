@@ -132,7 +132,7 @@ class Ready(Machine):
     ) -> subprocess.CompletedProcess[str]:
         installed = {
             "dpkg-query": 'shift 2; for name; do echo "installed $name"; done',
-            **dict.fromkeys(("bwrap", "git", "cmake", "make", "g++", "ip", *SHELLS), "exit 0"),
+            **dict.fromkeys(("bwrap", "git", "cmake", "make", "g++", "ip", "ssh-keygen", *SHELLS), "exit 0"),
         }
         here = {name: text for name, text in {**BARE, **installed, **programs}.items() if name not in without}
         return self.run(here, *arguments, rest="/nowhere")

@@ -39,8 +39,7 @@ class Parts(Record):
 def find_parts(folder: Path, facts: PackageFacts) -> Parts:
     """Python files that call `init_node`, programs of `add_executable`, launch files that can be read."""
     scripts = [f.path for f in facts.files if f.python and not f.python_fault and _is_node(folder / f.path)]
-    calls = facts.cmake.calls if facts.cmake else ()
-    programs = [c.args[0] for c in calls if c.name == "add_executable" and c.args]
+    programs = [one.name for one in facts.cmake.executables] if facts.cmake else []
     launches = [f.path for f in facts.launch_files if f.fault is None and f.path.endswith(".launch")]
     taken: set[str] = set()
     nodes = {_name(path, taken): path for path in [*scripts, *programs]}

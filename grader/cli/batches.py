@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
+from grader.classes.batch.folder import open_batch
 from grader.classes.batch.job import Executor, LocalExecutor
 from grader.classes.batch.run import BatchOptions, run_batch
+from grader.classes.course.standing import with_late_days
 from grader.classes.roster import Local, Roster
 from grader.classes.roster.entries import parse_time
 from grader.cli.class_display import open_class_display, print_batch
 from grader.cli.host_support import require_room, warn_without_sandbox
 from grader.cli.output import say_beside
-from grader.errors import ExitCode, UsageError
+from grader.errors import ExitCode, GraderError, UsageError
 from grader.model.batch import BatchRun
 from grader.portable import cores
-from grader.rubric.load import LoadedRubric, needs_ros
+from grader.rubric.course import load_course, split_name
+from grader.rubric.load import PIN, LoadedRubric, needs_ros, split_pin
 from grader.untrusted_text import line
 
 JOBS_PER_CORE = 4
@@ -33,6 +37,8 @@ def grade_class(
     as_json: bool,
 ) -> ExitCode:
     """Grade a class by the value of `--rubric`, print what came of it, and return the exit code."""
+    if of_course := split_name(split_pin(rubric)[0]):
+        roster = with_late_days(roster, load_course(of_course[0]), of_course[1])
     if needs_ros(loaded) and not (options.static_only or options.cluster):
         require_room(gradings=options.jobs)
         warn_without_sandbox(options.sandbox, loaded)
@@ -40,15 +46,32 @@ def grade_class(
         say_beside(f"roster: {fault}")
     with open_class_display() as watcher:
         chosen = executor(options, exchange)
-        folder = run_batch(roster, rubric_source(rubric), loaded, options, executor=chosen, watcher=watcher)
+        try:
+            folder = run_batch(
+                roster, rubric_source(rubric), loaded, options, executor=chosen, watcher=watcher
+            )
+        except KeyboardInterrupt:
+            _say_interrupted(options.out)
+            raise
     print_batch(folder, as_json=as_json)
     return exit_code(folder.run)
 
 
+def _say_interrupted(out: Path) -> None:
+    with suppress(GraderError):
+        counts = open_batch(out).run.counts
+        done = counts.submissions - counts.missing
+        say_beside(f"{done} of {counts.submissions} done; the same command continues")
+
+
 def rubric_source(rubric: str) -> str:
     """Return the value of `--rubric` so that it is found again from any folder."""
-    path = Path(rubric)
-    return str(path.absolute()) if path.is_file() else rubric
+    name, pin = split_pin(rubric)
+    of_course = split_name(name)
+    path = of_course[0] if of_course else Path(name)
+    if not path.is_file():
+        return rubric
+    return f"{path.absolute()}{f'#{of_course[1]}' if of_course else ''}{PIN if pin else ''}{pin}"
 
 
 def exit_code(run: BatchRun) -> ExitCode:

@@ -35,7 +35,7 @@ from grader.integrations.github import GitHub
 from grader.integrations.gitlab import GitLab
 from grader.judging.summary import overall_status, total_fields
 from grader.model.result import GradingResult
-from grader.report.sentences import without_sandbox
+from grader.report.sentences import rubric_words, without_sandbox
 from grader.report.terminal import open_console, print_report
 from grader.report.view import hidden_ids, without_hidden
 from grader.results import read_result
@@ -63,6 +63,7 @@ def run_job(system: str) -> ExitCode:
         raise
     teller.tell(graded)
     say(f"{graded.outcome.value}: {graded.message}")
+    say(f"rubric: {graded.result.rubric.id}, digest {rubric_words(graded.result)}")
     warning = without_sandbox(graded.result.environment.sandbox)
     if warning:
         say(warning)
@@ -80,7 +81,11 @@ def _graded(settings: Settings) -> Graded:
         warn_without_sandbox(settings.sandbox, rubric)
     clear(settings.out)
     options = pipeline.GradeOptions(
-        sandbox=settings.sandbox, package=settings.package, static_only=settings.static, keep_hidden=False
+        sandbox=settings.sandbox,
+        package=settings.package,
+        static_only=settings.static,
+        keep_hidden=False,
+        repository=settings.repository,
     )
     with temporary_folder("check") as folder:
         try:

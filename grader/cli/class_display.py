@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime, timedelta
+from itertools import islice
 from typing import IO
 
 from rich.console import Console, Group, RenderableType
@@ -20,14 +21,16 @@ from grader.classes.batch.progress import BatchProgress, list_attention
 from grader.classes.batch.regrade import CHANGES, Change, Regraded
 from grader.classes.batch.run import GRADEBOOK, INDEX, RESULTS, Watcher
 from grader.cli.output import say, say_json
+from grader.model.result import GradingResult
 from grader.untrusted_text import line
-from grader.wording import first_few, number
+from grader.wording import first_few, number, plural
 
 REFRESH_HZ = 4
 NAME_CHARS = 40
 TEXT_CHARS = 300
 RUNNING_SHOWN = 8
 NAMES_SHOWN = 10
+REASONS_SHOWN = 3
 CHANGES_SHOWN = 200
 MANY = 500
 """For more submissions than that, a log has a line per hundredth of them, and for each that is not graded."""
@@ -129,7 +132,7 @@ def print_batch(folder: BatchFolder, *, as_json: bool) -> None:
     for text in list_attention(folder):
         say(text)
     counts = folder.run.counts
-    parts = [f"{counts.submissions} submissions", f"{counts.graded} graded ({counts.passed} passed)"]
+    parts = [plural(counts.submissions, "submission"), f"{counts.graded} graded ({counts.passed} passed)"]
     parts += [f"{counts.inconclusive} inconclusive"] if counts.inconclusive else []
     parts += [f"{counts.error} could not be graded"] if counts.error else []
     parts += [f"{counts.missing} not graded yet"] if counts.missing else []
@@ -172,21 +175,27 @@ def _state(change: Change, which: str) -> dict[str, object] | None:
 
 
 def _regraded_lines(batch: BatchFolder, regraded: Sequence[Regraded]) -> Iterator[str]:
-    shown = 0
+    """Yield each change once, with all for whom it is the same, whose points changed, and what is left to do."""
+    same: dict[tuple[str, str], dict[str, str]] = {}
     for one in regraded:
-        if not one.changes or one.before is None or one.after is None:
-            continue
-        yield f"{one.entry.id}: {number(one.before.points)} -> {number(one.after.points)}"
         for change in one.changes:
-            shown += 1
-            if shown <= CHANGES_SHOWN:
-                before, after = (_status_and_points(change, which) for which in ("before", "after"))
-                yield f"    {change.criterion}: {before} -> {after}: {change.why}"
-    if shown > CHANGES_SHOWN:
-        yield f"{shown - CHANGES_SHOWN} more changes: {batch.path / CHANGES}"
+            before, after = (_status_and_points(change, which) for which in ("before", "after"))
+            same.setdefault((change.criterion, f"{before} -> {after}"), {})[one.entry.id] = change.why
+    for (criterion, what), reasons in islice(same.items(), CHANGES_SHOWN):
+        names = first_few(list(reasons), NAMES_SHOWN)
+        yield f"{criterion}: {what}, {plural(len(reasons), 'submission')}: {names}"
+        yield from (f"    {why}" for why in islice(dict.fromkeys(reasons.values()), REASONS_SHOWN))
+    moved = [(one, one.after.points - one.before.points) for one in regraded if one.before and one.after]
+    up, down = ([one for one, by in moved if by * sign > 0] for sign in (1, -1))
+    for word, found in (("more", up), ("fewer", down)):
+        points = [f"{one.entry.id} {_points(one.before)} -> {_points(one.after)}" for one in found]
+        if points:
+            yield f"{word} points for {len(points)}: {first_few(points, NAMES_SHOWN)}"
+    errors: dict[str, list[str]] = {}
     for one in regraded:
         if one.error:
-            yield f"{one.entry.id}: unchanged: {one.error}"
+            errors.setdefault(one.error, []).append(one.entry.id)
+    yield from (f"{first_few(names, NAMES_SHOWN)}: unchanged: {error}" for error, names in errors.items())
     missing = [one for one in regraded if one.missing]
     if missing:
         names = first_few([one.entry.id for one in missing], NAMES_SHOWN)
@@ -197,6 +206,10 @@ def _regraded_lines(batch: BatchFolder, regraded: Sequence[Regraded]) -> Iterato
     judged = sum(one.after is not None for one in regraded)
     yield f"{judged} of {len(regraded)} judged again, {changed} changed"
     yield f"{batch.path / GRADEBOOK}  {batch.path / CHANGES}"
+
+
+def _points(result: GradingResult | None) -> str:
+    return number(result.points) if result else "-"
 
 
 def _status_and_points(change: Change, which: str) -> str:

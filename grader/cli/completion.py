@@ -7,6 +7,7 @@ loading rubrics properly takes longer than anyone waits for a key.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -93,6 +94,25 @@ def selections(**_asked: object) -> dict[str, str]:
     }
 
 
+def submissions(*, parsed_args: argparse.Namespace, **_asked: object) -> dict[str, str]:
+    """Offer the ids of the class in the folder that is named already, each with the student's name."""
+    with suppress(OSError, ValueError, TypeError, AttributeError, KeyError):
+        run = json.loads(Path(parsed_args.folder, "run.json").read_bytes())
+        return {str(entry["id"]): _description(entry.get("name")) for entry in run["entries"]}
+    return {}
+
+
+def course_labs(*, parsed_args: argparse.Namespace, **_asked: object) -> dict[str, str]:
+    """Offer the labs of the course's file that is named already, each with its rubric."""
+    from grader.errors import GraderError  # noqa: PLC0415 - a build needs only `script`
+    from grader.rubric.course import load_course  # noqa: PLC0415 - as above
+
+    with suppress(OSError, ValueError, TypeError, AttributeError, GraderError):
+        labs = load_course(Path(parsed_args.course)).course.labs
+        return {name: lab.rubric for name, lab in labs.items()}
+    return {}
+
+
 def explained(*, prefix: str, parsed_args: argparse.Namespace, **_asked: object) -> dict[str, str]:
     """Offer what `grader explain` knows: checks, and criteria with their titles, after `LAB/` once that is typed."""
     rubric = getattr(parsed_args, "rubric", None)
@@ -118,11 +138,14 @@ def mistakes(*, parsed_args: argparse.Namespace, **_asked: object) -> dict[str, 
 
 BY_VALUE: dict[str, Completer] = {
     "ADDRESS": nothing,
+    "COURSE": partial(paths, endings=RUBRICS),
     "DIR": partial(paths, endings=()),
     "DIR|ZIP": partial(paths, endings=(".zip",)),
     "EVIDENCE": partial(paths, endings=RECORDINGS),
     "FILE": partial(paths, endings=None),
+    "RESULT": partial(paths, endings=(".json",)),
     "ID|FILE": labs_and_rubrics,
+    "ID": submissions,
     "LAB": lab_ids,
     "LAB|FILE": labs_and_rubrics,
     "MUTANT": mutants,
@@ -144,6 +167,8 @@ SPECIAL: dict[tuple[str, str], Completer] = {
     ("grader example", "mistake"): mistakes,
     ("grader record", "script"): partial(paths, endings=(".py",)),
     ("grader record", "launch"): partial(paths, endings=(".launch",)),
+    ("grader course grade", "lab"): course_labs,
+    ("grader course publish", "lab"): course_labs,
     ("grader rubric validate", "files"): partial(paths, endings=RUBRICS),
 }
 """By command and keyword, where the name of the value does not tell."""

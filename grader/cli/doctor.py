@@ -99,7 +99,7 @@ def _needed(loaded: LoadedRubric) -> dict[str, list[str]]:
     ]
     found: dict[str, list[str]] = {}
     for package, _, name in (one.partition("/") for one in dict.fromkeys(names)):
-        if package != rubric.package:
+        if package not in rubric.package_names:
             found.setdefault(package, []).append(name)
     return found
 

@@ -25,11 +25,14 @@ from grader.judging.summary import criteria_text, judged_text
 from grader.model.result import CriterionResult
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
-from grader.rubric.load import LoadedRubric
+from grader.rubric.find import known_labs
+from grader.rubric.load import LoadedRubric, load_rubric
+from grader.verification import Finding, compare, read_whole, result_folders, verify
 from grader.wording import number
 
 WORST_FIRST = (ExitCode.NOT_GRADED, ExitCode.BELOW_PASS_MARK, ExitCode.INCONCLUSIVE)
 CHANNELS_MAX = 500
+FINDING_CHARS = 500
 
 
 def judge_evidence(evidence: Sequence[Path], loaded: LoadedRubric, out: str) -> ExitCode:
@@ -154,6 +157,46 @@ def _free(path: Path, evidence: Path, *, named: bool) -> Path:
 
 def _name(run: Run) -> str:
     return f"{Path(run.evidence).stem}.bag"
+
+
+def verify_results(results: Sequence[Path], rubric: str | None, allowed: Path | None) -> ExitCode:
+    """Verify each result, print what was found, and return the exit code of the worst."""
+    folders = result_folders(list(results))
+    rubrics: dict[str, LoadedRubric] = {}
+    codes = set()
+    for folder in folders:
+        try:
+            name = rubric or read_whole(folder).rubric.id
+            if name not in rubrics:
+                rubrics[name] = _rubric_named(name, given=rubric is not None)
+            codes.add(_print_findings(folder, verify(folder, rubrics[name], allowed)))
+        except EvidenceError as error:  # noqa: PERF203 - each result has its own
+            report(error)
+            codes.add(ExitCode.NOT_GRADED)
+    return next((code for code in WORST_FIRST if code in codes), ExitCode.PASSED)
+
+
+def _rubric_named(name: str, *, given: bool) -> LoadedRubric:
+    """Load it; what a result says must not lead to a file."""
+    if not given and name not in {lab.id for lab in known_labs()}:
+        raise UsageError(
+            f"there is no lab {line(name, 100)} here", hint="give the course's rubric with --rubric"
+        )
+    return load_rubric(name)
+
+
+def compare_results(own: Path, official: Path) -> ExitCode:
+    """Print what differs between a student's own result and the official one."""
+    (mine,), (theirs,) = (result_folders([path]) for path in (own, official))
+    return _print_findings(mine, compare(read_whole(mine), read_whole(theirs)))
+
+
+def _print_findings(folder: Path, findings: Sequence[Finding]) -> ExitCode:
+    wrong = any(finding.wrong for finding in findings)
+    say(f"{folder}: {'something does not fit' if wrong else 'ok'}")
+    for finding in sorted(findings, key=lambda finding: not finding.wrong):
+        say(f"  {'x' if finding.wrong else '+'} {finding.about}: {line(finding.text, FINDING_CHARS)}")
+    return ExitCode.BELOW_PASS_MARK if wrong else ExitCode.PASSED
 
 
 def _export(run: Run, path: Path, *, everything: bool) -> None:

@@ -33,7 +33,7 @@ def print_labs(rubrics: Sequence[tuple[Rubric, str]], stream: IO[str]) -> None:
         table.add_column(heading, no_wrap=heading not in {"title", "from"}, overflow="fold")
     for rubric, source in rubrics:
         points = number(rubric.max_points)
-        cells = [rubric.id, rubric.package, str(len(rubric.criteria)), points, rubric.title]
+        cells = [rubric.id, ", ".join(rubric.package_names), str(len(rubric.criteria)), points, rubric.title]
         cells += [source] if own else []
         table.add_row(*(Text(visible(cell)) for cell in cells))
     emit(open_console(stream), [table])

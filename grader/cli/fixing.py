@@ -20,11 +20,12 @@ from grader.cli.select_rubric import Chosen
 from grader.errors import OutputError, UsageError
 from grader.files import temporary_folder
 from grader.intake import open_submission
-from grader.model.package import PackageFacts
 from grader.model.repair import Repair
+from grader.model.submission import SourcePackage
 from grader.package import read_package
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.editing import is_executable, naming_files, read_data
+from grader.pipeline import wanted_package
 from grader.portable import MODES_ON_DISK
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
@@ -59,28 +60,40 @@ def fix_packages(chosen: Sequence[Chosen], *, dry_run: bool, yes: bool) -> bool:
 
 
 def _fix_package(chosen: Chosen, *, dry_run: bool, yes: bool) -> bool:
+    rubric = chosen.rubric.rubric
     with temporary_folder("source") as work:
-        folder, facts = _read(chosen, work)
-        found = find_repairs(folder, facts, wanted_of(chosen.rubric.rubric))
-        repairs = [repair for repair in found if is_fixed(folder, repair)]
-        if repairs:
-            emit(open_console(sys.stdout), _parts(repairs, _diff(folder, repairs, work / "preview")))
-        else:
+        found = {
+            package.folder: [
+                repair
+                for repair in find_repairs(
+                    package.folder, read_package(package), wanted_of(rubric, package.asked)
+                )
+                if is_fixed(package.folder, repair)
+            ]
+            for package in _packages(chosen, work)
+        }
+        found = {folder: repairs for folder, repairs in found.items() if repairs}
+        for number, (folder, repairs) in enumerate(found.items()):
+            preview = work / f"preview-{number}"
+            emit(open_console(sys.stdout), _parts(repairs, _diff(folder, repairs, preview)))
+        if not found:
             say("There is nothing here that --fix repairs.")
-    if repairs and not dry_run and (yes or _agreed(len(repairs))):
-        for repair in repairs:
-            _apply(folder, repair)
-    return bool(repairs)
+    if found and not dry_run and (yes or _agreed(sum(map(len, found.values())))):
+        for folder, repairs in found.items():
+            for repair in repairs:
+                _apply(folder, repair)
+    return bool(found)
 
 
-def _read(chosen: Chosen, work: Path) -> tuple[Path, PackageFacts]:
-    """Return the student's own folder and its facts. Raises UsageError for an archive or an address."""
+def _packages(chosen: Chosen, work: Path) -> tuple[SourcePackage, ...]:
+    """Return the lab's packages in the student's own folder. Raises UsageError for an archive or an address."""
     submission = None
     if Path(chosen.source).is_dir():
-        submission = open_submission(chosen.source, package=chosen.rubric.rubric.package, workdir=work)
+        wanted = wanted_package(chosen.rubric.rubric, "")
+        submission = open_submission(chosen.source, package=wanted, workdir=work)
     if submission is None or submission.package.folder.resolve().is_relative_to(work.resolve()):
         raise UsageError(f"{chosen.source} is no folder of yours", hint="give your package's folder to --fix")
-    return submission.package.folder, read_package(submission.package)
+    return (submission.package, *submission.also)
 
 
 def is_fixed(folder: Path, repair: Repair) -> bool:

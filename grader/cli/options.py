@@ -18,7 +18,9 @@ def package_name(text: str) -> str:
     return text.strip()
 
 
-RUBRIC = Option("--rubric", "ID|FILE", "a lab's id or a rubric's file; see grader labs")
+RUBRIC = Option(
+    "--rubric", "ID|FILE", "a lab's id, a rubric's file or https:// address; #sha256:DIGEST behind it pins it"
+)
 SandboxOption = Annotated[
     SandboxMode, Option("--sandbox", "", "run students' code in a sandbox: if possible, always, or never")
 ]
@@ -39,11 +41,43 @@ CLASS_EXIT_CODES = """exit codes, that of the worst submission:
   4    some are inconclusive, or wait for a person
   130  interrupted: run the same command to continue
 """
+MERGE_EXIT_CODES = """exit codes:
+  0    all decisions stand there now
+  1    there are conflicts: all other decisions stand there now
+  2    the command line, or one of the files, is wrong
+  3    the file cannot be written
+"""
 MUTANTS_EXIT_CODES = """exit codes:
   0    the correct package gets full marks, and every mutant loses what it must and no more
   1    it does not, or a mutant survives, or a criterion is worth points that no mutant loses
   2    the command line, the rubric or the mutants file is wrong
   3    nothing could be graded here
+  130  interrupted
+"""
+PUBLISH_EXIT_CODES = """exit codes:
+  0    everything is published, or was before
+  2    the command line is wrong, or the rubric has changed
+  3    some could not be published, or could not be graded
+  4    some stay drafts: they are inconclusive, or wait for a person
+  130  interrupted: run the same command to continue
+"""
+FEEDBACK_EXIT_CODES = """exit codes:
+  0    everything is sent, or was before
+  2    the command line is wrong, or nothing is published
+  3    some could not be sent: they are named
+  130  interrupted: run the same command to continue
+"""
+VERIFY_EXIT_CODES = """exit codes:
+  0    the evidence gives what the result says, and nothing else is wrong
+  1    something does not fit: result, evidence, rubric or signature; or with --against: something differs
+  2    the command line, the rubric or the file of allowed signers is wrong
+  3    it cannot be verified: a result cannot be read, or says that nothing was graded
+  130  interrupted
+"""
+SIGN_EXIT_CODES = """exit codes:
+  0    signed
+  2    the command line is wrong, or the key cannot be used
+  3    a result or its evidence cannot be read
   130  interrupted
 """
 REPORT_EXIT_CODES = """exit codes:

@@ -16,7 +16,9 @@ from grader.errors import UsageError
 from grader.wording import did_you_mean
 
 GROUPS = {
+    "course": "Grade and publish a course of several labs",
     "rubric": "Write, check and test rubrics",
+    "overrides": "Work with what people decided about a class",
     "export": "Write evidence as a bag, or an autograder for Gradescope or PrairieLearn",
 }
 """Commands that have commands of their own."""

@@ -14,7 +14,7 @@ from grader.cli.find_packages import Found, find, shown
 from grader.errors import UsageError
 from grader.intake import enclosing_package, find_packages
 from grader.intake.choose import is_slip
-from grader.intake.find import MANIFEST, Candidate
+from grader.intake.find import MANIFEST, Candidate, find_nearest
 from grader.intake.names import is_archive_name, listing, printable
 from grader.intake.open import is_recording
 from grader.rubric.load import LoadedRubric, find_rubric_for_package, load_rubric, packages_of_labs
@@ -105,25 +105,34 @@ def _named(path: Path, found: Found, rubric: LoadedRubric) -> Chosen:
     if package is None:
         return Chosen(rubric=rubric, source=str(path))
     words = f"Checking {package.name} in {shown(package.folder)} ({found.moved})" if found.moved else ""
-    return Chosen(rubric=rubric, source=_source(path, found, package), package=package.folder, words=words)
+    source = _source(path, found, package, rubric.rubric)
+    return Chosen(rubric=rubric, source=source, package=package.folder, words=words)
 
 
 def _chosen(path: Path, found: Found, lab: Lab) -> Chosen:
     folder = shown(lab.package.folder)
     where = f" in {folder}" if folder != "." else ""
     words = f"Checking {lab.package.name}{where} against {lab.rubric}{f', {lab.why}' if lab.why else ''}"
+    rubric = load_rubric(lab.rubric)
     return Chosen(
-        rubric=load_rubric(lab.rubric),
-        source=_source(path, found, lab.package),
+        rubric=rubric,
+        source=_source(path, found, lab.package, rubric.rubric),
         package=lab.package.folder,
         words=words + (f" ({found.moved})" if found.moved else ""),
     )
 
 
-def _source(path: Path, found: Found, package: Candidate) -> str:
-    """Return the given folder if the package is in it and all of it was searched, else the package's folder."""
+def _source(path: Path, found: Found, package: Candidate, rubric: Rubric) -> str:
+    """Return the given folder if the package is in it and all of it was searched, else the package's folder; of a lab
+    with several packages the folder above it, if others of them lie there."""
     inside = package.folder.resolve().is_relative_to(path.resolve())
-    return str(path if inside and found.whole and not found.moved else package.folder)
+    here = path if inside and found.whole and not found.moved else package.folder
+    wanted = set(rubric.package_names)
+    if len(wanted) > 1 and not wanted <= {c.name for c in found.packages}:
+        beside, whole = find_nearest(package.folder.resolve().parent)
+        if whole and len(wanted & {c.name for c in beside if c.has_manifest}) > 1:
+            return str(package.folder.resolve().parent)
+    return str(here)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,8 +153,9 @@ def labs_of(found: Found) -> tuple[Lab, ...]:
     for read in (_by_name, _by_folder):
         for candidate in found.packages:
             lab = read(candidate)
-            if lab is not None:
-                labs.setdefault(lab.rubric, lab)
+            known = labs.get(lab.rubric) if lab is not None else None
+            if lab is not None and (known is None or (_is_main(lab) and not _is_main(known))):
+                labs[lab.rubric] = lab
     if not labs:
         bare = (c for c in found.candidates if not c.has_manifest and c.ignored_by is None)
         labs = {lab.rubric: lab for candidate in bare if (lab := _by_folder(candidate)) is not None}
@@ -154,6 +164,11 @@ def labs_of(found: Found) -> tuple[Lab, ...]:
     if not labs:
         raise _none(found)
     return tuple(labs.values())
+
+
+def _is_main(lab: Lab) -> bool:
+    """Return whether it was found by the lab's main package, of several."""
+    return not lab.why and packages_of_labs()[lab.rubric].lower() == lab.package.name.lower()
 
 
 def _by_name(candidate: Candidate) -> Lab | None:

@@ -238,6 +238,13 @@ class _Member(tarfile.TarInfo):
         except tarfile.HeaderError:
             raise tarfile.ReadError("the end is missing") from None
 
+    @classmethod
+    def fromtarfile(cls, archive: tarfile.TarFile) -> _Member:
+        try:
+            return super().fromtarfile(archive)
+        except tarfile.InvalidHeaderError:  # type: ignore[attr-defined]
+            raise tarfile.ReadError("a header is wrong") from None
+
 
 def _next(archive: tarfile.TarFile) -> tarfile.TarInfo | None:
     """As `archive.next()`, which in Python 3.10 seeks before the beginning of a tar that holds nothing."""

@@ -21,12 +21,19 @@ COPIES_LOOKED_AT, FOLDERS_OF_A_COPY = 50, 300
 class Wanted:
     """The package that the lab asks for, and the names of the `files` that it asks for in it.
 
-    `asked` is the name of the package to grade in its place, from `--package`, or "".
+    `asked` is the name of the package to grade in its place, from `--package`, or "". `others` are those that the lab
+    asks for besides.
     """
 
     name: str
     files: frozenset[str] = frozenset()
     asked: str = ""
+    others: tuple[Wanted, ...] = ()
+
+    @property
+    def each(self) -> tuple[Wanted, ...]:
+        """All that the lab asks for, this one first."""
+        return (self, *self.others)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,12 +7,13 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from hashlib import sha256
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.archive import unpack
@@ -59,11 +60,12 @@ class Opened:
 
 @dataclass(frozen=True, kw_only=True)
 class Located:
-    """The lab's package, and all the candidates it was chosen from."""
+    """The lab's package, what was chosen besides by the lab's names for it, and all the candidates."""
 
     opened: Opened
     candidates: list[Candidate]
     choice: Choice
+    also: Mapping[str, Choice]
 
 
 def open_submission(
@@ -220,13 +222,22 @@ def locate(opened: Opened, wanted: Wanted) -> Located:
 
 def _locate(opened: Opened, wanted: Wanted) -> Located | None:
     candidates = find_candidates(opened.root, leave_out=opened.leave_out)
-    choice = choose(candidates, wanted)
-    name = wanted.asked or wanted.name
-    if choice is None and (linked := linked_candidate(opened.root, name)):
-        choice = Choice(
-            package=linked, hints=(f"{printable(name)} is a link, followed to {printable(linked.path)}",)
-        )
-    return Located(opened=opened, candidates=candidates, choice=choice) if choice else None
+    chosen: dict[str, Choice] = {}
+    for one in wanted.each:
+        name, taken = one.asked or one.name, {choice.package.folder for choice in chosen.values()}
+        names = {other.asked or other.name for other in wanted.each if other is not one}
+        free = [c for c in candidates if c.manifest not in names and c.folder not in taken]
+        choice = choose(free, one)
+        if choice is None and (linked := linked_candidate(opened.root, name)):
+            choice = Choice(
+                package=linked, hints=(f"{printable(name)} is a link, followed to {printable(linked.path)}",)
+            )
+        if choice is None and one is wanted:
+            return None
+        if choice is not None:
+            chosen[one.name] = choice
+    main = chosen.pop(wanted.name)
+    return Located(opened=opened, candidates=candidates, choice=main, also=chosen)
 
 
 def describe(located: Located, git: Git, limits: IntakeLimits) -> Submission:
@@ -236,19 +247,58 @@ def describe(located: Located, git: Git, limits: IntakeLimits) -> Submission:
     repositories = Repositories(git, opened.leave_out, root=opened.root, known=opened.repository)
     content = package_content(chosen.folder, limits=limits, leave_out=opened.leave_out)
     modes = _modes(opened, chosen, content.entries, repositories)
-    others = [c for c in located.candidates if c.has_manifest and not c.ignored_by and c.name != chosen.name]
+    taken = {chosen.name, *(one.package.name for one in located.also.values())}
+    others = [c for c in located.candidates if c.has_manifest and not c.ignored_by and c.name not in taken]
     notes = remarks(chosen.folder, content.entries, content.left_out)
+    digest = tree_digest(chosen.folder, content.entries, modes.executable, content.left_out)
+    also = {name: _besides(located, name, repositories, limits) for name in located.also}
     return Submission(
         id=safe_name(opened.name),
         source=opened.source.given,
         root=opened.root,
         commit=_commit(opened, chosen, modes, repositories),
         archive_sha256=opened.archive_sha256,
-        digest=tree_digest(chosen.folder, content.entries, modes.executable, content.left_out),
+        digest=_digest_of_all(digest, also.values()),
         package=_package(chosen, modes, content, _right_in_git(opened, chosen, content, git)),
         packages=tuple(_others(opened, others[:_OTHERS_AT_MOST], repositories, limits)),
-        hints=(*opened.hints, *choice.hints, *modes.hints, *content.hints, *notes),
+        also=tuple(one.package for one in also.values()),
+        hints=(
+            *(*opened.hints, *choice.hints, *modes.hints, *content.hints, *notes),
+            *(f"{name}: {hint}" for name, one in also.items() for hint in one.hints),
+        ),
     )
+
+
+class _Besides(NamedTuple):
+    """A package that the lab asks for besides the main one."""
+
+    package: SourcePackage
+    digest: str
+    hints: tuple[str, ...]
+
+
+def _besides(located: Located, name: str, repositories: Repositories, limits: IntakeLimits) -> _Besides:
+    opened, choice = located.opened, located.also[name]
+    chosen = choice.package
+    content = package_content(chosen.folder, limits=limits, leave_out=opened.leave_out)
+    modes = _modes(opened, chosen, content.entries, repositories)
+    right = _right_in_git(opened, chosen, content, repositories.git)
+    return _Besides(
+        package=_package(chosen, modes, content, right).model_copy(update={"asked": name}),
+        digest=tree_digest(chosen.folder, content.entries, modes.executable, content.left_out),
+        hints=(
+            *(*choice.hints, *modes.hints, *content.hints),
+            *remarks(chosen.folder, content.entries, content.left_out),
+        ),
+    )
+
+
+def _digest_of_all(digest: str, also: Collection[_Besides]) -> str:
+    """Return the main package's digest, with those of the others where there are any."""
+    if not also:
+        return digest
+    parts = [digest, *(f"{one.package.asked} {one.digest}" for one in also)]
+    return sha256("\n".join(parts).encode()).hexdigest()
 
 
 def _commit(opened: Opened, chosen: Candidate, modes: Modes, repositories: Repositories) -> str | None:

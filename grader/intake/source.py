@@ -75,6 +75,12 @@ def parse_source(text: str) -> Source:
     raise UsageError(f"{printable(text) or 'an empty SOURCE'} does not exist", hint=web + _SOURCES)
 
 
+def local_path(source: str | Source) -> Path | None:
+    """Return the folder, file or repository on this machine; None for one elsewhere. Raises as `parse_source` does."""
+    found = source if isinstance(source, Source) else parse_source(source)
+    return found.top or found.path
+
+
 def with_ref(source: Source, ref: str | None) -> Source:
     """Return the same at `ref`, which a roster names in a column of its own.
 

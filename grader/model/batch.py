@@ -34,6 +34,8 @@ class Entry(Record):
     """When it was submitted, as the roster says, with a time zone."""
     extension_days: float = 0.0
     """The student's extension in days."""
+    late_days: int = Field(default=0, exclude_if=lambda value: not value)
+    """How many late days of the course the student can use here. Only there if there are any."""
     where: str = ""
     """The file and line: `roster.csv:7`."""
     extra: Mapping[str, str] = Field(default_factory=dict)
@@ -49,6 +51,12 @@ class RosterFault(Record):
     """The student's id, where there is one."""
     text: str
     """What is wrong."""
+    name: str = ""
+    """The student's name."""
+    group: str = ""
+    """The group."""
+    extra: Mapping[str, str] = Field(default_factory=dict)
+    """The further columns, as they were."""
 
     def __str__(self) -> str:
         return f"{self.where}: {self.text}"
@@ -56,16 +64,18 @@ class RosterFault(Record):
 
 class Roster(Record):
     """The submissions of a class, in the order of the roster. `columns` names columns that mean nothing to the grader,
-    `faults` rows that cannot be graded."""
+    `faults` rows that cannot be graded. `again` are rows of students who are there already: faults, too, unless
+    several attempts are allowed."""
 
     file: str
     entries: tuple[Entry, ...]
     columns: tuple[str, ...] = ()
     faults: tuple[RosterFault, ...] = ()
+    again: tuple[Entry, ...] = ()
 
 
-MISSING, ROSTER = "not-graded-yet", "roster"
-"""Kinds of errors that only a class has: not graded so far, and a fault of the roster."""
+MISSING, ROSTER, UNPUBLISHED = "not-graded-yet", "roster", "not-published"
+"""Kinds of errors that only a class has: not graded so far, a fault of the roster, and not published so far."""
 State = Literal["running", "complete", "interrupted"]
 
 

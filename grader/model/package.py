@@ -5,7 +5,12 @@ Paths are posix and relative to the package's root; lines count from 1.
 
 from __future__ import annotations
 
+import posixpath
+import re
+from collections.abc import Iterator, Mapping
 from typing import Literal
+
+from pydantic import Field
 
 from grader.model.record import Record
 from grader.model.submission import ModeSource
@@ -93,6 +98,67 @@ class CMakeFacts(Record):
     fault: Fault | None = None
     last_line: int | None = None
     stopped_line: int | None = None
+
+    @property
+    def executables(self) -> tuple[Executable, ...]:
+        """The programs of `add_executable`, under the names that the targets' properties give them."""
+        given: dict[str, dict[str, tuple[str, CMakeCall]]] = {}
+        for call in self.calls:
+            for target, name, value in _properties(call):
+                given.setdefault(target, {})[name] = (value, call)
+        made = (call for call in self.calls if call.name == "add_executable" and call.args)
+        return tuple(_executable(call, given.get(call.args[0], {})) for call in made)
+
+
+OF_NAMES = ("RUNTIME_OUTPUT_NAME", "OUTPUT_NAME", "PREFIX", "SUFFIX", "RUNTIME_OUTPUT_DIRECTORY")
+
+
+def _properties(call: CMakeCall) -> Iterator[tuple[str, str, str]]:
+    """Yield target, property and value of those that a program's name or folder depends on.
+
+    An empty argument (`PREFIX ""`) is none of a call's arguments: the next property's name stands in its place.
+    """
+    word = {"set_target_properties": "PROPERTIES", "set_property": "PROPERTY"}.get(call.name, "")
+    if word not in call.args or (word == "PROPERTY" and call.args[0] != "TARGET"):
+        return
+    at = call.args.index(word)
+    targets = call.args[1:at] if word == "PROPERTY" else call.args[:at]
+    rest = list(call.args[at + 1 :])
+    while rest:
+        name = rest.pop(0)
+        value = rest.pop(0) if rest and rest[0] not in OF_NAMES else ""
+        if name in OF_NAMES:
+            yield from ((target, name, value) for target in targets)
+
+
+def _executable(call: CMakeCall, given: Mapping[str, tuple[str, CMakeCall]]) -> Executable:
+    target = call.args[0]
+    values = {name: value for name, (value, _) in given.items()}
+    name = values.get("RUNTIME_OUTPUT_NAME") or values.get("OUTPUT_NAME") or target
+    return Executable(
+        target=target,
+        name=f"{values.get('PREFIX', '')}{name}{values.get('SUFFIX', '')}",
+        folder=values.get("RUNTIME_OUTPUT_DIRECTORY", ""),
+        call=call,
+        named=next((given[key][1] for key in OF_NAMES if key in given), None),
+    )
+
+
+class Executable(Record):
+    """A program that CMake makes: its `target`, the `name` of its file, and the `folder` that it goes to, "" for
+    catkin's own, `lib/<package>`. `call` is its `add_executable`, `named` what gives it another name or folder than the
+    target's. Where CMake was not asked, `${…}` and `$<…>` stay as they are written."""
+
+    target: str
+    name: str
+    folder: str
+    call: CMakeCall
+    named: CMakeCall | None
+
+    def is_called(self, name: str) -> bool:
+        """Return whether the program's file has this name, as far as that is known."""
+        literals = re.split(r"\$\{[^{}]*\}|\$<[^<>]*>", self.name)
+        return re.fullmatch(".*".join(map(re.escape, literals)), name) is not None
 
 
 class Shebang(Record):
@@ -281,6 +347,22 @@ class PackageFacts(Record):
     """Slips in Python files that compile."""
     interfaces: tuple[Interface, ...] = ()
     """The package's own `.msg`, `.srv` and `.action` files."""
+    asked: str = Field(default="", exclude_if=lambda value: not value)
+    """The lab's name for it, where the lab asks for several packages and this is not the main one."""
+    also: tuple[PackageFacts, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """What the lab asks for besides, as far as it was handed in. Their paths are relative to their own folders."""
+
+    def way_to(self, other: PackageFacts) -> str:
+        """Return the path of another package's folder from this one's, `.` for the same: `../lab_msgs`."""
+        return posixpath.relpath(other.path, self.path)
+
+    def views(self) -> tuple[PackageFacts, ...]:
+        """Return this package and those of `also`, in this order, each with all the others as its own `also`."""
+        alone = [one.model_copy(update={"also": ()}) for one in (self, *self.also)]
+        return tuple(
+            one.model_copy(update={"also": tuple(other for other in alone if other is not one)})
+            for one in alone
+        )
 
     def file(self, path: str) -> SourceFile | None:
         """Return the file at this path, or None."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal, get_args
 
 from grader.model.record import Record
@@ -70,6 +71,11 @@ class Repair(Record):
     """What is wrong."""
     fix: str
     """How it is repaired by hand: a command, or the line as it should be."""
+
+    def with_paths(self, path: Callable[[str], str]) -> Repair:
+        """Return the repair with other paths of the file, and of what it is renamed to."""
+        renamed = {"before": path(self.before), "after": path(self.after)} if self.kind == "file-name" else {}
+        return self.model_copy(update={"file": path(self.file), **renamed})
 
 
 def place_of(repair: Repair) -> str:

@@ -17,7 +17,9 @@ from grader.model.verdict import EvidenceCitation, FileCitation, Status
 Day = date | datetime
 COMMENT_CHARS = 2000
 AUTHOR_CHARS = 200
+BANK_CHARS = 500
 SaidBy = Literal["roster", "commit", "nobody"]
+RubricOrigin = Literal["grader", "pinned", "elsewhere", "submission"]
 
 
 class HandedIn(Record):
@@ -31,6 +33,8 @@ class HandedIn(Record):
     """The deadline, with the extension; null without one."""
     extension_days: float = 0.0
     """The extension in days."""
+    late_days: int = Field(default=0, exclude_if=lambda value: not value)
+    """How many late days of the course the student could use. Only there if there are any."""
     before: AwareDatetime | None = None
     """The time before which the commit to grade was looked for; null where the last one is graded."""
     note: str = ""
@@ -42,6 +46,8 @@ class Lateness(HandedIn):
 
     late_s: float = 0.0
     """Seconds after the deadline; 0 if it was in time."""
+    late_days_used: int = Field(default=0, exclude_if=lambda value: not value)
+    """How many of them this submission took; the deadline is so much later. Only there if there are any."""
     points_before: float
     """The points before the penalty."""
     points: float
@@ -50,8 +56,41 @@ class Lateness(HandedIn):
     """The reason, in one sentence."""
 
 
+CommentId = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]
+
+
+class BankComment(Record):
+    """A comment that is used again and again (`comments.yaml`): one of `points` and `change`, or neither."""
+
+    text: Annotated[str, Field(min_length=1, max_length=BANK_CHARS)]
+    """What students read."""
+    points: float | None = None
+    """The points that it stands for."""
+    change: float | None = None
+    """What it adds to the criterion's points, or takes from them."""
+
+
+class WrittenOverride(Record):
+    """An override as `overrides.yaml` has it."""
+
+    points: float | None = None
+    """The points that count: from 0 to the criterion's, below 0 for a penalty; null: as its `comments` say."""
+    comment: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
+    """What the student reads, below the texts of its `comments`."""
+    author: Annotated[str, Field(max_length=AUTHOR_CHARS)] = ""
+    """Who awarded them."""
+    date: Day | None = None
+    """When: a day, or a time."""
+    comments: Annotated[tuple[CommentId, ...], Field(max_length=10)] = ()
+    """The ids of comments in `comments.yaml`; whatever changes there changes here."""
+    answer: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
+    """What the student is told who asked about the criterion."""
+    together: Annotated[str, Field(max_length=40)] = ""
+    """The same word for all that were decided in one go, and can be taken back in one."""
+
+
 class Override(Record):
-    """Points that a person awards for one criterion of one submission (`overrides.yaml`)."""
+    """Points that a person awards for one criterion of one submission."""
 
     points: float
     """The points that count: from 0 to the criterion's, below 0 for a penalty."""
@@ -61,6 +100,12 @@ class Override(Record):
     """Who awarded them."""
     date: Day | None = None
     """When: a day, or a time."""
+    comments: tuple[CommentId, ...] = ()
+    """The ids of its comments in `comments.yaml`."""
+    answer: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
+    """What the student is told who asked about the criterion."""
+    together: str = ""
+    """The same word for all that were decided in one go."""
 
 
 class Automatic(Record):
@@ -180,6 +225,9 @@ class CriterionResult(Record):
     """The `id` of the criterion that keeps this one from being judged. Only there if it is `blocked`."""
     repaired: Repaired | None = Field(default=None, exclude_if=lambda value: value is None)
     """What a repaired copy of the package shows of it. Only there if one was run and changes something."""
+    made_up: dict[str, bool | int | float | str] = Field(default={}, exclude_if=lambda value: not value)
+    """The values that it is judged by and that were made up for this submission, by their names in the rubric. Only
+    there if there are any."""
 
     @property
     def counts(self) -> bool:
@@ -285,12 +333,23 @@ class Note(Record):
 class ErrorInfo(Record):
     kind: str
     """Whose fault: `submission`, `package-not-found` (the submission's); `host`, `arena`, `output`, `ros-missing`,
-    `sandbox-missing` (the machine's); `internal` (the grader's); `roster`, `not-graded-yet` (of a class). Readers
-    must accept others."""
+    `sandbox-missing` (the machine's); `internal` (the grader's); `roster`, `not-graded-yet`, `not-published` (of a
+    class). Readers must accept others."""
     message: str
     """What is wrong."""
     hint: str
     """What to do about it."""
+
+
+class Attempts(Record):
+    """The attempts of a student, of which one counts."""
+
+    counts: Literal["best", "last", "by-criterion"]
+    """Which one counts: the one with the most points, the last one, or for each criterion its best one."""
+    chosen: int
+    """Which one that is, counted from 1; by criterion, the one with the most points."""
+    points: tuple[float | None, ...]
+    """The points of each of them, before overrides; null for one that could not be graded."""
 
 
 class GradingResult(Record):
@@ -302,6 +361,9 @@ class GradingResult(Record):
     """Whose work it is."""
     rubric: RubricInfo
     """What it was judged by."""
+    rubric_origin: RubricOrigin | None = Field(default=None, exclude_if=lambda value: value is None)
+    """Where that came from. `grader`: it comes with the grader. `pinned`: its digest was given, and fits. `submission`:
+    it lies in the student's repository, so the student can change it. `elsewhere`: another file of the machine."""
     status: Literal["graded", "inconclusive", "error"]
     """`graded`: every criterion worth points is decided. `inconclusive`: some are open. `error`: it could not be
     graded, and `error` says why."""
@@ -309,6 +371,8 @@ class GradingResult(Record):
     """The points that count: after overrides, a gate and the late penalty."""
     max_points: float
     """The most points that can be reached, without bonuses."""
+    attempts: Attempts | None = Field(default=None, exclude_if=lambda value: value is None)
+    """The student's attempts. Only there if the course allows several."""
     gate: Gate | None = Field(default=None, exclude_if=lambda value: value is None)
     """The gate that keeps the points low. Only there if one does."""
     criteria: tuple[CriterionResult, ...]

@@ -17,7 +17,8 @@ class SourcePackage(Record):
     root itself). `executable` maps each regular file's path, relative to `folder`, to its executable bit, or to
     None where the source carries no modes (`mode_source` "none"). `left_out` are the paths, as in `SourceFile.path`, of
     what no one opens or copies: files too large or not readable here, pipes and devices. `right_in_git` are those whose
-    Windows line ends are this disk's alone: git hands them in without.
+    Windows line ends are this disk's alone: git hands them in without. `asked` is the lab's name for it where the lab
+    asks for several packages and this is not the main one.
     """
 
     name: str
@@ -27,14 +28,16 @@ class SourcePackage(Record):
     executable: dict[str, bool | None]
     left_out: frozenset[str] = frozenset()
     right_in_git: frozenset[str] = frozenset()
+    asked: str = ""
 
 
 class Submission(Record):
     """`commit` is the full hash where the source is a repository, `archive_sha256` where it is an archive.
 
-    `digest` is the sha256 of the package's tree (paths, executable bits, contents). `packages` are the other
-    packages of the same submission, for dependencies. `hints` are remarks that the report shows, for instance that
-    the package was found under another spelling.
+    `digest` is the sha256 of the package's tree (paths, executable bits, contents), and of those of `also`: what the
+    lab asks for besides, as far as it is there. `packages` are the other packages of the same submission, for
+    dependencies. `hints` are remarks that the report shows, for instance that the package was found under another
+    spelling.
     """
 
     id: str
@@ -45,6 +48,7 @@ class Submission(Record):
     digest: str
     package: SourcePackage
     packages: tuple[SourcePackage, ...]
+    also: tuple[SourcePackage, ...] = ()
     hints: tuple[str, ...] = ()
 
 

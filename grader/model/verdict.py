@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 from enum import Enum
 
 from pydantic import Field
@@ -37,7 +38,8 @@ class Status(str, Enum):
 
 
 class FileCitation(Record):
-    """A line of the student's own files; `file` is relative to the package's root, `line` counts from 1."""
+    """A line of the student's own files; `file` is relative to the package's root, `line` counts from 1. Of several
+    packages, it is the main one's root, and a file of another one is `../lab_msgs/…`."""
 
     file: str
     """A file of the submission, from the package's root."""
@@ -49,6 +51,10 @@ class FileCitation(Record):
     """Where what is meant ends, counted from 1, itself not included. Only there if it is known."""
     source: str = Field(default="", exclude_if=lambda value: not value)
     """The line's text. Only there if something was lost and the line is short."""
+
+    def below(self, folder: str) -> FileCitation:
+        """Return the line of the file that has this path in `folder`, another package's: `../lab_msgs`."""
+        return self.model_copy(update={"file": posixpath.normpath(f"{folder}/{self.file}")})
 
 
 class EvidenceCitation(Record):
@@ -95,6 +101,11 @@ class Verdict(Record):
         """Return the verdict with what was expected, what was measured and where it shows; None leaves a field."""
         fields = {"expected": expected, "measured": measured, "citations": citations}
         return self.model_copy(update={name: value for name, value in fields.items() if value is not None})
+
+    def moved(self, folder: str) -> Verdict:
+        """Return the verdict with the files that it cites below `folder`: `../lab_msgs`."""
+        cited = (one.below(folder) if isinstance(one, FileCitation) else one for one in self.citations)
+        return self.about(citations=tuple(cited))
 
     def once(self) -> Verdict:
         """Return the verdict marked as a loss that one run's timing could have made."""

@@ -6,7 +6,7 @@ import json
 import re
 from dataclasses import dataclass
 
-UPDATE = "update the grader: `pip install --upgrade ros-lab-grader`"
+UPDATE = "update the grader: install its new version as you installed this one"
 _DIGITS_MAX = 9
 
 
@@ -47,7 +47,24 @@ RUN = Versioned("grader.run", 1)
 EVIDENCE = Versioned("grader.evidence", 1)
 RUBRIC = Versioned("grader.rubric", 1)
 OVERRIDES = Versioned("grader.overrides", 1)
+COMMENTS = Versioned("grader.comments", 1)
 MUTANTS = Versioned("grader.mutants", 1)
 RUBRIC_TEST = Versioned("grader.rubric-test", 1)
 SIMILARITY = Versioned("grader.similarity", 1)
-ALL = (RESULT, EVIDENCE, RUBRIC, OVERRIDES, RUN, SIMILARITY, MUTANTS, RUBRIC_TEST)
+PUBLISHED = Versioned("grader.published", 1)
+SENT = Versioned("grader.sent", 1)
+COURSE = Versioned("grader.course", 1)
+ALL = (
+    RESULT,
+    EVIDENCE,
+    RUBRIC,
+    OVERRIDES,
+    COMMENTS,
+    RUN,
+    PUBLISHED,
+    SENT,
+    COURSE,
+    SIMILARITY,
+    MUTANTS,
+    RUBRIC_TEST,
+)

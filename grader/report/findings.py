@@ -66,10 +66,11 @@ def findings(result: GradingResult, prefix: str = "") -> tuple[Finding, ...]:
 
 
 def _finding(criterion: CriterionResult, result: GradingResult, prefix: str, limit: int) -> Finding:
-    places = tuple(
-        SourceLine(path=path, line=cited.line)
-        for cited in criterion.citations[:PLACES_MAX]
-        if isinstance(cited, FileCitation) and cited.line and (path := repository_path(prefix, cited.file))
+    cited = [c for c in criterion.citations[:PLACES_MAX] if isinstance(c, FileCitation)]
+    places = tuple(  # a file as a whole, such as one without its executable bit, is shown at its first line
+        SourceLine(path=path, line=one.line or 1)
+        for one in ([c for c in cited if c.line] or cited[:1])
+        if (path := repository_path(prefix, one.file))
     )
     return Finding(
         criterion=criterion,
@@ -95,8 +96,14 @@ def _severity(criterion: CriterionResult) -> Severity:
 
 
 def repository_path(prefix: str, file: str) -> str:
-    """`file` of the package in `prefix`, with `/` and without detours; empty where it is not inside."""
-    parts = [part for part in PurePosixPath(f"{prefix}/{file}").parts if part not in {"/", "//", "."}]
+    """`file` of the package in `prefix`, with `/` and without detours; empty where it is not inside.
+
+    Another of the lab's packages may lie beside that one: `../lab_msgs/package.xml`.
+    """
+    folder = PurePosixPath(prefix)
+    if folder.name and file.startswith("../"):
+        folder, file = folder.parent, file.removeprefix("../")
+    parts = [part for part in PurePosixPath(f"{folder}/{file}").parts if part not in {"/", "//", "."}]
     return "" if ".." in parts or not parts else line("/".join(parts), LIMIT)
 
 

@@ -24,7 +24,8 @@ class ReportInput:
     """What a form may be rendered from.
 
     `hidden` is how many criteria are left out of `result`, `prefix` the package's folder in the repository, `passed`
-    whether the pass mark is reached. `docs` has the sections of each check's docstring by the check's name.
+    whether the pass mark is reached. `docs` has the sections of each check's docstring by the check's name. `changes`
+    says what has changed since the result was first published.
     `load_figures` is called only by forms that show figures, for it reads the evidence.
     """
 
@@ -34,6 +35,7 @@ class ReportInput:
     prefix: str = ""
     passed: bool = False
     docs: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    changes: tuple[str, ...] = ()
     load_figures: Callable[[], Figures | None] = lambda: None
 
     @cached_property

@@ -57,9 +57,15 @@ DETAILS = (
 
 
 def render_markdown(
-    result: GradingResult, rubric: Rubric, *, hidden: int = 0, figures: Figures | None = None
+    result: GradingResult,
+    rubric: Rubric,
+    *,
+    hidden: int = 0,
+    figures: Figures | None = None,
+    changes: tuple[str, ...] = (),
 ) -> str:
-    """The report as GitHub's and GitLab's Markdown, at most 60 kB. `hidden` is how many criteria are left out of it.
+    """The report as GitHub's and GitLab's Markdown, at most 60 kB. `hidden` is how many criteria are left out of it,
+    `changes` what has changed since it was first published.
 
     Of a result with very long texts, less is said of each, and in the end the details are left out.
     """
@@ -73,7 +79,7 @@ def render_markdown(
     for detail in DETAILS:
         if _surely_too_long(result, detail):
             continue
-        text = _Writer(detail).report(result, rubric, hidden, graphs)
+        text = _Writer(detail).report(result, rubric, hidden, graphs, changes)
         if len(text.encode()) <= BYTES_MAX:
             break
     return text
@@ -93,11 +99,16 @@ class _Writer:
         self._detail = detail
 
     def report(
-        self, result: GradingResult, rubric: Rubric, hidden: int, graphs: dict[str, GraphFigure]
+        self,
+        result: GradingResult,
+        rubric: Rubric,
+        hidden: int,
+        graphs: dict[str, GraphFigure],
+        changes: tuple[str, ...] = (),
     ) -> str:
         view = arrange(result, rubric)
         lost, still = ((), ()) if not_graded(result) else (view.lost, view.open)
-        lines = [*self._head(result, rubric, hidden), *self._decided(result)]
+        lines = [*self._head(result, rubric, hidden), *self._changed(changes), *self._decided(result)]
         lines += self._listed("What was lost", lost)
         lines += self._listed("What is still open", still)
         if self._detail.folded:
@@ -119,7 +130,8 @@ class _Writer:
         graded = f"{number(result.points)} of {number(result.max_points)} points"
         yield from (f"# {'Not graded' if not_graded(result) else graded}", "")
         unwalled = without_sandbox(result.environment.sandbox)
-        yield from (f"**{self._text(unwalled)}**", "") if unwalled else ()
+        for warning in filter(None, (unwalled, sentences.students_rubric(result))):
+            yield from (f"**{self._text(warning)}**", "")
         for words in score_words(result):
             yield from (self._text(words), "")
         if result.error is not None:
@@ -138,6 +150,12 @@ class _Writer:
         kind = f", package {self._code(submission.package)}" if submission.package else ", a recording"
         yield f"Submission {self._code(submission.id)}{kind if result.error is None else ''}{commit}."
         yield ""
+
+    def _changed(self, changes: tuple[str, ...]) -> Iterator[str]:
+        if changes:
+            yield from (f"## {sentences.CHANGED_TITLE}", "")
+            yield from (f"- {self._text(change)}" for change in self._first(changes))
+            yield from (*self._more(changes), "")
 
     def _decided(self, result: GradingResult) -> Iterator[str]:
         found = decided(result)
@@ -238,7 +256,8 @@ class _Writer:
         yield (
             f"Graded by grader {self._text(used.grader)} with ROS {self._text(used.ros or 'not used')}, "
             f"Python {self._text(used.python)}, sandbox {self._text(used.sandbox)}, "
-            f"in {result.timing.wall_s:.1f} s. Rubric digest {self._code(result.rubric.digest[:12])}, "
+            f"in {result.timing.wall_s:.1f} s. Rubric digest {self._code(result.rubric.digest[:12])}"
+            f"{f' ({origin})' if (origin := sentences.RUBRIC_FROM[result.rubric_origin]) else ''}, "
             f"{kind} digest {self._code(result.submission.digest[:12])}."
         )
 

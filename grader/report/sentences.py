@@ -9,19 +9,36 @@ from datetime import datetime
 from grader.errors import GraderError
 from grader.judging.summary import passed
 from grader.model.repair import Repair, place_of
-from grader.model.result import AppliedOverride, Automatic, CriterionResult, GradingResult, HandedIn, Note
+from grader.model.result import (
+    AppliedOverride,
+    Automatic,
+    CriterionResult,
+    GradingResult,
+    HandedIn,
+    Lateness,
+    Note,
+)
 from grader.model.verdict import Status
 from grader.report.view import ReportView, hidden_ids, not_graded, points_of
+from grader.rubric.made_up import as_text
 from grader.rubric.model import Rubric
 from grader.wording import join_words, number, plural
 
 DECIDED_TITLE = "Decided by a person"
+CHANGED_TITLE = "Changed since it was first published"
 BY = {"roster": "as the roster says", "commit": "the commit's date", "nobody": "not known"}
 
 
 def score_words(result: GradingResult) -> tuple[str, ...]:
-    """Return the lines that stand below the score: a gate, what each repaired fault cost, and what being late cost."""
-    return (*gate_words(result), *repair_words(result), *late_words(result))
+    """Return the lines below the score: a gate, what repaired faults and being late cost, and what was made up."""
+    return (*gate_words(result), *repair_words(result), *late_words(result), *made_up_words(result))
+
+
+def made_up_words(result: GradingResult) -> tuple[str, ...]:
+    """Return `Made up for this submission: rate = 14`, of the criteria that are shown."""
+    values = {name: value for c in result.criteria for name, value in c.made_up.items()}
+    said = ", ".join(f"{name} = {as_text(value)}" for name, value in values.items())
+    return (f"Made up for this submission: {said}",) if said else ()
 
 
 def gate_words(result: GradingResult) -> tuple[str, ...]:
@@ -77,13 +94,27 @@ def judged_repaired(result: GradingResult) -> dict[str, list[str]]:
 def late_words(result: GradingResult) -> tuple[str, ...]:
     """Lines that say what being late cost, when it was handed in, and which commit counts; none where no one asked."""
     late, known = result.late, result.late or result.handed_in
+    attempts = (attempt_words(result),)
     if known is None:
-        return ()
+        return tuple(filter(None, attempts))
     cost = late.text if late else ""
     if late and late.points != late.points_before:
         before = f"{number(late.points_before)} of {number(result.max_points)} points before"
         cost = f"{before}, {number(late.points)} after: {late.text}"
-    return tuple(words[:1].upper() + words[1:] for words in (cost, _times(known), known.note) if words)
+    said = (cost, _times(known), known.note, *attempts)
+    return tuple(words[:1].upper() + words[1:] for words in said if words)
+
+
+def attempt_words(result: GradingResult) -> str:
+    """`Attempt 2 of 3 counts, the one with the most points: 60, 85, 70`; empty where there was one."""
+    attempts = result.attempts
+    if attempts is None or len(attempts.points) < 2:
+        return ""
+    points = ", ".join("not graded" if one is None else number(one) for one in attempts.points)
+    if attempts.counts == "by-criterion":
+        return f"For each criterion its best attempt counts; the {len(attempts.points)} attempts: {points} points"
+    which = "the last one" if attempts.counts == "last" else "the one with the most points"
+    return f"Attempt {attempts.chosen} of {len(attempts.points)} counts, {which}: {points} points"
 
 
 def when_words(result: GradingResult) -> str:
@@ -98,7 +129,10 @@ def _times(known: HandedIn) -> str:
     zone = (known.deadline or known.at).tzinfo if known.at else None
     at = f"submitted {_time(known.at.astimezone(zone))} ({BY[known.by]})" if known.at else ""
     days = known.extension_days
-    extension = f" with {plural(days, 'day')} of extension" if days else ""
+    used = known.late_days_used if isinstance(known, Lateness) else 0
+    added = [f"{plural(days, 'day')} of extension"] if days else []
+    added += [plural(used, "late day")] if used else []
+    extension = f" with {join_words(added)}" if added else ""
     deadline = f"deadline {_time(known.deadline)}{extension}" if known.deadline else ""
     return ", ".join(words for words in (at, deadline) if words)
 
@@ -113,7 +147,9 @@ def _time(time: datetime) -> str:
 def decision(override: AppliedOverride) -> str:
     """`by A. Miller, 2026-11-02: clear names`, as far as it is known."""
     who = ", ".join(part for part in (override.author or "a person", str(override.date or "")) if part)
-    return f"by {who}{': ' if override.comment else ''}{override.comment}"
+    answer = f"to your request: {override.answer}" if override.answer else ""
+    said = "; ".join(text for text in (override.comment, answer) if text)
+    return f"by {who}{': ' if said else ''}{said}"
 
 
 def automatic_words(override: AppliedOverride, criterion: CriterionResult) -> str:
@@ -204,6 +240,29 @@ def without_sandbox(label: str) -> str:
         why = f"The grading machine has no sandbox ({found['reason']})"
     who = "an unprivileged user there" if found["other"] else "the user who grades"
     return f"{why}: students' code runs with all rights of {who}."
+
+
+RUBRIC_FROM = {
+    "grader": "the grader's own",
+    "pinned": "pinned by its digest",
+    "submission": "from the student's repository",
+    "elsewhere": "a file outside the submission",
+    None: "",
+}
+
+
+def rubric_words(result: GradingResult) -> str:
+    """Return the digest of the rubric that judged, and where it came from: `0123456789ab (pinned by its digest)`."""
+    words = RUBRIC_FROM[result.rubric_origin]
+    return f"{result.rubric.digest[:12]} ({words})" if words else result.rubric.digest[:12]
+
+
+def students_rubric(result: GradingResult) -> str:
+    """Return the warning where the student could have written the rubric; nothing elsewhere."""
+    if result.rubric_origin != "submission":
+        return ""
+    where = f"The rubric is {RUBRIC_FROM['submission']}, where the student can change it"
+    return f"{where}: these points are a help, no mark."
 
 
 SIGNS = {

@@ -137,10 +137,15 @@ class Terminal:
         view = arrange(result, rubric)
         unwalled = without_sandbox(result.environment.sandbox)
         parts = [self._head(result, rubric)]
-        parts += [self._words(unwalled, indent=0, style="yellow")] if unwalled else []
+        warnings = filter(None, (unwalled, sentences.students_rubric(result)))
+        parts += [self._words(words, indent=0, style="yellow") for words in warnings]
         parts += [
             self._words(words, indent=0)
-            for words in (*sentences.gate_words(result), *sentences.late_words(result))
+            for words in (
+                *sentences.gate_words(result),
+                *sentences.late_words(result),
+                *sentences.made_up_words(result),
+            )
         ]
         parts += self._section(
             sentences.DECIDED_TITLE, [self._decision(o, c) for o, c in sentences.decided(result)]
@@ -170,7 +175,10 @@ class Terminal:
 
     def _head(self, result: GradingResult, rubric: Rubric) -> RenderableType:
         text = Text(f"{self._show(result.submission.id)}\n", "bold")
-        return text.append(self._show(f"{result.rubric.id}: {rubric.title}"), "not bold dim")
+        text.append(self._show(f"{result.rubric.id}: {rubric.title}"), "not bold dim")
+        if result.rubric_origin in (None, "grader"):
+            return text
+        return text.append(f"\nRubric {self._show(sentences.rubric_words(result))}", "not bold dim")
 
     def _score(self, result: GradingResult, view: ReportView) -> RenderableType:
         """`95 of 100 points, 1 thing to fix`."""

@@ -14,7 +14,7 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.rubric.model import Rubric
 from grader.untrusted_text import CITATIONS_MAX, clip, visible
-from grader.wording import number
+from grader.wording import number, plural
 
 NAMES_AND_NUMBERS = re.compile(r"/[\w/~]+|\d+(\.\d+)?")
 PLACE_CHARS = 300
@@ -249,6 +249,69 @@ def without_hidden(result: GradingResult, rubric: Rubric) -> GradingResult:
         "status": _status(result, shown, {o.criterion for o in decided}),
     }
     return result.model_copy(update=update)
+
+
+NOT_SHOWN = "not-shown"
+"""The id of the row that stands for all hidden criteria."""
+
+
+def for_student(result: GradingResult, hidden: frozenset[str]) -> GradingResult:
+    """Return a published result as its student may read it: with the points that count.
+
+    All criteria of the ids in `hidden` are one row with points and without words, and nothing speaks to those who mark.
+    """
+    unseen = [c for c in result.criteria if c.id in hidden]
+    shown = [_unlinked(c, hidden) for c in result.criteria if c.id not in hidden]
+    runs = {c.scenario for c in unseen} - {c.scenario for c in shown}
+    gate = result.gate
+    update = {
+        "criteria": (*shown, *_in_one(unseen)),
+        "overrides": tuple(
+            o.model_copy(update={"changed": False}) for o in result.overrides if o.criterion not in hidden
+        ),
+        "notes": tuple(note for note in result.notes if note.scenario not in runs),
+        "gate": gate.model_copy(update={"criterion": NOT_SHOWN})
+        if gate and gate.criterion in hidden
+        else gate,
+    }
+    return result.model_copy(update=update)
+
+
+def _unlinked(criterion: CriterionResult, hidden: frozenset[str]) -> CriterionResult:
+    if criterion.blocked_by not in hidden:
+        return criterion
+    return criterion.model_copy(update={"blocked_by": NOT_SHOWN})
+
+
+def _in_one(criteria: list[CriterionResult]) -> tuple[CriterionResult, ...]:
+    """Return one row for these criteria; none where they are worth nothing."""
+    counting = [c for c in criteria if c.counts]
+    if not counting:
+        return ()
+    points, most = (round(sum(p), 6) for p in zip(*((c.points, c.max_points) for c in counting), strict=True))
+    extra = 0.0 if most else round(sum(c.extra for c in counting), 6)
+    full = points >= sum(c.full for c in counting)
+    status = Status.PASS if full else Status.PARTIAL if points > 0 else Status.FAIL
+    if any(c.status.is_open for c in counting):
+        status = Status.INCONCLUSIVE
+    title = f"{plural(len(counting), 'criterion', 'criteria')} that your course does not show"
+    row = CriterionResult(
+        id=NOT_SHOWN,
+        title=title,
+        check="",
+        scenario=None,
+        status=status,
+        points=points,
+        max_points=most,
+        extra=extra,
+        message="" if full else title,
+        expected="",
+        measured="",
+        hint="",
+        reproduce="",
+        citations=(),
+    )
+    return (row,)
 
 
 def _status(result: GradingResult, shown: tuple[CriterionResult, ...], decided: set[str]) -> str:

@@ -74,6 +74,7 @@ METADATA = {
     "python": "The Python of that ROS.",
     "sandbox": "What shut the student's code in.",
     "limits": "The limits that it ran under, as JSON.",
+    "made_up": "The values that were made up for the submission, as JSON; only there where there are any.",
     "not_run": "Why nothing was run; only there where nothing was.",
     "recording.missing": "Which file was to be handed in and was not there.",
     "recording.problem": "Why the recording that was handed in cannot be read.",

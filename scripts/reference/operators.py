@@ -10,6 +10,7 @@ from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.registry import Operator
 from grader.authoring.mutation.solution import find_reference, load_solution
 from grader.rubric.load import LoadedRubric, all_rubrics
+from scripts.reference.table import prose
 
 EXAMPLE = """\
 schema: grader.mutants/1
@@ -109,4 +110,4 @@ def _described(operator: Operator) -> str:
     given = ", ".join(f"`{name}` (default `{field.default!r}`)" for name, field in fields)
     parameters = f" Parameters: {given}." if given else ""
     mistake = operator.mistake[:1].lower() + operator.mistake[1:]
-    return f"- `{operator.name}`: the student {mistake}. Fits {operator.fits}.{parameters}"
+    return prose(f"- `{operator.name}`: the student {mistake}. Fits {operator.fits}.{parameters}")

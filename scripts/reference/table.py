@@ -19,7 +19,14 @@ def table(heading: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Iterator
 
 def cell(text: str) -> str:
     """Text that stays in its cell."""
-    return text.replace("\n", " ").replace("|", "\\|")
+    return prose(text).replace("\n", " ").replace("|", "\\|")
+
+
+def prose(text: str) -> str:
+    """Text in which nothing but code (`<node>`) may begin with `<`: it would be taken for HTML, and not be shown."""
+    return "`".join(
+        part.replace("<", "&lt;") if n % 2 == 0 else part for n, part in enumerate(text.split("`"))
+    )
 
 
 def code(text: str) -> str:

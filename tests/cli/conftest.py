@@ -28,6 +28,7 @@ class GradeOptions:
     static_only: bool = False
     keep_hidden: bool = True
     files: bool = True
+    repository: Path | None = None
 
 
 class FakePipeline(ModuleType):

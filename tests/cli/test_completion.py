@@ -20,6 +20,7 @@ from grader.cli.completion import (
     mistakes,
     mutants,
     paths,
+    submissions,
 )
 from grader.cli.main import run
 from grader.cli.parser import commands, options, value_of
@@ -42,6 +43,8 @@ LINES = [
     ("grader grade sub", ("submission.zip ",)),
     ("grader batch ", ("roster.csv", "results/")),
     ("grader batch roster.csv --only f", ("failed ",)),
+    ("grader publish results --only a", ("ada ",)),
+    ("grader course grade course.yaml la", ("lab1 ", "lab2 ")),
     ("grader completion ", SHELLS),
 ]
 
@@ -50,6 +53,10 @@ LINES = [
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("completion")
     (folder / "results").mkdir()
+    (folder / "course.yaml").write_text(
+        "title: A course\nlabs: {lab1: {rubric: one.yaml}, lab2: {rubric: two.yaml}}\n"
+    )
+    (folder / "results" / "run.json").write_text('{"entries": [{"id": "ada"}, {"id": "bob"}]}')
     for name in ("submission.zip", "roster.csv", "mine.yaml", "notes.txt"):
         (folder / name).touch()
     return folder
@@ -161,9 +168,9 @@ def test_paths(folder: Path, monkeypatch):
     assert set(paths(prefix="", endings=())) == {"results/"}
     assert set(paths(prefix="s", endings=(".zip",))) == {"submission.zip"}
     assert set(paths(prefix="", endings=None)) == {
-        "mine.yaml", "notes.txt", "results/", "roster.csv", "submission.zip"
+        "course.yaml", "mine.yaml", "notes.txt", "results/", "roster.csv", "submission.zip"
     }  # fmt: skip
-    assert set(paths(prefix="results/", endings=None)) == {"results/a b.zip"}
+    assert set(paths(prefix="results/", endings=None)) == {"results/a b.zip", "results/run.json"}
     assert set(paths(prefix="results/.", endings=None)) == {"results/.hidden"}
     assert set(paths(prefix=f"{folder}/res", endings=())) == {f"{folder}/results/"}
 
@@ -178,6 +185,13 @@ def test_nobody_guesses_numbers_and_names():
     by_place = {(prog, action.dest): action for prog, action in taken()}
     for place in (("grader batch", "jobs"), ("grader grade", "submission_id"), ("grader batch", "before")):
         assert completer_of(place[0], by_place[place])(prefix="", parsed_args=argparse.Namespace()) == {}
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"entries": 1}', '{"entries": [{}]}'])
+def test_of_what_is_no_class_no_ids_are_offered(tmp_path, text):
+    (tmp_path / "run.json").write_text(text)
+    assert submissions(parsed_args=argparse.Namespace(folder=tmp_path)) == {}
+    assert submissions(parsed_args=argparse.Namespace()) == {}
 
 
 def test_forms_are_offered_by_the_parser_itself():

@@ -31,6 +31,37 @@ def prose(page: str) -> str:
     return text
 
 
+def test_no_page_installs_the_grader_from_an_index() -> None:
+    """It is on none, so anyone could take its name there."""
+    from_index = re.compile(
+        r"^\W*(?:\$ )?(?:pipx? install|pip3 install|uv add)\b.*[ '\"]ros-lab-grader", re.MULTILINE
+    )
+    found = {path.name for path in pages() if from_index.search(path.read_text(encoding="utf-8"))}
+    assert found == set()
+    assert from_index.search("$ pip install 'ros-lab-grader[review]'\n")
+
+
+HTML = {"br", "details", "div", "img", "kbd", "picture", "source", "span", "sub", "summary", "sup"}
+
+
+def tags(page: str) -> set[str]:
+    """The HTML elements in a page's Markdown."""
+    tokens = MarkdownIt("commonmark").enable("table").parse(page)
+    every = (one for token in tokens for one in (token, *(token.children or ())))
+    html = (one.content for one in every if one.type in {"html_block", "html_inline"})
+    return {name for text in html for name in re.findall(r"<([a-z][\w-]*)", text, re.IGNORECASE)}
+
+
+@pytest.mark.parametrize("path", pages(), ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_word_of_a_page_is_taken_for_html(path: Path) -> None:
+    """`<node>` outside of code is not shown at all."""
+    assert tags(path.read_text(encoding="utf-8")) <= HTML
+
+
+def test_a_word_that_is_taken_for_html_is_found() -> None:
+    assert tags("write `<node>` to DIR/<id>/, not &lt;tag>\n\n```\n<code>\n```\n") == {"id"}
+
+
 @pytest.mark.parametrize("path", pages(), ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_page_is_british(path: Path) -> None:
     assert AMERICAN.findall(prose(path.read_text(encoding="utf-8"))) == []

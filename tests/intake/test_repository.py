@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import threading
 import time
@@ -341,11 +342,13 @@ def test_ctrl_c_ends_git_and_leaves_nothing(tmp_path, monkeypatch):
             time.sleep(0.01)
         os.kill(os.getpid(), 2)
 
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     thread = threading.Thread(target=interrupt)
     thread.start()
     with pytest.raises(KeyboardInterrupt):
         opened("https://h.invalid/lab", tmp_path)
     thread.join()
+    signal.signal(signal.SIGINT, before)
     assert ended(int(pid_file.read_text()))
     assert list((tmp_path / "work").iterdir()) == []
 

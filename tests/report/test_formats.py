@@ -103,12 +103,12 @@ def test_sarif_names_rules_and_places_that_stay_inside_the_repository():
     )
     texts = {r["ruleId"]: r["message"]["text"] for r in run["results"]}
     assert "\\[a\\](javascript:alert(1))" in texts["check-links"]
-    assert len(run["results"]) == 9
+    assert len(run["results"]) == 10
 
 
 def test_code_quality_has_what_gitlab_documents_and_what_ruff_writes(tmp_path):
     issues = json.loads(kept("code-quality.json"))
-    assert len({issue["fingerprint"] for issue in issues}) == len(issues) == 9
+    assert len({issue["fingerprint"] for issue in issues}) == len(issues) == 10
     for issue in issues:
         assert issue["severity"] in SEVERITIES
         assert all(isinstance(issue[name], str) for name in ("description", "check_name", "fingerprint"))
@@ -147,6 +147,8 @@ def test_fingerprints_do_not_change_with_what_was_measured_or_where_the_line_wen
         (".", "./src//a.py", "src/a.py"),
         ("ws/src/lab1/", "src/a.py", "ws/src/lab1/src/a.py"),
         ("lab1", "../../etc/passwd", ""),
+        ("ws/src/lab1", "../lab_msgs/package.xml", "ws/src/lab_msgs/package.xml"),
+        (".", "../lab_msgs/package.xml", ""),
         ("", "//evil.example/x", "evil.example/x"),
         ("", "a\nb\x1b.py", "a\\nb\\x1b.py"),
         ("", "", ""),

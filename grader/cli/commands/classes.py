@@ -12,6 +12,7 @@ from grader.cli.declare import INSTRUCTORS, Argument, Flag, Option, command, loa
 from grader.cli.options import (
     BATCH_FOLDER,
     CLASS_EXIT_CODES,
+    MERGE_EXIT_CODES,
     REPORT_EXIT_CODES,
     RUBRIC,
     STATIC,
@@ -36,6 +37,7 @@ GRADEBOOKS = {
     "moodle": "gradebook-moodle.csv",
     "blackboard": "gradebook-blackboard.csv",
 }
+BATCH_FORMS = ("csv", "jsonl")
 
 
 @command("batch", group=INSTRUCTORS, exit_codes=CLASS_EXIT_CODES, runs_code=True)
@@ -180,6 +182,18 @@ def review(
         str | None,
         Option("--author", "NAME", "who reviews (default: git config user.name); the page can change it"),
     ] = None,
+    marker: Annotated[
+        str | None,
+        Option("--marker", "NAME", "who reviews, as --author; with --of, only that marker's share"),
+    ] = None,
+    of: Annotated[
+        str | None,
+        Option("--of", "N|NAMES", "how many markers share the class, or their names: ann,bob,cyd"),
+    ] = None,
+    group: Annotated[str | None, Option("--group", "G", "only the submissions of one group")] = None,
+    blind: Annotated[
+        bool, Flag("--blind", "hide names, ids and repositories of what is not published yet")
+    ] = False,
 ) -> ExitCode:
     """Review a class in the browser: award points, override marks, comment.
 
@@ -193,11 +207,17 @@ def review(
         from grader.classes.review.cards import Wrong, author_of
         from grader.classes.review.serve import browser, git_user, serve
         from grader.classes.review.session import open_session
+        from grader.classes.review.share import share_of
+    given = marker if author is None else author
     try:
-        name = author_of(git_user() if author is None else author)
+        name = author_of(git_user() if given is None else given)
     except Wrong as error:
         raise UsageError(f"--author: {error}") from error
     review = open_session(folder)
+    review.blind = blind
+    review.share = share_of(folder, marker, of, group)
+    if not review.items():
+        raise UsageError(f"{folder}: no submission is in this share", hint="see --group, --marker and --of")
     with ExitStack() as stack:
 
         def opened(address: str) -> None:
@@ -217,6 +237,37 @@ def review(
     return ExitCode.NOT_GRADED
 
 
+@command("overrides merge", group=INSTRUCTORS, exit_codes=MERGE_EXIT_CODES)
+def overrides_merge(
+    *,
+    folder: Annotated[Path, CLASS],
+    others: Annotated[
+        Sequence[Path], Argument("FROM", "folders of results of the same class, with overrides.yaml")
+    ],
+) -> ExitCode:
+    """Put other markers' decisions beside those in DIR.
+
+    Where two decided differently, DIR's stays and the conflict is named.
+    """
+    with loading():
+        from grader.classes.batch.folder import open_batch
+        from grader.classes.review.merge import merge
+        from grader.cli.output import say
+        from grader.rubric.load import load_rubric
+        from grader.wording import plural
+    batch = open_batch(folder)
+    rubric = load_rubric(batch.run.rubric_source).rubric
+    conflicts = 0
+    for other in others:
+        merged = merge(batch, rubric, other)
+        conflicts += len(merged.conflicts)
+        for conflict in merged.conflicts:
+            say(f"{other}: conflict: {conflict}")
+        say(f"{other}: {plural(merged.added, 'decision')} added, {merged.same} there already")
+    say(f"  hint: grader regrade {folder}, or a review of it, applies them")
+    return ExitCode.BELOW_PASS_MARK if conflicts else ExitCode.PASSED
+
+
 @command("gradebook", group=INSTRUCTORS)
 def gradebook(
     *,
@@ -232,17 +283,26 @@ def gradebook(
     ] = None,
     column: Annotated[str, Option("--column", "NAME", "the platform's name for the column of points")] = "",
     per_criterion: Annotated[bool, Flag("--per-criterion", "add a column for each criterion")] = False,
+    drafts: Annotated[
+        bool, Flag("--drafts", "take results as they are now, also where others are published")
+    ] = False,
 ) -> ExitCode:
     """Write a class's gradebook for people, programs or a learning platform.
 
+    It has what is published; of a class of which nothing is published, it has results as they are now.
     What a person has to know about it goes to stderr. Raises UsageError if the template would be overwritten.
     """
     with loading():
         from grader.classes.batch.folder import open_batch
+        from grader.classes.feedback.publish import publication_remarks, published_rows, read_published
         from grader.classes.gradebook import write_gradebook
         from grader.cli.output import say, say_beside
     batch = open_batch(folder)
+    published = read_published(folder)
+    by_drafts = drafts or not published.history
     name = Path(GRADEBOOKS[form])
+    if not by_drafts and form in BATCH_FORMS:  # the batch writes its own, of drafts
+        name = name.with_stem(f"{name.stem}-published")
     if template:  # Blackboard's tab-separated tables end in .xls
         name = name.with_suffix(template.suffix)
     target = Path(out) if out else folder / name
@@ -252,14 +312,14 @@ def gradebook(
         place = Path(temporary, GRADEBOOKS[form]) if out == STDOUT else target
         remarks = write_gradebook(
             batch.book(),
-            batch.rows(),
+            batch.rows() if by_drafts else published_rows(batch, published),
             place,
             form,
             per_criterion=per_criterion,
             template=template,
             column=column,
         )
-        for remark in remarks:
+        for remark in (*remarks, *(() if drafts else publication_remarks(batch, published))):
             say_beside(f"{form}: {remark}")
         if out == STDOUT:
             with place.open("rb") as written:

@@ -6,11 +6,21 @@ from pathlib import Path
 from typing import Annotated
 
 from grader.cli.declare import INSTRUCTORS, Argument, Option, command, loading
-from grader.cli.options import RUBRIC, AllFlag, JsonFlag, PackageOption, SandboxOption, count
+from grader.cli.options import (
+    RUBRIC,
+    SIGN_EXIT_CODES,
+    VERIFY_EXIT_CODES,
+    AllFlag,
+    JsonFlag,
+    PackageOption,
+    SandboxOption,
+    count,
+)
 from grader.errors import ExitCode, UsageError
 
 DEFAULT_OUT = Path("grader-results")
 PACKAGE = Option("--package", "NAME", "the package, if there are several")
+RESULTS = Argument("RESULT", "result.json, the folder that it is in, or a folder of such folders")
 
 
 @command("grade", group=INSTRUCTORS, runs_code=True)
@@ -145,4 +155,52 @@ def inspect(
         say_json(inspection.model_dump(mode="json"))
     else:
         print_inspection(inspection, sys.stdout)
+    return ExitCode.PASSED
+
+
+@command("verify", exit_codes=VERIFY_EXIT_CODES)
+def verify(
+    *,
+    results: Annotated[Sequence[Path], RESULTS],
+    rubric: Annotated[str | None, RUBRIC] = None,
+    allowed_signers: Annotated[
+        Path | None,
+        Option("--allowed-signers", "FILE", "the SSH keys that may have signed, as git has them"),
+    ] = None,
+    against: Annotated[
+        Path | None,
+        Option("--against", "RESULT", "compare one result, a student's own, with the official one instead"),
+    ] = None,
+) -> ExitCode:
+    """Judge the evidence of results again, and name what does not fit.
+
+    That may be the rubric, the result, the evidence or the signature. Without a rubric, the lab with the result's id is
+    taken.
+    """
+    with loading():
+        from grader.cli.evidence_commands import compare_results, verify_results
+    if against is not None:
+        if len(results) > 1 or rubric is not None or allowed_signers is not None:
+            raise UsageError("--against compares two results, and takes no other option")
+        return compare_results(results[0], against)
+    return verify_results(results, rubric, allowed_signers)
+
+
+@command("sign", exit_codes=SIGN_EXIT_CODES)
+def sign(
+    *,
+    results: Annotated[Sequence[Path], RESULTS],
+    key: Annotated[
+        Path, Option("--key", "FILE", "an SSH key, as git signs with; a .pub file if ssh-agent has it")
+    ],
+) -> ExitCode:
+    """Sign results and their evidence with an SSH key."""
+    with loading():
+        from grader.cli.output import say
+        from grader.signing import sign as sign_folder
+        from grader.verification import read_whole, result_folders
+    for folder in result_folders(list(results)):
+        read_whole(folder)
+        sign_folder(folder, key)
+        say(f"{folder}: signed")
     return ExitCode.PASSED

@@ -65,6 +65,7 @@ def check(
         from grader.cli.checking import check_packages
         from grader.cli.select_rubric import choose_all
         from grader.pipeline import GradeOptions
+        from grader.rubric.origin import checkout_around
     keep_files = watch or out is not None
     options = GradeOptions(
         sandbox=sandbox,
@@ -72,6 +73,7 @@ def check(
         static_only=static,
         keep_hidden=False,
         files=keep_files,
+        repository=checkout_around(Path(path)),
     )
     chosen = choose_all(Path(path), rubric, package or "")
     if fix:

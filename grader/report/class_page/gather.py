@@ -58,7 +58,7 @@ def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]],
         Diagnosis(
             criterion=found.criterion,
             points=found.points,
-            wordings=Counter([without_words(found.message, words)]),
+            wordings=Counter([withoutwords_in(found.message, words)]),
             members=sorted(now[member] for member in found.members),
         )
         for found in named.diagnoses
@@ -69,8 +69,8 @@ def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]],
 def _unnamed(named: Line, pseudonym: str, words: frozenset[str]) -> Line:
     problem = named.problem
     if problem is not None:
-        problem = replace(problem, message=without_words(problem.message, words), hint="")
-    why = without_words(named.why, words)
+        problem = replace(problem, message=withoutwords_in(problem.message, words), hint="")
+    why = withoutwords_in(named.why, words)
     return replace(named, id=pseudonym, name="", group="", folder="", why=why, problem=problem)
 
 
@@ -161,7 +161,7 @@ LEFT_OUT = "…"
 WORD_CHARS = 3
 PREFIXES = ("S", "P", "X", "No. ", "Anon. ")
 
-_WORDS = re.compile(r"[^\W_]+")
+WORDS = re.compile(r"[^\W_]+")
 
 
 def salt_in(folder: Path) -> bytes:
@@ -207,8 +207,8 @@ class Names:
     def add(self, entry: Entry, commit: str | None) -> None:
         """One submission's."""
         self._count += 1
-        self._own.update(_words(entry.id, entry.name, entry.group, commit or ""))
-        self._sources.update(set(_words(entry.source, entry.ref or "")))
+        self._own.update(words_in(entry.id, entry.name, entry.group, commit or ""))
+        self._sources.update(set(words_in(entry.source, entry.ref or "")))
 
     def told(self) -> frozenset[str]:
         """Return the words that could tell someone: of sources not those that most have (`home`, `submissions`)."""
@@ -216,15 +216,13 @@ class Names:
         return frozenset(self._own).union(word for word, times in self._sources.items() if times <= most)
 
 
-def without_words(text: str, words: frozenset[str]) -> str:
+def withoutwords_in(text: str, words: frozenset[str]) -> str:
     """`text` with `…` for each of the words, and for names of files, what is quoted, and numbers."""
-    return _WORDS.sub(lambda found: LEFT_OUT if found[0].casefold() in words else found[0], reduced(text))
+    return WORDS.sub(lambda found: LEFT_OUT if found[0].casefold() in words else found[0], reduced(text))
 
 
-def _words(*texts: str) -> Iterable[str]:
+def words_in(*texts: str) -> Iterable[str]:
+    """Yield the words of these texts that are long enough to tell someone."""
     return (
-        word
-        for text in texts
-        for found in _WORDS.findall(text)
-        if len(word := found.casefold()) >= WORD_CHARS
+        word for text in texts for found in WORDS.findall(text) if len(word := found.casefold()) >= WORD_CHARS
     )

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from grader.evidence import events
 from grader.evidence.events import PACKAGE_TOPIC, TOPICS
-from grader.model import batch, result, verdict
+from grader.model import batch, publication, result, verdict
 from grader.model.batch import BatchRun
 from grader.model.mutants import MutantsFile, RubricTest
 from grader.model.package import PackageFacts
+from grader.model.publication import Publication, Sent
 from grader.model.record import Record, field_docstrings
-from grader.model.result import GradingResult, Override
+from grader.model.result import BankComment, GradingResult, WrittenOverride
 from grader.model.similarity import Similarity
 from grader.report.file_formats.known import FORMATS, Format
+from grader.rubric import course
+from grader.rubric.course import Course
 from grader.rubric.model import Rubric
 from grader.rubric.schema import DIALECT, rubric_schema
 
@@ -24,11 +27,14 @@ ROOTS: dict[str, type[Record]] = {
     "result": GradingResult,
     "rubric": Rubric,
     "run": BatchRun,
+    "published": Publication,
+    "sent": Sent,
+    "course": Course,
     "similarity": Similarity,
     "mutants": MutantsFile,
     "rubric-test": RubricTest,
 }
-"""The record that a whole file is; evidence has one for each topic, and overrides are a map."""
+"""The record that a whole file is; evidence has one for each topic, and overrides and comments are maps."""
 
 
 def schema_of(name: str) -> Schema:
@@ -86,7 +92,7 @@ def _evidence() -> Schema:
     for topic, record in records.items():
         schema = record.model_json_schema(by_alias=True, ref_template="#/$defs/{model}")
         definitions |= schema.pop("$defs", {})
-        definitions[record.__name__] = schema
+        definitions.setdefault(record.__name__, schema)  # one that holds others of its kind is there already
         channels[topic] = {"$ref": f"#/$defs/{record.__name__}"}
     text = (
         "The JSON channels of an evidence file: each message on a topic is what stands under its name here."
@@ -101,30 +107,42 @@ def _evidence() -> Schema:
 
 def _overrides() -> Schema:
     """The file is a map, not a record. What may be left out may be left empty, too."""
-    override = Override.model_json_schema(by_alias=True)
-    for key in ("comment", "author"):
-        found = override["properties"][key]
+    override = _with_empty(WrittenOverride, ("comment", "author", "comments", "answer", "together"))
+    override["anyOf"] = [{"required": ["points"]}, {"required": ["comments"]}]
+    return _two_levels("overrides", "What people decided: by submission, then by criterion.", override)
+
+
+def _comments() -> Schema:
+    """It is such a map, too."""
+    says = "Comments that are used again and again: by criterion, then by id."
+    return _two_levels("comments", says, _with_empty(BankComment, ()))
+
+
+def _with_empty(record: type[Record], keys: Sequence[str]) -> Schema:
+    schema = record.model_json_schema(by_alias=True)
+    for key in keys:
+        found = schema["properties"][key]
         kept = {"title": found.pop("title"), "default": found.pop("default")}
-        override["properties"][key] = {**kept, "anyOf": [dict(found), {"type": "null"}]}
-    criteria = {"type": "object", "additionalProperties": {"$ref": "#/$defs/Override"}}
+        schema["properties"][key] = {**kept, "anyOf": [dict(found), {"type": "null"}]}
+    return schema
+
+
+def _two_levels(name: str, says: str, one: Schema) -> Schema:
+    title = one["title"]
+    inner = {"type": "object", "additionalProperties": {"$ref": f"#/$defs/{title}"}}
     version = field_docstrings(GradingResult)["schema"]
     return {
-        "description": "What people decided: by submission, then by criterion.",
+        "description": says,
         "type": "object",
-        "properties": {
-            "schema": {
-                "const": str(FORMATS["overrides"].is_),
-                "description": version,
-            }
-        },
-        "additionalProperties": {"anyOf": [criteria, {"type": "null"}]},
-        "$defs": {"Override": override},
+        "properties": {"schema": {"const": str(FORMATS[name].is_), "description": version}},
+        "additionalProperties": {"anyOf": [inner, {"type": "null"}]},
+        "$defs": {title: one},
     }
 
 
 _RECORDS: dict[str, type[Record]] = {
     kind.__name__: kind
-    for module in (batch, events, result, verdict)
+    for module in (batch, course, events, publication, result, verdict)
     for kind in vars(module).values()
     if inspect.isclass(kind) and issubclass(kind, Record)
 }
@@ -132,6 +150,8 @@ _RECORDS: dict[str, type[Record]] = {
 _MAKERS: dict[str, Callable[[], Schema]] = {
     **{name: _of(record) for name, record in ROOTS.items()},
     "rubric": rubric_schema,
+    "course": lambda: Course.model_json_schema(by_alias=True),
     "evidence": _evidence,
     "overrides": _overrides,
+    "comments": _comments,
 }

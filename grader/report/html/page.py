@@ -65,12 +65,14 @@ class Head:
     mark_at: float | None
     pass_mark: str
     unwalled: str
+    students_rubric: str
     when: str
     late: tuple[str, ...]
     short: str
     left_out: str
     fault: str
     again: str
+    changes: tuple[str, ...] = ()
 
 
 def render_html(
@@ -80,13 +82,14 @@ def render_html(
     *,
     hidden: int = 0,
     docs: Docs | None = None,
+    changes: tuple[str, ...] = (),
 ) -> str:
     """Return the whole page, at most `BYTES_MAX` long. `hidden` is how many criteria are left out of `result`.
 
-    `docs` has the sections of the checks' docstrings.
+    `docs` has the sections of the checks' docstrings, `changes` what has changed since it was first published.
     """
     view = arrange(result, rubric)
-    head = _head(result, rubric, view, hidden)
+    head = replace(_head(result, rubric, view, hidden), changes=changes)
     page = ""
     for detail in DETAILS:
         made = Maker(result, rubric, figures or Figures(), docs or {}, detail).page(view)
@@ -136,6 +139,7 @@ def _head(result: GradingResult, rubric: Rubric, view: ReportView, hidden: int) 
         else None,
         pass_mark=sentences.pass_mark(result, rubric, hidden),
         unwalled=without_sandbox(result.environment.sandbox),
+        students_rubric=sentences.students_rubric(result),
         when=sentences.when_words(result),
         late=sentences.late_words(result),
         short=sentences.in_short(result, view),
