@@ -23,7 +23,8 @@ ROOT = Path(__file__).resolve().parent.parent
 LAB = "leeds-comp3631-lab1"
 SOLUTION = ROOT / "reference_solutions" / LAB
 KEYS = [
-    "schema", "submission", "rubric", "status", "points", "max_points", "criteria", "environment", "timing"
+    "schema", "submission", "rubric", "rubric_origin", "status", "points", "max_points", "criteria", "environment",
+    "timing",
 ]  # fmt: skip
 CRITERION_KEYS = [
     "id", "title", "check", "scenario", "status", "points", "max_points", "message", "expected", "measured",

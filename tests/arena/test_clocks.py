@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -86,7 +87,7 @@ def test_node_that_never_publishes_is_given_up(tmp_path: Path) -> None:
     code = "import rospy\nrospy.init_node('quiet')\nrospy.spin()\n"
     run = run_script(tmp_path, code, window_s=1, topics=["/count"], first_message_s=2)
     assert run.outcome.outcome == "silent"
-    assert run.outcome.detail in {"no message within 2 s", "the graph has settled, without /count"}
+    assert re.fullmatch(r"no message within \d+ s|the graph has settled, without /count", run.outcome.detail)
 
 
 def test_flood_is_recorded_up_to_the_limit_and_the_rest_counted(tmp_path: Path) -> None:
