@@ -100,11 +100,11 @@ class Override(Record):
     """Who awarded them."""
     date: Day | None = None
     """When: a day, or a time."""
-    comments: tuple[CommentId, ...] = ()
+    comments: tuple[CommentId, ...] = Field(default=(), exclude_if=lambda value: not value)
     """The ids of its comments in `comments.yaml`."""
-    answer: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
+    answer: str = Field(default="", max_length=COMMENT_CHARS, exclude_if=lambda value: not value)
     """What the student is told who asked about the criterion."""
-    together: str = ""
+    together: str = Field(default="", exclude_if=lambda value: not value)
     """The same word for all that were decided in one go."""
 
 

@@ -190,7 +190,7 @@ def review(
         str | None,
         Option("--of", "N|NAMES", "how many markers share the class, or their names: ann,bob,cyd"),
     ] = None,
-    group: Annotated[str | None, Option("--group", "G", "only the submissions of one group")] = None,
+    group: Annotated[str | None, Option("--group", "NAME", "only the submissions of one group")] = None,
     blind: Annotated[
         bool, Flag("--blind", "hide names, ids and repositories of what is not published yet")
     ] = False,
@@ -242,7 +242,7 @@ def overrides_merge(
     *,
     folder: Annotated[Path, CLASS],
     others: Annotated[
-        Sequence[Path], Argument("FROM", "folders of results of the same class, with overrides.yaml")
+        Sequence[Path], Argument("OTHER", "folders of results of the same class, with overrides.yaml")
     ],
 ) -> ExitCode:
     """Put other markers' decisions beside those in DIR.
