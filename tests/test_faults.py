@@ -150,13 +150,6 @@ def test_a_roscore_that_does_not_start(out: Path, open_path: Path, own_locks: di
     assert "rosmaster is broken here" in next(c.message for c in result.criteria if c.id == "rate")
 
 
-@pytest.mark.full
-def test_a_rosout_that_dies(out: Path) -> None:
-    with grading(out, setup="mount --bind /bin/false /usr/lib/rosout/rosout") as one:
-        assert one.end() == 0, one.err
-    assert passed(result_in(out)) == ALL
-
-
 def test_a_sandbox_that_is_not_made(out: Path, open_path: Path, own_locks: dict[str, str]) -> None:
     """As where the kernel has no more namespaces to give: no process of the student's has run."""
     (open_path / "real").touch()

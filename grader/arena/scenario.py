@@ -115,7 +115,6 @@ async def _run(
     scenario: Scenario, starts: list[tuple[Start, Spec]], arena: ArenaSession, tell: Tell, beside: Path | None
 ) -> tuple[str, str]:
     tell("starting the managed roscore")
-    await arena.wait(lambda: arena.rosout_up, 3.0)
     if scenario.clock == "warped":
         arena.send(do="warp", warp=scenario.warp, step_s=CLOCK_STEP_S)
     set_params(scenario.params, arena)

@@ -10,7 +10,6 @@ import struct
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -33,8 +32,6 @@ CLOCK, ROSOUT_TOPIC = "/clock", "/rosout"
 TIME = struct.Struct("<II")
 WATCHED_MAX = 20
 NS = 1_000_000_000
-ROSOUT = ("/usr/lib/rosout/rosout", "lib/rosout/rosout")
-LOG_FOLDER = ("/bin/sh", "-c", 'mkdir -p "$ROS_HOME/log" && exec "$0"')
 READY_S = 15.0
 END_S = 5.0
 GROUPS_S, LOOK_S = 2.0, 0.02
@@ -81,7 +78,6 @@ class ArenaSession:
         self._channels: dict[int, _Channel] = {}
         self._ready = False
         self._done = False
-        self.rosout_up = False
         self._failure = ""
         self._error: Exception | None = None
         self._killed = Killed(sandboxed=place.sandbox.bubblewrap)
@@ -208,8 +204,6 @@ class ArenaSession:
             )
 
     def _config(self) -> dict[str, Any]:
-        rosout = self._rosout_spec() if self._master else None
-        self.rosout_up = rosout is None  # then no one need wait for it
         return {
             "master": self._master,
             "stage": self.place.stage(),
@@ -217,17 +211,7 @@ class ArenaSession:
             "port": PORT if self.place.sandbox.bubblewrap else 0,
             "limits": self.place.limits.model_dump(),
             "suffix": "_" + secrets.token_hex(4),
-            "rosout": rosout,
         }
-
-    def _rosout_spec(self) -> dict[str, Any] | None:
-        for name in ROSOUT:
-            for prefix in ("/", *self.place.ros.prefixes):
-                program = Path(prefix) / name
-                if program.exists():
-                    bare = replace(self.place, env={})
-                    return bare.spec("rosout", [*LOG_FOLDER, str(program)], role="grader", copy=False)
-        return None
 
     def _read(self, chunk: bytes) -> None:
         try:
@@ -274,7 +258,6 @@ class ArenaSession:
         topic, record = frame.fields["topic"], frame.fields["record"]
         self._writer.event(topic, frame.time_ns, TOPICS[topic].model_validate(record))
         if topic == "/grader/graph":
-            self.rosout_up = self.rosout_up or "/rosout" in record["nodes"]
             nodes = [n for n in record["nodes"] if not is_grader_node(n)]
             picture = {key: value for key, value in record.items() if key != "connections"}
             self.live.graph(nodes, record["processes"], time.monotonic(), picture=picture)

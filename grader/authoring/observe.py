@@ -191,5 +191,5 @@ def _read(run: Run) -> tuple[str, ...]:
 
 
 def _last_words(run: Run) -> str:
-    lines = [line.line for _, line in run.console if line.line.strip() and line.process != "rosout"]
+    lines = [line.line for _, line in run.console if line.line.strip()]
     return lines[-1] if lines else "it ended with an error"

@@ -169,22 +169,6 @@ def test_who_may_call_in_whose_name(module, method, args, why) -> None:
     assert (why in found) if why else found == ""
 
 
-def test_only_rosout_speaks_for_rosout(module) -> None:
-    rules = module("guard").Rules(Fixed(p1="rosout"), {"/rosout": NEW}.get, set())
-    args = ("/rosout", "/rosout", "rosgraph_msgs/Log", NEW)
-    assert rules.why_not("registerSubscriber", args, Caller("rosout")) == ""
-    for other in ("attack", None):
-        assert "/rosout" in rules.why_not("registerSubscriber", args, Caller(other))
-
-
-def test_rosout_speaks_where_nobody_can_tell_who_calls(module) -> None:
-    args = ("/rosout", "/rosout", "rosgraph_msgs/Log", NEW)
-    for registered in ({}, {"/rosout": NEW}):
-        rules = module("guard").Rules(Fixed(), registered.get, set())
-        assert rules.why_not("registerSubscriber", args, Caller(None)) == ""
-        assert "/rosout" in rules.why_not("registerSubscriber", args, Caller("attack"))
-
-
 def test_who_takes_too_many_names(module) -> None:
     rules = module("guard").Rules(Fixed(), {}.get, set())
 

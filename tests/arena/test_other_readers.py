@@ -73,7 +73,7 @@ def test_every_ros_channel_decodes_elsewhere(recorded: tuple[Path, list[str]]) -
             assert schema.encoding == "ros1msg"
             assert channel.metadata["callerid"].startswith("/")
             assert message is not None
-    assert {"/count", "/text", "/cmd_vel", "/rosout", "/rosout_agg"} <= topics
+    assert {"/count", "/text", "/cmd_vel", "/rosout"} <= topics
     assert topics == {c.topic for c in ros.values()}
 
 

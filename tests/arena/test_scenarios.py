@@ -212,6 +212,43 @@ def test_services_are_called_and_answer(tmp_path: Path) -> None:
     assert seen.outcome.outcome == "complete"
 
 
+LOGGING = f"""{NODE}
+import subprocess
+from rosgraph_msgs.msg import Log
+
+collected = []
+rospy.init_node("logging")
+rospy.Subscriber("/rosout_agg", Log, collected.append)
+for words in (
+    "rosnode ping -c1 /rosout", "rosservice call /rosout/get_loggers", "rosnode info /rosout", "rosnode info /logging"
+):
+    print(subprocess.run(words.split(), capture_output=True, text=True).stdout, flush=True)
+while not collected:
+    rospy.loginfo("here")
+    rospy.sleep(0.05)
+print("collected", collected[0].msg, "of", collected[0].name)
+"""
+
+
+def test_rosout_is_there_for_nodes_and_tools(tmp_path: Path) -> None:
+    """The grader's own node answers in its place."""
+    scenario = Scenario(
+        title="log",
+        start=(Start(name="logging", script="logs.py"),),
+        until=Until(ended=("logging",)),
+    )
+    seen = _run(tmp_path, {"scripts/logs.py": LOGGING}, scenario)
+    said = "\n".join(printed(seen, "logging"))
+    assert "xmlrpc reply from" in said
+    assert "/rosout_agg [rosgraph_msgs/Log]" in said
+    assert "loggers: []" in said
+    assert "* to: /rosout" in said
+    assert "/grader_recorder" not in said.split("* to: /rosout")[0].rsplit("topic: /rosout", 1)[-1]
+    assert "collected here of /logging" in said
+    assert "/rosout" in seen.graph[-1][1].nodes
+    assert "rosout" not in {event.name for _, event in seen.processes}
+
+
 WAITER = (
     NODE
     + "from std_msgs.msg import String\nrospy.init_node('waiter')\n"

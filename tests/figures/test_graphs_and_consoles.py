@@ -106,8 +106,8 @@ def test_the_first_and_the_last_hundred_lines() -> None:
 
 
 def test_what_the_graders_own_processes_print_is_left_out() -> None:
-    processes = [{"name": "talker"}, {"name": "rosout", "role": "grader"}]
-    lines = [{"process": "rosout", "line": "own"}, {"process": "talker", "line": "the student's"}]
+    processes = [{"name": "talker"}, {"name": "world", "role": "grader"}]
+    lines = [{"process": "world", "line": "own"}, {"process": "talker", "line": "the student's"}]
     found = console(processes=processes, console=lines)
     assert found is not None
     assert [line.text for line in found.lines] == ["the student's"]

@@ -12,10 +12,7 @@ from tests.checks.examples import runs_of
 
 OWN = ["/grader_recorder_0a1b2c3d", "/rosout"]
 RUN: dict[str, Any] = {
-    "processes": [
-        {"name": "talker", "start_s": 0.5, "exit_s": 3.0, "exit_code": 1},
-        {"name": "rosout", "role": "grader"},
-    ],
+    "processes": [{"name": "talker", "start_s": 0.5, "exit_s": 3.0, "exit_code": 1}],
     "graph": [
         {"nodes": [*OWN, "/talker"], "processes": {"/talker": "talker"}, "at_s": 1},
         {"nodes": OWN, "at_s": 3.2},

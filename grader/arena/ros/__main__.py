@@ -4,9 +4,9 @@ Runs under ROS's own interpreter and imports nothing but the standard library an
 process, the template, which has imported all that an arena needs and does nothing else (`stand_by`).
 
 The first line of its stdin configures an arena:
-`master` (false for a build, which needs none), `port`, `limits`, `suffix` (of its nodes' names), `rosout` (a process
-spec, or null), `stage` (the folder over which what sandboxes see is mounted, and the user who writes there; null
-without a sandbox). When stdin ends, all ends.
+`master` (false for a build, which needs none), `port`, `limits`, `suffix` (of its nodes' names), `stage` (the folder
+over which what sandboxes see is mounted, and the user who writes there; null without a sandbox). When stdin ends, all
+ends.
 """
 
 import array
@@ -98,8 +98,8 @@ class Arena:
         self._actor.uri = api.uri
         own_ports.update((server.port, api.port, self._actor.port))
         self._calibration.record(self.loop, self._wire, name.format("calibration"))
-        if config["rosout"]:
-            self._spawn(config["rosout"])
+        self._actor.stand_in_for_rosout(self._master)
+        self._recorder.on_log = self._actor.pass_on_log
 
     def _command_bytes(self):
         try:

@@ -1,9 +1,10 @@
-"""The grader's own node: it publishes probe messages, `/clock`, `/rosout_agg`, and offers services (`services`).
+"""The grader's own node: it publishes probe messages and `/clock`, offers services (`services`), and is `/rosout` too.
 
 The bytes come ready-made from the grader, so the arena needs no message classes. What is sent is recorded in the
 moment of sending, not by a detour over the network.
 """
 
+import base64
 import collections
 import contextlib
 import os
@@ -13,7 +14,7 @@ import threading
 import time
 
 from bounded_sockets import LOOPBACK, UNKNOWN_PROCESS, BoundedSocket, ProtocolError
-from guard import shown
+from guard import ROSOUT, shown
 from services import Services
 from tcpros import HEADER_BYTES_MAX, Closed, check_fields, read_header, write_header
 from wire import LENGTH, now_ns
@@ -28,6 +29,42 @@ CLOCK = {
     "definition": "time clock\n",
     "latching": True,
 }
+LOG = {
+    "topic": "/rosout_agg",
+    "type": "rosgraph_msgs/Log",
+    "md5sum": "acffd30cd6b6de30f120938c17c593fb",
+    "definition": """byte DEBUG=1
+byte INFO=2
+byte WARN=4
+byte ERROR=8
+byte FATAL=16
+Header header
+byte level
+string name
+string msg
+string file
+string function
+uint32 line
+string[] topics
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+""",
+    "latching": False,
+}
+LOGGERS = {
+    "service": "/rosout/get_loggers",
+    "type": "roscpp/GetLoggers",
+    "md5sum": "32e97e85527d4678a8f9279894bb64b0",
+}
+SET_LEVEL = {
+    "service": "/rosout/set_logger_level",
+    "type": "roscpp/SetLoggerLevel",
+    "md5sum": "51da076440d78ca1684d36c868df61ea",
+}
+NO_LOGGERS, NOTHING = base64.b64encode(bytes(LENGTH.size)).decode(), ""
 TIME = struct.Struct("<II")
 NS = 1000000000
 HANDSHAKE_S = 2.0
@@ -115,11 +152,30 @@ class Actor:
         self.topics[fields["topic"]] = _Topic(fields, channel, known_as)
         master.registerPublisher(self.caller_id, fields["topic"], fields["type"], self.uri)
 
-    def serve(self, master, fields):
+    def serve(self, master, fields, node=None):
         """Register a service; `fields` holds service, type, md5sum, answers (base64), error, delay_s."""
         self._services.add(fields)
         address = "rosrpc://{}:{}".format(LOOPBACK, self.port)
-        master.registerService(self.caller_id, fields["service"], address, self.uri)
+        master.registerService(node or self.caller_id, fields["service"], address, self.uri)
+
+    def stand_in_for_rosout(self, master):
+        """Register what ROS's rosout has: roslaunch starts one of its own in a graph that has none."""
+        self.topics[LOG["topic"]] = _Topic(LOG, None, ROSOUT)
+        master.registerPublisher(ROSOUT, LOG["topic"], LOG["type"], self.uri)
+        for fields, answer in ((LOGGERS, NO_LOGGERS), (SET_LEVEL, NOTHING)):
+            self.serve(master, dict(fields, answers=[answer], error="", delay_s=0.0, told=False), ROSOUT)
+        master.registerSubscriber(ROSOUT, ROSOUT, LOG["type"], self.uri)
+
+    def pass_on_log(self, pieces):
+        """Publish messages of `/rosout`, each behind its length, on `/rosout_agg`; where nobody listens, they are not
+        recorded a second time."""
+        topic = self.topics[LOG["topic"]]
+        if topic.subscribers:
+            with topic.lock:
+                topic.channel = topic.channel or self._wire.channel(callerid=ROSOUT, **LOG)
+                self._wire.messages(topic.channel, pieces, now_ns())
+                for sock in list(topic.subscribers):
+                    self._send(topic, sock, b"".join(pieces))
 
     def publish(self, topic_name, data):
         """Send and record one message."""
@@ -193,7 +249,7 @@ class Actor:
 
 
 class Clock:
-    """`/clock`, `warp` times faster than the wall in steps of `step_s`, once a node other than rosout listens.
+    """`/clock`, `warp` times faster than the wall in steps of `step_s`, once a node listens.
 
     A late wake-up makes the clock slower, never jumpy: no step is ever caught up.
     """
@@ -218,7 +274,7 @@ class Clock:
 
     def _run(self):
         while not self._stopped.wait(self._pause_s):
-            if any(name != "/rosout" for name in self._actor.subscribers("/clock")):
+            if self._actor.subscribers("/clock"):
                 self._now_ns += self._step_ns
                 self._tick()
 

@@ -193,6 +193,7 @@ class Connection:
         """None of them is earlier than those before it."""
         time_ns = self._handed_on_ns = max(self._handed_on_ns, time_ns)
         self._messages += messages
+        self._recorder.pass_on(self.topic, pieces)
         if self._opened:
             self._recorder.wire.messages(self._account.channel, pieces, time_ns)
             return

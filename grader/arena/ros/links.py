@@ -11,7 +11,7 @@ import time
 
 import sockets
 from bounded_sockets import ProtocolError, call, port_of, slave_api
-from guard import NAME_CHARS_MAX, OWN_NODE, shown
+from guard import NAME_CHARS_MAX, OWN_NODE, ROSOUT, shown
 from quotas import Pool, cut
 
 BUS_INFO_S, ROUND_S = 1.5, 3.0
@@ -108,7 +108,7 @@ class Links:
             if not isinstance(entry, list) or len(entry) < 5:
                 continue
             other, direction, transport, topic = (cut(value, NAME_CHARS_MAX) for value in entry[1:5])
-            if direction == "o" and not OWN_NODE.fullmatch(other):
+            if direction == "o" and other != ROSOUT and not OWN_NODE.fullmatch(other):
                 serves.append(Said(topic, other, transport))
             elif direction == "i":
                 hears.add((topic, port_of(other) or other))

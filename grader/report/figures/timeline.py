@@ -17,7 +17,6 @@ STRETCHES_MAX = 120
 PARTS = 400
 """Messages that are nearer to each other than such a part of the run are drawn as one stretch."""
 SAYS_LETTERS = 120
-ROSOUT = "rosout"
 QUIET = frozenset({"clock", "interrupt", "open", "note", "left", "lookup"})
 
 
@@ -48,7 +47,6 @@ def _lane(kind: str, name: str, stretches: Iterable[Stretch]) -> Iterator[Lane]:
 
 def _processes(run: Run) -> Iterator[Lane]:
     names = dict.fromkeys(event.name for _, event in run.processes if event.role != "build")
-    names.pop(ROSOUT, None)
     for name in names:
         yield from _lane("process", name, _lives(run, name))
 
@@ -79,7 +77,7 @@ def _failed(event: ProcessEvent) -> bool:
 
 def _nodes(run: Run) -> Iterator[Lane]:
     """From the first of the master's states that has a node up to the first that has it no longer."""
-    for node in filter(is_drawn, (*run.student_nodes(), *sorted(run.grader_nodes - {f"/{ROSOUT}"}))):
+    for node in filter(is_drawn, (*run.student_nodes(), *sorted(run.grader_nodes - {"/rosout"}))):
         yield from _lane("node", node, _there(run, node))
 
 
