@@ -79,6 +79,9 @@ class Around:
     def remove_reader(self, _sock: socket.socket) -> None:
         self.look = None
 
+    def pass_on(self, _topic: str, _pieces: list[bytes]) -> None:
+        """Nobody else listens."""
+
     def call_later(self, _seconds: float, work: Callable[[], None]) -> None:
         self.later.append(work)
 
