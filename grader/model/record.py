@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ast
 import inspect
+import sys
+from functools import cache
 from itertools import pairwise
-from textwrap import dedent
 
 from pydantic import BaseModel, ConfigDict
 from typing_extensions import Self
@@ -33,12 +34,7 @@ def field_docstrings(record: type) -> dict[str, str]:
     for kind in reversed(record.__mro__):
         if kind in {Record, BaseModel, tuple, object}:
             continue
-        try:
-            (definition,) = ast.parse(dedent(inspect.getsource(kind))).body
-        except (OSError, TypeError):
-            continue
-        assert isinstance(definition, ast.ClassDef)  # noqa: S101 - it is one
-        for node, text in pairwise(definition.body):
+        for node, text in pairwise(_classes(kind.__module__).get(kind.__name__, [])):
             match node, text:
                 case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
                     key = (fields[name].serialization_alias if name in fields else "") or name.removesuffix(
@@ -46,3 +42,13 @@ def field_docstrings(record: type) -> dict[str, str]:
                     )
                     texts[key] = inspect.cleandoc(words).replace("\n", " ")
     return texts
+
+
+@cache
+def _classes(module: str) -> dict[str, list[ast.stmt]]:
+    """Return what is in each class of a module, by the class's name; nothing where there is no source to read."""
+    try:
+        tree = ast.parse(inspect.getsource(sys.modules[module]))
+    except (OSError, TypeError):
+        return {}
+    return {node.name: node.body for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}

@@ -21,16 +21,26 @@ REPOSITORY = Path(__file__).parents[2]
 EXAMPLES = examples()
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=[e.id for e in EXAMPLES])
-def test_verdict(example: Example) -> None:
+@pytest.mark.parametrize("name", sorted({e.check for e in EXAMPLES}))
+def test_verdicts(name: str) -> None:
+    wrong = {e.id: faults_of(e) for e in EXAMPLES if e.check == name}
+    assert {case: faults for case, faults in wrong.items() if faults} == {}
+
+
+def faults_of(example: Example) -> list[str]:
     verdict = example.verdict()
-    assert differences(verdict, example.expect) == [], verdict
-    assert verdict.expected, "every verdict says what was expected"
-    assert verdict.message == verdict.message.strip()
-    assert "\n" not in verdict.message + verdict.hint + verdict.measured
-    assert in_language(verdict.message, "cpp") == verdict.message, "only hints speak of code"
-    if verdict.status is not Status.PASS:
-        assert verdict.hint, "where points are lost, the student is told what to do"
+    found = differences(verdict, example.expect)
+    said = verdict.message + verdict.hint + verdict.measured
+    for is_right, fault in (
+        (bool(verdict.expected), "a verdict says what was expected"),
+        (verdict.message == verdict.message.strip(), "there is space around the message"),
+        ("\n" not in said, "what is said is one line"),
+        (in_language(verdict.message, "cpp") == verdict.message, "only hints speak of code"),
+        (verdict.status is Status.PASS or verdict.hint, "where points are lost, a hint says what to do"),
+    ):
+        if not is_right:
+            found.append(f"{fault}: {verdict}")
+    return found
 
 
 @pytest.mark.parametrize("check", CHECKS.values(), ids=CHECKS)

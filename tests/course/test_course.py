@@ -19,6 +19,8 @@ from grader.rubric.load import load_rubric
 from grader.rubric.model import Late
 from tests.batch.a_class import CORRECT, RUBRIC, WRONG_NAME, lines_of
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 COURSE = """title: Robotics 1
 late: {lost: 10}
 late_days: {budget: 3, per_lab: 2}

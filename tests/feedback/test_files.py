@@ -20,6 +20,8 @@ from grader.cli.main import run
 from grader.model.publication import Publication
 from tests.feedback.a_class import award, feedback, publish, sent
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 
 def report(out: Path, name: str, file: str = "report.html") -> bytes:
     published = read_published(out)

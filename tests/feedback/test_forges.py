@@ -14,6 +14,8 @@ from tests.feedback.a_class import COMMIT, award, feedback, publish, sent
 from tests.feedback.forges import TOKEN, Failure, Forge, Repo, forge, github, gitlab
 from tests.feedback.test_git import use
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 NAMES = ("ada", "bob")
 
 

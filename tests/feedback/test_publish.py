@@ -21,6 +21,8 @@ from tests.feedback.a_class import award, publish, write_result
 from tests.review.a_class import result_of
 from tests.support.a_class import criterion, made_result
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+
 CRITERIA = (criterion("rate", Status.FAIL, 0, 10), criterion("style", Status.PASS, 10, 10))
 
 

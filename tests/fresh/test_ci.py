@@ -13,7 +13,7 @@ from tests.ci.gitlab import JOB, variables_of
 from tests.ci.runner import ACTION, outputs_in
 from tests.fresh.room import Rooms, Root
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros, pytest.mark.full, pytest.mark.slow, pytest.mark.timeout(900)]
 
 REPO = Path(__file__).resolve().parents[2]
 SOLUTION = REPO / "reference_solutions" / "leeds-comp3631-lab1" / "lab1"
@@ -49,7 +49,6 @@ def installed(machine: Root, locks: Path) -> tuple[Root, subprocess.CompletedPro
     return machine, done
 
 
-@pytest.mark.full
 def test_a_job_of_gitlab_installs_the_grader_and_runs_nodes(installed) -> None:
     root, done = installed
     assert done.returncode == 0, done.stdout + done.stderr
@@ -59,7 +58,6 @@ def test_a_job_of_gitlab_installs_the_grader_and_runs_nodes(installed) -> None:
     assert "sandbox: " in done.stdout
 
 
-@pytest.mark.full
 def test_a_job_of_github_in_a_container_runs_what_is_installed(installed, locks) -> None:
     root, _ = installed
     home = f"{PROJECT}.grader"

@@ -20,7 +20,7 @@ from grader.cli.main import run
 from tests.fresh.images import Image, build
 from tests.fresh.room import Rooms, Root
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.ros, pytest.mark.full, pytest.mark.slow, pytest.mark.timeout(900)]
 
 REPO = Path(__file__).resolve().parents[2]
 LAB = "mcr2-basic-comms"
@@ -94,14 +94,12 @@ def _failed(document: Mapping[str, Any]) -> list[str]:
     return [test["name"].split(":")[0] for test in document["tests"] if test["status"] != "passed"]
 
 
-@pytest.mark.full
 def test_gradescope_gives_full_marks_to_the_correct_package(rooms, autograder, locks) -> None:
     document = _graded_by_gradescope(rooms.fresh_root(on=autograder), _tree(CORRECT), locks)
     assert (document["score"], _failed(document)) == (100, []), document["stdout"]
     assert document["extra_data"]["rubric"]["id"] == LAB
 
 
-@pytest.mark.full
 def test_gradescope_takes_from_a_faulty_package_what_its_fault_costs(rooms, autograder, locks) -> None:
     root = rooms.fresh_root(on=autograder)
     document = _graded_by_gradescope(root, _tree(NO_TIME), locks)
@@ -118,7 +116,6 @@ def test_gradescope_says_that_there_is_no_package(rooms, autograder, locks) -> N
     assert "basic_comms" in document["output"]
 
 
-@pytest.mark.full
 def test_gradescope_without_a_sandbox_is_not_fooled_by_a_forger(rooms, autograder, locks) -> None:
     root = rooms.fresh_root(on=autograder)
     settings = root.path / "autograder" / "source" / "grader.json"
@@ -197,7 +194,6 @@ def _zip(folder: Path, file: Path) -> bytes:
     return Path(shutil.make_archive(str(file), "zip", folder.parent, folder.name)).read_bytes()
 
 
-@pytest.mark.full
 def test_prairielearn_gives_full_marks_to_the_correct_package(rooms, question, locks, tmp_path) -> None:
     data = _zip(CORRECT, tmp_path / "basic_comms")
     document = _graded_by_prairielearn(rooms, question, "basic_comms.zip", data, locks)
@@ -205,7 +201,6 @@ def test_prairielearn_gives_full_marks_to_the_correct_package(rooms, question, l
     assert sum(test["points"] for test in document["tests"]) == 100
 
 
-@pytest.mark.full
 def test_prairielearn_takes_no_attempt_for_what_is_no_package(rooms, question, locks) -> None:
     document = _graded_by_prairielearn(rooms, question, "basic_comms.zip", b"PK, not really", locks)
     assert document["gradable"] is False
@@ -229,7 +224,6 @@ def _context() -> list[str]:
     ]  # fmt: skip
 
 
-@pytest.mark.full
 def test_docker_grades_the_package_in_its_folder_as_an_ordinary_user(rooms, docker) -> None:
     root = rooms.fresh_root(on=docker.root)
     root.copy_in(CORRECT, "/work")
@@ -248,7 +242,6 @@ def test_docker_grades_the_package_in_its_folder_as_an_ordinary_user(rooms, dock
     assert done.returncode in {0, 4}  # a machine that was late is nobody's fault
 
 
-@pytest.mark.full
 def test_docker_does_so_as_any_user_with_a_folder_that_is_only_read(rooms, docker) -> None:
     """As `docker run --user` has it on a CI system: a number that no name in the image stands for."""
     root = rooms.fresh_root(on=docker.root)
@@ -258,7 +251,6 @@ def test_docker_does_so_as_any_user_with_a_folder_that_is_only_read(rooms, docke
     assert {c["status"] for c in json.loads(done.stdout)["criteria"]} <= {"pass", "inconclusive"}
 
 
-@pytest.mark.full
 def test_docker_says_what_it_can_do_when_asked_for_nothing(rooms, docker) -> None:
     root = rooms.fresh_root(on=docker.root)
     done = root.run(
@@ -267,7 +259,6 @@ def test_docker_says_what_it_can_do_when_asked_for_nothing(rooms, docker) -> Non
     assert "Grades introductory ROS 1 labs" in done.stdout
 
 
-@pytest.mark.full
 def test_the_development_container_runs_its_commands(rooms, docker) -> None:
     file = REPO / ".devcontainer" / "devcontainer.json"
     settings = json.loads(file.read_text())

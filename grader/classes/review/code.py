@@ -182,15 +182,12 @@ def highlighted(lines: Sequence[str], suffix: str) -> list[Markup]:
     text = "\n".join(lines)
     made, at = [], 0
     for found in pattern.finditer(text):
-        made += [escape(text[at : found.start()]), *_marked(found[0], found.lastgroup or "")]
+        made += [escape(text[at : found.start()]), _marked(found[0], found.lastgroup or "")]
         at = found.end()
     return [Markup(part) for part in "".join([*made, escape(text[at:])]).split("\n")]  # noqa: S704 - escaped
 
 
-def _marked(text: str, kind: str) -> Iterator[Markup]:
-    """Yield an element for each line of it."""
-    for number, part in enumerate(text.split("\n")):
-        if number:
-            yield Markup("\n")
-        if part:
-            yield Markup('<span class="hl-{}">{}</span>').format(kind, part)
+def _marked(text: str, kind: str) -> str:
+    """Return an element for each line of it."""
+    parts = escape(text).split("\n")
+    return "\n".join(part and f'<span class="hl-{kind}">{part}</span>' for part in parts)

@@ -6,7 +6,9 @@ const told = (form, text, bad) => {
   place.classList.toggle("bad", Boolean(bad));
 };
 
-const typed = (form) => JSON.stringify([...form.querySelectorAll("input:not([type=hidden]), textarea")].map((field) => (field.type === "checkbox" ? field.checked : field.value)));
+const fields = (form) => [...form.querySelectorAll("input:not([type=hidden]), textarea")];
+const typed = (form) => JSON.stringify(fields(form).map((field) => (field.type === "checkbox" ? field.checked : field.value)));
+const written = (form) => JSON.stringify(fields(form).map((field) => (field.type === "checkbox" ? field.defaultChecked : field.defaultValue)));
 
 const settle = (form) => {
   form.dataset.at = typed(form);
@@ -69,12 +71,15 @@ document.addEventListener("submit", (event) => {
   send(event.target, event.submitter);
 });
 
-document.addEventListener("input", (event) => {
-  const form = event.target.closest("form.decide");
-  if (!form) return;
+const look = (form) => {
   const changed = typed(form) !== form.dataset.at;
   form.classList.toggle("unsaved", changed);
   told(form, changed ? "not saved yet" : "");
+};
+
+document.addEventListener("input", (event) => {
+  const form = event.target.closest("form.decide");
+  if (form) look(form);
 });
 
 window.addEventListener("beforeunload", (event) => {
@@ -126,7 +131,10 @@ document.addEventListener("keydown", (event) => {
   }
 });
 
-document.querySelectorAll("form.decide").forEach(settle);
+document.querySelectorAll("form.decide").forEach((form) => {
+  form.dataset.at = written(form);
+  if (typed(form) !== form.dataset.at) look(form); // typed before this script came
+});
 document.getElementById("anew")?.addEventListener("click", (event) => {
   event.target.hidden = true;
   const frame = document.getElementById("report");
