@@ -76,8 +76,10 @@ _LINKED = re.compile(
 _BEFORE, _AFTER = "(\"'", ".,:;)\"'"
 _MARKUP = re.compile(r"[\\`*\[\]|~$]|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])")
 _SPAN = re.compile(r"(?<!`)`(?! )([^`]*[^` ])`(?!`)")
-_TOKEN = re.compile(r"(?:(?<!`)`(?! )[^`]*[^` ]`(?!`)|[^\s])+")
-"""A word, whose code may have blanks in it."""
+_ARGUMENTS = r"(?:[^()`]|\((?:[^()`]|\([^()`]*\))*\)){1,200}"
+_CALL = rf"(?:[\w.]*\w\({_ARGUMENTS}\))+"
+_TOKEN = re.compile(rf"(?:(?<!`)`(?! )[^`]*[^` ]`(?!`)|(?<![\w.]){_CALL}|[^\s])+")
+"""A word, whose code may have blanks in it, and so may a call: `rospy.Service('~count', …)`."""
 _FIRST = re.compile(r"[#=:{]|[-+](?![^\s+-])")
 _NUMBERED = re.compile(r"(\d{1,9})([.)])(?!\S)")
 _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
@@ -131,7 +133,9 @@ def _word(word: str, *, cell: bool) -> str:
     if _LINKED.search(word) is None:
         return _escaped(word)
     rest = word.lstrip(_BEFORE)
-    middle = _closed(rest, rest.rstrip(_AFTER))
+    call = re.match(_CALL, rest)
+    whole = call is not None and not rest[call.end() :].strip(_AFTER)
+    middle = call[0] if call and whole else _closed(rest, rest.rstrip(_AFTER))
     before, after = word[: len(word) - len(rest)], rest[len(middle) :]
     return _escaped(before) + _code(middle, cell=cell) + _escaped(after)
 
