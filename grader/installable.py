@@ -36,15 +36,15 @@ def known_packages() -> dict[str, tuple[str, ...]]:
 
 
 @cache
-def noetic_messages() -> dict[str, tuple[str, ...]]:
-    """Return the names of ROS Noetic's own message types by package (`sensor_msgs`: `JointState`, …)."""
+def noetic_messages() -> dict[str, dict[str, tuple[str, ...]]]:
+    """Return the fields of ROS Noetic's own message types by package and name (`sensor_msgs`: {`JointState`: …})."""
     from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - slow to load, and few need it
 
-    found: dict[str, list[str]] = {}
-    for full in get_typestore(Stores.ROS1_NOETIC).fielddefs:
+    found: dict[str, dict[str, tuple[str, ...]]] = {}
+    for full, (_, fields) in sorted(get_typestore(Stores.ROS1_NOETIC).fielddefs.items()):
         package, _, name = full.partition("/msg/")
-        found.setdefault(package, []).append(name)
-    return {package: tuple(sorted(names)) for package, names in found.items()}
+        found.setdefault(package, {})[name] = tuple(field for field, _ in fields)
+    return found
 
 
 def install_hint(name: str, lines: Iterable[str] = ()) -> str:

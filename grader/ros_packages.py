@@ -59,7 +59,7 @@ class RosPackages:
         """Return the names of a package's types, as installed here, else as ROS Noetic has them."""
         folder = self.folders.get(package)
         there = sorted(p.stem for p in (folder / kind).glob(f"*.{kind}")) if folder else []
-        return tuple(there) or (noetic_messages().get(package, ()) if kind == "msg" else ())
+        return tuple(there) or (tuple(noetic_messages().get(package, ())) if kind == "msg" else ())
 
     def text(self, type_: str, kind: Literal["srv", "action"]) -> str | None:
         """Return the text of a service's or an action's file; None where it is not installed here."""

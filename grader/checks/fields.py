@@ -63,7 +63,7 @@ class FieldBoundsParams(Record):
         return is_within(value, self.min, self.max)
 
 
-@check("field-bounds", params=FieldBoundsParams, messages_only=True, heeds_losses=True)
+@check("field-bounds", params=FieldBoundsParams, messages_only=True, heeds_losses=True, of_callbacks=True)
 def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> Verdict:
     """A field of the messages stays within its bounds.
 
@@ -164,7 +164,7 @@ class FieldEqualsParams(Record):
         return bool(reading.values) and not any(next(found, None) for found in each)
 
 
-@check("field-equals", params=FieldEqualsParams, messages_only=True)
+@check("field-equals", params=FieldEqualsParams, messages_only=True, of_callbacks=True)
 def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> Verdict:
     """A field of the messages has the right value.
 

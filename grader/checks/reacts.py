@@ -103,7 +103,7 @@ class Answer(NamedTuple):
     after_s: float | None
 
 
-@check("reacts", params=ReactsParams)
+@check("reacts", params=ReactsParams, of_callbacks=True)
 def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     """The node answers what it hears, in time.
 
@@ -130,7 +130,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         _nothing_to_judge(package, run, effects, own, params)
         or _early(causes, effects, run, params)
         or _never_caused(causes, run, params)
-        or _unanswered(answers, run, params)
+        or _unanswered(answers, run, params, _instead(causes, effects, params))
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.cause.words}")
     )
     times = [one.after_s for one in answers if one.after_s is not None]
@@ -217,7 +217,26 @@ def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> 
     ).once()
 
 
-def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Verdict | None:
+def _instead(
+    causes: Sequence[Reading], effects: Sequence[Reading], params: ReactsParams
+) -> tuple[str, str] | None:
+    """Return when an effect that never answers its cause came, in words, and what to look at; None where it never came
+    or nothing can be said of what it came upon."""
+    came = next((one.time_ns for one in effects if params.effect.holds(one)), None)
+    before = [one for one in causes if came is not None and one.time_ns <= came and one.values]
+    asked = next((one for one in causes if params.cause.holds(one) and one.values), None)
+    if came is None or not before or asked is None or params.cause.holds(before[-1]):
+        return None
+    field, topic = params.cause.field, params.cause.topic
+    (then, *_), (wanted, *_) = before[-1].values, asked.values
+    words = f"it came when {field} was {value_text(then)}"
+    hint = f"look at the condition in the callback of {topic}: it holds for {value_text(then)} and not for"
+    return words, f"{hint} {value_text(wanted)}"
+
+
+def _unanswered(
+    answers: Sequence[Answer], run: Run, params: ReactsParams, instead: tuple[str, str] | None
+) -> Verdict | None:
     hint = f"publish on {params.effect.topic} in the callback of {params.cause.topic}"
     if not answers and (unsent := misfit(run, params.cause.topic)):
         return unsent
@@ -230,7 +249,8 @@ def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Ve
     reaction, times = f"{params.effect.words} {{}} {params.cause.words}", plural(len(answers), "time")
     late = max((one.after_s for one in slow if one.after_s is not None), default=None)
     if late is None and len(slow) == len(answers):
-        verdict = failed(f"{reaction.format('never follows')}, which came {times}", hint=hint)
+        seen, hint = (f"; {instead[0]}", instead[1]) if instead else ("", hint)
+        verdict = failed(f"{reaction.format('never follows')}, which came {times}{seen}", hint=hint)
         return verdict.once() if len(answers) == 1 else verdict
     how = "does not follow" if late is None else f"comes up to {late:.2f} s after"
     verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).once()

@@ -78,7 +78,8 @@ class Check:
     `messages_only` checks ask a run for its messages alone, so they judge another tool's recording too. For such a
     run `package` is empty where there is none. `heeds_losses` checks look for themselves at what the recorder lost.
     What a check of `run_anyway` finds wrong with files is repaired before anything is run, so it explains no empty run,
-    unless the file is not there at all. `source` is the file of an instructor's own check.
+    unless the file is not there at all. `of_callbacks` checks judge what a node does upon what it hears: an exception
+    in a callback explains what they miss. `source` is the file of an instructor's own check.
     """
 
     name: str
@@ -90,6 +91,7 @@ class Check:
     messages_only: bool = False
     heeds_losses: bool = False
     run_anyway: bool = False
+    of_callbacks: bool = False
     source: str = ""
 
     @property
@@ -169,6 +171,7 @@ def check(
     messages_only: bool = False,
     heeds_losses: bool = False,
     run_anyway: bool = False,
+    of_callbacks: bool = False,
 ) -> Callable[[Callable[..., Verdict]], Callable[..., Verdict]]:
     """Register a function under a name. Raises ValueError for a name that is taken or a fact that no one has."""
 
@@ -192,6 +195,7 @@ def check(
             messages_only=messages_only,
             heeds_losses=heeds_losses,
             run_anyway=run_anyway,
+            of_callbacks=of_callbacks,
             source=own.source if own else "",
         )
         return function

@@ -77,7 +77,7 @@ class PathParams(Record):
         return Way((ORIGIN, *self.points) if added else self.points, self.tolerance_m, added)
 
 
-@check("path", params=PathParams, messages_only=True)
+@check("path", params=PathParams, messages_only=True, of_callbacks=True)
 def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     """The robot takes the right way.
 

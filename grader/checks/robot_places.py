@@ -114,7 +114,7 @@ class Stretch(NamedTuple):
         return self.from_s if math.isfinite(self.from_s) else set_off_s(path)
 
 
-@check("ends-at", params=EndsAtParams, messages_only=True)
+@check("ends-at", params=EndsAtParams, messages_only=True, of_callbacks=True)
 def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
     """The robot ends where it was sent.
 
@@ -320,7 +320,7 @@ class StaysWithinParams(Place):
         return Band(self.walls or shown_walls(run), self.min_m, self.max_m)
 
 
-@check("stays-within", params=StaysWithinParams, messages_only=True)
+@check("stays-within", params=StaysWithinParams, messages_only=True, of_callbacks=True)
 def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> Verdict:
     """The robot stays where it may be.
 

@@ -78,7 +78,7 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
     )
 
 
-@check("service-answers", params=ServiceAnswersParams)
+@check("service-answers", params=ServiceAnswersParams, of_callbacks=True)
 def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParams) -> Verdict:
     """The service answers as it should.
 

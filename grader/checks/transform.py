@@ -88,7 +88,7 @@ class Seen(NamedTuple):
     value: Transform | None
 
 
-@check("transform", params=TransformParams, messages_only=True)
+@check("transform", params=TransformParams, messages_only=True, of_callbacks=True)
 def transform(package: PackageFacts, run: Run, params: TransformParams) -> Verdict:
     """The transform between two frames is sent, and right.
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from grader.checks import CHECKS, Check
 from grader.checks.all_runs import NotRecorded
+from grader.checks.support.exit_causes import heed_errors
 from grader.checks.support.text import texts_in
 from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
@@ -130,6 +131,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
             if isinstance(asked, Verdict)
             else heed_losses(check, asked, _sound(check.function(**asked)))
         )
+        if not isinstance(asked, Verdict):
+            found = heed_errors(check, facts.package_of(criterion), asked.get("run"), found)
         return _named(said_for_node(found, criterion, facts), criterion, facts)
     except NotRecorded as missing:
         return missing.verdict

@@ -7,6 +7,7 @@ import signal
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from grader.checks.registry import Check
 from grader.checks.support.idioms import LOOP, SPIN
 from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import path_in_package
@@ -14,10 +15,11 @@ from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
 from grader.installable import ROS_2, install_hint, known_packages, noetic_messages
 from grader.model.package import Fault, PackageFacts
-from grader.model.verdict import FileCitation, Verdict, inconclusive
+from grader.model.verdict import Citations, FileCitation, Verdict, inconclusive
 from grader.wording import join_words, seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
+ATTRIBUTES_SHOWN = 8
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
 RACE = "publish() to a closed topic"
 ARGUMENT_HINT = (
@@ -49,6 +51,8 @@ SLIPS = {
     **{f"name '{old}' is not defined": (f"`{old}` is of Python 2", f"write `{new}`, as Python 3 has it")
        for old, new in {"xrange": "range", "unicode": "str", "basestring": "str", "long": "int", "unichr": "chr",
                         "reduce": "functools.reduce", "file": "open"}.items()},
+    **{f"'{kind}' object has no attribute 'data'": (f"it is no message but the {kind} in it", "leave out `.data` here")
+       for kind in ("int", "float", "str", "bool")},
     "namespaces are not allowed in node names": ("the name in `rospy.init_node(…)` has a slash in it",
      "write the node's name without a slash"),
     "init_node() has already been called with different arguments": ("`rospy.init_node(…)` is called a second time",
@@ -74,6 +78,23 @@ _NO_MODULE = re.compile(r"No module named '(\w+)'$")
 _NAME = re.compile(r"name '(\w+)' is not defined")
 _MEANT = re.compile(r"did you mean `(\w+)`\?$")
 _NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
+_NO_ATTRIBUTE = re.compile(r"(?:module|type object)? ?'([\w.]+)'(?: object)? has no attribute '(\w+)'")
+ATTRIBUTES = {
+    "rospy": (
+        *("init_node", "Publisher", "Subscriber", "Service", "ServiceProxy", "Rate", "Timer", "Time", "Duration"),
+        *("sleep", "spin", "is_shutdown", "on_shutdown", "signal_shutdown", "loginfo", "logwarn", "logerr", "logdebug"),
+        *("logfatal", "get_param", "set_param", "has_param", "delete_param", "search_param", "get_time", "get_rostime"),
+        *("get_name", "wait_for_message", "wait_for_service", "get_namespace", "get_published_topics", "myargv"),
+        *("ROSException", "ROSInterruptException", "ROSInitException", "ServiceException"),
+    ),
+    "Publisher": ("publish", "unregister", "get_num_connections"),
+    "Subscriber": ("unregister", "get_num_connections"),
+    "Rate": ("sleep", "remaining"),
+    "Time": ("now", "to_sec", "to_nsec", "secs", "nsecs", "is_zero"),
+    "Duration": ("to_sec", "to_nsec", "secs", "nsecs"),
+    "ServiceProxy": ("wait_for_service", "close"),
+}  # fmt: skip
+"""What a lab's scripts use of rospy (http://docs.ros.org/en/noetic/api/rospy/html/)."""
 HEADING = "Traceback (most recent call last):"
 _FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
 _CARETS = re.compile(r"    \s*([~^]*\^[~^]*)")
@@ -231,8 +252,26 @@ def explain_error(package: PackageFacts, run: Run) -> Ending | None:
         t
         for one in lives(run)
         for t in process_tracebacks(run, one.name, after_ns=one.start_ns, before_ns=one.interrupt_ns)
+        if not is_rospys_own(t)
     ]
     return explain_traceback(found[-1], package) if found else None
+
+
+def heed_errors(check: Check, package: PackageFacts | None, run: object, verdict: Verdict) -> Verdict:
+    """Return a lost mark with the exception that a callback raised, which rospy prints and outlives."""
+    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
+    if not unexplained or package is None or not isinstance(run, Run) or early_end(run):
+        return verdict
+    end = explain_error(package, run)
+    if end is None:
+        return verdict
+
+    def lost(message: str, *, hint: str, citations: Citations, measured: str) -> Verdict:
+        update = {"message": message, "hint": hint, "citations": (*citations, *verdict.citations)}
+        return verdict.model_copy(update=update).about(measured=measured)
+
+    message = f"{verdict.message}; a callback fails: {end.cause}"
+    return end.verdict(lost, message, measured=verdict.measured).about(expected=verdict.expected)
 
 
 def _limit(life: Life, run: Run) -> str:
@@ -258,7 +297,7 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     """One traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
-    slip = _slip(found)
+    slip = _slip(found, package)
     cause, hint = slip or CAUSES.get(found.kind, ("", "fix the line that is named"))
     maker = next((one for one in (package, *package.also) if _makes(one, found.message)), None)
     if maker is not None:
@@ -289,12 +328,14 @@ def _makes(package: PackageFacts, message: str) -> bool:
     return named and bool(package.interfaces)
 
 
-def _slip(found: Traceback) -> tuple[str, str] | None:
+def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint of a known slip, by what was said, by the module and by the line itself."""
     if known := next((known for said, known in SLIPS.items() if said in found.message), None):
         return known
     if wrong := _NO_TYPE.match(found.message):
         return _other_types(wrong[1], wrong[2])
+    if wrong := _NO_ATTRIBUTE.search(found.message):
+        return _other_attributes(package, wrong[1], wrong[2])
     module = _NO_MODULE.search(found.message)
     if module and module[1] in ROS_2:
         return f"{module[1]} is of ROS 2", "this lab is for ROS 1: write the node with rospy"
@@ -324,6 +365,31 @@ def _other_types(name: str, package: str) -> tuple[str, str] | None:
         lines = join_words([f"from {other}.msg import {name}" for other in having], "or")
         return f"{package} has no {name}, {join_words(having)} has", lines
     return (f"{package} has {near[0]}", f"from {package}.msg import {near[0]}") if near else None
+
+
+def _other_attributes(package: PackageFacts, owner: str, wrong: str) -> tuple[str, str] | None:
+    """Return what a message has, or an object of rospy's, in place of an attribute that it has not."""
+    known = ATTRIBUTES.get(owner) or _fields_of(package, owner)
+    if not known:
+        return None
+    if near := near_names(wrong, known):
+        return f"{owner} has {near[0]}", f"write {near[0]} for {wrong}"
+    if owner in ATTRIBUTES:
+        return None
+    listed = join_words(known[:ATTRIBUTES_SHOWN]) + (", …" if len(known) > ATTRIBUTES_SHOWN else "")
+    return f"{owner} has {listed}", f"write the field that you mean for {wrong}"
+
+
+def _fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
+    """Return the fields of a message type, of the student's own or of ROS's, by the name of its class."""
+    for own in (package, *package.also):
+        for one in own.interfaces:
+            stem = one.path.rpartition("/")[2].partition(".")[0]
+            part = name[len(stem) :].lower()
+            fields = tuple(field.name for field in one.fields if field.part == part)
+            if name.startswith(stem) and fields:
+                return fields
+    return next((fields for types in noetic_messages().values() if (fields := types.get(name, ()))), ())
 
 
 def _lacking(found: Traceback, package: PackageFacts) -> str:

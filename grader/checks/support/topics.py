@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Literal
 
 from grader.checks.registry import Check
-from grader.checks.support.exit_causes import explain_end
+from grader.checks.support.exit_causes import explain_end, explain_error
 from grader.checks.support.idioms import INIT, LOOP, PUBLISHER, publisher
 from grader.checks.support.nodes import plain_type
 from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives
@@ -93,11 +93,18 @@ def no_message(
     if absent := no_node(package, run, what) or _refused(run, topic) or misfit(run):
         return absent
     if topic in published:
-        hint = f"call publish(…) inside the loop `{LOOP}`"
-        return of_node(f"{what}, although it is advertised", measured="no message", hint=hint)
+        return _advertised(package, run, what, of_node)
     only = f"it publishes on {join_words(published)}; " if published else ""
     hint = f"{only}add {publisher(topic)} and publish in the loop"
     return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
+
+
+def _advertised(package: PackageFacts, run: Run, what: str, of_node: Callable[..., Verdict]) -> Verdict:
+    message = f"{what}, although it is advertised"
+    if end := explain_error(package, run):
+        return end.verdict(of_node, f"{message}: an error comes first: {end.cause}", measured="no message")
+    hint = f"call publish(…) inside the loop `{LOOP}`"
+    return of_node(message, measured="no message", hint=hint)
 
 
 def sent_by(run: Run, topic: str, of: Sender) -> tuple[Channel, ...]:
