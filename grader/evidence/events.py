@@ -147,7 +147,7 @@ class ActorEvent(Record):
     Of services and actions that the grader offers: `serve` is a call, or a goal, of the node `actor`, and `value` has
     the fields of its `request` and of the `response` or result, None where the service fails; a goal's state is in
     `detail`. `lookup`: the node `actor` asked the master for the service `topic`, the first time; `detail` says where
-    it was not there.
+    it was not there. `read`: the same of the parameter `topic`.
     """
 
     action: Literal[
@@ -174,6 +174,7 @@ class ActorEvent(Record):
         "left",
         "serve",
         "lookup",
+        "read",
     ]
     """What was done."""
     actor: str

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from grader.checks import CHECKS, Check
 from grader.checks.all_runs import NotRecorded
 from grader.checks.support.exit_causes import heed_errors
+from grader.checks.support.parameters import heed_unread
 from grader.checks.support.text import texts_in
 from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
@@ -132,7 +133,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
             else heed_losses(check, asked, _sound(check.function(**asked)))
         )
         if not isinstance(asked, Verdict):
-            found = heed_errors(check, facts.package_of(criterion), asked.get("run"), found)
+            package, run = facts.package_of(criterion), asked.get("run")
+            found = heed_unread(check, package, run, heed_errors(check, package, run, found))
         return _named(said_for_node(found, criterion, facts), criterion, facts)
     except NotRecorded as missing:
         return missing.verdict

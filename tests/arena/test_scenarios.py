@@ -28,7 +28,7 @@ SERVER = (
     + "rospy.Service('enable', SetBool, answer)\n"
     + "rospy.Subscriber('cmd_vel', Twist, lambda m: print('x is', m.linear.x))\nrospy.spin()\n"
 )
-READER = NODE + "rospy.init_node('reader')\nprint(rospy.get_param('details'))\nrospy.set_param('/done', 5)\n"
+READER = NODE + "rospy.init_node('reader')\nprint(rospy.get_param('details'), rospy.has_param('other'))\nrospy.set_param('/done', 5)\n"
 CONFIG = "details:\n  name: Ada\n  phone: 77777\n  weight: 1.5\n  digits: '0123'\n  flags: [true, 2]\n"
 
 
@@ -133,6 +133,8 @@ def test_parameters_of_a_file_are_made_up(tmp_path: Path, sandbox: str) -> None:
     (line,) = printed(seen, "reader")
     assert all(repr(values[f"/details/{n}"]) in line for n in ("name", "phone", "weight", "digits", "street"))
     assert [(e.name, e.value) for _, e in seen.params if e.caller_id == "/reader"] == [("/done", 5)]
+    asked = {(e.actor, e.topic, e.detail) for _, e in seen.actors if e.action == "read"}
+    assert asked >= {("/reader", "/details", ""), ("/reader", "/other", "not there")}
     assert seen.outcome.outcome == "ended"
 
 

@@ -19,7 +19,7 @@ from registry_log import GraphLog, ParamLog
 
 NOTIFY_S = 10.0
 OPENED_MAX, ARGUMENTS_MAX, ARGUMENT_CHARS = 100, 20, 1000
-LOOKUPS_MAX = 100
+TOLD_MAX = 100
 PROBE_S = 0.5
 SUBSCRIBED_S = 0.3
 LOOK_S = 0.01
@@ -53,7 +53,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._recorder = recorder
         self._own = own
         self._opened = 0
-        self._lookups = set()
+        self._told = {"lookup": set(), "read": set()}
         self._pool = Pool()
         self._calling = threading.local()
         self._guard = guard
@@ -144,17 +144,34 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
     def lookupService(self, caller_id, service):
         """What a client asks for is told once: `wait_for_service` asks again and again."""
         answer = super().lookupService(caller_id, service)
-        key = caller_id, str(service)
-        if self._caller is not None and key not in self._lookups and len(self._lookups) < LOOKUPS_MAX:
-            self._lookups.add(key)
-            record = {"action": "lookup", "actor": caller_id, "topic": cut(service, ARGUMENT_CHARS)}
-            self._wire.event("/grader/actor", dict(record, detail="" if answer[0] == 1 else "not there"))
+        self._asked("lookup", caller_id, service, is_there=answer[0] == 1)
         return answer
 
     def getParam(self, caller_id, key):
         if key == "/use_sim_time":
             self._recorder.gate(caller_id)
-        return super().getParam(caller_id, key)
+        answer = super().getParam(caller_id, key)
+        self._asked("read", caller_id, key, is_there=answer[0] == 1)
+        return answer
+
+    def hasParam(self, caller_id, key):
+        answer = super().hasParam(caller_id, key)
+        self._asked("read", caller_id, key, is_there=answer[2] is True)
+        return answer
+
+    def subscribeParam(self, caller_id, caller_api, key):
+        """What is read by `get_param_cached`, and by roscpp; of a name that is not there the answer is empty."""
+        answer = super().subscribeParam(caller_id, caller_api, key)
+        self._asked("read", caller_id, key, is_there=answer[2] != {})
+        return answer
+
+    def _asked(self, action, caller_id, name, is_there):
+        """Tell the first time that a node asks for a name."""
+        asked = self._told[action]
+        if self._caller is not None and (caller_id, str(name)) not in asked and len(asked) < TOLD_MAX:
+            asked.add((caller_id, str(name)))
+            record = {"action": action, "actor": caller_id, "topic": cut(name, ARGUMENT_CHARS)}
+            self._wire.event("/grader/actor", dict(record, detail="" if is_there else "not there"))
 
     def unregisterService(self, caller_id, service, service_api):
         self._graph.before_leaving()

@@ -11,13 +11,16 @@ from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
+from grader.checks.registry import Check
 from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
+from grader.checks.support.idioms import get_param, init
 from grader.checks.support.processes import early_end
 from grader.checks.support.text import near_names
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchParam, PackageFacts
+from grader.model.verdict import EvidenceCitation, Verdict
 from grader.wording import join_words
 
 SYSTEM = (
@@ -171,6 +174,37 @@ def params_given(run: Run) -> dict[str, Given]:
     events = [e for _, e in run.actors if e.action == "param"]
     names = (absolute_name(e.topic or "") for e in events)
     return {n: Given(n, e.value, NOT_IN_FILE not in e.detail) for n, e in zip(names, events, strict=True)}
+
+
+def heed_unread(check: Check, _package: PackageFacts | None, run: object, verdict: Verdict) -> Verdict:
+    """Return a lost mark with the parameter that the run sets and that no node asked for, whatever it did instead."""
+    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
+    if not unexplained or not isinstance(run, Run) or early_end(run):
+        return verdict
+    asked = [
+        (e.actor, absolute_name(e.topic or ""))
+        for _, e in run.actors
+        if e.action == "read" and run.is_student_node(e.actor)
+    ]
+    names = {name for _, name in asked}
+    unread = [
+        one
+        for name, one in params_given(run).items()
+        if not any(f"{name}/".startswith(f"{n}/") or f"{n}/".startswith(f"{name}/") for n in names)
+    ]
+    if not asked or not unread:
+        return verdict
+    name, value, _ = unread[0]
+    above, _, last = name.rpartition("/")
+    own = [(node, n) for node, n in asked if last in n.split("/") or near_names(last, n.split("/"))]
+    seen = f"; {own[0][0]} asks for {own[0][1]}" if own else ""
+    hint = f"read it with {get_param(f'~{last}' if above in run.student_nodes() else name)}"
+    if own and own[0][1] == f"{own[0][0]}/{last}" and above not in run.student_nodes():
+        hint = f"name the node {above}: {init(above.lstrip('/'))}"
+    message = f"{verdict.message}; the run sets {name} to {value!r}, and no node reads it{seen}"
+    cited = EvidenceCitation(evidence=run.evidence, topic="/grader/actor")
+    update = {"message": message, "hint": hint, "citations": (*verdict.citations, cited), "cause": name}
+    return verdict.model_copy(update=update)
 
 
 def is_printed(value: object, lines: Sequence[Line]) -> bool:

@@ -17,7 +17,7 @@ STRETCHES_MAX = 120
 PARTS = 400
 """Messages that are nearer to each other than such a part of the run are drawn as one stretch."""
 SAYS_LETTERS = 120
-QUIET = frozenset({"clock", "interrupt", "open", "note", "left", "lookup"})
+QUIET = frozenset({"clock", "interrupt", "open", "note", "left", "lookup", "read"})
 
 
 def timeline_of(run: Run) -> TimelineFigure | None:
