@@ -28,7 +28,11 @@ SERVER = (
     + "rospy.Service('enable', SetBool, answer)\n"
     + "rospy.Subscriber('cmd_vel', Twist, lambda m: print('x is', m.linear.x))\nrospy.spin()\n"
 )
-READER = NODE + "rospy.init_node('reader')\nprint(rospy.get_param('details'), rospy.has_param('other'))\nrospy.set_param('/done', 5)\n"
+READER = (
+    NODE
+    + "rospy.init_node('reader')\nprint(rospy.get_param('details'), rospy.has_param('other'))\n"
+    + "rospy.set_param('/done', 5)\n"
+)
 CONFIG = "details:\n  name: Ada\n  phone: 77777\n  weight: 1.5\n  digits: '0123'\n  flags: [true, 2]\n"
 
 
