@@ -96,7 +96,8 @@ def launch(test, config, path):
     except roslaunch.launch.RLTestTimeoutException:
         return "late"
     except roslaunch.core.RLException as error:
-        return shorten(error)
+        # Of a test that has ended with an error when roslaunch first looks: what it left says how it went.
+        return None if str(error).endswith("] failed to launch") else shorten(error)
     finally:
         parent.tear_down()
     return None
