@@ -369,6 +369,14 @@ def in_short(result: GradingResult, view: ReportView) -> str:
     return " ".join(said)
 
 
+def points_line(result: GradingResult, view: ReportView) -> str:
+    """`95 of 100 points`; `20 of 100 points so far, 80 still open` where not all is settled."""
+    still = sum(loss.points for loss in view.open)
+    return f"{number(result.points)} of {number(result.max_points)} points" + (
+        f" so far, {number(still)} still open" if still else ""
+    )
+
+
 def lost_words(criterion: CriterionResult, blocked: float) -> str:
     """`10 points lost, and 25 more in what it holds back`; points that are open are not lost."""
     own = criterion.missing

@@ -185,7 +185,7 @@ class Terminal:
         if not_graded(result):
             text = Text("\nNot graded", "bold")
             return text.append(f"\n{self._show(result.error.message)}", "not bold") if result.error else text
-        points = f"{number(result.points)} of {number(result.max_points)} points"
+        points = sentences.points_line(result, view)
         things = f", {plural(len(view.lost), 'thing')} to fix" if view.lost else ""
         text = Text(f"\n{points}{things}", "bold")
         return text.append("".join(f"\n{words}" for words in sentences.gate_words(result)), "not bold")

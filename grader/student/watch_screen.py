@@ -13,6 +13,7 @@ from rich.text import Text
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.result_json import result_text
+from grader.report.sentences import points_line
 from grader.report.terminal import Terminal, emit, open_console, print_report
 from grader.report.text import line
 from grader.report.view import arrange, points_of
@@ -92,7 +93,7 @@ class TerminalScreen(Screen):
         view = arrange(result, self._rubric)
         lost = number(sum(loss.points for loss in view.lost))
         yield Text.assemble(
-            (f"{number(result.points)} of {number(result.max_points)} points", "bold"),
+            (points_line(result, view), "bold"),
             f", {lost} lost" if view.lost else ", nothing lost",
         )
         changed = compare(before, result)
