@@ -25,7 +25,7 @@ from grader.judging.summary import criteria_text, judged_text
 from grader.model.result import CriterionResult
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
-from grader.rubric.find import known_labs
+from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.verification import Finding, compare, read_whole, result_folders, verify
 from grader.wording import number
@@ -178,7 +178,7 @@ def verify_results(results: Sequence[Path], rubric: str | None, allowed: Path | 
 
 def _rubric_named(name: str, *, given: bool) -> LoadedRubric:
     """Load it; what a result says must not lead to a file."""
-    if not given and name not in {lab.id for lab in known_labs()}:
+    if not given and not named_labs(name):
         raise UsageError(
             f"there is no lab {line(name, 100)} here", hint="give the course's rubric with --rubric"
         )

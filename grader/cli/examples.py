@@ -19,7 +19,7 @@ from grader.errors import UsageError
 from grader.files import check_writable
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
-from grader.rubric.find import BUILT_IN
+from grader.rubric.find import BUILT_IN, EXAMPLE
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import NAME_PATTERN, Rubric
 from grader.wording import did_you_mean, number
@@ -28,7 +28,7 @@ from grader.wording import did_you_mean, number
 def print_labs(rubrics: Sequence[tuple[Rubric, str]], stream: IO[str]) -> None:
     """Print a table of labs with the package that each is for, and where each comes from."""
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="dim")
-    own = any(source != BUILT_IN for _, source in rubrics)
+    own = any(source not in {BUILT_IN, EXAMPLE} for _, source in rubrics)
     for heading in ("lab", "package", "criteria", "points", "title", *(["from"] if own else [])):
         table.add_column(heading, no_wrap=heading not in {"title", "from"}, overflow="fold")
     for rubric, source in rubrics:

@@ -24,7 +24,7 @@ from grader.report.forms import FORMS, ReportInput
 from grader.report.sentences import missing_hidden
 from grader.report.terminal import open_console, print_report
 from grader.report.view import without_hidden
-from grader.rubric.find import known_labs
+from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import Rubric
 from grader.wording import first_few
@@ -52,7 +52,7 @@ def rubric_of(given: str | None, folder: Path, batch: BatchFolder | None = None)
         batch = open_batch(folder.absolute().parent)
     if given is None and batch is None:
         given = result_in(folder).rubric.id
-        if given not in {lab.id for lab in known_labs()}:
+        if not named_labs(given):
             message = f'{folder}: its rubric "{given}" is none of the labs that are known here'
             raise UsageError(message, hint="name its file with --rubric")
     return load_rubric(given or (batch.run.rubric_source if batch else ""))

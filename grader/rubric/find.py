@@ -1,4 +1,4 @@
-"""Where rubrics are: those that come with the grader, and folders of the user's own.
+"""Where rubrics are: those that come with the grader, its examples, and folders of the user's own.
 
 `rubrics/` of a checkout, or what travels inside the wheel; then the folders of `$GRADER_RUBRICS`, then those that
 `grader labs --add` has written down. Nothing is looked for where a submission lies: all of these are absolute paths.
@@ -22,11 +22,12 @@ SUFFIXES = (".yaml", ".yml")
 VARIABLE = "GRADER_RUBRICS"
 SCHEMA = "grader.rubric/"
 BUILT_IN = "the grader"
+EXAMPLE = "the grader's examples"
 
 
 class LabFile(NamedTuple):
     """A rubric by its id; `packages` is empty where the file cannot be read. `source` says where it was found: a folder
-    of the user's, or `the grader`."""
+    of the user's, `the grader` or `the grader's examples`."""
 
     id: str
     path: Path
@@ -97,10 +98,21 @@ def known_labs() -> tuple[LabFile, ...]:
     return (*_built_in(rubrics_folder()), *(lab for place in own_folders() for lab in _rubrics_in(place)))
 
 
+def example_labs() -> tuple[LabFile, ...]:
+    """Return the examples of rubrics that come with the grader, in order of their ids."""
+    return _built_in(rubrics_folder() / "examples", EXAMPLE)
+
+
+def named_labs(name: str) -> list[LabFile]:
+    """Return the labs with that id: the known ones, else the example."""
+    known = [lab for lab in known_labs() if lab.id == name]
+    return known or [lab for lab in example_labs() if lab.id == name]
+
+
 @cache
-def _built_in(folder: Path) -> tuple[LabFile, ...]:
-    paths = [folder / f"{name}.yaml" for name in rubric_ids()]
-    return tuple(LabFile(path.stem, path, _texts(path, "package")) for path in paths)
+def _built_in(folder: Path, source: str = BUILT_IN) -> tuple[LabFile, ...]:
+    paths = sorted(folder.glob("*.yaml"))
+    return tuple(LabFile(path.stem, path, _texts(path, "package"), source) for path in paths)
 
 
 def locate(name_or_path: str) -> tuple[Path, str]:
@@ -109,8 +121,7 @@ def locate(name_or_path: str) -> tuple[Path, str]:
     path = Path(name_or_path)
     if path.suffix in SUFFIXES or "/" in name_or_path:
         return path, name_or_path
-    known = known_labs()
-    found = [lab.path for lab in known if lab.id == name_or_path]
+    found = [lab.path for lab in named_labs(name_or_path)]
     if len(found) > 1:
         paths = ", ".join(_short(path) for path in found)
         raise UsageError(
@@ -121,8 +132,9 @@ def locate(name_or_path: str) -> tuple[Path, str]:
         return found[0], _short(found[0])
     if path.is_file():
         return path, name_or_path
+    known = [lab.id for lab in (*known_labs(), *example_labs())]
     raise RubricError(
-        [f'there is no rubric "{name_or_path}"{did_you_mean(name_or_path, [lab.id for lab in known])}'],
+        [f'there is no rubric "{name_or_path}"{did_you_mean(name_or_path, known)}'],
         hint="grader labs lists the rubrics; a rubric of your own is given by its file name",
     )
 

@@ -23,6 +23,9 @@ def labs(
         Path | None, Option("--add", "DIR", "also look for labs in this folder, from now on")
     ] = None,
     remove: Annotated[Path | None, Option("--remove", "DIR", "do not look there any more")] = None,
+    examples: Annotated[
+        bool, Flag("--examples", "list the examples of rubrics that come with the grader")
+    ] = False,
     as_json: JsonFlag = False,
 ) -> ExitCode:
     """List the labs that are known here, and where each comes from.
@@ -32,7 +35,7 @@ def labs(
     with loading():
         from grader.cli.examples import print_labs
         from grader.cli.output import say, say_json
-        from grader.rubric.find import add_folder, known_labs, remove_folder
+        from grader.rubric.find import add_folder, example_labs, known_labs, remove_folder
         from grader.rubric.load import load_rubric
     if add is not None:
         say(f"{add_folder(add)}: its labs are known from now on")
@@ -41,7 +44,7 @@ def labs(
     if add is not None or remove is not None:
         return ExitCode.PASSED
     rows, faulty = [], []
-    for lab in known_labs():
+    for lab in example_labs() if examples else known_labs():
         try:
             rows.append((load_rubric(str(lab.path)).rubric, lab.source))
         except RubricError:  # noqa: PERF203 - one that is faulty hides no other
