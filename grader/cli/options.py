@@ -67,6 +67,12 @@ FEEDBACK_EXIT_CODES = """exit codes:
   3    some could not be sent: they are named
   130  interrupted: run the same command to continue
 """
+REQUESTS_EXIT_CODES = """exit codes:
+  0    every question is listed
+  2    the command line is wrong
+  3    a repository could not be read: it is named
+  130  interrupted
+"""
 VERIFY_EXIT_CODES = """exit codes:
   0    the evidence gives what the result says, and nothing else is wrong
   1    something does not fit: result, evidence, rubric or signature; or with --against: something differs

@@ -1,4 +1,4 @@
-"""What `grader publish` and `grader feedback` print, and their exit codes."""
+"""What `grader publish`, `grader feedback` and `grader requests` print, and their exit codes."""
 
 from __future__ import annotations
 
@@ -7,16 +7,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from typing import cast
 
 from grader.classes.batch.folder import BatchFolder, open_batch
 from grader.classes.feedback import publish as publishing
-from grader.classes.feedback.forms import Form, Settings
+from grader.classes.feedback.forms import FORMS, Form, Settings
 from grader.classes.feedback.publish import Publishing, Step, plan, read_published, refuse_other_rubric
+from grader.classes.feedback.rest import Comments
 from grader.classes.feedback.send import Delivery, Failure, Selection, Wanted, deliver, faults, selected
+from grader.classes.review.requests import Asked, fetch, rows_of, write_requests
 from grader.classes.review.serve import git_user
+from grader.classes.review.session import ReviewSession, open_session
 from grader.classes.roster.entries import parse_time
 from grader.cli.output import say, say_beside, say_document, say_json
-from grader.errors import ExitCode, UsageError
+from grader.errors import ExitCode, NotSent, UsageError
 from grader.model.result import AUTHOR_CHARS
 from grader.portable import cores
 from grader.report.view import hidden_ids
@@ -184,3 +188,57 @@ def _others(selection: Selection) -> Iterator[str]:
 
 def _failed(failures: Sequence[Failure]) -> list[str]:
     return [f"{len(failures)} could not be sent"] if failures else []
+
+
+def list_requests(folder: Path, forge: str | None, label: str, *, as_json: bool) -> ExitCode:
+    """Print what students ask and what was answered; with a forge, get what is asked there first."""
+    session = open_session(folder)
+    failures = _fetch(session, forge, label) if forge else []
+    asked, decided = session.requests(), session.overrides()
+    listed = [
+        {
+            "student": student,
+            "criterion": criterion,
+            "text": one.text,
+            "when": one.when,
+            "source": one.source,
+            "answer": answer.answer if (answer := decided.get(student, {}).get(criterion)) else "",
+        }
+        for student, of in asked.found.items()
+        for criterion, ones in of.items()
+        for one in ones
+    ]
+    if as_json:
+        say_json(listed)
+    else:
+        for one in listed:
+            about = ", ".join(filter(None, (one["when"], one["source"])))
+            say(f"{one['student']} {one['criterion']}" + (f" ({about})" if about else ""))
+            for text in filter(str.strip, one["text"].splitlines()):
+                say(f"    {text}")
+            if one["answer"]:
+                say(f"    answer: {one['answer']}")
+        answered = sum(bool(one["answer"]) for one in listed)
+        say(
+            f"{plural(len(listed), 'question')}, {answered} answered; grader review {folder} takes the answers"
+        )
+    for fault in asked.faults:
+        say_beside(f"left out: {fault}")
+    for failure in failures:
+        say_beside(f"{failure.id}: {failure.message}" + (f" ({failure.hint})" if failure.hint else ""))
+    return ExitCode.NOT_GRADED if failures else ExitCode.PASSED
+
+
+def _fetch(session: ReviewSession, forge: str, label: str) -> list[Failure]:
+    """Write what is asked on a forge into the class's folder. Whose repository fails keeps the rows of before."""
+    sender = cast(Comments, FORMS[forge].open(Settings(folder=session.path, told=say_beside)))
+    batch, path = session.submissions.batch(), session.path / f"requests-{forge}.csv"
+    rows, failures = list[Asked](), list[Failure]()
+    for entry in batch.run.entries:
+        try:
+            rows += fetch(sender, batch, entry, session.rubric.rubric.criteria, label)
+        except NotSent as error:  # noqa: PERF203 - each repository has its own
+            rows += rows_of(path, {entry.id})
+            failures.append(Failure(id=entry.id, message=error.message, hint=error.hint))
+    write_requests(path, rows)
+    return failures

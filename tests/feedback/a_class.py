@@ -77,10 +77,17 @@ def write_result(out: Path, name: str, result: GradingResult) -> None:
 
 
 def award(
-    out: Path, name: str, criterion: str, points: float, comment: str = "", *, settled: bool = True
+    out: Path,
+    name: str,
+    criterion: str,
+    points: float,
+    comment: str = "",
+    *,
+    answer: str = "",
+    settled: bool = True,
 ) -> None:
     """Override a criterion, and let the results follow."""
-    override = Override(points=points, comment=comment, author="ann")
+    override = Override(points=points, comment=comment, answer=answer, author="ann")
     write_override(out / OVERRIDES, name, criterion, override)
     if settled:
         settle(out)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.feedback import rest
+from grader.cli.main import run
 from tests.feedback.a_class import COMMIT, award, feedback, publish, sent
 from tests.feedback.forges import TOKEN, Failure, Forge, Repo, forge, github, gitlab
 from tests.feedback.test_git import use
@@ -243,3 +244,85 @@ def test_a_dry_run_asks_no_server(published: Path, system: str, server: Forge, c
 )
 def test_the_repository_in_an_address(source: str, place: tuple[str, str]) -> None:
     assert rest.host_and_path(source) == place
+
+
+def ask(server: Forge, system: str, name: str, **about: object) -> None:
+    """A student opens an issue, as each API gives it."""
+    repo = server.repos[f"course/{name}"]
+    number = len(repo.issues) + 1
+    title, text = about.pop("title", "A question"), about.pop("text", "")
+    if system == "github":
+        web = f"https://github.com/course/{name}/issues/{number}"
+        issue = {"number": number, "html_url": web, "body": text, "state": "open", "labels": []}
+    else:
+        web = f"{server.address}/course/{name}/-/issues/{number}"
+        issue = {"iid": number, "web_url": web, "description": text, "state": "opened", "labels": []}
+    repo.issues.append({"title": title, "created_at": "2026-11-20T10:00:00Z", **issue, **about})
+
+
+def asked(out: Path, system: str, *options: str) -> int:
+    return run(["requests", str(out), "--from", system, *options])
+
+
+def test_questions_come_in_from_issues(published: Path, system: str, server: Forge, capsys) -> None:
+    ask(
+        server, system, "ada", title="style: why 5?", text="The names are\nthose of the handout; answers too."
+    )
+    ask(server, system, "ada", title="Please look again", text="=at `answers`, thank you")
+    ask(server, system, "ada", title="style, settled", state="closed")
+    ask(server, system, "bob", title="Does it rain?")
+    if system == "github":
+        ask(server, system, "bob", title="style", pull_request={"url": "https://x"})
+    assert asked(published, system) == 3
+    said = capsys.readouterr()
+    assert "ada style (2026-11-20T10:00:00Z, " in said.out
+    assert "    style: why 5?\n    The names are\n    those of the handout; answers too.\n" in said.out
+    assert "    =at `answers`, thank you\n" in said.out
+    assert "\n2 questions, 0 answered; " in said.out
+    assert "no criterion is named: Does it rain?" in said.err
+    assert "cem: " in said.err
+    assert TOKEN not in "".join(said) + (published / f"requests-{system}.csv").read_text()
+    award(published, "ada", "style", 7, answer="Line 12 shadows a name.")
+    del server.repos["course/ada"]
+    assert asked(published, system) == 3
+    said = capsys.readouterr()
+    assert "\n2 questions, 1 answered; " in said.out
+    assert "    answer: Line 12 shadows a name.\n" in said.out
+    assert f"ada: {server_name(server, system)}/course/ada: " in said.err
+
+
+def server_name(server: Forge, system: str) -> str:
+    return "github.com" if system == "github" else server.address.partition("//")[2]
+
+
+def test_only_issues_with_a_label(published: Path, system: str, server: Forge, capsys) -> None:
+    label = {"name": "lab 1"} if system == "github" else "lab 1"
+    ask(server, system, "ada", title="style", labels=[label])
+    ask(server, system, "ada", title="answers")
+    asked(published, system, "--label", "lab 1")
+    assert "\n1 question, 0 answered; " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("options", [(), ("--issues",)])
+def test_answers_to_feedback_are_questions(
+    options: tuple[str, ...], published: Path, system: str, server: Forge, capsys
+) -> None:
+    both(published, system, *options)
+    repo = server.repos["course/ada"]
+    text = "Could you look at style once more?"
+    if options:
+        repo.notes.append((1, text))
+    elif system == "github":
+        repo.comments.append({"commit_id": COMMIT, "body": text, "html_url": "https://github.com/c"})
+    else:
+        repo.comments.append({"commit_id": COMMIT, "body": text})
+    capsys.readouterr()
+    asked(published, system)
+    said = capsys.readouterr().out
+    assert "ada style (" in said
+    assert f"    {text}\n" in said
+    assert "\n1 question, 0 answered; " in said
+
+
+def test_a_label_is_of_a_forge(published: Path) -> None:
+    assert run(["requests", str(published), "--label", "x"]) == 2

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from grader.classes.review.requests import Request, read_requests
+from grader.classes.review.requests import Request, read_requests, request_files
+from grader.model.batch import Entry
+from grader.rubric.load import load_rubric
 from tests.review.a_class import overrides_of, points_of, result_of
 from tests.review.test_pages import rows
 
@@ -24,9 +26,7 @@ def asked(out):
 
 
 def test_rows_become_requests_and_faults_name_their_line(tmp_path) -> None:
-    path = tmp_path / "requests.csv"
-    path.write_text("\ufeff" + ASKED)
-    found = read_requests(path, ["ada", "dana"], ["style", "counter-wrap"])
+    found = read(tmp_path, "\ufeff" + ASKED)
     assert found.found == {
         "dana": {"counter-wrap": (Request(text="Why 0?\nIt is <b>right</b>.", when="2026-11-09"),)},
         "ada": {"style": (Request(text="Could I have more?", when=""),)},
@@ -39,14 +39,59 @@ def test_rows_become_requests_and_faults_name_their_line(tmp_path) -> None:
 
 @pytest.mark.parametrize(("text", "column"), [("", "student"), ("student,text\n", "criterion")])
 def test_a_file_without_a_column_says_so(tmp_path, text, column) -> None:
-    (tmp_path / "requests.csv").write_text(text)
-    found = read_requests(tmp_path / "requests.csv", ["ada"], ["style"])
+    found = read(tmp_path, text)
     assert (found.found, found.faults) == ({}, (f"requests.csv:1: there is no column {column}",))
 
 
 def test_no_file_is_no_request(tmp_path) -> None:
-    found = read_requests(tmp_path / "requests.csv", ["ada"], ["style"])
+    found = read(tmp_path)
     assert (found.found, found.faults) == ({}, ())
+
+
+def test_the_export_of_a_form_is_read_as_it_is(tmp_path) -> None:
+    found = read(
+        tmp_path,
+        """\
+Timestamp,E-mail address,Your name,Which criterion is your question about?,What is your question?,Score
+2026/11/20 10:00,dana@x.example,D.,The counter wraps,Why 0?,
+2026/11/20 10:01,,Ada Lovelace,style (names),Please look again,
+2026/11/20 10:02,,Someone,style,Why?,
+2026/11/20 10:03,,Ada Lovelace,style and counter-wrap,Both?,
+""",
+        """\
+ID;x,student,text,criterion
+1,ada,Please look again,style
+""",
+    )
+    first, second = (
+        Request(text="Please look again", when="2026/11/20 10:01"),
+        Request(text="Please look again"),
+    )
+    both = Request(text="Both?", when="2026/11/20 10:03")
+    assert found.found == {
+        "dana": {"counter-wrap": (Request(text="Why 0?", when="2026/11/20 10:00"),)},
+        "ada": {"style": (first, both, second), "counter-wrap": (both,)},
+    }
+    assert found.faults == ('requests.csv:4: there is no submission "Someone"',)
+
+
+def read(folder, *texts):
+    for number, text in enumerate(texts):
+        (folder / f"requests{number or ''}.csv").write_text(text)
+    entries = [
+        Entry(id="ada", source="/ada", name="Ada Lovelace"),
+        Entry(id="dana", source="/dana", extra={"Email address": "Dana@x.example"}),
+    ]
+    criteria = [
+        criterion.model_copy(update={"id": name, "title": title})
+        for criterion, name, title in zip(
+            load_rubric("leeds-comp3631-lab1").rubric.criteria,
+            ("style", "counter-wrap"),
+            ("Style", "The counter wraps"),
+            strict=False,
+        )
+    ]
+    return read_requests(request_files(folder), entries, criteria)
 
 
 @pytest.mark.usefixtures("asked")

@@ -179,3 +179,5 @@ _FORMS = (
     ),
 )
 FORMS: Mapping[str, Form] = {form.name: form for form in _FORMS}
+FORGES = tuple(form.name for form in _FORMS if "--issues" in form.options)
+"""Those through which students can ask back."""

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from typing import Any
 from urllib.parse import quote, urlsplit
 
 from grader.classes.feedback.forms import Settings
-from grader.classes.feedback.rest import Api, Comments, required_token
+from grader.classes.feedback.rest import Api, Comments, Post, required_token
 
 VERSION = "2022-11-28"
 
@@ -41,9 +42,9 @@ class GitHub(Comments):
         """Comment on a commit; return the comment's address."""
         return str(self.api.post(f"{_at(path)}/commits/{commit}/comments", {"body": body})["html_url"])
 
-    def comments(self, path: str, commit: str) -> Iterator[tuple[str, str]]:
+    def comments(self, path: str, commit: str) -> Iterator[Post]:
         """Yield the comments on a commit."""
-        return _texts(self.api.pages(f"{_at(path)}/commits/{commit}/comments"))
+        return _posts(self.api.pages(f"{_at(path)}/commits/{commit}/comments"))
 
     def open_issue(self, path: str, title: str, body: str) -> str:
         """Open an issue."""
@@ -53,16 +54,28 @@ class GitHub(Comments):
         """Comment on an issue."""
         return str(self.api.post(f"{_at(path)}/issues/{issue}/comments", {"body": body})["html_url"])
 
-    def issues(self, path: str, issue: int | None) -> Iterator[tuple[str, str]]:
-        """Yield the issues, and the comments on that one."""
-        yield from _texts(self.api.pages(f"{_at(path)}/issues?state=all"))
-        if issue is not None:
-            yield from _texts(self.api.pages(f"{_at(path)}/issues/{issue}/comments"))
+    def issues(self, path: str) -> Iterator[Post]:
+        """Yield the issues; a pull request is none."""
+        found = self.api.pages(f"{_at(path)}/issues?state=all")
+        return _posts(one for one in found if "pull_request" not in one)
+
+    def replies(self, path: str, issue: int) -> Iterator[Post]:
+        """Yield the comments on an issue."""
+        return _posts(self.api.pages(f"{_at(path)}/issues/{issue}/comments"))
 
 
 def _at(path: str) -> str:
     return f"/repos/{quote(path)}"
 
 
-def _texts(found: Iterator[dict[str, object]]) -> Iterator[tuple[str, str]]:
-    return ((str(one.get("html_url", "")), str(one.get("body") or "")) for one in found)
+def _posts(found: Iterator[dict[str, Any]]) -> Iterator[Post]:
+    for one in found:
+        yield Post(
+            address=str(one.get("html_url", "")),
+            text=str(one.get("body") or ""),
+            when=str(one.get("created_at") or ""),
+            title=str(one.get("title") or ""),
+            number=int(one.get("number") or 0),
+            is_open=one.get("state", "open") == "open",
+            labels=tuple(str(label["name"]) for label in one.get("labels") or () if isinstance(label, dict)),
+        )

@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import quote, urlsplit
 
 from grader.classes.feedback.forms import Settings
-from grader.classes.feedback.rest import Api, Comments, required_token
+from grader.classes.feedback.rest import Api, Comments, Post, required_token
 
 
 class GitLab(Comments):
@@ -39,10 +39,10 @@ class GitLab(Comments):
         self.api.post(f"{_at(path)}/repository/commits/{commit}/comments", {"note": body})
         return self._commit(path, commit)
 
-    def comments(self, path: str, commit: str) -> Iterator[tuple[str, str]]:
+    def comments(self, path: str, commit: str) -> Iterator[Post]:
         """Yield the comments on a commit."""
-        found = self.api.pages(f"{_at(path)}/repository/commits/{commit}/comments")
-        return ((self._commit(path, commit), str(one.get("note", ""))) for one in found)
+        for one in self.api.pages(f"{_at(path)}/repository/commits/{commit}/comments"):
+            yield _post(one, self._commit(path, commit), "note")
 
     def open_issue(self, path: str, title: str, body: str) -> str:
         """Open an issue; in a project that others can read, one that only members see."""
@@ -54,13 +54,16 @@ class GitLab(Comments):
         made = self.api.post(f"{_at(path)}/issues/{issue}/notes", {"body": body})
         return self._note(path, issue, made)
 
-    def issues(self, path: str, issue: int | None) -> Iterator[tuple[str, str]]:
-        """Yield the issues, and the comments on that one."""
+    def issues(self, path: str) -> Iterator[Post]:
+        """Yield the issues."""
         for one in self.api.pages(f"{_at(path)}/issues?scope=all"):
-            yield str(one.get("web_url", "")), str(one.get("description") or "")
-        if issue is not None:
-            for note in self.api.pages(f"{_at(path)}/issues/{issue}/notes"):
-                yield self._note(path, issue, note), str(note.get("body") or "")
+            yield _post(one, str(one.get("web_url", "")), "description")
+
+    def replies(self, path: str, issue: int) -> Iterator[Post]:
+        """Yield the comments on an issue; what GitLab itself notes there is none."""
+        for note in self.api.pages(f"{_at(path)}/issues/{issue}/notes"):
+            if note.get("system") is not True:
+                yield _post(note, self._note(path, issue, note), "body")
 
     def _commit(self, path: str, commit: str) -> str:
         return f"{self._address}/{path}/-/commit/{commit}"
@@ -71,3 +74,15 @@ class GitLab(Comments):
 
 def _at(path: str) -> str:
     return f"/projects/{quote(path, safe='')}"
+
+
+def _post(one: dict[str, Any], address: str, body: str) -> Post:
+    return Post(
+        address=address,
+        text=str(one.get(body) or ""),
+        when=str(one.get("created_at") or ""),
+        title=str(one.get("title") or ""),
+        number=int(one.get("iid") or 0),
+        is_open=one.get("state", "opened") == "opened",
+        labels=tuple(map(str, one.get("labels") or ())),
+    )

@@ -28,6 +28,7 @@ from grader.classes.feedback.forms import PAGE, Feedback, Sender, Settings, Unsu
 from grader.classes.gradebook.matching import kinds
 from grader.errors import HostError, NotSent, UsageError
 from grader.files import atomic_write
+from grader.model.batch import Entry
 from grader.untrusted_text import line
 
 USER, PASSWORD, FROM = "GRADER_SMTP_USER", "GRADER_SMTP_PASSWORD", "GRADER_SMTP_FROM"
@@ -77,7 +78,7 @@ class Mail(Sender):
 
     def place(self, feedback: Feedback) -> str:
         """Return the addresses."""
-        return ", ".join(addresses(feedback))
+        return ", ".join(addresses(feedback.entry))
 
     def show(self, feedback: Feedback) -> str:
         """Return the mail with its headers, and what is attached."""
@@ -88,7 +89,7 @@ class Mail(Sender):
     def send(self, feedback: Feedback, *, look: bool = False) -> str:
         """Send or write the mail; return where it went."""
         del look
-        data, to = self.message(feedback).as_bytes(policy=SMTP), addresses(feedback)
+        data, to = self.message(feedback).as_bytes(policy=SMTP), addresses(feedback.entry)
         if self.server is None:
             path = (self.settings.out or self.settings.folder / "mails") / f"{feedback.name}.eml"
             atomic_write(path, data)
@@ -102,7 +103,7 @@ class Mail(Sender):
         if self.sender:
             message["From"] = self.sender
         try:
-            message["To"] = [Address(addr_spec=to) for to in addresses(feedback)]
+            message["To"] = [Address(addr_spec=to) for to in addresses(feedback.entry)]
         except (ValueError, IndexError) as error:
             raise NotSent(f"{line(self.place(feedback), 80)} is no mail address") from error
         message["Subject"] = feedback.subject
@@ -117,14 +118,14 @@ class Mail(Sender):
         return message
 
 
-def addresses(feedback: Feedback) -> list[str]:
+def addresses(entry: Entry) -> list[str]:
     """Return the addresses in the roster's columns, several of a group. Raises NotSent."""
-    extra = feedback.entry.extra
+    extra = entry.extra
     known = kinds(extra, "canvas")
     fields = [
         extra[column] for kind in ("email", "login") for column, found in known.items() if found == kind
     ]
-    fields += [feedback.entry.id]
+    fields += [entry.id]
     for field in fields:
         found = [part for part in _SEVERAL.split(field.strip()) if part]
         if found and all(_ADDRESS.fullmatch(part) for part in found):

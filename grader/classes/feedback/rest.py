@@ -2,7 +2,7 @@
 
 `Comments` is what GitHub and GitLab have in common: a comment on the commit that was graded, or an issue, which later
 feedback is added to. Each body ends with a mark that says what it is, so that a comment can be found of which nobody
-knows whether it was made.
+knows whether it was made, and what students answer can be told from it.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from http.client import HTTPException
+from itertools import chain
 from typing import Any
 from urllib.error import HTTPError, URLError
 from urllib.parse import unquote, urljoin, urlsplit
@@ -24,6 +25,7 @@ from grader import __version__
 from grader.classes.feedback.forms import Feedback, Sender, Unsure
 from grader.errors import GraderError, HostError, NotSent, UsageError
 from grader.intake.source import parse_source
+from grader.model.batch import Entry
 from grader.untrusted_text import line
 
 TIMEOUT_S = 60.0
@@ -34,6 +36,7 @@ WAIT_S, WAIT_MAX_S = 60.0, 3900.0
 ANSWER_BYTES_MAX = 16 << 20
 SAID_CHARS = 300
 PAGES_MAX = 50
+MARK = "<!-- ros-lab-grader feedback "
 _SCP = re.compile(r"(?:[\w.+-]+@)?(?P<host>[\w.-]+):(?P<path>(?!/).+)")
 _ISSUE = re.compile(r"/(?:issues|work_items)/(\d+)")
 _LOCAL = {"localhost", "127.0.0.1", "::1"}
@@ -210,6 +213,19 @@ def host_and_path(address: str) -> tuple[str, str]:
     return host.lower(), path
 
 
+@dataclass(frozen=True, kw_only=True)
+class Post:
+    """An issue, by its `number`, or a comment; `when` is an ISO 8601 time."""
+
+    address: str
+    text: str
+    when: str = ""
+    title: str = ""
+    number: int = 0
+    is_open: bool = True
+    labels: tuple[str, ...] = ()
+
+
 class Comments(Sender):
     """A forge on which comments are made. `server` is the host in addresses of its repositories."""
 
@@ -219,18 +235,18 @@ class Comments(Sender):
 
     def place(self, feedback: Feedback) -> str:
         """Return the commit, or the repository whose issue it will be. Raises NotSent."""
-        path = self.path(feedback)
+        path = self.path(feedback.entry)
         if self.settings.issues:
             return f"{self.server}/{path}: {feedback.last_place or 'a new issue'}"
         if not feedback.commit:
             raise NotSent("no commit is known that was graded", hint="--issues opens an issue instead")
         return f"{self.server}/{path}: commit {feedback.commit[:12]}"
 
-    def path(self, feedback: Feedback) -> str:
+    def path(self, entry: Entry) -> str:
         """Return the repository's path on this server. Raises NotSent."""
-        host, path = host_and_path(feedback.entry.source)
+        host, path = host_and_path(entry.source)
         if host != self.server or "/" not in path:
-            raise NotSent(f"its repository is not on {self.server}: {line(feedback.entry.source, 200)}")
+            raise NotSent(f"its repository is not on {self.server}: {line(entry.source, 200)}")
         return path
 
     def show(self, feedback: Feedback) -> str:
@@ -243,7 +259,7 @@ class Comments(Sender):
 
     def send(self, feedback: Feedback, *, look: bool = False) -> str:
         """Make the comment or the issue; return its address."""
-        path = self.path(feedback)
+        path = self.path(feedback.entry)
         try:
             if not self.settings.public and self.is_public(path):
                 raise NotSent(
@@ -252,7 +268,7 @@ class Comments(Sender):
                 )
             return self._once(feedback, path, look=look)
         except Refused as error:
-            raise self._error(error, feedback) from error
+            raise self._error(error, self.place(feedback)) from error
         except Broken as error:
             raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
 
@@ -289,20 +305,36 @@ class Comments(Sender):
         if not self.settings.issues:
             found = self.comments(path, feedback.commit)
         else:
-            found = self.issues(path, int(issue[1]) if issue else None)
-        return next((address for address, body in found if mark(feedback) in body), "")
+            found = chain(self.issues(path), self.replies(path, int(issue[1])) if issue else ())
+        return next((post.address for post in found if mark(feedback) in post.text), "")
 
-    def _error(self, error: Refused, feedback: Feedback) -> GraderError:
+    def questions(self, entry: Entry, commit: str, label: str = "") -> Iterator[Post]:
+        """Yield what a student asks: each open issue (with that label), each answer to feedback, in an issue or on the
+        commit. Raises NotSent."""
+        path = self.path(entry)
+        try:
+            for post in self.issues(path):
+                if MARK in post.text:
+                    yield from (reply for reply in self.replies(path, post.number) if MARK not in reply.text)
+                elif post.is_open and (not label or label in post.labels):
+                    yield post
+            if commit:
+                yield from (post for post in self.comments(path, commit) if MARK not in post.text)
+        except Refused as error:
+            raise self._error(error, f"{self.server}/{path}") from error
+        except Broken as error:
+            raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
+
+    def _error(self, error: Refused, where: str) -> GraderError:
         if error.status == 401:
             return HostError(
                 f"{self.server} does not take the token: {error.text}", hint=f"set {self.token} again"
             )
         hints = {
-            403: "the token needs the right to write there",
+            403: "the token may not do that there",
             404: "check the address, and what the token may see",
             410: "issues are switched off there",
         }
-        where = self.place(feedback)
         return NotSent(
             f"{where}: {self.name} says {error.status} {error.text}".rstrip(),
             hint=hints.get(error.status, ""),
@@ -317,8 +349,8 @@ class Comments(Sender):
         """Comment on a commit; return the comment's address."""
 
     @abstractmethod
-    def comments(self, path: str, commit: str) -> Iterator[tuple[str, str]]:
-        """Yield the address and the text of each comment on a commit."""
+    def comments(self, path: str, commit: str) -> Iterator[Post]:
+        """Yield each comment on a commit."""
 
     @abstractmethod
     def open_issue(self, path: str, title: str, body: str) -> str:
@@ -329,13 +361,17 @@ class Comments(Sender):
         """Comment on an issue; return the comment's address."""
 
     @abstractmethod
-    def issues(self, path: str, issue: int | None) -> Iterator[tuple[str, str]]:
-        """Yield the address and the text of each issue and of the comments on that one."""
+    def issues(self, path: str) -> Iterator[Post]:
+        """Yield each issue."""
+
+    @abstractmethod
+    def replies(self, path: str, issue: int) -> Iterator[Post]:
+        """Yield each comment on an issue."""
 
 
 def mark(feedback: Feedback) -> str:
     """Return what is in the comment for the grader alone."""
-    return f"<!-- ros-lab-grader feedback {feedback.publication.digest} -->"
+    return f"{MARK}{feedback.publication.digest} -->"
 
 
 def required_token(name: str, value: str) -> str:

@@ -352,18 +352,14 @@ class _Views:
         asked = self._session.requests().found.get(name, {})
         if mask := self._session.mask(item, None):
             asked = {
-                of: tuple(replace(one, text=mask.text(one.text)) for one in ones)
+                of: tuple(replace(one, text=mask.text(one.text), source="") for one in ones)
                 for of, ones in asked.items()
             }
         return Known(decided=decided, bank=found.bank, requests=asked)
 
     def _troubles(self) -> list[str]:
         faults = self._session.requests().faults
-        found = (
-            [f"{len(faults)} rows of requests.csv are left out"]
-            if faults and self._session.blind
-            else [*faults[:10]]
-        )
+        found = [f"{len(faults)} requests are left out"] if faults and self._session.blind else [*faults[:10]]
         if self._session.batch_runs():
             found.append(
                 "A batch is running in this folder. What you decide is kept; reports and gradebook follow "

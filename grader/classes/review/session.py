@@ -27,8 +27,7 @@ from grader.classes.overrides.bank import Bank, read_bank, resolve
 from grader.classes.overrides.write import write_override, write_overrides
 from grader.classes.review.background import BackgroundWriter, Pace
 from grader.classes.review.blind import Mask, aliases, mask_of
-from grader.classes.review.requests import FILE as REQUESTS
-from grader.classes.review.requests import Requests, read_requests
+from grader.classes.review.requests import Requests, read_requests, request_files
 from grader.classes.review.submissions import Item, Submissions, alike, stamp_of
 from grader.errors import Busy, GraderError, RubricError, UsageError
 from grader.files import unwritable
@@ -145,14 +144,13 @@ class ReviewSession:
         return items
 
     def requests(self) -> Requests:
-        """Return what students ask, as `requests.csv` says now."""
-        ids = tuple(ids_of(self.submissions.batch().run))
-        stamp = (stamp_of(self.path / REQUESTS), ids)
+        """Return what students ask, as the files of requests say now."""
+        entries, paths = self.submissions.batch().run.entries, request_files(self.path)
+        stamp = (tuple((path, stamp_of(path)) for path in paths), entries)
         with self._guard:
             found = self._requests
         if found is None or found[0] != stamp:
-            criteria = [criterion.id for criterion in self.rubric.rubric.criteria]
-            found = (stamp, read_requests(self.path / REQUESTS, ids, criteria))
+            found = (stamp, read_requests(paths, entries, self.rubric.rubric.criteria))
             with self._guard:
                 self._requests = found
         return found[1]

@@ -4,19 +4,27 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-from grader.classes.feedback.forms import FORMS
+from grader.classes.feedback.forms import FORGES, FORMS
 from grader.cli.declare import INSTRUCTORS, Argument, Flag, Option, command, loading
-from grader.cli.options import BATCH_FOLDER, FEEDBACK_EXIT_CODES, PUBLISH_EXIT_CODES, JsonFlag
-from grader.errors import ExitCode
+from grader.cli.options import (
+    BATCH_FOLDER,
+    FEEDBACK_EXIT_CODES,
+    PUBLISH_EXIT_CODES,
+    REQUESTS_EXIT_CODES,
+    JsonFlag,
+)
+from grader.errors import ExitCode, UsageError
 
 CLASS = Argument("DIR", BATCH_FOLDER)
-VARIABLES = """variables:
-  GRADER_SMTP_USER, GRADER_SMTP_PASSWORD  log in at the mail server
-  GRADER_SMTP_FROM                        as --from
+TOKENS = """\
   GITHUB_TOKEN, GITHUB_SERVER_URL         the token for GitHub, and its server (default: https://github.com)
   GITLAB_TOKEN, CI_SERVER_URL             the token for GitLab, and its server (default: https://gitlab.com)
 
 """
+VARIABLES = f"""variables:
+  GRADER_SMTP_USER, GRADER_SMTP_PASSWORD  log in at the mail server
+  GRADER_SMTP_FROM                        as --from
+{TOKENS}"""
 
 
 @command("publish", group=INSTRUCTORS, exit_codes=PUBLISH_EXIT_CODES)
@@ -110,3 +118,27 @@ def feedback(
     )
     wanted = Wanted(only=only, changed_since=returning.parse_since(changed_since), again=again)
     return returning.send(folder, FORMS[form], settings, wanted, drafts=drafts, dry_run=dry_run)
+
+
+@command("requests", group=INSTRUCTORS, notes=f"variables:\n{TOKENS}", exit_codes=REQUESTS_EXIT_CODES)
+def requests(
+    *,
+    folder: Annotated[Path, CLASS],
+    forge: Annotated[
+        str | None,
+        Option(
+            "--from", "", "first get the open issues, and the answers to feedback, from there", choices=FORGES
+        ),
+    ] = None,
+    label: Annotated[str, Option("--label", "NAME", "only issues with this label")] = "",
+    as_json: JsonFlag = False,
+) -> ExitCode:
+    """List what the students of a class ask about criteria, and what was answered.
+
+    Questions are rows of DIR/requests*.csv; `grader review` shows them beside the criterion, and takes the answer.
+    """
+    with loading():
+        from grader.cli import returning
+    if label and forge is None:
+        raise UsageError("--label chooses among the issues of a forge", hint="give --from, too")
+    return returning.list_requests(folder, forge, label, as_json=as_json)
