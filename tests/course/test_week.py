@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.review.requests import FILE as REQUESTS
 from grader.classes.roster.table import read_table
 from grader.cli.main import run
 from tests.batch.a_class import CORRECT, RUBRIC, WRONG_NAME, lines_of
@@ -102,7 +101,7 @@ def test_a_week(course: Path, capsys) -> None:
     assert mails_of() == dict.fromkeys(STUDENTS, 1)
 
     rows = "".join(f'{name},style,"{text}"\n' for name, text in ASKED.items())
-    (OUT / REQUESTS).write_text(f"student,criterion,text\n{rows}")
+    (OUT / "requests.csv").write_text(f"student,criterion,text\n{rows}")
     answer_all()
     with (course / "rubric.yaml").open("a") as file:
         file.write("# The same, in other words.\n")
