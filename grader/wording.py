@@ -66,3 +66,15 @@ def did_you_mean(word: str, candidates: Iterable[str]) -> str:
     """Return ` (did you mean "rate"?)` for the end of a message, or ""."""
     near = closest(word, candidates)
     return f' (did you mean "{near}"?)' if near else ""
+
+
+def is_one_edit(one: str, other: str) -> bool:
+    """Return whether one letter added, left out, changed, or swapped with its neighbour makes one the other."""
+    if abs(len(one) - len(other)) > 1:
+        return False
+    start = next((i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), None)
+    if start is None:
+        return len(one) != len(other)
+    one, other = one[start:], other[start:]
+    swapped = one[:2] == other[1::-1] and one[2:] == other[2:]
+    return swapped or one[1:] == other[1:] or one[1:] == other or one == other[1:]

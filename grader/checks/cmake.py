@@ -12,7 +12,7 @@ from grader.checks.registry import check
 from grader.checks.support.build_errors import misspelt_cmake_lists
 from grader.checks.support.scripts import PYTHON, Installed, copies_of, installed, is_bin, names_script
 from grader.checks.support.text import near_names, shown
-from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts
+from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts, meant_command
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words
@@ -85,23 +85,38 @@ def _fault(fault: Fault | None) -> Iterator[str]:
         yield f"{line}CMake cannot read it: {fault.cause or fault.message}"
 
 
+def _misspelt(facts: CMakeFacts, name: str) -> CMakeCall | None:
+    """The first call whose name is a slip of the command's."""
+    return next((call for call in facts.calls if meant_command(call.name) == name), None)
+
+
+def _respell(call: CMakeCall, name: str) -> tuple[str, str, int]:
+    return f"line {call.line}: there is no command {call.name}(…)", f"write {name} for {call.name}", call.line
+
+
 def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str, int | None]]:
     """Yield what is missing or wrong, how to fix it, and the line."""
     wanted = names[0]
     project = _first(facts, "project")
-    if project is None:
+    if project is None and (slip := _misspelt(facts, "project")):
+        yield _respell(slip, "project")
+    elif project is None:
         yield "project(…) is missing", f"add project({wanted})", None
     elif not project.args or project.args[0] not in names:
         name = project.args[0] if project.args else ""
         message = f"line {project.line}: project({name}) differs from the package's name {wanted}"
         yield message, f"write project({wanted})", project.line
     packages = [c for c in facts.calls if c.name == "find_package"]
-    if not any(c.args[:1] == ("catkin",) for c in packages):
+    if slip := _misspelt(facts, "find_package"):
+        yield _respell(slip, "find_package")
+    elif not any(c.args[:1] == ("catkin",) for c in packages):
         slip = next((c for c in packages if c.args and c.args[0].casefold() == "catkin"), None)
         other = f" (line {slip.line} says {slip.args[0]})" if slip else ""
         line = slip.line if slip else None
         yield f"find_package(catkin …) is missing{other}", "add find_package(catkin REQUIRED)", line
-    if _first(facts, "catkin_package") is None:
+    if slip := _misspelt(facts, "catkin_package"):
+        yield _respell(slip, "catkin_package")
+    elif _first(facts, "catkin_package") is None:
         yield "catkin_package(…) is missing", "add catkin_package() after find_package(catkin …)", None
 
 
@@ -206,7 +221,7 @@ def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) ->
     if blurred is not None:
         why = f"which scripts {blurred.path} holds is known to CMake alone, and it did not finish"
         return Lack(why, "build the package with catkin_make", _line(blurred), unsure=True)
-    return _unnamed(all_named, hits, paths[0], script)
+    return _unnamed(package, all_named, hits, paths[0])
 
 
 def _misplaced(package: PackageFacts, one: Installed) -> Lack:
@@ -228,7 +243,9 @@ def _misplaced(package: PackageFacts, one: Installed) -> Lack:
     return Lack(why, f"write DESTINATION {BIN}, below find_package(catkin …)", _line(one))
 
 
-def _unnamed(all_named: Sequence[Installed], hits: Sequence[Installed], path: str, script: str) -> Lack:
+def _unnamed(
+    package: PackageFacts, all_named: Sequence[Installed], hits: Sequence[Installed], path: str
+) -> Lack:
     """Another command names it, a slip of its name or place is named, or nothing is."""
     if hits:
         other = f"install({hits[0].kind} …)"
@@ -237,12 +254,15 @@ def _unnamed(all_named: Sequence[Installed], hits: Sequence[Installed], path: st
             why, f"replace {other} by catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(hits[0])
         )
     of_python = [one for one in all_named if one.call.name == PYTHON]
+    if not of_python and package.cmake and (slip := _misspelt(package.cmake, PYTHON)):
+        why, fix, line = _respell(slip, PYTHON)
+        return Lack(f"{why}, so nothing installs {{}}", fix, FileCitation(file=slip.file, line=line))
     if not of_python:
         why = "no catkin_install_python(…) is called, so nothing installs {}"
         fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN}), without # before it"
         return Lack(why, fix, None, path)
     names = {PurePosixPath(one.path).name: one for one in of_python}
-    wanted = PurePosixPath(script).name
+    wanted = PurePosixPath(path).name
     near = [wanted] if wanted in names else list(near_names(wanted, names))
     if near:
         one = names[near[0]]

@@ -33,6 +33,8 @@ from grader.wording import join_words, plural, seconds, significant
 CONNECT_NS = 1_000_000_000
 LARGEST = 2.0**64
 
+FIRST_STEPS = 50
+
 
 class StartParams(Record):
     """Where the counting begins."""
@@ -102,7 +104,9 @@ def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:
         return inconclusive(message, hint="grade again")
     hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
     message = f"the first value on {params.topic} is {significant(first.values[0])}, not {params.start}"
-    if first.values[0] > params.start and first.is_flood(run, params.rate_hz):
+    # a full queue drops values again and again: where the next ones came whole, it was not full
+    drops = first.is_flood(run, params.rate_hz) and any(s.change > 1 for s in first.steps[:FIRST_STEPS])
+    if first.values[0] > params.start and drops:
         why = f"{message}; but its node floods its topics, and a publisher's queue drops values of a flood"
         return inconclusive(why, hint="grade again")
     verdict = failed(message, hint=hint)
@@ -245,6 +249,8 @@ def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
         kinds: dict[float, str] = {0: "repeats a value", -1: "goes back"}
         message = join_words(dict.fromkeys(kinds.get(s.change, "skips values") for s in found.own))
     hint = "add one to the counter in one place only, once in each turn of the loop"
+    if usual == 0:
+        hint = "set the counter before the loop, and add one to it in each turn: nothing in the loop may set it back"
     verdict = failed(f"the counter {message}: {place}", hint=hint)
     return verdict.once() if count.is_single(found.own) else verdict
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import PurePosixPath
-from typing import NamedTuple
 
 from grader.checks.build import CATKIN_MAKE
 from grader.checks.registry import check
 from grader.checks.support.exit_causes import SYNTAX, syntax_hint
 from grader.checks.support.scripts import (
     PYTHON,
+    RIGHT_SHEBANG,
+    Obstacle,
     add_hint,
     can_be_moved,
     chmod_hint,
@@ -19,6 +20,7 @@ from grader.checks.support.scripts import (
     is_found,
     names_script,
     paths_by_name,
+    shebang_obstacles,
 )
 from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
@@ -27,7 +29,6 @@ from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words
 
-RIGHT_SHEBANG = "#!/usr/bin/env python3"
 # a script without its first line is run by the shell, which knows no `import`
 TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
 UNPARSED = (*SYNTAX, "ValueError")
@@ -39,13 +40,6 @@ class ExecutableParams(Record):
 
     path: str
     """Where the handout puts the script; it is found by its name in other folders too."""
-
-
-class Obstacle(NamedTuple):
-    """Why `rosrun` cannot run the file, and the command that fixes it."""
-
-    why: str
-    fix: str
 
 
 @check("executable", params=ExecutableParams, run_anyway=True)
@@ -80,7 +74,7 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
 
 def _judged(package: PackageFacts, build: Run, found: SourceFile, params: ExecutableParams) -> Verdict:
     remarks = package.hints_on(found.path)
-    of_first_line = list(_shebang_obstacles(found))
+    of_first_line = list(shebang_obstacles(found))
     obstacles = [*of_first_line, *_mode_obstacles(found, remarks)]
     moved = f"the handout puts it at {params.path}; move it there" if found.path != params.path else ""
     hint = moved or "; ".join(remarks)
@@ -125,7 +119,7 @@ def _unparsed(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -> Verd
         f"{file.path} {where}: {fault.kind}: {fault.cause or fault.message}{others}",
         measured=f"{file.path}: {_mode(file)}, {_first_line(file)}{source}",
         hint="; ".join(fixes),
-        citations=(fault.place, *((_cite_shebang(file),) if any(_shebang_obstacles(file)) else ())),
+        citations=(fault.place, *((_cite_shebang(file),) if any(shebang_obstacles(file)) else ())),
     )
 
 
@@ -164,26 +158,6 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
 def _mode_obstacles(file: SourceFile, remarks: tuple[str, ...]) -> Iterator[Obstacle]:
     if file.executable is False:
         yield Obstacle("has no executable bit", "; ".join(remarks) or chmod_hint(file.path))
-
-
-def _shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
-    """Yield what keeps the system from starting the file, the package facts' own words first."""
-    fix = f"write {RIGHT_SHEBANG} as the very first line, with nothing above it"
-    if file.link_problem:
-        yield Obstacle(f"cannot be run: {file.link_problem}", "hand in the file itself")
-    elif file.shebang is not None and file.shebang.crlf:
-        problem = file.shebang_problem or "its #! line ends with Windows' CRLF"
-        yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}, then commit and push")
-    elif file.shebang_problem:
-        yield Obstacle(f"cannot be run: {file.shebang_problem}", fix)
-    elif file.bom:
-        yield Obstacle("begins with an invisible byte order mark (BOM)", "save it as UTF-8 without BOM")
-    elif file.shebang is None:
-        yield Obstacle("does not begin with a #! line", fix)
-    elif file.shebang.found is False:
-        yield Obstacle(f"names {file.shebang.interpreter}, which is not on a ROS machine", fix)
-    elif file.python and "python" not in file.shebang.interpreter:
-        yield Obstacle(f"is Python, and its first line names {file.shebang.interpreter}", fix)
 
 
 def _rosrun_answer(build: Run, path: str) -> str:

@@ -6,7 +6,7 @@ import re
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.executable import RIGHT_SHEBANG, ExecutableParams, executable
+from grader.checks.executable import ExecutableParams, executable
 from grader.checks.launch_xml import missing_node
 from grader.checks.registry import LaunchName, check
 from grader.checks.support.launch import (
@@ -22,7 +22,7 @@ from grader.checks.support.launch import (
     why_died,
     why_not_up,
 )
-from grader.checks.support.scripts import find_script
+from grader.checks.support.scripts import RIGHT_SHEBANG, find_script
 from grader.checks.support.text import bare, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run

@@ -20,6 +20,7 @@ from grader.checks.support.launch import (
     nodes_up,
     not_executable,
     not_run,
+    not_started,
     own_script,
     quoted,
     read_launch,
@@ -29,6 +30,7 @@ from grader.checks.support.launch import (
     why_not_up,
 )
 from grader.checks.support.nodes import GlobalName
+from grader.checks.support.scripts import shebang_obstacles
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import cite, nodes_on, topics_with
 from grader.evidence.run import Run
@@ -143,9 +145,16 @@ def _absent(package: PackageFacts, run: Run, nodes: Sequence[str], absent: Seque
     """Return why nodes of the launch file did not come up: all that lack the executable bit, or the first."""
     scripts = [script for node in absent if (script := own_script(package, node))]
     plain = [script.path for script in scripts if script.executable is False]
-    why = not_executable(*dict.fromkeys(plain)) if plain else why_not_up(package, run, absent[0])
+    unstarted = {script.path: script for script in scripts if any(shebang_obstacles(script))}
+    several = bool(plain) or len(unstarted) > 1
+    if plain:
+        why = not_executable(*dict.fromkeys(plain))
+    elif several:
+        why = not_started(*unstarted.values())
+    else:
+        why = why_not_up(package, run, absent[0])
     said = "" if why.citations or "roslaunch says" in why.why else quoted(run)
-    name = "" if plain else f"{absent[0].full_name}: "
+    name = "" if several else f"{absent[0].full_name}: "
     return why.verdict(f"{_comes_up(nodes)}; {name}{why.why}{said}")
 
 

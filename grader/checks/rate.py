@@ -126,14 +126,10 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     found = judged_rhythm(run, params, sent_by(run, params.topic, params.of))
     if found is None:
         return nothing_sent(package, run, params.topic, params.of).about(expected=expected)
-    uneven = _uneven(found, run, package, params)
-    if uneven is not None:
-        why = partial(_why_late, found, params=params)
-        uneven = excused(uneven, run, found.times_ns[0], found.until_ns, why)
     verdict = (
         _flood(found, package, params)
         or _short(found, run, package, params)
-        or uneven
+        or _excused(_uneven(found, run, package, params), found, run, params)
         or passed(f"{params.topic} has {hertz(found.mean_hz)}, evenly")
     )
     citations = (*verdict.citations, cite(run, params.topic, found.times_ns[0], found.times_ns[-1]))
@@ -141,6 +137,14 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     if verdict.status is Status.INCONCLUSIVE or NO_EXCUSE in verdict.message:
         measured += _lateness(found, run)
     return verdict.about(expected=expected, measured=measured, citations=citations)
+
+
+def _excused(uneven: Verdict | None, found: Rhythm, run: Run, params: RateParams) -> Verdict | None:
+    """The verdict, unless the machine was late itself."""
+    if uneven is None:
+        return None
+    why = partial(_why_late, found, params=params)
+    return excused(uneven, run, found.times_ns[0], found.until_ns, why)
 
 
 def judged_rhythm(run: Run, params: RateParams, channels: Sequence[Channel]) -> Rhythm | None:
@@ -191,7 +195,7 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
     in_bounds = params.low_hz * (1 - ROUNDING) <= mean_hz <= params.high_hz * (1 + ROUNDING)
     if in_bounds and even:
         return None
-    other = _fell_silent(found, params) or _bursts(found, outside, even, params)
+    other = _fell_silent(found, run, package, params) or _bursts(found, outside, even, params)
     if other is not None:
         return other
     wrong = _wrong_mean(found, params)
@@ -199,13 +203,22 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
     return by_number or _by_parameter(wrong, run, package, params)
 
 
-def _fell_silent(found: Rhythm, params: RateParams) -> Verdict | None:
+def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
     """The silence at the end is longer than anything that came before it."""
     before_ns = max(found.gaps_ns[:-1], default=0)
     if found.tail_ns <= max(5 * params.period_ns, 2 * before_ns, 0.5e9):
         return None
     lasted = seconds(found.times_ns[-1] - found.times_ns[0])
     message = f"{params.topic} falls silent {lasted} after its first message, while its node lives on"
+    callers = (c.callerid for c in run.student_channels(params.topic))
+    slip = next((s for one in callers for s in slips_of(package, run, one, "spin-in-loop")), None)
+    if slip is not None:
+        cited = (FileCitation(file=slip.file, line=slip.line),)
+        return failed(
+            f"{message}: {slip.message}",
+            hint="take spin() out: the loop keeps the node alive",
+            citations=cited,
+        )
     hint = f"publish in a loop `{LOOP}`, not a number of times"
     return failed(message, hint=hint).once()
 
@@ -237,12 +250,14 @@ def _by_number(
     """Name the line where the node's script asks for the rate that was measured."""
     channels = run.student_channels(params.topic)
     asked = [s for c in channels for s in slips_of(package, run, c.callerid, "rate-number")]
-    slip = next((s for s in asked if abs(float(s.message) / mean_hz - 1) < NUMBER_SHARE), None)
+    slip = next((s for s in asked if abs(float(s.message) - mean_hz) < NUMBER_SHARE * mean_hz), None)
     if slip is None:
         return None
     where = f"{slip.file}, line {slip.line}"
     message = f"{verdict.message}; {where} asks for {slip.message} Hz"
-    hint = f"make it {significant(params.rate_hz)} Hz in {where}: {loop_rate(significant(params.rate_hz))}"
+    hint = (
+        f"make it {significant(params.rate_hz)} Hz in {where}: use {loop_rate(significant(params.rate_hz))}"
+    )
     cited = (FileCitation(file=slip.file, line=slip.line),)
     return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
 

@@ -16,7 +16,7 @@ from grader.checks.support.console_output import (
     sent_by,
 )
 from grader.checks.support.exit_causes import ended_after, explain_end
-from grader.checks.support.idioms import GET_TIME, INIT, SPIN, init
+from grader.checks.support.idioms import GET_TIME, INIT, LOOP, SPIN, init
 from grader.checks.support.nodes import GlobalName, are_noted, nodes_of
 from grader.checks.support.processes import NO_SCRIPT_HINT, Life, life, lives
 from grader.checks.support.text import VALUE, in_words
@@ -25,10 +25,11 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
-from grader.wording import join_words, plural
+from grader.wording import join_words, plural, seconds
 
 SAME_NAME = "new node registered with same name"
-FEW = 2
+FEW, ENOUGH_NS = 2, 4_000_000_000
+"""Messages of a copy, and how long both are watched at least before too few of them are the copy's own."""
 
 
 class CopiesParams(Record):
@@ -56,6 +57,10 @@ class Trio(NamedTuple):
     listener: Life
     first_nodes: tuple[str, ...]
     second_nodes: tuple[str, ...]
+
+    def watched_ns(self, run: Run) -> int:
+        """How long both copies ran before Ctrl-C."""
+        return min(one.until_ns(run) for one in self[:2]) - self.second.start_ns
 
 
 @check("copies", params=CopiesParams)
@@ -197,7 +202,7 @@ def _heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) ->
         _judged(first, second, said, trio, params)
         or _listener_gone(package, run, trio)
         or (_judged(first, second, known, trio, params) and _other_words(params))
-        or _unheard(first, second, known, trio, params)
+        or _unheard(run, (first, second), known, trio, params)
     )
 
 
@@ -225,11 +230,21 @@ def _judged(
 
 
 def _unheard(
-    first: Counter[str], second: Counter[str], printed: Counter[str], trio: Trio, params: CopiesParams
+    run: Run,
+    sent: tuple[Counter[str], Counter[str]],
+    printed: Counter[str],
+    trio: Trio,
+    params: CopiesParams,
 ) -> Verdict:
     """The listener hears one copy, or none at all: then the listener's own criterion says why."""
-    names = (trio.first_nodes[0], trio.second_nodes[0])
-    if min(first.total(), second.total()) < FEW:
+    (first, second), names = sent, (trio.first_nodes[0], trio.second_nodes[0])
+    fewest = min(first.total(), second.total())
+    if fewest < FEW and trio.watched_ns(run) >= ENOUGH_NS:
+        message = (
+            f"both copies live, but one sends {plural(fewest, 'message')} in {seconds(trio.watched_ns(run))}"
+        )
+        return unjudged(message, hint=f"publish on {params.topic} in the loop `{LOOP}`, again and again")
+    if fewest < FEW:
         message = "the two copies were watched too briefly to see their messages printed"
         return inconclusive(message, hint="grade again")
     if not printed:

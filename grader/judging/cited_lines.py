@@ -13,7 +13,8 @@ def show_lines(verdict: Verdict, build: Run) -> Verdict:
     """Return a verdict whose cited lines have their text; one that loses nothing, or cites none, stays as it is."""
     if not verdict.status.is_lost or not any(isinstance(c, FileCitation) for c in verdict.citations):
         return verdict
-    return verdict.about(citations=tuple(_with_text(citation, build) for citation in verdict.citations))
+    cited = tuple(_with_text(citation, build) for citation in verdict.citations)
+    return verdict.model_copy(update={"citations": cited})
 
 
 def _with_text(citation: Citation, build: Run) -> Citation:

@@ -60,6 +60,8 @@ class Rhythm(Record):
     @property
     def comes_in_bursts(self) -> bool:
         """Many gaps are far shorter than the mean one, and some far longer."""
+        if not self.gaps_ns:
+            return False
         mean_ns = self.span_ns / len(self.gaps_ns)
         short = sum(gap < 0.3 * mean_ns for gap in self.gaps_ns)
         return short >= 0.25 * len(self.gaps_ns) and max(self.gaps_ns) > 1.5 * mean_ns
@@ -67,6 +69,8 @@ class Rhythm(Record):
     @property
     def is_even(self) -> bool:
         """Nearly all gaps are like the mean one, whatever that is."""
+        if not self.gaps_ns:
+            return True
         mean_ns = self.span_ns / len(self.gaps_ns)
         return len(self.outside(EVEN_FROM * mean_ns, EVEN_TO * mean_ns)) <= UNEVEN_SHARE * len(self.gaps_ns)
 

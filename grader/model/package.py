@@ -8,6 +8,7 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
 from typing import Literal
 
 from pydantic import Field
@@ -74,6 +75,40 @@ class Manifest(Record):
     dependencies: tuple[Dependency, ...]
     build_type: str
     advice: tuple[str, ...] = ()
+
+
+CMAKE_COMMANDS = (
+    *("add_action_files", "add_compile_options", "add_custom_target", "add_definitions", "add_dependencies"),
+    *("add_executable", "add_library", "add_message_files", "add_rostest", "add_service_files"),
+    *(
+        "catkin_add_nosetests",
+        "catkin_package",
+        "catkin_package_xml",
+        "catkin_install_python",
+        "catkin_python_setup",
+    ),
+    *("cmake_minimum_required", "find_package", "find_library", "generate_dynamic_reconfigure_options"),
+    *(
+        "generate_messages",
+        "include_directories",
+        "install",
+        "link_directories",
+        "list",
+        "message",
+        "project",
+    ),
+    *("set", "set_target_properties", "target_compile_features", "target_compile_options"),
+    *("target_include_directories", "target_link_libraries", "target_sources"),
+)
+"""Of CMake and catkin, those that a beginner's package calls."""
+ALIKE, SHORT = 0.88, 5
+"""How alike two names of commands are that differ by one slip; in names of so few letters that says nothing."""
+
+
+def meant_command(name: str) -> str:
+    """Return the command of CMake or catkin that a name, in small letters, is a slip of; empty where it is none."""
+    near = [] if name in CMAKE_COMMANDS else get_close_matches(name, CMAKE_COMMANDS, 1, ALIKE)
+    return near[0] if near and len(name) > SHORT else ""
 
 
 class CMakeCall(Record):
@@ -210,6 +245,13 @@ SlipKind = Literal[
     "rate-number",
     "reset-value",
     "reset-limit",
+    "never-called",
+    "main-guard",
+    "never-reached",
+    "spin-in-loop",
+    "loop-left",
+    "callback-called",
+    "callback-values",
 ]
 
 
@@ -221,7 +263,11 @@ class PythonSlip(Record):
     and counts, and nothing in it can tell the time; that is a slip only where its messages are to tell it.
     `rate-parameter` and `rate-number`: no slip, but a loop or a timer whose rate is a parameter, `message` its name as
     written, or a number, `message` in Hz. `reset-value` and `reset-limit`: where a counter goes back, to the number
-    `message`, or when it reaches it.
+    `message`, or when it reaches it. `never-called`: a function that makes a node, publishes or waits, which nothing
+    names; `main-guard`: `__name__` beside another word than `__main__`. `never-reached`: an endless loop before the
+    first `publish(…)`; `spin-in-loop`: a loop that publishes and waits in `spin()`; `loop-left`: one that ends in its
+    first turn. `callback-called`, `callback-values`: a callback that is called where it is to be named, or that takes
+    another number of values than ROS has for it.
     """
 
     file: str
@@ -253,6 +299,8 @@ class LaunchNode(Record):
     respawn: str | None = None
     required: str | None = None
     uncertain: bool = False
+    unknown: tuple[str, ...] = ()
+    """Attributes that roslaunch does not know."""
 
     @property
     def full_name(self) -> str:

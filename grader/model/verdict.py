@@ -98,14 +98,16 @@ class Verdict(Record):
     def about(
         self, *, expected: str | None = None, measured: str | None = None, citations: Citations | None = None
     ) -> Verdict:
-        """Return the verdict with what was expected, what was measured and where it shows; None leaves a field."""
-        fields = {"expected": expected, "measured": measured, "citations": citations}
+        """Return the verdict with what was expected and measured; None leaves a field. `citations`, where it shows,
+        come behind those that it has."""
+        places = None if citations is None else tuple(dict.fromkeys((*self.citations, *citations)))
+        fields = {"expected": expected, "measured": measured, "citations": places}
         return self.model_copy(update={name: value for name, value in fields.items() if value is not None})
 
     def moved(self, folder: str) -> Verdict:
         """Return the verdict with the files that it cites below `folder`: `../lab_msgs`."""
         cited = (one.below(folder) if isinstance(one, FileCitation) else one for one in self.citations)
-        return self.about(citations=tuple(cited))
+        return self.model_copy(update={"citations": tuple(cited)})
 
     def once(self) -> Verdict:
         """Return the verdict marked as a loss that one run's timing could have made."""

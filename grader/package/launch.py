@@ -9,7 +9,7 @@ from typing import NamedTuple
 from lxml import etree
 
 from grader.model.package import Fault, LaunchFile, LaunchNode
-from grader.package.launch_loader import Find, Scope, load, wanted
+from grader.package.launch_loader import Find, Scope, load, unknown_attributes, wanted
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_xml
 
@@ -187,4 +187,5 @@ def _node(element: etree._Element, remaps: Remaps) -> LaunchNode:
         args=element.get("args"),
         remaps=remaps,
         line=line_of(element) or 0,
+        unknown=unknown_attributes(element),
     )

@@ -29,6 +29,23 @@ _VALUE_CHARS_MAX = 4_000
 _TRUE, _FALSE = frozenset({"true", "1"}), frozenset({"false", "0"})
 
 Remaps = tuple[tuple[str, str], ...]
+_NODE_ATTRIBUTES = frozenset(
+    {
+        *(
+            "pkg",
+            "type",
+            "name",
+            "args",
+            "machine",
+            "respawn",
+            "respawn_delay",
+            "required",
+            "ns",
+            "clear_params",
+        ),
+        *("output", "cwd", "launch-prefix", "if", "unless"),
+    }
+)
 
 
 class Find(Protocol):
@@ -81,6 +98,7 @@ def node_of(element: etree._Element, scope: Scope, remaps: Remaps) -> LaunchNode
         file=scope.file,
         namespace=scope.below(scope.get(element, "ns")).namespace,
         uncertain=scope.uncertain,
+        unknown=unknown_attributes(element),
     )
 
 
@@ -300,3 +318,8 @@ def _plain(path: str) -> str | None:
         elif part != ".":
             parts.append(part)
     return "/".join(parts)
+
+
+def unknown_attributes(element: etree._Element) -> tuple[str, ...]:
+    """Return attributes of a `<node>` that roslaunch does not know, the first ten."""
+    return tuple(str(name)[:100] for name in element.attrib if name not in _NODE_ATTRIBUTES)[:10]

@@ -9,6 +9,7 @@ import re
 import sys
 import warnings
 from collections.abc import Iterable, Iterator
+from difflib import get_close_matches
 from itertools import chain
 from typing import Any
 
@@ -73,8 +74,11 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
         for repair in (
             _without_old_names,
             _without_old_print,
+            lambda t: _with_modules(t, types),
             lambda t: _with_imports(t, types),
             _with_calls,
+            _with_callbacks,
+            _with_main,
             _with_spin,
         ):
             for step in repair(text):
@@ -314,6 +318,26 @@ def _bound(tree: ast.Module) -> set[str]:
     return found
 
 
+def _with_modules(text: str, types: list[str]) -> Iterator[Step]:
+    """`from std_msgs import String` and `from std_msg.msg import String`, for `from std_msgs.msg import String`."""
+    known = {package: set(names.split()) for package, names in MESSAGES.items()}
+    for package, _, name in (kind.partition("/") for kind in types):
+        known.setdefault(package, set()).add(name)
+    for node in ast.walk(ast.parse(text)):
+        module = node.module if isinstance(node, ast.ImportFrom) and not node.level else None
+        package, _, inner = (module or "").partition(".")
+        names = {alias.name for alias in getattr(node, "names", ())}
+        if not module or inner not in ("", "msg", "msgs") or (package in known and inner == "msg"):
+            continue
+        near = package if package in known else next(iter(get_close_matches(package, known, 1, 0.85)), "")
+        lines, at = text.split("\n"), node.lineno - 1  # type: ignore[attr-defined] # an import
+        after = re.sub(rf"from\s+{re.escape(module)}\b", f"from {near}.msg", lines[at], count=1)
+        if near and names <= known[near] and after != lines[at]:
+            for step in _step("module", at + 1, text, _with_line(lines, at, after), module):
+                text = step["text"]
+                yield step
+
+
 def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
     tree = ast.parse(text)
     bound = _bound(tree)
@@ -387,6 +411,60 @@ def _is_callable(node: ast.expr, own: set[str]) -> bool:
     return (isinstance(node, ast.Attribute) and node.attr in CALLED) or (
         isinstance(node, ast.Name) and node.id in own
     )
+
+
+def _with_callbacks(text: str) -> Iterator[Step]:
+    """`Subscriber('x', String, on_x())` calls the function, which takes a message, instead of naming it."""
+    tree, lines = ast.parse(text), text.split("\n")
+    own = {n.name: n.args for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+    called = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and _last(node.func) in {"Subscriber", "Timer", "Service"}:
+            given = [*node.args[1:3], *(k.value for k in node.keywords if k.arg in {"callback", "handler"})]
+            calls = (n for n in given if isinstance(n, ast.Call) and not n.args and not n.keywords)
+            called += [
+                n for n in calls if (args := own.get(_last(n.func))) and len(args.args) > len(args.defaults)
+            ]
+    spans = [(span, ast.unparse(n.func)) for n in called if (span := _span(lines, n))]
+    if spans:
+        after = _edited(text, [(*span, name) for span, name in spans])
+        words = ", ".join(dict.fromkeys(name for _, name in spans))
+        yield from _step("callback", min(span for span, _ in spans)[0] + 1, text, after, words)
+
+
+def _with_main(text: str) -> Iterator[Step]:
+    """A script that calls nothing, or only where `__name__` has a value that it never has."""
+    tree, lines = ast.parse(text), text.split("\n")
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Compare) and isinstance(node.left, ast.Name) and node.left.id == "__name__":
+            word, span = node.comparators[0], _span(lines, node.comparators[0])
+            if (
+                isinstance(word, ast.Constant)
+                and str(word.value).strip("_ ").lower() == "main" != word.value
+                and span
+            ):
+                if word.value != "__main__":
+                    after = _edited(text, [(*span, "'__main__'")])
+                    yield from _step("guard", node.lineno, text, after, str(word.value))
+                return
+    runs = (
+        s
+        for s in tree.body
+        if not isinstance(s, ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom)
+    )
+    if any(isinstance(n, ast.Call) for s in runs for n in ast.walk(s)):
+        return
+    makers = [
+        f
+        for f in tree.body
+        if isinstance(f, ast.FunctionDef)
+        and len(f.args.args) == len(f.args.defaults)
+        and any(isinstance(n, ast.Call) and _last(n.func) == "init_node" for n in ast.walk(f))
+    ]
+    named = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
+    if len(makers) == 1 and makers[0].name not in named:
+        after = f"{text.rstrip()}\n\n\nif __name__ == '__main__':\n    {makers[0].name}()\n"
+        yield from _step("main", makers[0].lineno, text, after, makers[0].name)
 
 
 def _with_spin(text: str) -> Iterator[Step]:

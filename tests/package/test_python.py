@@ -132,6 +132,56 @@ def test_slips_are_found_and_named(tmp_path):
     assert "`rate.sleep()`" in slips[2].message
 
 
+def node(body: str) -> str:
+    """A script whose function makes a node, with these lines in it."""
+    return f"import rospy\ndef main():\n    rospy.init_node('a')\n{body}"
+
+
+LOOP = "    while not rospy.is_shutdown():\n"
+CALLED = "if __name__ == '__main__':\n    main()\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (node(LOOP + "        p.publish(1)\n") + CALLED, []),
+        (node(LOOP + "        p.publish(1)\n"), [("never-called", 2, "nothing calls `main()`")]),
+        (node("    rospy.spin()\n") + "if __name__ == 'main':\n    main()\n",
+         [("main-guard", 5, "`__name__` is never 'main'")]),
+        (node("    rospy.spin()\n") + "if __name__ != '__main__':\n    pass\nmain()\n", []),
+        (node("    rospy.spin()\n") + "threading.Thread(target=main)\n", []),
+        ("class A:\n    def __init__(self):\n        init('a')\n    def go(self):\n        self.p.publish(1)\nA()\n",
+         [("never-called", 4, "nothing calls `go()`")]),
+        (node("    while True:\n        pass\n    p.publish(1)\n") + CALLED,
+         [("never-reached", 4, "the loop of line 4 goes on")]),
+        (node(LOOP + "        rate.sleep()\n    p.publish(1)\n") + CALLED,
+         [("never-reached", 4, "the publish(…) of line 6")]),
+        (node("    rospy.spin()\n    p.publish(1)\n") + CALLED, [("never-reached", 4, "the spin() of line 4")]),
+        (node("    while True:\n        break\n    p.publish(1)\n") + CALLED, []),
+        (node("    while not done:\n        pass\n    p.publish(1)\n") + CALLED, []),
+        (node(LOOP + "        p.publish(1)\n        rospy.spin()\n") + CALLED,
+         [("spin-in-loop", 6, "stops at the spin()")]),
+        (node(LOOP + "        p.publish(1)\n        break\n") + CALLED, [("loop-left", 6, "at the break of line 6")]),
+        (node(LOOP + "        p.publish(1)\n        if x:\n            return\n") + CALLED, []),
+        ("def f(m):\n    pass\nrospy.Subscriber('a', A, f())\n",
+         [("callback-called", 3, "write `f`, without brackets")]),
+        ("def f():\n    pass\nrospy.Subscriber('a', A, callback=f)\n", [("callback-values", 1, "`f` takes 0 values")]),
+        ("def f(m):\n    pass\nrospy.Subscriber('a', A, f)\n", []),
+        ("def f(m, a):\n    pass\nrospy.Subscriber('a', A, f, 3)\n", []),
+        ("def f(*a):\n    pass\nrospy.Timer(d, f)\n", []),
+        ("def f():\n    return lambda m: 0\nrospy.Subscriber('a', A, f())\n", []),
+        ("class A:\n    def f(m):\n        pass\n    def g(self):\n        rospy.Service('a', T, self.f)\n",
+         [("callback-values", 2, "`f` takes 0 values, and ROS calls it with the request")]),
+    ],
+)  # fmt: skip
+def test_what_never_runs_is_known(tmp_path, text, found):
+    (tmp_path / "a.py").write_text(text)
+    others = ("rate-number", "no-clock", "misspelt", "not-called")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind not in others]
+    assert [(s.kind, s.line) for s in slips] == [one[:2] for one in found]
+    assert all(words in slip.message for slip, (_, _, words) in zip(slips, found, strict=True))
+
+
 @pytest.mark.parametrize(
     ("rate", "found"),
     [

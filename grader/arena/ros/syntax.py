@@ -193,6 +193,10 @@ def slips(tree):
     found += misspelt(tree)
     found += loop_rates(tree)
     found += resets(tree)
+    found += never_run(tree)
+    found += never_reached(tree)
+    found += stopped_loops(tree)
+    found += callbacks(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
     if published is not None and counts(tree) and not knows_time(tree):
         message = "the script counts, and reads no clock"
@@ -230,6 +234,124 @@ def loop_rates(tree):
         elif number:
             hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
             yield {"line": value.lineno, "kind": "rate-number", "message": hz}
+
+
+def never_run(tree):
+    """Functions that make a node, publish or wait, and that nothing names; and `__name__` beside another word than
+    `__main__`.
+    """
+    named = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+    named |= {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
+            works = any(
+                is_call(inner, work) for inner in ast.walk(node) for work in ("init_node", "publish", "spin")
+            )
+            if works and not node.name.startswith("__"):
+                message = "nothing calls `%s()`" % node.name[:TEXT_LIMIT]
+                yield {"line": node.lineno, "kind": "never-called", "message": message}
+        elif isinstance(node, ast.Compare) and isinstance(node.left, ast.Name) and node.left.id == "__name__":
+            word = node.comparators[0]
+            if (
+                isinstance(word, ast.Constant)
+                and isinstance(node.ops[0], (ast.Eq, ast.Is))
+                and word.value != "__main__"
+            ):
+                message = "`__name__` is never %r" % (word.value,)
+                yield {"line": node.lineno, "kind": "main-guard", "message": message[:TEXT_LIMIT]}
+
+
+def never_reached(tree):
+    """Loops without an end before the first `publish(…)` that comes behind them in the same block."""
+    for node in ast.walk(tree):
+        for block in (getattr(node, "body", None), getattr(node, "orelse", None)):
+            for index, loop in enumerate(block if isinstance(block, list) else ()):
+                spins = isinstance(loop, ast.Expr) and is_call(loop.value, "spin")
+                if not spins and not (isinstance(loop, ast.While) and is_endless(loop)):
+                    continue
+                behind = [n for later in block[index + 1 :] for n in ast.walk(later) if is_call(n, "publish")]
+                if behind and not any(is_call(n, "publish") for n in ast.walk(loop)):
+                    what = "spin()" if spins else "loop"
+                    message = "the %s of line %d goes on until the node ends" % (what, loop.lineno)
+                    message += ", and the publish(…) of line %d stands behind it" % behind[0].lineno
+                    yield {"line": loop.lineno, "kind": "never-reached", "message": message}
+
+
+def stopped_loops(tree):
+    """`spin()` in a loop that publishes: the loop does not come round. And `break` or `return` in each of its turns."""
+    for loop in ast.walk(tree):
+        inside = list(ast.walk(loop)) if isinstance(loop, (ast.While, ast.For)) else []
+        if not any(is_call(n, "publish") for n in inside):
+            continue
+        spin = next((n for n in inside if is_call(n, "spin")), None)
+        if spin is not None:
+            message = "the loop stops at the spin() of line %d, which waits until the node ends" % spin.lineno
+            yield {"line": spin.lineno, "kind": "spin-in-loop", "message": message}
+        left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None)
+        if left is not None:
+            word = "break" if isinstance(left, ast.Break) else "return"
+            message = "the loop ends in its first turn, at the %s of line %d" % (word, left.lineno)
+            yield {"line": left.lineno, "kind": "loop-left", "message": message}
+
+
+def is_endless(loop):
+    """Whether it asks for nothing but the node's end, and nothing in it leaves it."""
+    test = loop.test
+    inverted = isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not)
+    asks = (isinstance(test, ast.Constant) and bool(test.value)) or (
+        inverted and is_call(test.operand, "is_shutdown")
+    )
+    return asks and not any(isinstance(n, (ast.Break, ast.Return, ast.Raise)) for n in ast.walk(loop))
+
+
+CALLBACKS = {"Subscriber": ("callback", 2, 1), "Timer": ("callback", 1, 1), "Service": ("handler", 2, 1)}
+"""What takes a function: the argument's name, its place, and with how many values ROS calls it."""
+
+
+def callbacks(tree):
+    """Functions that ROS calls with another number of values than they take, and those that are called where the
+    function itself is meant.
+    """
+    functions = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        if name not in CALLBACKS:
+            continue
+        keyword, place, values = CALLBACKS[name]
+        given = [k.value for k in node.keywords if k.arg == keyword] + node.args[place : place + 1]
+        values += any(k.arg == "callback_args" for k in node.keywords) or len(node.args) > place + 1
+        for one in given[:1]:
+            called = isinstance(one, ast.Call)
+            meant = one.func if called else one
+            own = functions.get(dotted(meant).rpartition(".")[2])
+            least, most = takes(own, isinstance(meant, ast.Attribute)) if own else (values, values)
+            if own and called and least:
+                message = "`%s()` is called here: write `%s`, without brackets" % (
+                    dotted(meant),
+                    dotted(meant),
+                )
+                yield {"line": one.lineno, "kind": "callback-called", "message": message}
+            elif own and not called and not least <= values <= most:
+                what = (
+                    "the request" if name == "Service" else "the event" if name == "Timer" else "the message"
+                )
+                message = "`%s` takes %d values, and ROS calls it with %s" % (
+                    own.name[:TEXT_LIMIT],
+                    least,
+                    what,
+                )
+                yield {"line": own.lineno, "kind": "callback-values", "message": message}
+
+
+def takes(function, bound):
+    """With how many values a function can be called at least and at most; of a method without `self`."""
+    given = function.args.posonlyargs + function.args.args
+    of_class = any(getattr(d, "id", "") == "staticmethod" for d in function.decorator_list)
+    own = 1 if bound and not of_class else 0
+    least = len(given) - len(function.args.defaults) - own
+    return least, 99 if function.args.vararg else len(given) - own
 
 
 def constant(node, given, depth=4):

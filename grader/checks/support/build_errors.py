@@ -11,7 +11,7 @@ from typing import NamedTuple
 from grader.checks.support.scripts import path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.installable import ROS_2, install_hint, known_packages
-from grader.model.package import PackageFacts
+from grader.model.package import PackageFacts, meant_command
 from grader.model.verdict import FileCitation
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
@@ -31,6 +31,9 @@ CALLERS_MAX = 40
 SYSTEM = ("/usr/", "/opt/")
 _QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
 """As compilers and linkers write them."""
+OF_GENERATION = ("add_message_files", "add_service_files", "add_action_files", "generate_messages")
+OF_CATKIN = ("catkin_package", "catkin_install_python", "catkin_python_setup")
+"""Commands that `find_package(catkin …)` defines."""
 STANDARD = {
     **dict.fromkeys(("cout", "cin", "cerr", "endl"), "iostream"),
     **dict.fromkeys(("string", "to_string", "stoi"), "string"),
@@ -307,6 +310,19 @@ def _main_twice(_found: re.Match[str], _package: PackageFacts, _lines: Sequence[
     )
 
 
+def _unknown_command(found: re.Match[str], *_: object) -> Explained:
+    name = found[1]
+    if right := meant_command(name.lower()):
+        return Explained(f"there is no command {name}(…)", f"write {right} for {name}")
+    if name.lower() in OF_GENERATION:
+        why = f"{name}(…) comes with message_generation, which find_package(catkin …) does not name"
+        return Explained(why, "write find_package(catkin REQUIRED COMPONENTS … message_generation)")
+    if name.lower() in OF_CATKIN:
+        why = f"{name}(…) is catkin's, and find_package(catkin …) is not called above it"
+        return Explained(why, f"call find_package(catkin REQUIRED COMPONENTS …) above {name}(…)")
+    return Explained(f"there is no command {name}(…)", "check the spelling of the command")
+
+
 _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]], ...] = (
     (r'Could not find a package configuration file provided by "([\w-]+)"', _missing_package),
     (r"(add_\w+_files)\(\) directory not found: (\S+)", _missing_folder),
@@ -320,6 +336,7 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"Cannot find source file: (\S+)", _missing_source),
     (r"Could not find messages which '([^']+)' depends on", _message_of_another),
     (r"(generate_messages)\(\) must be called before catkin_package\(\)", _before_catkin_package),
+    (UNKNOWN_COMMAND + r' "(\w+)"', _unknown_command),
     (r"does not contain a CMakeLists\.txt", _no_cmake_lists),
     (r'dependency target "([^"]+)" of target "([^"]+)" does not exist', _missing_dependency),
     (r'dependencies to non-existent target "([^"]+)"', _missing_target),

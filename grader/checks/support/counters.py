@@ -22,7 +22,8 @@ from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import plural, significant
 
-FLOOD_FACTOR = 3
+FLOOD_FACTOR, FLOOD_HZ = 3, 500
+"""Times the nominal rate, and real messages a second."""
 SYSTEMATIC_SHARE = 0.05
 STUCK_COUNT = 5
 LEAST_AFTER_START = 3
@@ -127,7 +128,8 @@ class Count(Record):
         """So many messages that the publisher's own queue drops some."""
         span_s = (self.times_ns[-1] - self.times_ns[0]) / 1e9
         warp = run.warp if run.clock == "warped" else 1.0
-        return len(self.steps) > 20 and len(self.steps) >= FLOOD_FACTOR * rate_hz * warp * span_s
+        least_hz = max(FLOOD_FACTOR * rate_hz * warp, FLOOD_HZ)
+        return len(self.steps) > 20 and len(self.steps) >= least_hz * span_s
 
     def usual_step(self) -> float | None:
         """The step that at least four of five are, None where there is none."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import signal
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 from grader.checks.registry import Check
@@ -14,13 +16,15 @@ from grader.checks.support.scripts import path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
 from grader.installable import ROS_2, install_hint, known_packages, noetic_messages
-from grader.model.package import Fault, PackageFacts
+from grader.model.package import Fault, PackageFacts, PythonSlip
 from grader.model.verdict import Citations, FileCitation, Verdict, inconclusive
 from grader.wording import join_words, seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
 ATTRIBUTES_SHOWN = 8
+MAIN = "`if __name__ == '__main__':`"
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
+IMPORT_ERRORS = ("ImportError", "ModuleNotFoundError")
 RACE = "publish() to a closed topic"
 ARGUMENT_HINT = (
     "give the value in the code, or take a default where `len(sys.argv)` is 1: a lab starts it by its name"
@@ -57,6 +61,14 @@ SLIPS = {
      "write the node's name without a slash"),
     "init_node() has already been called with different arguments": ("`rospy.init_node(…)` is called a second time",
      "one script is one node: call `rospy.init_node(…)` once"),
+    "not enough arguments for format string": ("the text has more `%` in it than values stand behind it",
+     "give one value for each `%` of the text, or leave one out"),
+    "not all arguments converted during string formatting": ("the text has fewer `%` in it than values stand behind it",
+     "put a `%s` into the text for each value"),
+    "must be of type bytes or an ascii string": ("the message is a text, and it gets something else",
+     "publish a text here, `str(…)`; a number goes to the publisher of its own topic"),
+    "must be an integer type": ("the message is a whole number, and it gets something else",
+     "publish a whole number here, `int(…)`; a text goes to the publisher of its own topic"),
     "Invalid number of arguments, args should be": (
      "the message gets a different number of values than it has fields",
      'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not by a comma'),
@@ -75,10 +87,30 @@ _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
 _NO_MODULE = re.compile(r"No module named '(\w+)'$")
+_KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
+_ARITY = re.compile(r"([\w.]+)\(\) (?:takes|missing) ")
+_ADDED = re.compile(
+    r"can only concatenate str \(not \"(\w+)\"\) to str|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'"
+)
 _NAME = re.compile(r"name '(\w+)' is not defined")
 _MEANT = re.compile(r"did you mean `(\w+)`\?$")
+_FROM_PACKAGE = re.compile(r"cannot import name '(\w+)' from '(\w+)'")
 _NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
 _NO_ATTRIBUTE = re.compile(r"(?:module|type object)? ?'([\w.]+)'(?: object)? has no attribute '(\w+)'")
+KEYWORDS = (
+    *("anonymous", "log_level", "disable_signals", "argv", "queue_size", "latch", "tcp_nodelay", "headers"),
+    *(
+        "callback",
+        "callback_args",
+        "buff_size",
+        "subscriber_listener",
+        "data_class",
+        "oneshot",
+        "timeout",
+        "default",
+    ),
+)
+"""Arguments of rospy's functions that are given by their names."""
 ATTRIBUTES = {
     "rospy": (
         *("init_node", "Publisher", "Subscriber", "Service", "ServiceProxy", "Rate", "Timer", "Time", "Duration"),
@@ -240,10 +272,28 @@ def _explained(life: Life, run: Run, package: PackageFacts) -> Ending:
         return Ending(f"{_signal_name(life.end.signal)} ended it", RUN_IT)
     if code == 0:
         hint = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
-        return Ending("its script came to its end", hint, by_itself=True)
+        return _not_run(life, package) or Ending("its script came to its end", hint, by_itself=True)
     last = next((line.line for _, line in reversed(list(run.lines(life.name))) if line.line.strip()), "")
     words = f"; its last words: {shown(last)}" if last else ""
     return Ending(f"it exited with code {code}{words}", RUN_IT)
+
+
+def _not_run(life: Life, package: PackageFacts) -> Ending | None:
+    """The script comes to its end because what it defines is never called, or because its loop is left."""
+    kinds = ("main-guard", "never-called", "loop-left")
+    slips = [s for s in package.slips if s.file == life.start.script and s.kind in kinds]
+    if not slips:
+        return None
+    slip = min(slips, key=lambda one: kinds.index(one.kind))
+    called = re.search(r"`(.+)`", slip.message)
+    hint = f"write {MAIN}"
+    if slip.kind == "loop-left":
+        hint = f"take it out of line {slip.line}, or put it below an `if`"
+    elif called and slip.kind == "never-called":
+        hint = f"call {called[1]} at the end of the script, below {MAIN}"
+    cause = f"its script came to its end: {slip.message} ({slip.file}, line {slip.line})"
+    place = FileCitation(file=slip.file, line=slip.line)
+    return Ending(cause, hint, (place,), by_itself=True)
 
 
 def explain_error(package: PackageFacts, run: Run) -> Ending | None:
@@ -317,6 +367,11 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         place = source.python_fault.place
     if place is not None and found.kind == "NameError":
         cause, hint = _misspelt(found, place, package) or (cause, hint)
+    if found.kind == "TypeError" and (wrong := _callback(found, place, package)):
+        place = place or FileCitation(file=wrong.file, line=wrong.line)
+        cause, hint = wrong.message, _callback_hint(wrong)
+    elif place is not None and found.kind == "TypeError":
+        cause, hint = _operand(found) or (cause, hint)
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(found.text)}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else ())
@@ -330,19 +385,34 @@ def _makes(package: PackageFacts, message: str) -> bool:
 
 def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint of a known slip, by what was said, by the module and by the line itself."""
-    if known := next((known for said, known in SLIPS.items() if said in found.message), None):
-        return known
+    source = found.own_frames[-1].source if found.own_frames else ""
+    if found.kind == "IndexError" and "argv" in source:
+        return "it reads an argument of the command line, and is started without any", ARGUMENT_HINT
+    known = next((known for said, known in SLIPS.items() if said in found.message), None)
+    return known or _other_name(found, package)
+
+
+def _other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """A message type, a module, an attribute or an argument that there is none of, and what is meant."""
     if wrong := _NO_TYPE.match(found.message):
         return _other_types(wrong[1], wrong[2])
     if wrong := _NO_ATTRIBUTE.search(found.message):
         return _other_attributes(package, wrong[1], wrong[2])
-    module = _NO_MODULE.search(found.message)
-    if module and module[1] in ROS_2:
-        return f"{module[1]} is of ROS 2", "this lab is for ROS 1: write the node with rospy"
-    source = found.own_frames[-1].source if found.own_frames else ""
-    if found.kind == "IndexError" and "argv" in source:
-        return "it reads an argument of the command line, and is started without any", ARGUMENT_HINT
-    return None
+    if wrong := _KEYWORD.search(found.message):
+        near = near_names(wrong[1], KEYWORDS)
+        return (f"it is called {near[0]}", f"write {near[0]}= for {wrong[1]}=") if near else None
+    return _other_module(found.message) if found.kind in IMPORT_ERRORS else None
+
+
+def _other_module(message: str) -> tuple[str, str] | None:
+    """Return where messages come from that are imported from `std_msgs`, or from a package of nearly that name."""
+    asked, wanted = _NO_MODULE.search(message), _FROM_PACKAGE.search(message)
+    if asked and asked[1] in ROS_2:
+        return f"{asked[1]} is of ROS 2", "this lab is for ROS 1: write the node with rospy"
+    near = near_names(asked[1], noetic_messages()) if asked and asked[1] not in known_packages() else ()
+    if wanted and wanted[1] in noetic_messages().get(wanted[2], ()):
+        near = (wanted[2],)
+    return (f"messages come from {near[0]}.msg", f"write `from {near[0]}.msg import …`") if near else None
 
 
 def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
@@ -355,6 +425,43 @@ def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> t
     said = next((message for message in slips if wrong and message.startswith(wrong)), "")
     near = _MEANT.search(said)
     return (f"did you mean {near[1]}?", f"write {near[1]} in line {place.line}") if near else None
+
+
+def _callback(found: Traceback, place: FileCitation | None, package: PackageFacts) -> PythonSlip | None:
+    """The callback that the error speaks of: one that is called in this line, or that ROS calls with other values."""
+    called = [s for s in package.slips if s.kind == "callback-called" and place is not None]
+    here = next((s for s in called if place and (s.file, s.line) == (place.file, place.line)), None)
+    match = _ARITY.match(found.message)
+    name = match[1].rpartition(".")[2] if match else ""
+    taken = (s for s in package.slips if s.kind == "callback-values" and s.message.startswith(f"`{name}` "))
+    return here or (next(taken, None) if name and not found.own_frames else None)
+
+
+def _callback_hint(slip: PythonSlip) -> str:
+    if slip.kind == "callback-called":
+        return slip.message.partition(": ")[2]
+    name = slip.message.split("`")[1]
+    return f"write `def {name}(msg):`, or `def {name}(self, msg):` in a class"
+
+
+def _operand(found: Traceback) -> tuple[str, str] | None:
+    """A text and something else are added: which of both is no text, where Python marks the place."""
+    if not (match := _ADDED.search(found.message)):
+        return None
+    kind, is_right = (
+        (match[1], True) if match[1] else (match[2], False) if match[3] == "str" else (match[3], True)
+    )
+    frame = found.own_frames[-1]
+    sides = frame.source[slice(*frame.marked)] if frame.marked else ""
+    with suppress(SyntaxError, ValueError, RecursionError):
+        tree = ast.parse(sides, mode="eval").body
+        if isinstance(tree, ast.BinOp) and isinstance(tree.op, ast.Add):
+            other = shown(ast.unparse(tree.right if is_right else tree.left))
+            return f"{other} is no text", f"write `str({other})` for `{other}`"
+    return (
+        f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} is no text",
+        "put it into `str(…)` before it is added to a text",
+    )
 
 
 def _other_types(name: str, package: str) -> tuple[str, str] | None:
@@ -420,6 +527,8 @@ def process_tracebacks(
 def is_rospys_own(found: Traceback) -> bool:
     """A race of rospy's own shutdown, or a thread in which no line of the student's takes part."""
     race = found.kind == "ROSException" and RACE in found.message
+    if found.kind == "TypeError" and _ARITY.match(found.message):
+        return False  # a callback that takes other values: rospy's line calls it
     return race or (bool(found.frames) and not found.own_frames)
 
 

@@ -20,6 +20,7 @@ from grader.checks.support.scripts import (
     is_elsewhere,
     paths_by_name,
     programs,
+    shebang_obstacles,
 )
 from grader.checks.support.text import bare, near_names, shown
 from grader.evidence.run import Run
@@ -27,6 +28,10 @@ from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFact
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, unjudged
 from grader.wording import join_words
 
+OTHER_ATTRIBUTES = {"package": "pkg", "exec": "type", "executable": "type", "script": "type"}
+"""What ROS 2, or plain English, calls them."""
+NOT_EXECUTED = (2, 126, 127)
+"""Exit codes of `env` and of a shell that find no such program, or cannot read what it is given."""
 UNRESOLVED = "$("
 ATTRIBUTES = ("pkg", "type", "name")
 _ERRORS = (
@@ -140,7 +145,15 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
     """
     missing = [a for a in ATTRIBUTES if not (getattr(node, a) or "").strip()]
     if missing:
-        return _slip(node, f"<node> has no {join_words(missing)}", "a <node> needs pkg, type and name")
+        known = {
+            name: OTHER_ATTRIBUTES[name] for name in node.unknown if OTHER_ATTRIBUTES.get(name) in missing
+        }
+        slips = {name: meant[0] for name in node.unknown if (meant := near_names(name, missing))} | known
+        told = "".join(f"; it has no attribute {name}" for name in slips)
+        fix = "; ".join(f"write {right}= for {name}=" for name, right in slips.items())
+        return _slip(
+            node, f"<node> has no {join_words(missing)}{told}", fix or "a <node> needs pkg, type and name"
+        )
     pkg, name = str(node.pkg), str(node.type)
     if path := next((a for a in ("pkg", "type") if "$(find" in str(getattr(node, a))), None):
         return _slip(
@@ -360,6 +373,14 @@ def not_executable(*paths: str) -> Absence:
     return Absence(why, chmod_hint(*paths), True, tuple(FileCitation(file=path) for path in paths))
 
 
+def not_started(*scripts: SourceFile) -> Absence:
+    """Return the absence of nodes whose scripts the system cannot start by their first line."""
+    obstacles = {script.path: next(shebang_obstacles(script)) for script in scripts}
+    why = "; ".join(f"{path} {one.why}" for path, one in obstacles.items())
+    fix = "; ".join(dict.fromkeys(one.fix for one in obstacles.values()))
+    return Absence(f"it died: {why}", fix, True, tuple(FileCitation(file=path, line=1) for path in obstacles))
+
+
 def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | None:
     """Its traceback where it was printed, or what roslaunch says of its end."""
     code = died(run, node)
@@ -382,6 +403,8 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         fault = script.python_fault
         why = f"it died: {fault.kind}: {fault.cause or fault.message}"
         return Absence(why, syntax_hint(fault), of_script=True, citations=(fault.place,))
+    if script is not None and code in NOT_EXECUTED and any(shebang_obstacles(script)):
+        return not_started(script)
     hint = 'write output="screen" into the <node>, and read what it prints last'
     return Absence(f"it died with exit code {code}", hint, of_script=True)
 

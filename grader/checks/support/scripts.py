@@ -10,6 +10,7 @@ from typing import NamedTuple
 from grader.model.package import CMakeCall, Executable, PackageFacts, SourceFile
 
 PYTHON = "catkin_install_python"
+RIGHT_SHEBANG = "#!/usr/bin/env python3"
 NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
 _KINDS = ("PROGRAMS", "FILES", "TARGETS", "DIRECTORY", "SCRIPT", "CODE")
 _OPTIONS = (
@@ -164,3 +165,30 @@ def _named(call: CMakeCall) -> Iterator[Installed]:
     last = next((i for i, word in enumerate(words) if word in _OPTIONS), len(words))
     for path in words[:last]:
         yield Installed(call, kind, path, destination)
+
+
+class Obstacle(NamedTuple):
+    """Why `rosrun` cannot run the file, and the command that fixes it."""
+
+    why: str
+    fix: str
+
+
+def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
+    """Yield what keeps the system from starting the file, the package facts' own words first."""
+    fix = f"write {RIGHT_SHEBANG} as the very first line, with nothing above it"
+    if file.link_problem:
+        yield Obstacle(f"cannot be run: {file.link_problem}", "hand in the file itself")
+    elif file.shebang is not None and file.shebang.crlf:
+        problem = file.shebang_problem or "its #! line ends with Windows' CRLF"
+        yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}, then commit and push")
+    elif file.shebang_problem:
+        yield Obstacle(f"cannot be run: {file.shebang_problem}", fix)
+    elif file.bom:
+        yield Obstacle("begins with an invisible byte order mark (BOM)", "save it as UTF-8 without BOM")
+    elif file.shebang is None:
+        yield Obstacle("does not begin with a #! line", fix)
+    elif file.shebang.found is False:
+        yield Obstacle(f"names {file.shebang.interpreter}, which is not on a ROS machine", fix)
+    elif file.python and "python" not in file.shebang.interpreter:
+        yield Obstacle(f"is Python, and its first line names {file.shebang.interpreter}", fix)

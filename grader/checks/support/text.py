@@ -8,11 +8,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 
 from grader.untrusted_text import visible
-from grader.wording import shorten
+from grader.wording import is_one_edit, shorten
 
 SIMILARITY = 0.8
 OTHER_WORDS_SHARE = 0.5
 """Of the points, for what is said at the right place in other words than the handout's."""
+SLIP_CHARS_MIN = 4
+"""Of the last part of a name, so that one letter more, less or another is a slip."""
 NAMES_MAX, NAME_CHARS_MAX = 1_000, 60
 """Of names that students may give by the thousand: so many are looked at, and so much of each."""
 SHOWN_CHARS = 160
@@ -46,7 +48,10 @@ def near_names(wanted: str, names: Iterable[str]) -> tuple[str, ...]:
 def _is_near(wanted: str, name: str) -> bool:
     last_wanted, last_name = (n.rstrip("/").rpartition("/")[2] for n in (wanted, name))
     same_words = sorted(_words(last_wanted)) == sorted(_words(last_name)) != []
-    return same_words or _squeezed(last_wanted) == _squeezed(last_name) or _is_similar(wanted, name)
+    squeezed = _squeezed(last_wanted), _squeezed(last_name)
+    same = same_words or squeezed[0] == squeezed[1]
+    slip = min(map(len, squeezed)) >= SLIP_CHARS_MIN and is_one_edit(*squeezed)
+    return same or slip or _is_similar(wanted, name)
 
 
 def _is_similar(first: str, second: str) -> bool:

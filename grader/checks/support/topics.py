@@ -13,9 +13,17 @@ from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives
 from grader.checks.support.text import near_names, texts_in
 from grader.evidence.events import MISFIT
 from grader.evidence.run import Channel, Run
-from grader.model.package import PackageFacts
+from grader.model.package import PackageFacts, PythonSlip
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Status, Verdict, failed, inconclusive, unjudged
+from grader.model.verdict import (
+    EvidenceCitation,
+    FileCitation,
+    Status,
+    Verdict,
+    failed,
+    inconclusive,
+    unjudged,
+)
 from grader.wording import join_words, plural
 
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
@@ -103,8 +111,26 @@ def _advertised(package: PackageFacts, run: Run, what: str, of_node: Callable[..
     message = f"{what}, although it is advertised"
     if end := explain_error(package, run):
         return end.verdict(of_node, f"{message}: an error comes first: {end.cause}", measured="no message")
+    if slip := _unreached(package, run):
+        verdict = of_node(f"{message}: {slip.message}", measured="no message", hint=_reach_hint(slip))
+        return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
     hint = f"call publish(…) inside the loop `{LOOP}`"
     return of_node(message, measured="no message", hint=hint)
+
+
+def _unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
+    """Return why a script that runs does not come to its `publish(…)`."""
+    scripts = {one.start.script for one in lives(run)}
+    kinds = ("never-reached", "never-called", "spin-in-loop")
+    return next((s for s in package.slips if s.file in scripts and s.kind in kinds), None)
+
+
+def _reach_hint(slip: PythonSlip) -> str:
+    if slip.kind == "never-called":
+        return f"call it, or move its lines to where they run: line {slip.line}"
+    if slip.kind == "spin-in-loop":
+        return "take spin() out: the loop keeps the node alive"
+    return f"publish inside the loop `{LOOP}`, not behind a loop that never ends"
 
 
 def sent_by(run: Run, topic: str, of: Sender) -> tuple[Channel, ...]:

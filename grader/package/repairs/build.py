@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 
 from cmake_parser.ast import Command, Token
 
-from grader.model.package import PackageFacts
+from grader.model.package import PackageFacts, meant_command
 from grader.model.repair import RepairKind
 from grader.package.cmake_parse import commands_of
 from grader.package.manifest import parse_manifest
@@ -134,6 +134,7 @@ def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted)
     _close_bracket(files)
     if commands_of(_cmake(files).encode()) is None:
         return
+    _spell_commands(files)
     needs = " ".join(wanted.dependencies or ("rospy", "std_msgs"))
     if not _calls_catkin(files, package):
         line = f"find_package(catkin REQUIRED COMPONENTS {needs})"
@@ -187,6 +188,19 @@ def _close_bracket(files: Files) -> None:
             message = f"line {last + 1} of {CMAKE}: a bracket that is opened is never closed"
             files.change("build-line", CMAKE, changed, message)
             return
+
+
+def _spell_commands(files: Files) -> None:
+    """Commands with nearly the name of a known one, unless the file defines them."""
+    defined = {words[0].value.lower() for c in _commands(files, "function", "macro") if (words := _words(c))}
+    for command in reversed(commands_of(_cmake(files).encode()) or []):
+        name = command.identifier
+        right = "" if name.lower() in defined else meant_command(name.lower())
+        if right:
+            text, start = _cmake(files), command.span.start
+            start = text.index(name, start)
+            message = f"line {command.line} of {CMAKE}: there is no command {name}; it is called {right}"
+            files.change("build-line", CMAKE, text[:start] + right + text[start + len(name) :], message)
 
 
 def _name_project(files: Files, name: str, wanted: str) -> None:

@@ -24,8 +24,25 @@ WALL_S = 10.0
 ATTEMPTS = 3
 """A source that crashes Python costs its own repairs, not those of the others."""
 
-Cause = Literal["tabs", "python2", "characters", "token", "old-name", "import", "call", "spin"]
-KINDS: dict[str, RepairKind] = {"import": "missing-import", "call": "missing-call", "spin": "missing-call"}
+Cause = Literal[
+    "tabs",
+    "python2",
+    "characters",
+    "token",
+    "old-name",
+    "module",
+    "import",
+    "call",
+    "callback",
+    "guard",
+    "main",
+    "spin",
+]
+CALLS = ("call", "callback", "guard", "main", "spin")
+KINDS: dict[str, RepairKind] = {
+    **dict.fromkeys(("module", "import"), "missing-import"),
+    **dict.fromkeys(CALLS, "missing-call"),
+}
 
 
 class _Error(Record):
@@ -105,7 +122,7 @@ def _joined(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
     """Steps of one cause that follow each other are one mistake, but each missing token and import is its own."""
     groups: list[tuple[Cause, list[_Step]]] = []
     for step in steps:
-        if groups and groups[-1][0] == step.cause and step.cause not in ("token", "import"):
+        if groups and groups[-1][0] == step.cause and step.cause not in ("token", "module", "import"):
             groups[-1][1].append(step)
         else:
             groups.append((step.cause, [step]))
@@ -121,20 +138,30 @@ def _change(files: Files, file: str, cause: Cause, steps: list[_Step]) -> None:
 def _words(file: str, cause: Cause, steps: list[_Step]) -> tuple[str, str]:
     """What is wrong, and how it is repaired; "" where the changed line says it."""
     first = steps[0]
-    place = f"line {first.line} of {file}"
-    if cause == "tabs":
-        message = f"{place}: tabs and spaces are mixed in the indentation"
-        return message, "replace each tab by spaces (in the editor: convert indentation to spaces)"
-    if cause == "old-name":
-        return f"{place}: {first.word} is Python 2", ""
-    if cause == "import":
-        return f"{place} uses {first.word}, which is not imported", ""
-    if cause == "call":
-        calls = ", ".join(f"{word}()" for word in first.word.split(", "))
-        return f"{place}: {first.word} is named but not called", f"write {calls}"
-    if cause == "spin":
-        message = f"{file} ends as soon as it has subscribed, because nothing keeps it running"
-        return message, f"write {first.word} as the last line of what makes the node"
+    place, word = f"line {first.line} of {file}", first.word
+    calls = ", ".join(f"{one}()" for one in word.split(", "))
+    said: dict[Cause, tuple[str, str]] = {
+        "tabs": (
+            f"{place}: tabs and spaces are mixed in the indentation",
+            "replace each tab by spaces (in the editor: convert indentation to spaces)",
+        ),
+        "old-name": (f"{place}: {word} is Python 2", ""),
+        "import": (f"{place} uses {word}, which is not imported", ""),
+        "module": (f"{place}: messages are not imported from {word}", ""),
+        "call": (f"{place}: {word} is named but not called", f"write {calls}"),
+        "callback": (f"{place}: {calls} is called where the function itself is meant", ""),
+        "guard": (f"{place}: `__name__` is never {word!r}", ""),
+        "main": (
+            f"{place}: nothing calls {calls}",
+            f"add `if __name__ == '__main__':`, and {calls} below it",
+        ),
+        "spin": (
+            f"{file} ends as soon as it has subscribed, because nothing keeps it running",
+            f"write {word} as the last line of what makes the node",
+        ),
+    }
+    if cause in said:
+        return said[cause]
     error = first.error
     told = cause_of(error.message, error.text, column=error.column) if error else ""
     return f"{place}: {told or (error.message if error else 'not Python 3')}", ""

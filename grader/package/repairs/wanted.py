@@ -7,6 +7,7 @@ from typing import Any
 
 from grader.model.record import Record
 from grader.rubric.model import Criterion, Rubric
+from grader.wording import is_one_edit
 
 
 class Wanted(Record):
@@ -118,15 +119,3 @@ def is_near(name: str, wanted: str) -> bool:
 
 SHORTEST = 3
 """Shorter names differ by one letter because they are different names."""
-
-
-def is_one_edit(one: str, other: str) -> bool:
-    """Return whether one letter added, left out, changed, or swapped with its neighbour makes one the other."""
-    if abs(len(one) - len(other)) > 1:
-        return False
-    start = next((i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), None)
-    if start is None:
-        return len(one) != len(other)
-    one, other = one[start:], other[start:]
-    swapped = one[:2] == other[1::-1] and one[2:] == other[2:]
-    return swapped or one[1:] == other[1:] or one[1:] == other or one == other[1:]
