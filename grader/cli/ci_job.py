@@ -73,6 +73,7 @@ def run_job(system: str) -> ExitCode:
 
 
 def _graded(settings: Settings) -> Graded:
+    settings.check_attempt()
     chosen = _chosen(settings)
     source, rubric = chosen.source, with_pass_mark(chosen.rubric, settings.mark)
     if chosen.words:
@@ -135,6 +136,8 @@ def _judged(result: GradingResult, rubric: LoadedRubric, settings: Settings, pre
     code = ExitCode.NOT_GRADED if error or not counted.criteria else exit_code(counted.criteria, lab)
     outcome = OF_CODE[code]
     message, hint = describe_outcome(counted, lab, outcome, static=settings.static)
+    if settings.attempts is not None:
+        message = f"attempt {settings.attempt} of {settings.attempts}: {message}"
     students = error is not None and error.kind in STUDENTS
     return Graded(
         outcome=outcome,

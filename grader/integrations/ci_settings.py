@@ -11,20 +11,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
-from grader.errors import UsageError
+from grader.errors import SubmissionError, UsageError
 from grader.intake.names import is_package_name
 from grader.integrations.ci_results import Outcome
 from grader.model.sandbox_mode import SandboxMode
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 from grader.untrusted_text import line
-from grader.wording import number
+from grader.wording import number, plural
 
 MODES = ("auto", "require", "none")
 YES, NO = {"true", "yes", "on", "1"}, {"", "false", "no", "off", "0"}
 FAILING = (Outcome.BELOW, Outcome.NOT_GRADED, Outcome.INCONCLUSIVE)
 NEVER = "never"
 OUT = "grader-results"
+COUNTERS = ("GITHUB_RUN_NUMBER", "CI_PIPELINE_IID")
+"""By which GitHub numbers a workflow's runs, and GitLab a project's pipelines. To run one again is the same attempt."""
 SHOWN_CHARS = 100
 MARK_PATTERN = re.compile(r"(\d{1,6}(?:\.\d{1,6})?)\s*(%?)")
 MARK_HINT = "write points (12.5) or a percentage of the visible points (60%)"
@@ -33,7 +35,8 @@ MARK_HINT = "write points (12.5) or a percentage of the visible points (60%)"
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """`lab` is a rubric's id or file, or None if the package's name decides. `package` is the name of the package to
-    grade in place of the lab's, or "". `fail_on` holds the outcomes that fail the job. `out` is the
+    grade in place of the lab's, or "". `attempt` is the number of this run by the system's count, `attempts` how many
+    are graded at most; None where no limit is asked for. `fail_on` holds the outcomes that fail the job. `out` is the
     folder for the reports, `repository` the student's checkout, as the system names it."""
 
     lab: str | None
@@ -45,11 +48,29 @@ class Settings:
     sandbox: SandboxMode
     out: Path
     repository: Path | None = None
+    attempt: int | None = None
+    attempts: int | None = None
+
+    def check_attempt(self) -> None:
+        """Raise SubmissionError if this is an attempt too many, UsageError if it has no number."""
+        if self.attempts is None:
+            return
+        if self.attempt is None:
+            raise UsageError(
+                "attempts: this job has no number", hint=f"set one of {' and '.join(COUNTERS)}, or no limit"
+            )
+        if self.attempt > self.attempts:
+            message = (
+                f"attempt {self.attempt}, and {plural(self.attempts, 'attempt')} can be graded: nothing was"
+            )
+            raise SubmissionError(
+                message, hint="what was graded before counts; ask your teachers for one more"
+            )
 
 
 def read_settings(variables: Mapping[str, str]) -> Settings:
-    """Read `GRADER_LAB`, `_PATH`, `_PACKAGE`, `_PASS_MARK`, `_FAIL_ON`, `_STATIC`, `_SANDBOX` and `_OUT`. One that
-    is missing or empty has its default. Raises UsageError that names the input of the action, as the
+    """Read `GRADER_LAB`, `_PATH`, `_PACKAGE`, `_PASS_MARK`, `_FAIL_ON`, `_STATIC`, `_SANDBOX`, `_ATTEMPTS` and
+    `_OUT`. One that is missing or empty has its default. Raises UsageError that names the input of the action, as the
     variable is named."""
 
     def given(name: str) -> str:
@@ -66,6 +87,8 @@ def read_settings(variables: Mapping[str, str]) -> Settings:
         sandbox=_sandbox(given("SANDBOX")),
         out=Path(given("OUT") or OUT),
         repository=Path(workspace) if workspace else None,
+        attempt=next((int(text) for name in COUNTERS if (text := variables.get(name, "")).isdecimal()), None),
+        attempts=_attempts(given("ATTEMPTS")),
     )
 
 
@@ -73,6 +96,14 @@ def _package(text: str) -> str:
     if text and not is_package_name(text):
         raise UsageError(f"package: {_quoted(text)} cannot be a package's name", hint="write its <name>")
     return text
+
+
+def _attempts(text: str) -> int | None:
+    if text and not re.fullmatch(r"[1-9]\d{0,5}", text):
+        raise UsageError(
+            f"attempts: {_quoted(text)} is no number of attempts", hint="write 5, say, or nothing"
+        )
+    return int(text) if text else None
 
 
 def _fail_on(text: str) -> frozenset[Outcome]:

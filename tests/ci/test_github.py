@@ -33,6 +33,19 @@ def test_a_package_without_mistakes_passes(runner):
     assert (seen.points, seen.of, seen.failed) == (20, 20, "")
 
 
+def test_an_attempt_too_many_is_not_graded(runner):
+    handed_in(runner.workspace)
+    runner.more["GITHUB_RUN_NUMBER"] = "2"
+    ran = runner.use(static="true", path="ws/src/my lab", attempts="2")
+    assert ran.code == 0, ran.log
+    assert "attempt 2 of 2: 20 of 20 points" in ran.summary
+    runner.more["GITHUB_RUN_NUMBER"] = "3"
+    ran = runner.use(static="true", path="ws/src/my lab", attempts="2")
+    assert (ran.code, ran.outputs["status"], ran.outputs["passed"]) == (3, "not-graded", "false")
+    assert "attempt 3, and 2 attempts can be graded: nothing was" in ran.summary
+    assert "ask your teachers" in ran.log
+
+
 @pytest.mark.full
 def test_a_loss_is_shown_at_its_line_and_the_step_fails(runner):
     package = handed_in(runner.workspace)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from grader.cli.outcome import exit_code
-from grader.errors import ExitCode, UsageError
+from grader.errors import ExitCode, SubmissionError, UsageError
 from grader.integrations.ci_results import Outcome, points_to_pass
 from grader.integrations.ci_settings import FAILING, PassMark, read_pass_mark, read_settings, with_pass_mark
 from grader.rubric.load import load_rubric
@@ -104,3 +104,21 @@ def test_a_package_that_can_have_no_such_name(name):
     with pytest.raises(UsageError, match="package: ") as caught:
         read_settings({"GRADER_PACKAGE": name})
     assert "\x1b" not in caught.value.message
+
+
+@pytest.mark.parametrize("counter", ["GITHUB_RUN_NUMBER", "CI_PIPELINE_IID"])
+def test_so_many_attempts_are_graded(counter):
+    last = read_settings({"GRADER_ATTEMPTS": "5", counter: "5"})
+    last.check_attempt()
+    assert (last.attempt, last.attempts) == (5, 5)
+    with pytest.raises(SubmissionError, match="attempt 6, and 5 attempts can be graded"):
+        read_settings({"GRADER_ATTEMPTS": "5", counter: "6"}).check_attempt()
+    read_settings({counter: "600"}).check_attempt()
+    with pytest.raises(UsageError, match="this job has no number"):
+        read_settings({"GRADER_ATTEMPTS": "5"}).check_attempt()
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "many", "1.5", "1\n2"])
+def test_a_number_of_attempts_that_is_none(text):
+    with pytest.raises(UsageError, match="is no number of attempts"):
+        read_settings({"GRADER_ATTEMPTS": text})

@@ -25,6 +25,7 @@ CI_VARIABLES = """variables, all optional:
   GRADER_FAIL_ON    any of below-pass-mark, not-graded, inconclusive (default: all), or never
   GRADER_STATIC     true: check the files only and run nothing
   GRADER_SANDBOX    auto (default), require or none
+  GRADER_ATTEMPTS   how many runs are graded at most, by the CI system's own count (default: all)
   GRADER_OUT        where the results go (default: grader-results)
 
 """
