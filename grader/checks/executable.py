@@ -31,6 +31,8 @@ from grader.wording import join_words
 
 # a script without its first line is run by the shell, which knows no `import`
 TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
+HOME = "/home/student"
+"""Of the sandbox: to a student it is their own."""
 UNPARSED = (*SYNTAX, "ValueError")
 """What Python says of a file that it cannot parse; other faults are of the reading."""
 
@@ -167,7 +169,7 @@ def _rosrun_answer(build: Run, path: str) -> str:
     lines = [line for line in said if "parsing manifest" not in line]
     telling = (line for words in TELLING for line in lines if words in line)
     answer = next(telling, lines[-1] if lines else "")
-    return f"; rosrun answers: {shown(answer)}" if answer else ""
+    return f"; rosrun answers: {shown(answer.replace(HOME, '~'))}" if answer else ""
 
 
 def _mode(file: SourceFile) -> str:

@@ -153,7 +153,9 @@ def _absent(package: PackageFacts, run: Run, nodes: Sequence[str], absent: Seque
         why = not_started(*unstarted.values())
     else:
         why = why_not_up(package, run, absent[0])
-    said = "" if why.citations or "roslaunch says" in why.why else quoted(run)
+    said = "" if why.citations or why.unbuilt or "roslaunch says" in why.why else quoted(run)
+    if not why.citations:
+        why = why._replace(citations=(FileCitation(file=absent[0].file, line=absent[0].line),))
     name = "" if several else f"{absent[0].full_name}: "
     return why.verdict(f"{_comes_up(nodes)}; {name}{why.why}{said}")
 
@@ -341,9 +343,10 @@ def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) 
     lost = unjudged if lacking.own and absence.of_script else failed
     verdict = inconclusive if absence.of_machine else lost
     place = FileCitation(file=node.file or file.path, line=node.line)
-    return verdict(
+    found = verdict(
         f"{name} did not come up: {absence.why}", hint=absence.hint, citations=(*absence.citations, place)
     )
+    return found.model_copy(update={"unbuilt": absence.unbuilt})
 
 
 def _connected(run: Run, topic: str, names: list[str]) -> bool:

@@ -288,7 +288,8 @@ def _by_parameter(verdict: Verdict, run: Run, package: PackageFacts, params: Rat
 def _rate_hint(ratio: float, nominal: str, *, even: bool) -> str:
     """Return what may be wrong where a loop comes round `ratio` times as often as it should."""
     if abs(ratio - 0.5) < 0.05:
-        return f"use {loop_rate(nominal)}, and one rate.sleep() in each turn: two of them halve the rate"
+        halved = "two of them halve the rate, as does an `if` before publish(…)"
+        return f"use {loop_rate(nominal)}, and one rate.sleep() in each turn: {halved}"
     if abs(ratio - 2) < 0.2 and not even:
         return f"twice the rate: does the loop, or a second publisher, publish twice? {loop_rate(nominal)}"
     if ratio < 1:

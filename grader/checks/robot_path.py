@@ -25,6 +25,7 @@ from grader.checks.support.geometry import (
     set_off_s,
     stands,
     track,
+    turns_of,
 )
 from grader.checks.support.lateness import Lateness, excused
 from grader.checks.support.nodes import GlobalName
@@ -40,6 +41,8 @@ LATE_P95_MS = 5.0
 LATE_TURNS = 4
 """Each turn may be late: at 1.6 rad/s, 25 ms in each of four are 0.16 rad, and 0.3 m beside a line of 2 m."""
 ORIGIN = (0.0, 0.0)
+DEGREES_FROM = 20.0
+"""Radians a second that no robot of a lab turns with, and that small angles in degrees come to."""
 
 
 class PathParams(Record):
@@ -133,7 +136,7 @@ def _judged(found: Track, run: Run, params: PathParams) -> Verdict:
     if stands(taken):
         hint = "publish a velocity that is not 0, again and again while it has to drive"
         return unjudged("it never moves", measured=figures, hint=hint)
-    words = what_is_wrong(taken, params.way, course, mirror=params.relative)
+    words = _in_degrees(run) or what_is_wrong(taken, params.way, course, mirror=params.relative)
     verdict = failed(words.message, hint=words.hint, measured=figures)
     nearly = followed(taken, params.way.points, 2 * params.tolerance_m)
     if not nearly.done and not _strays_late(nearly, params.way):
@@ -151,6 +154,16 @@ def _why_late(late: Lateness) -> str:
     if not (late.full or late.max_ms >= LATE_MS or late.p95_ms >= LATE_P95_MS):
         return ""
     return "busy" if late.full else f"late itself, by up to {late.max_ms:.0f} ms"
+
+
+def _in_degrees(run: Run) -> Words | None:
+    """A turn so fast that degrees are meant where radians are asked for."""
+    turns = ((c, turn) for c in run.student_channels() for turn in turns_of(c))
+    channel, fastest = max(turns, key=lambda one: abs(one[1]), default=(None, 0.0))
+    if channel is None or abs(fastest) < DEGREES_FROM:
+        return None
+    message = f"it turns with an angular.z of {significant(fastest)} on {channel.topic}, which is in radians a second"
+    return Words(message, "a turn of 90 degrees is math.pi / 2, in radians: math.radians(90)")
 
 
 class Words(NamedTuple):
@@ -228,7 +241,10 @@ def _strays(path: Sequence[Pose], way: Way, course: Course) -> Words:
     return (
         _too_far(path, way, course)
         or _too_early(path, way, course)
-        or Words(f"it strays {metres(far_m)} from the line from {line}, {where}", f"only {allowed}")
+        or Words(
+            f"it strays {metres(far_m)} from the line from {line}, {where}",
+            f"keep to the straight line from one point to the next: {allowed}",
+        )
     )
 
 
@@ -263,7 +279,7 @@ def _too_early(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
     short_m = math.dist(start, end) - along
     if along <= 0 or short_m <= way.tolerance_m or aside * _along(following, start, end)[1] <= 0:
         return None
-    message = f"it turns off {metres(short_m)} before {way.name(course.reached)}, {_after(path, pose)}"
+    message = f"it leaves the way {metres(short_m)} before {way.name(course.reached)}, {_after(path, pose)}"
     return Words(message, "drive on to the point before you turn: distance is speed times time")
 
 

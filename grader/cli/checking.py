@@ -32,7 +32,7 @@ from grader.model.result import GitStatus, GradingResult, Point
 from grader.report.terminal import open_console
 from grader.report.text import line
 from grader.report.view import arrange, hidden_ids, without_hidden
-from grader.rubric.find import rubric_ids
+from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, needs_ros
 from grader.student.git_status import advise, read_environment
 from grader.student.git_view import write_staged
@@ -235,7 +235,7 @@ def _what_next(result: GradingResult, chosen: Chosen, report: Path | None) -> It
         yield f"Report: {os.path.relpath(report) if report.is_relative_to(Path.cwd().parent) else report}"
     if lost:
         name = lost[0].criterion.id
-        known = lab.rubric.id in rubric_ids()
+        known = bool(named_labs(lab.rubric.id))
         yield f"Why: grader explain {f'{lab.rubric.id}/{name}' if known else f'{name} --rubric {lab.path}'}"
         yield "On each save: grader check --watch"
 

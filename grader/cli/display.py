@@ -29,7 +29,7 @@ from grader.report.text import visible
 from grader.untrusted_text import line, uncommanded
 
 EARLY_TITLE = "Your files, before anything is built or run:"
-SO_FAR = "Provisional: building may change these."
+SO_FAR = "Provisional: the build can still change these results."
 MESSAGE_CHARS = 300
 INDENT, HANGING = 2, 4
 ESCAPE = 8

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
+import textwrap
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
@@ -11,7 +13,7 @@ from contextlib import suppress
 from grader.errors import ExitCode, GraderError, RubricError
 from grader.untrusted_text import line, visible
 
-LINE_CHARS = 2000
+LINE_CHARS, NARROWEST = 2000, 40
 SIGPIPE_CODE = 141  # what a shell reports for a program that a closed pipe ended
 
 
@@ -45,11 +47,21 @@ def report(error: GraderError) -> None:
     fault of a rubric has its own line."""
     faults = error.faults if isinstance(error, RubricError) else [error.message]
     for fault in faults:
-        _say(f"grader: error: {_line(fault)}")
+        _say(_fitted(f"grader: error: {_line(fault)}"))
     if error.hint:
-        _say(f"  hint: {_line(error.hint)}")
+        _say(_fitted(f"  hint: {_line(error.hint)}"))
     if error.note:
-        _say(f"  note: {_line(error.note)}")
+        _say(_fitted(f"  note: {_line(error.note)}"))
+
+
+def _fitted(text: str) -> str:
+    """The line as it is, or on a terminal in lines that end between words."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        return text
+    width = max(shutil.get_terminal_size().columns, NARROWEST)
+    return textwrap.fill(
+        text, width, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+    )
 
 
 def flush() -> None:

@@ -104,7 +104,8 @@ def _named(path: Path, found: Found, rubric: LoadedRubric) -> Chosen:
     package = next(iter([*fitting, *found.packages]), None)
     if package is None:
         return Chosen(rubric=rubric, source=str(path))
-    words = f"Checking {package.name} in {shown(package.folder)} ({found.moved})" if found.moved else ""
+    where = f" in {shown(package.folder)}" if found.moved else ""
+    words = f"Checking {package.name}{where} against {rubric.rubric.id}{f' ({found.moved})' if found.moved else ''}"
     source = _source(path, found, package, rubric.rubric)
     return Chosen(rubric=rubric, source=source, package=package.folder, words=words)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Collection, Mapping
 from graphlib import TopologicalSorter
 from pathlib import PurePath
@@ -11,7 +12,7 @@ from typing import NamedTuple
 
 from grader.checks import CHECKS, Check
 from grader.checks.all_runs import NotRecorded
-from grader.checks.support.exit_causes import heed_errors
+from grader.checks.support.exit_causes import SYNTAX, heed_errors
 from grader.checks.support.parameters import heed_unread
 from grader.checks.support.text import texts_in
 from grader.checks.support.topics import heed_losses
@@ -223,7 +224,12 @@ class Requirements:
         """
         verdict, check = self.verdicts[required], self._checks.get(self._criteria[required].check)
         repaired = check is not None and check.run_anyway and criterion.scenario is not None
-        if repaired and check is not None and check.name == "build" and self._is_compiled(criterion):
+        if (
+            repaired
+            and check is not None
+            and check.name == "build"
+            and (found.unbuilt or self._is_compiled(criterion))
+        ):
             repaired = False
         beside = (
             found.cause not in {"", verdict.cause} and self._criteria[required].scenario == criterion.scenario
@@ -286,12 +292,20 @@ def result_of(
         expected=verdict.expected,
         measured=verdict.measured,
         hint=verdict.hint or (criterion.hint if lost else ""),
-        reproduce=criterion.reproduce,
+        reproduce=_compiled(verdict) or criterion.reproduce,
         citations=verdict.citations,
         blocked_by=verdict.blocked_by,
         repaired=repaired,
         made_up=dict(made_up),
     )
+
+
+def _compiled(verdict: Verdict) -> str:
+    """Return the command that shows a fault of a script's grammar; "" for any other verdict."""
+    told = verdict.status.is_lost and any(kind in verdict.message for kind in SYNTAX)
+    cited = (one.file for one in verdict.citations if isinstance(one, FileCitation))
+    file = next((file for file in cited if told and file.endswith(".py")), "")
+    return f"python3 -m py_compile {shlex.quote(file)}" if file else ""
 
 
 def _points(criterion: Criterion, verdict: Verdict) -> float:

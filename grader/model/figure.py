@@ -156,6 +156,8 @@ class PathFigure(Record):
     reached: int
     strayed: int | None = None
     messages: int = 0
+    first: int = Field(default=0, exclude_if=lambda value: not value)
+    """The number of the first corner; 0 is a start that the rubric does not count."""
 
 
 class PlaceFigure(Record):

@@ -377,9 +377,12 @@ def points_line(result: GradingResult, view: ReportView) -> str:
     )
 
 
-def lost_words(criterion: CriterionResult, blocked: float) -> str:
-    """`10 points lost, and 25 more in what it holds back`; points that are open are not lost."""
+def lost_words(criterion: CriterionResult, blocked: float, alike: float = 0.0) -> str:
+    """`10 points lost, and 25 more in what it holds back`; points that are open are not lost. `alike` are those of
+    other criteria that the same mistake costs."""
     own = criterion.missing
     state = "still open" if criterion.status.is_open else "lost"
     said = f"{count_points(own)} {state}" if own else "costs nothing itself"
-    return f"{said}, and {number(blocked)} more in what it holds back" if blocked else said
+    more = [f"{number(alike)} more where the same mistake shows"] if alike else []
+    more += [f"{number(blocked)} more in what it holds back"] if blocked else []
+    return ", and ".join([said, *more])

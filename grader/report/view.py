@@ -178,6 +178,10 @@ def without_place(text: str, place: str) -> str:
     return next((text.removeprefix(one) for one in beginnings if text.startswith(one)), text)
 
 
+TAB = " " * 4
+"""As which a tab of a cited line is shown."""
+
+
 def pointed_at(criterion: CriterionResult, chars: int = SOURCE_CHARS) -> list[tuple[str, str]]:
     """Each line of a file whose text is known, behind its number, and carets below what is meant:
     `12 | print "hello"` and `   |       ^`."""
@@ -194,11 +198,15 @@ def pointed_at(criterion: CriterionResult, chars: int = SOURCE_CHARS) -> list[tu
 def caret(citation: FileCitation, chars: int = SOURCE_CHARS) -> tuple[str, str] | None:
     """Return the visible text of the cited line, `chars` of it around its column, and carets for the line below;
     None where the text is not known. Without a column all of the text is meant."""
-    source = citation.source.rstrip()
-    if not source.strip():
+    raw = citation.source.rstrip()
+    if not raw.strip():
         return None
-    begin = (citation.column or len(source) - len(source.lstrip()) + 1) - 1
-    end = citation.end_column - 1 if citation.end_column else begin + 1 if citation.column else len(source)
+    column = (citation.column or len(raw) - len(raw.lstrip()) + 1) - 1
+    end_column = (
+        citation.end_column - 1 if citation.end_column else column + 1 if citation.column else len(raw)
+    )
+    source = raw.replace("\t", TAB)
+    begin, end = (at + raw[:at].count("\t") * (len(TAB) - 1) for at in (column, end_column))
     first = max(0, begin - chars // 2) if end > chars else 0
     left = "…" if first else ""
     shown, meant = source[first : first + chars], source[begin : min(end, first + chars)]

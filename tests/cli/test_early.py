@@ -33,7 +33,7 @@ Your files, before anything is built or run:
   ✓ 1 pass: manifest
   ✗ fail  talker  has no executable bit
     hint: chmod +x talker.py
-  Provisional: building may change these.
+  Provisional: the build can still change these results.
 
 """
 

@@ -156,7 +156,7 @@ def test_of_citations_only_the_first_are_kept():
     ("source", "column", "text", "below"),
     [
         ("        print text", 9, "        print text", "        ^"),
-        ("\tcounter += 1", 2, "\\tcounter += 1", "  ^"),
+        ("\tcounter += 1", 2, "    counter += 1", "    ^"),
         ("x = 语(", 6, "x = 语(", "      ^"),
         ("for i in x", 11, "for i in x", "          ^"),
         ("a" * 100 + "`" + "b" * 100, 101, "…" + "a" * 30 + "`" + "b" * 29 + "…", " " * 31 + "^"),

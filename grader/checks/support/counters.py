@@ -309,7 +309,11 @@ def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], pa
     does = f"sets it to {slip.message}" if wrong_value else f"resets it by the number {slip.message}"
     message = f"{verdict.message}; {slip.file}, line {slip.line} {does}"
     cited = (FileCitation(file=slip.file, line=slip.line),)
-    return verdict.model_copy(update={"message": message, "citations": cited})
+    right = params.minimum if wrong_value else params.maximum
+    hint = f"set it to {right} there: write {right} for {slip.message} in line {slip.line}"
+    if not wrong_value:
+        hint = f"let it count up to {right} there: `if counter > {right}`, or `% {right + 1}`, in line {slip.line}"
+    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
 
 
 def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Literal["program", "flood", "lost"]:

@@ -265,5 +265,11 @@ def _command(time_s: float, message: Any) -> Command | None:  # noqa: ANN401 - a
     return Command(time_s, linear["x"], linear["y"], angular["z"])
 
 
+def turns_of(channel: Channel) -> list[float]:
+    """Return the angular.z of each velocity that was sent on a topic; none for messages of another kind."""
+    commands = (_command(0.0, message) for message in channel.values) if "Twist" in channel.type else ()
+    return [one.turn for one in commands if one is not None and math.isfinite(one.turn)]
+
+
 def _finite(*values: float) -> bool:
     return all(math.isfinite(value) and abs(value) < FASTEST for value in values)

@@ -276,11 +276,14 @@ class Absence(NamedTuple):
     of_script: bool = False
     citations: tuple[FileCitation, ...] = ()
     of_machine: bool = False
+    unbuilt: bool = False
+    """Only the build makes it."""
 
     def verdict(self, message: str) -> Verdict:
         """Return the verdict: nothing to judge in the launch file where the script or the machine is at fault."""
         kind = inconclusive if self.of_machine else unjudged if self.of_script else failed
-        return kind(message, hint=self.hint, citations=self.citations)
+        verdict = kind(message, hint=self.hint, citations=self.citations)
+        return verdict.model_copy(update={"unbuilt": self.unbuilt})
 
 
 def name_pattern(node: LaunchNode) -> re.Pattern[str]:
@@ -430,6 +433,10 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
         return None
     if (script := own_script(package, node)) and script.executable is False:
         return not_executable(script.path)
+    owner = _owner(package, node)
+    if owner is not None and any(one.is_called(str(node.type)) for one in programs(owner)):
+        why = f"CMakeLists.txt makes the program {node.type}, and the build left none"
+        return Absence(why, "first get the build to pass: catkin_make", of_script=True, unbuilt=True)
     if "Cannot locate" not in line:
         return Absence(
             f"there is no package {node.pkg}", "check the spelling of pkg, and that it is installed"

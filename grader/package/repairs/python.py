@@ -17,10 +17,12 @@ from grader.model.record import Record
 from grader.model.repair import RepairKind
 from grader.package.python import cause_of
 from grader.package.repairs.editing import Files
+from grader.wording import join_words, plural
 
 EXAMINE = "grader.package.python_child:examine"
 LIMITS = {"memory_bytes": 1 << 30, "cpu_s": 20, "file_bytes": 32 << 20, "answer_bytes": 16 << 20}
 WALL_S = 10.0
+INDENTED_SHOWN = 4
 ATTEMPTS = 3
 """A source that crashes Python costs its own repairs, not those of the others."""
 
@@ -131,11 +133,24 @@ def _joined(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
 
 def _change(files: Files, file: str, cause: Cause, steps: list[_Step]) -> None:
     kind = KINDS.get(cause, "python-syntax")
-    message, fix = _words(file, cause, steps)
+    message, fix = _words(file, cause, steps, files.text(file) or "")
     files.change(kind, file, steps[-1].text, message, fix)
 
 
-def _words(file: str, cause: Cause, steps: list[_Step]) -> tuple[str, str]:
+def _indented(before: str, after: str) -> str:
+    """How lines that are indented with tabs have to begin, so that the file parses."""
+    pairs = enumerate(zip(before.split("\n"), after.split("\n"), strict=False), start=1)
+    lines = [
+        (number, len(new) - len(new.lstrip())) for number, (old, new) in pairs if old != new and new.strip()
+    ]
+    if len(lines) > INDENTED_SHOWN:
+        first, spaces = lines[0]
+        return f"indent with spaces alone, the same for each level, in {len(lines)} lines: line {first} with {spaces}"
+    begun = join_words(f"line {number} with {plural(spaces, 'space')}" for number, spaces in lines)
+    return f"in place of the tabs, begin {begun}"
+
+
+def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[str, str]:
     """What is wrong, and how it is repaired; "" where the changed line says it."""
     first = steps[0]
     place, word = f"line {first.line} of {file}", first.word
@@ -143,7 +158,7 @@ def _words(file: str, cause: Cause, steps: list[_Step]) -> tuple[str, str]:
     said: dict[Cause, tuple[str, str]] = {
         "tabs": (
             f"{place}: tabs and spaces are mixed in the indentation",
-            "replace each tab by spaces (in the editor: convert indentation to spaces)",
+            _indented(before, steps[-1].text),
         ),
         "old-name": (f"{place}: {word} is Python 2", ""),
         "import": (f"{place} uses {word}, which is not imported", ""),

@@ -40,6 +40,7 @@ def path_figures(run: Run, params: PathParams) -> Iterator[PathFigure]:
         corners=tuple(map(_spot, way.points[:CORNERS_MAX])),
         tolerance_m=finite(params.tolerance_m),
         reached=course.reached,
+        first=0 if way.added else 1,
         strayed=None if course.strayed is None else kept.index(course.strayed),
         messages=sum(len(c.messages) for c in run.channels if c.topic == params.topic and not c.by_grader),
     )

@@ -324,7 +324,7 @@ class Maker:
         repaired = [self._by_id[i] for i in self._repaired.get(loss.criterion.id, ()) if i not in told]
         return replace(
             self._card(loss.criterion, self._with_graph(loss.criterion)),
-            lost=lost_words(loss.criterion, blocked),
+            lost=lost_words(loss.criterion, blocked, sum(c.missing for c in loss.alike)),
             blocked=[self._short(c) for c in loss.blocked],
             alike=[self._short(c) for c in loss.alike],
             repaired=[self._short(c) for c in repaired],

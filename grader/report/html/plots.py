@@ -200,19 +200,19 @@ def path_plot(figure: PathFigure, name: str) -> Markup | None:
     taken = [(frame.x(x), frame.y(y)) for x, y in figure.points]
     children.append(element("path", d=path(taken), class_="line strong-line"))
     children += _corners(figure, corners)
-    children += _marked(figure.strayed, taken, "too far off")
+    children += _marked(figure.strayed, taken, "leaves it here")
     size = (frame.width, frame.height)
     return drawing(name, size, f"The path of {figure.topic}, seen from above", path_words(figure), *children)
 
 
 def path_words(figure: PathFigure) -> str:
     """What the plot shows, in words."""
-    words = f"{figure.topic} passed {figure.reached} of {len(figure.corners)} corners in order; "
+    words = f"{figure.topic} passed {figure.reached} of {plural(len(figure.corners), 'point')} in order; "
     words += f"{number(figure.tolerance_m)} m off the path is allowed"
     if figure.strayed is None:
         return f"{words} and it stayed within that."
     x, y = figure.points[figure.strayed]
-    return f"{words}. It is too far off for the first time at x {number(x, 2)}, y {number(y, 2)}."
+    return f"{words}. It leaves that for the first time at x {number(x, 2)}, y {number(y, 2)}."
 
 
 def place_plot(figure: PlaceFigure, name: str) -> Markup:
@@ -268,7 +268,7 @@ def _corners(figure: PathFigure, corners: list[tuple[float, float]]) -> Iterator
         passed = i < figure.reached
         yield element("circle", cx=x, cy=y, r=5, class_="corner passed" if passed else "corner")
         if i < CORNER_LABELS_MAX and (x, y) not in corners[:i]:
-            yield text(x + 8, y - 8, "start" if i == 0 else f"{i}")
+            yield text(x + 8, y - 8, "start" if i == 0 and not figure.first else f"{i + figure.first}")
 
 
 def _marked(index: int | None, taken: list[tuple[float, float]], words: str) -> Iterator[Markup]:
@@ -309,7 +309,8 @@ def rate_words(figure: RateFigure) -> str:
     if figure.ends_silent:
         words += "; the last one is the silence at the end"
     if figure.late:
-        words += f". The grading machine itself was late {plural(len(figure.late), 'time')} (hatched)"
+        times = plural(len(figure.late), "time")
+        words += f". The grading machine itself was late {times} (hatched), which is allowed for"
     return words + "."
 
 

@@ -232,8 +232,8 @@ def test_a_way_shows_the_room_the_corners_and_where_it_strays():
     assert len(classed(plot, "corner")) == 5
     assert len(classed(plot, "passed")) == 2
     assert len(classed(plot, "wrong")) == 1
-    assert "too far off" in texts(plot)
-    assert "passed 2 of 5 corners" in path_words(way())
+    assert "leaves it here" in texts(plot)
+    assert "passed 2 of 5 points" in path_words(way())
     assert "x 2.9, y 1" in path_words(way())
     assert "stayed within that" in path_words(way(strayed=None))
 
