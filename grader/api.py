@@ -25,17 +25,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path, PurePath
-from platform import python_version
 from typing import TYPE_CHECKING, TypeAlias, TypeVar, get_args
 
-from grader import __version__
 from grader.errors import EvidenceError, UsageError
 from grader.evidence.run import Run
-from grader.faults import NOTHING_RUN
 from grader.files import check_writable
 from grader.judging.facts import PACKAGE_RUN
 from grader.model.progress import Progress, Silence, StepState
-from grader.model.result import NO_TIME, EnvironmentInfo, GradingResult, SubmissionInfo
+from grader.model.result import NO_TIME, GradingResult, SubmissionInfo
 from grader.model.sandbox_mode import SandboxMode
 from grader.portable import wait_for_children
 from grader.results import RESULT, read_result_file
@@ -131,16 +128,22 @@ def judge(evidence: StrPath | Sequence[StrPath], rubric: StrPath | LoadedRubric)
 
     Raises EvidenceError where the evidence cannot be read (or a newer grader wrote it), RubricError.
     """
-    from grader import pipeline  # noqa: PLC0415 - loading a rubric needs nothing of it
     from grader.evidence.reader import load_evidence  # noqa: PLC0415 - slow to load
     from grader.judging import judge as criteria_of  # noqa: PLC0415 - as above
+    from grader.judging.summary import assemble_result, environment_info  # noqa: PLC0415 - as above
 
     paths = [evidence] if isinstance(evidence, (str, os.PathLike)) else evidence
     loaded = _loaded(rubric)
     runs = load_evidence([Path(path) for path in paths])
     criteria = criteria_of(loaded.rubric, runs, loaded.checks, loaded.handed_out)
-    result = pipeline.assemble_result(_submission(runs), loaded, runs, criteria, timing=NO_TIME)
-    return result.model_copy(update={"environment": _environment(runs)})
+    return assemble_result(
+        _submission(runs),
+        loaded,
+        criteria,
+        runs=runs,
+        environment=environment_info(_metadata(runs, "ros"), _metadata(runs, "sandbox")),
+        timing=NO_TIME,
+    )
 
 
 def load_result(path: StrPath) -> GradingResult:
@@ -259,13 +262,4 @@ def _submission(runs: Mapping[str, Run]) -> SubmissionInfo:
         commit=_metadata(runs, "submission.commit") or None,
         digest=_metadata(runs, "submission.digest"),
         package=_metadata(runs, "submission.package"),
-    )
-
-
-def _environment(runs: Mapping[str, Run]) -> EnvironmentInfo:
-    return EnvironmentInfo(
-        grader=__version__,
-        ros=_metadata(runs, "ros"),
-        python=python_version(),
-        sandbox=_metadata(runs, "sandbox") or NOTHING_RUN,
     )

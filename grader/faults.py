@@ -10,9 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from platform import python_version
 
-from grader import __version__
 from grader.errors import (
     Busy,
     EvidenceError,
@@ -26,13 +24,12 @@ from grader.errors import (
 )
 from grader.files import FULL
 from grader.intake.source import Source, identify
+from grader.judging.summary import assemble_result, environment_info
 from grader.model.result import (
     NO_TIME,
     CriterionResult,
-    EnvironmentInfo,
     ErrorInfo,
     GradingResult,
-    RubricInfo,
     RubricOrigin,
     SubmissionInfo,
     TimingInfo,
@@ -54,8 +51,6 @@ MACHINE = FULL | {
 AGAIN = "fix that (`grader doctor` checks this machine), then grade again"
 NUMBER = re.compile(r"\[Errno (\d+)\]")
 UNEXPECTED = {EvidenceError.kind, GraderError.kind}
-NOTHING_RUN = "nothing was run"
-"""In place of a sandbox's name."""
 NO_THREAD = "can't start new thread"
 """What Python says where there is no memory for its stack, or too many run."""
 MEMORY = "grade fewer submissions side by side, or on a machine with more memory"
@@ -137,17 +132,16 @@ def error_result(
     fault: GraderError, submission: SubmissionInfo, rubric: LoadedRubric, timing: TimingInfo = NO_TIME
 ) -> GradingResult:
     """Return the result that says why nothing was graded: every criterion is open, and no points are awarded."""
-    return GradingResult(
-        submission=submission,
-        rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
-        status="error",
-        points=0.0,
-        max_points=rubric.rubric.max_points,
-        criteria=tuple(_not_judged(criterion, fault) for criterion in rubric.rubric.criteria),
-        environment=EnvironmentInfo(grader=__version__, ros="", python=python_version(), sandbox=NOTHING_RUN),
+    result = assemble_result(
+        submission,
+        rubric,
+        tuple(_not_judged(criterion, fault) for criterion in rubric.rubric.criteria),
+        runs={},
+        environment=environment_info(),
         timing=timing,
-        error=ErrorInfo(kind=fault.kind, message=fault.message, hint=fault.hint),
     )
+    error = ErrorInfo(kind=fault.kind, message=fault.message, hint=fault.hint)
+    return result.model_copy(update={"status": "error", "error": error})
 
 
 def _not_judged(criterion: Criterion, fault: GraderError) -> CriterionResult:

@@ -21,18 +21,21 @@ from grader.rubric.model import Rubric
 NAMES_SHOWN = 4
 
 
-def keep_recording(path: Path, folder: Path) -> Path:
-    """Copy the recording that is the whole submission into the folder, under its own name, and return the copy.
-
-    Raises EvidenceError if it cannot be read, SubmissionError if it is the grader's own evidence.
-    """
-    return _copy(path, folder / (safe_name(path.stem) + _suffix(path)))
-
-
-def keep_scenarios(
+def copy_recordings(
     rubric: Rubric, submission: Submission | RecordedSubmission, folder: Path, progress: Progress
 ) -> None:
-    """Copy the recording of each scenario that names one, or write an evidence file that says why there is none."""
+    """Copy the recording that is the whole submission into the folder, under its own name; else the recording of each
+    scenario that names one, or write an evidence file that says why there is none.
+
+    Raises SubmissionError if the whole submission cannot be read, or is the grader's own evidence.
+    """
+    if isinstance(submission, RecordedSubmission) and submission.file is not None:
+        path = submission.file
+        try:
+            _copy(path, folder / (safe_name(path.stem) + _suffix(path)))
+        except EvidenceError as error:
+            raise SubmissionError(error.message, hint=error.hint) from error
+        return
     for name, scenario in rubric.scenarios.items():
         if scenario.recording is None:
             continue
@@ -78,8 +81,8 @@ def _suffix(path: Path) -> str:
         return {b"\x89MCAP": ".mcap", b"SQLit": ".db3"}.get(file.read(5), ".bag")
 
 
-def _copy(path: Path, target: Path) -> Path:
-    """Copy it, and check the copy: so what is judged is what was checked."""
+def _copy(path: Path, target: Path) -> None:
+    """Copy the file, and check the copy: so what is judged is what was checked."""
     limit_bytes = IntakeLimits().recording_bytes
     if path.stat().st_size > limit_bytes:
         raise EvidenceError(f"{path}: larger than {limit_bytes >> 20} MiB", hint=LESS)
@@ -92,7 +95,6 @@ def _copy(path: Path, target: Path) -> Path:
     except (EvidenceError, SubmissionError) as error:
         target.unlink()
         raise type(error)(error.message.replace(str(target), str(path)), hint=error.hint) from error
-    return target
 
 
 def _write_reason(

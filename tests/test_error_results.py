@@ -57,7 +57,7 @@ def rubric() -> LoadedRubric:
 def breaking(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     """Let the grading end with this error once the submission is open."""
 
-    def raises(*_args: object) -> None:
+    def raises(*_args: object, **_kwargs: object) -> None:
         raise error
 
     monkeypatch.setattr(pipeline, "record_and_judge", raises)

@@ -32,7 +32,7 @@ ALLOWED = {
     "results": BASE | {"files"},
     "signing": {"errors", "files", "host_programs", "results"},
     "verification": BASE | {"evidence", "judging", "report", "results", "rubric", "signing"},
-    "faults": BASE | {"files", "intake", "report", "results", "rubric"},
+    "faults": BASE | {"files", "intake", "judging", "report", "results", "rubric"},
     "evidence": BASE | {"files", "installable"},
     "package": BASE | {"files", "host_programs", "limited_child", "rubric.model"},
     "intake": BASE | {"files", "host_programs", "limited_child"},
@@ -46,13 +46,16 @@ ALLOWED = {
     },
     "submitted_recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "repaired_copy": {"files", "judging", "model", "package", "rubric"},
-    "pipeline": {
-        "repaired_copy",
-        *BASE, "arena", "evidence", "faults", "files", "installable", "intake", "judging", "package",
-        "report", "results", "ros_packages", "rubric", "submitted_recordings"
+    "recording": BASE | {
+        "arena", "evidence", "files", "installable", "judging", "package", "repaired_copy", "ros_packages", "rubric",
+        "submitted_recordings"
+    },
+    "pipeline": BASE | {
+        "arena", "evidence", "faults", "files", "intake", "judging", "package", "recording", "report", "results",
+        "rubric", "submitted_recordings"
     },
     "api": {
-        *BASE, "arena.asynchronous", "evidence", "faults", "files", "judging", "pipeline", "results", "rubric"
+        *BASE, "arena.asynchronous", "evidence", "files", "judging", "pipeline", "results", "rubric"
     },
     "authoring": {
         *BASE, "checks", "classes.batch", "evidence", "files", "intake", "package", "pipeline", "rubric"

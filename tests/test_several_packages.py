@@ -16,7 +16,8 @@ from grader.model.progress import Silence
 from grader.model.result import CriterionResult
 from grader.model.submission import Submission
 from grader.model.verdict import FileCitation, Status
-from grader.pipeline import read_facts, wanted_package
+from grader.package import read_packages
+from grader.pipeline import wanted_package
 from grader.repaired_copy import choose_repairs, repaired_copy
 from grader.rubric.find import VARIABLE
 from grader.rubric.load import load_rubric
@@ -124,7 +125,7 @@ def test_repairs_are_made_on_a_copy_of_their_own_package(copy, tmp_path):
     script = copy / STATION / "scripts" / "sensor.py"
     script.write_text(script.read_text().replace("rospy.Rate(10)", "rospy.Rate(10"))
     submission, rubric = opened(copy, tmp_path), loaded(LAB).rubric
-    facts = read_facts(submission, Silence())
+    facts = read_packages(submission)
     lost = [c.model_copy(update={"status": Status.FAIL}) for c in judged(copy, tmp_path).values()]
     repairs, scenarios = choose_repairs(submission, facts, rubric, lost, built=True)
     assert [one.file for one in repairs] == [f"../{STATION}/scripts/sensor.py"]

@@ -61,6 +61,11 @@ class Recording:
     student_cpu_s: float = 0.0
     files: list[Path] = field(default_factory=list)
 
+    @property
+    def labels(self) -> tuple[str, str]:
+        """The ROS and the sandbox that ran the submission, "" for what there was none of."""
+        return self.ros.label if self.ros else "", self.sandbox.label if self.sandbox else ""
+
     def add(self, cost: RunCost | Recording) -> None:
         self.cpu_s += cost.cpu_s
         self.student_cpu_s += cost.student_cpu_s
@@ -68,6 +73,7 @@ class Recording:
 
 def metadata(submission: Submission, recording: Recording, limits: RunLimits) -> dict[str, str]:
     """What every file of evidence says of where it comes from."""
+    ros, sandbox = recording.labels
     return {
         "submission.id": submission.id,
         "submission.source": submission.source,
@@ -75,9 +81,9 @@ def metadata(submission: Submission, recording: Recording, limits: RunLimits) ->
         "submission.digest": submission.digest,
         "submission.package": submission.package.name,
         "grader": __version__,
-        "ros": recording.ros.label if recording.ros else "",
+        "ros": ros,
         "python": recording.ros.python if recording.ros else "",
-        "sandbox": recording.sandbox.label if recording.sandbox else "",
+        "sandbox": sandbox,
         "limits": limits.model_dump_json(),
     }
 
@@ -137,7 +143,7 @@ def why_unrun() -> str:
 
 
 class StaticRecorder:
-    """As `arena.recording.Recorder`, where nothing is to be run or can be; `reason` says why."""
+    """As `arena.recorder.Recorder`, where nothing is to be run or can be; `reason` says why."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""What all criteria come to, and notes on what was noticed while student code ran.
+"""The result: what all criteria come to, and notes on what was noticed while student code ran.
 
 Points are rounded as people round them: half up, in decimals. Notes cost no points.
 """
@@ -7,11 +7,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from decimal import ROUND_HALF_UP, Decimal
+from platform import python_version
 from typing import Literal
 
+from grader import __version__
 from grader.evidence.run import Run
-from grader.model.result import CriterionResult, Gate, GradingResult, LeftOut, Note
+from grader.model.result import (
+    CriterionResult,
+    EnvironmentInfo,
+    Gate,
+    GradingResult,
+    LeftOut,
+    Note,
+    RubricInfo,
+    RubricOrigin,
+    SubmissionInfo,
+    TimingInfo,
+)
 from grader.model.verdict import Status
+from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 from grader.untrusted_text import clip, clipped, json_text, text_limit
 
@@ -20,6 +34,41 @@ KINDS = ("refused", "limit")
 NOTES_MAX = 20
 TEXT_CHARS = 300
 ACTOR_CHARS = 100
+NOTHING_RUN = "nothing was run"
+"""In place of a sandbox's name."""
+
+
+def assemble_result(
+    submission: SubmissionInfo,
+    rubric: LoadedRubric,
+    criteria: tuple[CriterionResult, ...],
+    *,
+    runs: Mapping[str, Run],
+    environment: EnvironmentInfo,
+    timing: TimingInfo,
+    rubric_origin: RubricOrigin | None = None,
+) -> GradingResult:
+    """Return the automatic result that these criteria make."""
+    return GradingResult(
+        submission=submission,
+        rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
+        rubric_origin=rubric_origin,
+        status=overall_status(criteria),
+        points=total_points(rubric.rubric, criteria),
+        gate=closed_gate(rubric.rubric, criteria),
+        max_points=rubric.rubric.max_points,
+        criteria=criteria,
+        environment=environment,
+        timing=timing,
+        notes=notes_of(runs),
+    )
+
+
+def environment_info(ros: str = "", sandbox: str = "") -> EnvironmentInfo:
+    """Return this grader and Python, with the names of the ROS and the sandbox that ran the submission."""
+    return EnvironmentInfo(
+        grader=__version__, ros=ros, python=python_version(), sandbox=sandbox or NOTHING_RUN
+    )
 
 
 def total_points(rubric: Rubric, results: Sequence[CriterionResult]) -> float:

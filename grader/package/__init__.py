@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from grader.package.facts import python_paths, read_package, with_build_facts
+    from grader.package.facts import python_paths, read_package, read_packages, with_build_facts
     from grader.package.python import SyntaxReport, check_syntax, read_syntax_report
 
 __all__ = [
@@ -20,12 +20,13 @@ __all__ = [
     "check_syntax",
     "python_paths",
     "read_package",
+    "read_packages",
     "read_syntax_report",
     "with_build_facts",
 ]
 
 _PLACES = {
-    "facts": ("python_paths", "read_package", "with_build_facts"),
+    "facts": ("python_paths", "read_package", "read_packages", "with_build_facts"),
     "python": ("SyntaxReport", "check_syntax", "read_syntax_report"),
 }
 _MODULE_OF = {name: f"grader.package.{module}" for module, names in _PLACES.items() for name in names}

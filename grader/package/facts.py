@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 
 from grader.model.interfaces import PARTS, parse_interface
 from grader.model.package import Fault, Interface, PackageFacts, PythonSlip, SourceFile
-from grader.model.submission import SourcePackage
+from grader.model.submission import SourcePackage, Submission
 from grader.package.files import Entry, Interpreters, read_files
 from grader.package.python import check_syntax
 from grader.package.reading import SOURCE_LIMIT_BYTES, read_markup
@@ -66,6 +66,12 @@ def read_package(
         interfaces=_interfaces(package.folder, _readable(entries)),
         asked=package.asked,
     )
+
+
+def read_packages(submission: Submission) -> PackageFacts:
+    """Return the facts of a submission's main package, with those of the others."""
+    facts = read_package(submission.package, hints=submission.hints)
+    return facts.model_copy(update={"also": tuple(map(read_package, submission.also))})
 
 
 def with_build_facts(

@@ -13,14 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import admission, recording
+from grader.arena import admission
 from grader.arena import admission as module
 from grader.arena.admission import Admission, FileLock, shared_folder
-from grader.arena.recording import Recorder
+from grader.arena.recorder import Recorder
 from grader.arena.static_recorder import RunCost
 from grader.intake import open_submission
 from grader.model.progress import Silence
-from grader.pipeline import read_facts
+from grader.package import read_packages
 from grader.rubric.load import load_rubric
 
 REFERENCE = Path(__file__).parents[2] / "reference_solutions" / "leeds-comp3631-lab1"
@@ -278,11 +278,11 @@ def test_runs_of_a_later_loop_wait_for_each_other_as_those_of_the_first(
             await asyncio.sleep(0)
         return RunCost(cpu_s=0.0, student_cpu_s=0.0)
 
-    monkeypatch.setattr(recording, "run_scenario", run_scenario)
+    monkeypatch.setattr("grader.arena.recorder.run_scenario", run_scenario)
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
     rubric = load_rubric("leeds-comp3631-lab1").rubric
     submission = open_submission(str(REFERENCE), package=rubric.package, workdir=tmp_path / "opened")
-    facts = read_facts(submission, Silence())
+    facts = read_packages(submission)
     with Recorder(
         submission, facts, rubric, tmp_path / "evidence", mode="auto", progress=Silence()
     ) as recorder:

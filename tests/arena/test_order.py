@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.arena.recording import order_runs
+from grader.arena.recorder import order_runs
 from grader.rubric.model import Rubric, Scenario, Start, Until
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from grader.arena.control_groups import Cgroups
 from grader.arena.sandbox import Sandbox
-from grader.faults import NOTHING_RUN
 from grader.integrations import gradescope
+from grader.judging.summary import NOTHING_RUN
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
 from grader.report.class_page.page import write_class_page

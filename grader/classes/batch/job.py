@@ -17,11 +17,11 @@ from pydantic import Field
 from grader import __version__
 from grader.classes.fetching import NothingInTime, Obtained, Rule, obtain
 from grader.errors import GraderError, SubmissionError, UsageError
-from grader.faults import NOTHING_RUN, GradingContext, classify_errors, fault_of
+from grader.faults import GradingContext, classify_errors, fault_of
 from grader.files import temporary_folder
 from grader.intake import safe_name, without_password
 from grader.judging.settle import settle
-from grader.judging.summary import passed
+from grader.judging.summary import NOTHING_RUN, passed
 from grader.model.batch import Entry
 from grader.model.progress import Silence
 from grader.model.record import Record

@@ -1,0 +1,212 @@
+"""Record what a rubric needs of one submission: by which recorder, what is recorded again, and what besides.
+
+A submission with its facts comes in, evidence goes out. How a run is recorded is the business of `arena`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from grader.errors import HostError
+from grader.evidence.run import Run
+from grader.files import make_folder
+from grader.installable import ON_THE_MACHINE
+from grader.judging.judge import judge, judge_all_runs
+from grader.judging.other_runs import REPAIRS, was_built
+from grader.model.package import PackageFacts
+from grader.model.progress import Progress
+from grader.model.result import CriterionResult
+from grader.model.submission import Submission
+from grader.model.verdict import Status
+from grader.package import read_packages
+from grader.ros_packages import look_for
+from grader.rubric.load import LoadedRubric, needs_ros, started
+from grader.rubric.made_up import KEY
+from grader.rubric.model import Rubric
+from grader.rubric.rates import rates_of, watched_of
+from grader.wording import join_words
+
+if TYPE_CHECKING:
+    from grader.arena.asynchronous import Stop
+    from grader.arena.recorder import Recorder
+    from grader.arena.static_recorder import Recording, StaticRecorder
+    from grader.model.sandbox_mode import SandboxMode
+
+LATER = ("grader.evidence.decode", "grader.evidence.reader")
+"""Slow to import, and needed by no verdict that the files alone decide: imported while the build runs. The arena is
+imported when it begins, and what judges or reports recordings when it is called."""
+ROS_TYPES = "rosbags.typesys.stores.ros1_noetic"
+
+Judged: TypeAlias = tuple[dict[str, Run], tuple[CriterionResult, ...]]
+"""The runs by scenario, and the criteria judged by them, in the rubric's order."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingOptions:
+    """How a submission is recorded.
+
+    `static_only` runs nothing. `reused` is evidence by scenario that still holds: these scenarios are not run again.
+    `stop` ends the runs in order, from another thread; then `arena.asynchronous.Stopped` is raised.
+    """
+
+    sandbox: SandboxMode = "auto"
+    static_only: bool = False
+    reused: Mapping[str, Path] = field(default_factory=dict)
+    stop: Stop | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """A submission to record into the folder `evidence`."""
+
+    submission: Submission
+    facts: PackageFacts
+    rubric: LoadedRubric
+    evidence: Path
+    options: RecordingOptions
+    progress: Progress
+
+
+def make_recorder(
+    job: Job, *, only: Collection[str] | None = None, about: Mapping[str, str] | None = None
+) -> Recorder | StaticRecorder:
+    """Return what records the rubric's scenarios (`only` these), to be used as a context: the arena, or a recorder of
+    files alone where nothing is to be run, or can be. `about` goes into the metadata."""
+    from grader.arena.static_recorder import (  # noqa: PLC0415 - see LATER
+        STATIC_ONLY,
+        StaticRecorder,
+        why_unrun,
+    )
+
+    make_folder(job.evidence)
+    rubric, options = job.rubric.rubric, job.options
+    scenarios = started(rubric, only)
+    reason = STATIC_ONLY if options.static_only or not needs_ros(job.rubric) else why_unrun()
+    if reason:
+        return StaticRecorder(
+            job.submission,
+            job.facts,
+            scenarios,
+            job.evidence,
+            reason=reason,
+            progress=job.progress,
+            recorded=options.reused,
+        )
+    from grader.arena.recorder import Recorder  # noqa: PLC0415 - see LATER
+
+    refuse_missing(rubric)
+    made_up = {KEY: json.dumps(rubric.values)} if rubric.values else {}
+    return Recorder(
+        job.submission,
+        job.facts,
+        scenarios,
+        job.evidence,
+        beside=job.rubric.path.parent,
+        rates=rates_of(rubric),
+        watched=watched_of(rubric),
+        mode=options.sandbox,
+        progress=job.progress,
+        recorded=options.reused,
+        stop=options.stop,
+        about={**made_up, **(about or {})},
+    )
+
+
+def refuse_missing(rubric: Rubric) -> None:
+    """Raise HostError where this machine lacks what the rubric says that the lab needs."""
+    lacking = [need for need in look_for(**rubric.needs.model_dump()) if not need.here]
+    if lacking:
+        raise HostError(
+            f"the lab needs {join_words(need.name for need in lacking)}, which this machine lacks",
+            hint="; ".join(need.install for need in lacking),
+        )
+
+
+def record_all(job: Job, recorder: Recorder | StaticRecorder) -> None:
+    """Record every scenario, and copy the recordings that scenarios name in the submission."""
+    recorder.record_all(partial(import_later, job.rubric))
+    from grader.submitted_recordings import copy_recordings  # noqa: PLC0415 - see LATER
+
+    copy_recordings(job.rubric.rubric, job.submission, job.evidence, job.progress)
+
+
+def import_later(rubric: LoadedRubric) -> None:
+    """Import modules before they are needed. Only what the grader sends needs ROS's own message types, hundreds."""
+    sends = any(s.probes or s.steps or s.serves for s in rubric.rubric.scenarios.values())
+    for name in (*LATER, *([ROS_TYPES] if sends else [])):
+        import_module(name)
+
+
+def judge_folder(evidence: Path, rubric: LoadedRubric) -> Judged:
+    """Read and judge what is in the folder. Raises EvidenceError."""
+    from grader.evidence.reader import load_evidence  # noqa: PLC0415 - see LATER
+
+    runs = load_evidence([evidence])
+    return runs, judge(rubric.rubric, runs, rubric.checks, rubric.handed_out)
+
+
+def judge_recorded(recorder: Recorder | StaticRecorder, evidence: Path, rubric: LoadedRubric) -> Judged:
+    """Judge what is in the folder. What this recorder recorded and cannot be judged because the machine was late is
+    recorded again, alone, at most `RETRIES` times."""
+    from grader.arena.static_recorder import RETRIES  # noqa: PLC0415 - see LATER
+
+    runs, criteria = judge_folder(evidence, rubric)
+    for _ in range(RETRIES):
+        again = inconclusive_scenarios(criteria, recorder.recording)
+        if not again:
+            break
+        recorder.record_again(again)
+        runs, criteria = judge_folder(evidence, rubric)
+    return runs, criteria
+
+
+def inconclusive_scenarios(criteria: tuple[CriterionResult, ...], recording: Recording) -> list[str]:
+    """Return the scenarios that were run and left a criterion inconclusive."""
+    recorded = {path.stem for path in recording.files}
+    late = (c for c in criteria if c.status is Status.INCONCLUSIVE and not c.hint.startswith(ON_THE_MACHINE))
+    return sorted({c.scenario for c in late if c.scenario is not None} & recorded)
+
+
+def record_other_runs(job: Job, recorder: Recorder | StaticRecorder, runs: dict[str, Run]) -> bool:
+    """Record what a lost mark needs besides the first runs, and return whether there was anything.
+
+    A run whose timing could have cost the mark is repeated. Where a mechanical repair could be the reason for the loss,
+    a repaired copy is run.
+    """
+    if recorder.recording.sandbox is None and recorder.recording.ros is None:
+        return False
+    from grader import repaired_copy as copies  # noqa: PLC0415 - only a lost mark needs it
+
+    rubric = job.rubric.rubric
+    judged = judge_all_runs(rubric, runs, job.rubric.checks)
+    repairs, scenarios = copies.choose_repairs(
+        job.submission, recorder.recording.facts, rubric, judged.criteria, built=was_built(runs)
+    )
+    doubtful = sorted(judged.doubtful - set(scenarios))
+    if doubtful:
+        recorder.repeat(doubtful, job.evidence / copies.REPEATED)
+    if not repairs:
+        return bool(doubtful)
+    with copies.repaired_copy(job.submission, repairs) as copy:
+        if copy is None:
+            return bool(doubtful)
+        of_copy = replace(
+            job,
+            submission=copy,
+            facts=read_packages(copy),
+            evidence=job.evidence / copies.REPAIRED,
+            options=replace(job.options, reused={}),
+            progress=copies.CopyProgress(job.progress),
+        )
+        about = {REPAIRS: copies.dump_repairs(repairs)}
+        with make_recorder(of_copy, only=scenarios, about=about) as again:
+            again.record_all(lambda: None)
+            judge_recorded(again, job.evidence, job.rubric)
+        recorder.recording.add(again.recording)
+    return True
