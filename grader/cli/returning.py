@@ -11,9 +11,9 @@ from typing import cast
 
 from grader.classes.batch.folder import BatchFolder, open_batch
 from grader.classes.feedback import publish as publishing
+from grader.classes.feedback.forges import Comments
 from grader.classes.feedback.forms import FORMS, Form, Settings
 from grader.classes.feedback.publish import Publishing, Step, plan, read_published, refuse_other_rubric
-from grader.classes.feedback.rest import Comments
 from grader.classes.feedback.send import Delivery, Failure, Selection, Wanted, deliver, faults, selected
 from grader.classes.review.requests import Asked, fetch, rows_of, write_requests
 from grader.classes.review.serve import git_user

@@ -9,8 +9,7 @@ from rich.console import Console
 
 from grader.classes.batch.gradings import _Steps
 from grader.classes.batch.job import Outcome
-from grader.classes.batch.progress import LATELY, BatchProgress
-from grader.cli.class_display import LiveClass, PlainClass, summary
+from grader.cli.class_display import LATELY, BatchProgress, LiveClass, PlainClass, summary
 
 
 class Clock:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.feedback.folder import Folder
+from grader.classes.feedback.files import Folder
 from grader.classes.feedback.forms import FORMS, Feedback
 from grader.classes.feedback.publish import read_published
 from grader.cli.main import run

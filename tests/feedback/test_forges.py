@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.feedback import rest
+from grader.classes.feedback import forges, rest
 from grader.cli.main import run
 from tests.feedback.a_class import COMMIT, award, feedback, publish, sent
 from tests.feedback.forges import TOKEN, Failure, Forge, Repo, forge, github, gitlab
@@ -243,7 +243,7 @@ def test_a_dry_run_asks_no_server(published: Path, system: str, server: Forge, c
     ],
 )
 def test_the_repository_in_an_address(source: str, place: tuple[str, str]) -> None:
-    assert rest.host_and_path(source) == place
+    assert forges.host_and_path(source) == place
 
 
 def ask(server: Forge, system: str, name: str, **about: object) -> None:

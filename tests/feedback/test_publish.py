@@ -12,8 +12,7 @@ import pytest
 
 from grader.classes.batch.folder import open_batch
 from grader.classes.batch.run import alone
-from grader.classes.feedback.changes import changes_between
-from grader.classes.feedback.publish import read_published
+from grader.classes.feedback.publish import changes_between, read_published
 from grader.cli.main import run
 from grader.model.result import AppliedOverride, Automatic, GradingResult, Lateness
 from grader.model.verdict import Status

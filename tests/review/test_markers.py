@@ -10,9 +10,8 @@ import pytest
 
 from grader.classes.batch.folder import open_batch
 from grader.classes.overrides.write import write_override
-from grader.classes.review.merge import Merged, merge
+from grader.classes.review.markers import Merged, merge, share_of
 from grader.classes.review.session import open_session
-from grader.classes.review.share import share_of
 from grader.cli.main import run as main
 from grader.errors import UsageError
 from grader.model.batch import Entry

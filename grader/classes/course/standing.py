@@ -9,7 +9,7 @@ from datetime import datetime
 
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch
 from grader.classes.feedback.publish import plan, read_published
-from grader.classes.feedback.sent import SentLog
+from grader.classes.feedback.send import SentLog
 from grader.classes.overrides import folder_key
 from grader.model.batch import Entry, Roster
 from grader.rubric.course import CourseFile

@@ -137,19 +137,19 @@ class Form:
 _FORMS = (
     Form(
         name="folder",
-        sender="folder:Folder",
+        sender="files:Folder",
         purpose="a folder for each student, with `report.md` and `report.html`",
         options=frozenset({"--out"}),
     ),
     Form(
         name="moodle",
-        sender="archives:Moodle",
+        sender="files:Moodle",
         purpose="Moodle's zip of feedback files, with `report.html` for each student",
         options=frozenset({"--out"}),
     ),
     Form(
         name="canvas",
-        sender="archives:Canvas",
+        sender="files:Canvas",
         purpose="Canvas' zip for re-upload: the reports under the names of the submitted files",
         options=frozenset({"--out"}),
     ),
@@ -167,13 +167,13 @@ _FORMS = (
     ),
     Form(
         name="github",
-        sender="github:GitHub",
+        sender="forges:GitHub",
         purpose="a comment on the commit that was graded, or an issue",
         options=frozenset({"--issues", "--public"}),
     ),
     Form(
         name="gitlab",
-        sender="gitlab:GitLab",
+        sender="forges:GitLab",
         purpose="a comment on the commit that was graded, or an issue",
         options=frozenset({"--issues", "--public"}),
     ),

@@ -25,7 +25,7 @@ from urllib.parse import urlsplit
 from typing_extensions import Self
 
 from grader.classes.feedback.forms import PAGE, Feedback, Sender, Settings, Unsure
-from grader.classes.gradebook.matching import kinds
+from grader.classes.gradebook.platforms import kinds
 from grader.errors import HostError, NotSent, UsageError
 from grader.files import atomic_write
 from grader.model.batch import Entry

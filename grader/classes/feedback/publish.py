@@ -1,12 +1,13 @@
 """Results are drafts until they are published: then they are frozen, as marks and as the student reads them.
 
-`plan` says what would be published, `publish` does it, `published_rows` gives a gradebook what counts.
+`plan` says what would be published, `publish` does it, `published_rows` gives a gradebook what counts, and
+`changes_between` says in words what has changed: `85 → 95: override by ann, clear names (style)`.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from functools import partial
@@ -16,24 +17,24 @@ from typing import Literal
 from pydantic import ValidationError
 
 from grader.classes.batch.folder import BatchFolder
+from grader.classes.batch.regrade import Change, pairs
 from grader.classes.batch.reports import figures_in
 from grader.classes.batch.run import alone
-from grader.classes.feedback.changes import changes_between
 from grader.classes.gradebook import Row
 from grader.errors import EvidenceError, GraderError, UsageError
 from grader.files import atomic_write, make_folder
 from grader.intake import safe_name
 from grader.model.batch import UNPUBLISHED, Entry
 from grader.model.publication import Publication
-from grader.model.result import GradingResult
+from grader.model.result import AppliedOverride, GradingResult
 from grader.model.version import PUBLISHED as FORMAT
 from grader.model.version import UPDATE
 from grader.report.forms import FORMS, ReportInput
 from grader.report.result_json import result_bytes
-from grader.report.view import for_student, is_students_fault
+from grader.report.view import for_student, is_students_fault, not_graded
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric
-from grader.wording import did_you_mean, join_words
+from grader.wording import did_you_mean, join_words, number, plural
 from grader.workers import WorkerEnded, run_each
 
 FILE, FOLDER = "published.jsonl", ".published"
@@ -91,14 +92,14 @@ def frozen_folder(path: Path, publication: Publication) -> Path:
 def read_published(path: Path) -> Published:
     """Read what is published of the class in `path`. Raises UsageError for what no grader wrote, or a newer one."""
     file, history = path / FILE, dict[str, list[Publication]]()
-    for number, row in enumerate(read_rows(file), start=1):
+    for place, row in enumerate(read_rows(file), start=1):
         try:
             publication = Publication.read_json(row)
         except ValidationError as error:
             if newer := FORMAT.newer_in(row):
-                raise UsageError(f"{file}:{number}: {newer}", hint=UPDATE) from error
+                raise UsageError(f"{file}:{place}: {newer}", hint=UPDATE) from error
             hint = "restore it: without it, nobody knows what was published"
-            raise UsageError(f"{file}:{number}: not what this grader writes", hint=hint) from error
+            raise UsageError(f"{file}:{place}: not what this grader writes", hint=hint) from error
         history.setdefault(safe_name(publication.id), []).append(publication)
     return Published(path, history)
 
@@ -325,3 +326,78 @@ def publication_remarks(folder: BatchFolder, published: Published) -> Iterator[s
             f"{changed} changed after they were published and stand here as published; "
             f"grader publish {folder.path} --dry-run shows the changes"
         )
+
+
+def changes_between(
+    before: GradingResult, after: GradingResult, hidden: Collection[str] = ()
+) -> tuple[str, ...]:
+    """Return a line for the points if one thing changed, else one for the points and one for each change; none if the
+    marks and all that people said of them are the same. Criteria of the ids in `hidden` are counted and not named."""
+    points = f"{_total(before)} → {_total(after)}" if _total(before) != _total(after) else ""
+    causes = [*_whole(before, after)]
+    if not_graded(before) == not_graded(after):
+        causes = [*_criteria(before, after, hidden), *causes]
+    if len(causes) == 1 and points:
+        return (f"{points}: {causes[0]}",)
+    return tuple(line for line in (points, *causes) if line)
+
+
+def _total(result: GradingResult) -> str:
+    if not_graded(result):
+        return "not graded"
+    return number(result.points) + (" (not settled)" if result.status == "inconclusive" else "")
+
+
+def _criteria(before: GradingResult, after: GradingResult, hidden: Collection[str]) -> Iterator[str]:
+    overrides = [{o.criterion: o for o in result.overrides} for result in (before, after)]
+    unseen = 0
+    for change in pairs(before, after):
+        was, now = (found.get(change.criterion) for found in overrides)
+        decided = _decision(was) != _decision(now)
+        if not decided and _state(change, "before") == _state(change, "after"):
+            continue
+        if change.criterion in hidden:
+            unseen += 1
+        elif decided:
+            yield f"{_override(now)} ({change.criterion})"
+        else:
+            yield f"judged again ({change.criterion}): {change.why}"
+    if unseen:
+        yield f"{plural(unseen, 'criterion', 'criteria')} that your course does not show"
+
+
+def _state(change: Change, which: str) -> tuple[object, ...]:
+    criterion = change.before if which == "before" else change.after
+    if criterion is None:
+        return ()
+    return criterion.status, criterion.points, criterion.max_points, criterion.left_out is None
+
+
+def _decision(override: AppliedOverride | None) -> tuple[object, ...]:
+    return (override.points, override.comment, override.author) if override else ()
+
+
+def _override(override: AppliedOverride | None) -> str:
+    if override is None:
+        return "an override was taken back"
+    comment = f", {override.comment}" if override.comment else ""
+    return f"override by {override.author or 'a person'}{comment}"
+
+
+def _whole(before: GradingResult, after: GradingResult) -> Iterator[str]:
+    late, was = (
+        r.late.text if r.late and r.late.points != r.late.points_before else "" for r in (after, before)
+    )
+    if late != was:
+        yield late or "no late penalty"
+    if before.gate != after.gate:
+        gate = after.gate
+        yield (
+            f"no more than {number(gate.at_most)} points without a criterion" if gate else "no gate any more"
+        )
+    if before.error != after.error and after.error is not None:
+        yield after.error.message
+    if before.submission.commit != after.submission.commit:
+        yield f"commit {(after.submission.commit or 'unknown')[:7]} was graded"
+    if before.rubric.digest != after.rubric.digest and before.max_points != after.max_points:
+        yield f"out of {number(after.max_points)} points, not {number(before.max_points)}"

@@ -1,31 +1,20 @@
-"""JSON over HTTP as forges speak it: a token for one server, limits that are respected, and comments made once.
-
-`Comments` is what GitHub and GitLab have in common: a comment on the commit that was graded, or an issue, which later
-feedback is added to. Each body ends with a mark that says what it is, so that a comment can be found of which nobody
-knows whether it was made, and what students answer can be told from it.
-"""
+"""JSON over HTTP as forges speak it: a token for one server, and limits that are respected."""
 
 from __future__ import annotations
 
 import json
-import re
 import time
-from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from http.client import HTTPException
-from itertools import chain
 from typing import Any
 from urllib.error import HTTPError, URLError
-from urllib.parse import unquote, urljoin, urlsplit
+from urllib.parse import urljoin, urlsplit
 from urllib.request import HTTPRedirectHandler, Request, build_opener
 
 from grader import __version__
-from grader.classes.feedback.forms import Feedback, Sender, Unsure
-from grader.errors import GraderError, HostError, NotSent, UsageError
-from grader.intake.source import parse_source
-from grader.model.batch import Entry
+from grader.errors import HostError, UsageError
 from grader.untrusted_text import line
 
 TIMEOUT_S = 60.0
@@ -36,9 +25,6 @@ WAIT_S, WAIT_MAX_S = 60.0, 3900.0
 ANSWER_BYTES_MAX = 16 << 20
 SAID_CHARS = 300
 PAGES_MAX = 50
-MARK = "<!-- ros-lab-grader feedback "
-_SCP = re.compile(r"(?:[\w.+-]+@)?(?P<host>[\w.-]+):(?P<path>(?!/).+)")
-_ISSUE = re.compile(r"/(?:issues|work_items)/(\d+)")
 _LOCAL = {"localhost", "127.0.0.1", "::1"}
 
 
@@ -192,186 +178,6 @@ def _wait_s(answer: _Answer, times: int) -> float | None:
     if exhausted and reset.isdecimal():
         return max(1.0, float(reset) - time.time() + 1)
     return WAIT_S * 2.0**times
-
-
-def host_and_path(address: str) -> tuple[str, str]:
-    """Return the server and the path of a repository's address, `org/name`. Raises NotSent."""
-    try:
-        source = parse_source(address)
-    except GraderError as error:
-        raise NotSent(error.message, hint=error.hint) from error
-    if not source.remote:
-        raise NotSent(
-            "no repository on a server was submitted", hint="return it by another form: --form folder"
-        )
-    found = _SCP.fullmatch(source.url) if "://" not in source.url else None
-    parts = urlsplit(source.url)
-    host = found["host"] if found else parts.netloc.rpartition("@")[2]
-    if not found and parts.scheme not in ("http", "https"):
-        host = parts.hostname or ""
-    path = unquote(found["path"] if found else parts.path).strip("/").removesuffix(".git")
-    return host.lower(), path
-
-
-@dataclass(frozen=True, kw_only=True)
-class Post:
-    """An issue, by its `number`, or a comment; `when` is an ISO 8601 time."""
-
-    address: str
-    text: str
-    when: str = ""
-    title: str = ""
-    number: int = 0
-    is_open: bool = True
-    labels: tuple[str, ...] = ()
-
-
-class Comments(Sender):
-    """A forge on which comments are made. `server` is the host in addresses of its repositories."""
-
-    unsure = "look"
-    name = server = token = ""
-    api: Api
-
-    def place(self, feedback: Feedback) -> str:
-        """Return the commit, or the repository whose issue it will be. Raises NotSent."""
-        path = self.path(feedback.entry)
-        if self.settings.issues:
-            return f"{self.server}/{path}: {feedback.last_place or 'a new issue'}"
-        if not feedback.commit:
-            raise NotSent("no commit is known that was graded", hint="--issues opens an issue instead")
-        return f"{self.server}/{path}: commit {feedback.commit[:12]}"
-
-    def path(self, entry: Entry) -> str:
-        """Return the repository's path on this server. Raises NotSent."""
-        host, path = host_and_path(entry.source)
-        if host != self.server or "/" not in path:
-            raise NotSent(f"its repository is not on {self.server}: {line(entry.source, 200)}")
-        return path
-
-    def show(self, feedback: Feedback) -> str:
-        """Return the comment."""
-        return self.body(feedback)
-
-    def body(self, feedback: Feedback) -> str:
-        """Return the comment, with the mark that says what it is."""
-        return f"{feedback.text.rstrip()}\n\n{mark(feedback)}\n"
-
-    def send(self, feedback: Feedback, *, look: bool = False) -> str:
-        """Make the comment or the issue; return its address."""
-        path = self.path(feedback.entry)
-        try:
-            if not self.settings.public and self.is_public(path):
-                raise NotSent(
-                    "everybody can read this repository, and so the feedback",
-                    hint="--public returns it all the same",
-                )
-            return self._once(feedback, path, look=look)
-        except Refused as error:
-            raise self._error(error, self.place(feedback)) from error
-        except Broken as error:
-            raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
-
-    def _once(self, feedback: Feedback, path: str, *, look: bool) -> str:
-        """Make it, and look whether it is there where that is not known."""
-        for left in reversed(range(TRIES)):
-            if look and (found := self._found(feedback, path)):
-                return found
-            try:
-                return self._make(feedback, path)
-            except Broken as error:
-                look = True
-                if not left:
-                    raise Unsure(
-                        f"{self.server}: {error}", hint="the same command looks, and tries it again"
-                    ) from error
-        raise AssertionError
-
-    def _make(self, feedback: Feedback, path: str) -> str:
-        body = self.body(feedback)
-        if not self.settings.issues:
-            return self.comment(path, feedback.commit, body)
-        issue = _ISSUE.search(feedback.last_place)
-        if issue:
-            try:
-                return self.reply(path, int(issue[1]), body)
-            except Refused as error:
-                if error.status not in (404, 410):
-                    raise
-        return self.open_issue(path, feedback.subject, body)
-
-    def _found(self, feedback: Feedback, path: str) -> str:
-        issue = _ISSUE.search(feedback.last_place)
-        if not self.settings.issues:
-            found = self.comments(path, feedback.commit)
-        else:
-            found = chain(self.issues(path), self.replies(path, int(issue[1])) if issue else ())
-        return next((post.address for post in found if mark(feedback) in post.text), "")
-
-    def questions(self, entry: Entry, commit: str, label: str = "") -> Iterator[Post]:
-        """Yield what a student asks: each open issue (with that label), each answer to feedback, in an issue or on the
-        commit. Raises NotSent."""
-        path = self.path(entry)
-        try:
-            for post in self.issues(path):
-                if MARK in post.text:
-                    yield from (reply for reply in self.replies(path, post.number) if MARK not in reply.text)
-                elif post.is_open and (not label or label in post.labels):
-                    yield post
-            if commit:
-                yield from (post for post in self.comments(path, commit) if MARK not in post.text)
-        except Refused as error:
-            raise self._error(error, f"{self.server}/{path}") from error
-        except Broken as error:
-            raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
-
-    def _error(self, error: Refused, where: str) -> GraderError:
-        if error.status == 401:
-            return HostError(
-                f"{self.server} does not take the token: {error.text}", hint=f"set {self.token} again"
-            )
-        hints = {
-            403: "the token may not do that there",
-            404: "check the address, and what the token may see",
-            410: "issues are switched off there",
-        }
-        return NotSent(
-            f"{where}: {self.name} says {error.status} {error.text}".rstrip(),
-            hint=hints.get(error.status, ""),
-        )
-
-    @abstractmethod
-    def is_public(self, path: str) -> bool:
-        """Return whether everybody can read the repository, or everybody with an account."""
-
-    @abstractmethod
-    def comment(self, path: str, commit: str, body: str) -> str:
-        """Comment on a commit; return the comment's address."""
-
-    @abstractmethod
-    def comments(self, path: str, commit: str) -> Iterator[Post]:
-        """Yield each comment on a commit."""
-
-    @abstractmethod
-    def open_issue(self, path: str, title: str, body: str) -> str:
-        """Open an issue; return its address."""
-
-    @abstractmethod
-    def reply(self, path: str, issue: int, body: str) -> str:
-        """Comment on an issue; return the comment's address."""
-
-    @abstractmethod
-    def issues(self, path: str) -> Iterator[Post]:
-        """Yield each issue."""
-
-    @abstractmethod
-    def replies(self, path: str, issue: int) -> Iterator[Post]:
-        """Yield each comment on an issue."""
-
-
-def mark(feedback: Feedback) -> str:
-    """Return what is in the comment for the grader alone."""
-    return f"{MARK}{feedback.publication.digest} -->"
 
 
 def required_token(name: str, value: str) -> str:

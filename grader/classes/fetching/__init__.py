@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from grader.classes.fetching.history import NothingInTime, Rule
 from grader.classes.fetching.mirror import Patience
-from grader.classes.fetching.obtain import Obtained, obtain
-from grader.classes.fetching.prefetch import Prefetch, prefetch
+from grader.classes.fetching.obtain import Obtained, Prefetch, obtain, prefetch
 
 __all__ = ["NothingInTime", "Obtained", "Patience", "Prefetch", "Rule", "obtain", "prefetch"]

@@ -7,17 +7,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from grader.classes.gradebook.matching import (
+from grader.classes.gradebook.platforms import (
     Identity,
     Kind,
+    Mark,
     Platform,
+    Wanted,
     entry_identity,
     kinds,
     match,
     plain,
     row_identity,
 )
-from grader.classes.gradebook.platforms import Mark, Wanted
 from grader.classes.gradebook.table import harmless, number_text
 from grader.classes.roster.table import delimiter_of, encoding_of
 from grader.errors import UsageError

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
-from importlib import import_module
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
-from grader.classes.gradebook.matching import Platform
-from grader.classes.gradebook.platforms import fresh, marks_of, remarks_of, wanted_columns
-from grader.classes.gradebook.table import Book, Form, Row, cells, csv_line, header
+from grader.classes.gradebook.platforms import Platform, fresh, marks_of, remarks_of, wanted_columns
+from grader.classes.gradebook.table import Book, Cell, Form, Row, cells, csv_line, header, visible_text
 from grader.classes.gradebook.template import fill_template
-from grader.errors import UsageError
+from grader.errors import OutputError, UsageError
 from grader.files import atomic_write, whole_file
 from grader.model.result import GradingResult
 from grader.untrusted_text import json_text, steers
+
+if TYPE_CHECKING:
+    from xlsxwriter.format import Format
+    from xlsxwriter.worksheet import Worksheet
 
 PLATFORMS: Mapping[Form, Platform] = {"canvas": "canvas", "moodle": "moodle", "blackboard": "blackboard"}
 
@@ -69,8 +73,8 @@ def _plain(book: Book, rows: Iterable[Row], target: Path, form: Form) -> None:
         write_csv(book, rows, target)
     elif form == "jsonl":
         write_jsonl(rows, target)
-    else:  # only who wants a workbook waits for its library
-        import_module("grader.classes.gradebook.workbook").write_workbook(book, rows, target)
+    else:
+        write_workbook(book, rows, target)
 
 
 OPTIONAL = {
@@ -101,3 +105,70 @@ def json_line(row: Row) -> str:
     if "##" not in text and not any(map(steers, set(text))):
         return text + "\n"
     return re.sub(r"\n *", "", json_text(data)) + "\n"
+
+
+WIDTH_MIN, WIDTH_MAX, WIDTH_TEXT = 8, 40, 24
+WORKBOOK = {
+    "constant_memory": True,
+    "strings_to_formulas": False,
+    "strings_to_urls": False,
+    "strings_to_numbers": False,
+}
+
+
+def write_workbook(book: Book, rows: Iterable[Row], target: Path) -> None:
+    """Write two sheets: the gradebook, and what its criteria are. No text is a formula or a link."""
+    import xlsxwriter  # noqa: PLC0415 - slow to load
+    from xlsxwriter.exceptions import XlsxWriterException  # noqa: PLC0415 - as above
+
+    with whole_file(target) as path, TemporaryDirectory(prefix="gradebook-") as temporary:
+        workbook = xlsxwriter.Workbook(str(path), {**WORKBOOK, "tmpdir": temporary})
+        sheets = [workbook.add_worksheet(name) for name in ("Gradebook", "Criteria")]
+        try:
+            bold = workbook.add_format({"bold": True})
+            _gradebook(sheets[0], book, rows, bold)
+            _criteria(sheets[1], book, bold)
+            workbook.close()
+        except XlsxWriterException as error:
+            raise OutputError(
+                f"cannot write {target}: {error}", hint="choose another form with --form"
+            ) from error
+        finally:
+            for sheet in sheets:  # where something failed, the rows that are there already are still open
+                sheet.row_data_fh.close()
+
+
+def _gradebook(sheet: Worksheet, book: Book, rows: Iterable[Row], bold: Format) -> None:
+    names = header(book)
+    _widths(sheet, names)
+    _write(sheet, 0, names, bold)
+    last = 0
+    for last, row in enumerate(rows, start=1):
+        _write(sheet, last, list(cells(book, row)))
+    sheet.freeze_panes(1, 1)
+    sheet.autofilter(0, 0, max(last, 1), len(names) - 1)
+
+
+def _criteria(sheet: Worksheet, book: Book, bold: Format) -> None:
+    names = ("id", "title", "max_points")
+    sheet.set_column(0, 0, WIDTH_TEXT)
+    sheet.set_column(1, 1, WIDTH_MAX)
+    _write(sheet, 0, names, bold)
+    for number, criterion in enumerate(book.criteria, start=1):
+        _write(sheet, number, criterion[: len(names)])
+    sheet.freeze_panes(1, 0)
+
+
+def _widths(sheet: Worksheet, names: Sequence[str]) -> None:
+    wide = {"id", "name", "late", "comment", "error"}
+    for column, name in enumerate(names):
+        width = WIDTH_TEXT if name in wide else min(max(len(name) + 3, WIDTH_MIN), WIDTH_MAX)
+        sheet.set_column(column, column, width)
+
+
+def _write(sheet: Worksheet, number: int, row: Sequence[Cell], form: Format | None = None) -> None:
+    for column, cell in enumerate(row):
+        if isinstance(cell, str) and cell:
+            sheet.write_string(number, column, visible_text(cell), form)
+        elif isinstance(cell, int | float):
+            sheet.write_number(number, column, cell, form)

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.classes.batch.folder import BatchFolder
+from grader.classes.feedback.forges import Comments
 from grader.classes.feedback.mail import addresses
-from grader.classes.feedback.rest import Comments
 from grader.classes.overrides import folder_key
 from grader.errors import NotSent
 from grader.files import atomic_write, read_untrusted

@@ -1,17 +1,26 @@
-"""A folder with a submission in each entry. The names in bulk downloads of Moodle and Canvas are known."""
+"""A folder with a submission in each entry, or the zip of all submissions that Moodle or Canvas offers for download.
+
+The names in these downloads are known. Students' own archives in them stay packed: each is opened, within its limits,
+when it is graded.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import re
+import shutil
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 from grader.classes.roster.allowed_sources import REFUSED, Local, local_fault
 from grader.classes.roster.entries import Found, columns_of, gather
-from grader.errors import UsageError
+from grader.errors import HostError, UsageError
+from grader.files import make_folder, temporary_folder, unwritable
 from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable
 from grader.model.batch import Entry, Roster
+from grader.untrusted_text import line
 
 PLATFORMS = ("Moodle", "Canvas")
 IGNORED = {"__MACOSX", "Thumbs.db", "desktop.ini"}
@@ -179,3 +188,68 @@ def platform_name(name: str) -> Named | None:
             is_blind=blind_canvas is not None,
         )
     return None
+
+
+FOLDER = ".submissions"
+
+
+def is_download(path: Path) -> bool:
+    """Return whether `path` is a zip file."""
+    return path.is_file() and path.suffix.lower() == ".zip"
+
+
+def unpack_download(path: Path, out: Path) -> Path:
+    """Unpack the zip below `out` and return the folder; one that was unpacked there before is returned as it is.
+
+    Raises:
+        UsageError: It is no zip file, is damaged or encrypted, or is itself one package.
+        HostError: The disk has no room for it.
+
+    """
+    try:
+        with zipfile.ZipFile(path) as download:
+            members = [member for member in download.infolist() if not member.is_dir()]
+            if any(member.filename.count("/") <= 1 and _name(member) == "package.xml" for member in members):
+                raise UsageError(
+                    f"{path}: this is one package, not a download of submissions",
+                    hint="grader grade takes one submission",
+                )
+            folder = out.absolute() / FOLDER / _digest(members)
+            if not folder.is_dir():
+                _unpack(download, members, folder)
+    except (zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError) as error:
+        raise UsageError(
+            f"{path}: cannot be unpacked: {line(str(error), 200)}", hint="download it again"
+        ) from error
+    except OSError as error:
+        raise unwritable(out, error) from error
+    return folder
+
+
+def _name(member: zipfile.ZipInfo) -> str:
+    return member.filename.rpartition("/")[2]
+
+
+def _digest(members: list[zipfile.ZipInfo]) -> str:
+    listed = [f"{member.filename}\0{member.file_size}\0{member.CRC}" for member in members]
+    return hashlib.sha256("\n".join(listed).encode("utf-8", "surrogateescape")).hexdigest()[:12]
+
+
+def _unpack(download: zipfile.ZipFile, members: list[zipfile.ZipInfo], folder: Path) -> None:
+    make_folder(folder.parent)
+    size_bytes = sum(member.file_size for member in members)
+    if size_bytes > shutil.disk_usage(folder.parent).free:
+        raise HostError(f"{folder.parent}: no room for {size_bytes >> 20} MB of submissions")
+    with temporary_folder("download", folder.parent) as new:
+        place = new / "all"
+        place.mkdir()
+        for member in members:
+            download.extract(member, place)
+        _within_one_folder(place).rename(folder)
+
+
+def _within_one_folder(place: Path) -> Path:
+    """Return the folder of the submissions: some put it into another one."""
+    inside = list(place.iterdir())
+    alone = inside[0] if len(inside) == 1 and inside[0].is_dir() else None
+    return alone if alone is not None and platform_name(alone.name) is None else place

@@ -110,7 +110,7 @@ def batch(
     with loading():
         from grader.classes.batch.run import BatchOptions
         from grader.classes.roster import read_roster
-        from grader.classes.roster.download import is_download, unpack_download
+        from grader.classes.roster.folder import is_download, unpack_download
         from grader.cli import batches
         from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric)
@@ -205,9 +205,9 @@ def review(
     require_library()
     with loading():
         from grader.classes.review.cards import Wrong, author_of
+        from grader.classes.review.markers import share_of
         from grader.classes.review.serve import browser, git_user, serve
         from grader.classes.review.session import open_session
-        from grader.classes.review.share import share_of
     given = marker if author is None else author
     try:
         name = author_of(git_user() if given is None else given)
@@ -251,7 +251,7 @@ def overrides_merge(
     """
     with loading():
         from grader.classes.batch.folder import open_batch
-        from grader.classes.review.merge import merge
+        from grader.classes.review.markers import merge
         from grader.cli.output import say
         from grader.rubric.load import load_rubric
         from grader.wording import plural

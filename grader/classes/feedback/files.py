@@ -1,4 +1,5 @@
-"""The zips of feedback that Moodle and Canvas take: one for all students, with names that say whose each file is.
+"""Feedback as files: a folder for each student, or one zip that Moodle or Canvas takes, with names that say whose each
+file is.
 
 Both platforms tell students apart by the names of their own download, so the class has to be graded from that, or its
 roster needs Moodle's numbers.
@@ -19,10 +20,10 @@ from typing import Literal
 from typing_extensions import Self
 
 from grader.classes.feedback.forms import PAGE, TEXT, Feedback, Sender, Settings
-from grader.classes.gradebook.matching import kinds
+from grader.classes.gradebook.platforms import kinds
 from grader.classes.roster.folder import platform_name
 from grader.errors import NotSent, UsageError
-from grader.files import whole_file
+from grader.files import atomic_write, whole_file
 
 _TAR = re.compile(r"\.(?:tar|tar\.(?P<ending>gz|xz|bz2)|t(?P<short>gz|xz|bz2?))$", re.IGNORECASE)
 _NO_NAME = re.compile(r'[_/\\:*?"<>|\x00-\x1f\x7f]+')
@@ -161,3 +162,19 @@ def _tar(files: dict[str, bytes], compressed: str) -> bytes:
 def _free(folder: Path, stem: str) -> Path:
     names = (folder / f"{stem}{f'-{number}' if number > 1 else ''}.zip" for number in range(1, 10_000))
     return next(name for name in names if not name.exists())
+
+
+class Folder(Sender):
+    """Writes into `--out`, by default `feedback/` in the class's folder."""
+
+    def place(self, feedback: Feedback) -> str:
+        """Return the student's folder."""
+        return str((self.settings.out or self.settings.folder / "feedback") / feedback.name)
+
+    def send(self, feedback: Feedback, *, look: bool = False) -> str:
+        """Write both files. Raises OutputError, which ends the run."""
+        del look
+        folder = (self.settings.out or self.settings.folder / "feedback") / feedback.name
+        atomic_write(folder / TEXT, feedback.text.encode())
+        atomic_write(folder / PAGE, feedback.page)
+        return str(folder)

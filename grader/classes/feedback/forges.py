@@ -1,0 +1,350 @@
+"""GitHub and GitLab: a comment on the commit that was graded, or an issue, which later feedback is added to.
+
+Each body ends with a mark that says what it is, so that a comment can be found of which nobody knows whether it was
+made, and what students answer can be told from it. A token goes to one server alone: GitHub's is in `GITHUB_TOKEN` (or
+`GH_TOKEN`), for `GITHUB_SERVER_URL`, by default github.com; GitLab's in `GITLAB_TOKEN`, for `CI_SERVER_URL`, by default
+gitlab.com. Their REST APIs: docs.github.com/rest, docs.gitlab.com/api.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from abc import abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+from urllib.parse import quote, unquote, urlsplit
+
+from grader.classes.feedback.forms import Feedback, Sender, Settings, Unsure
+from grader.classes.feedback.rest import TRIES, Api, Broken, Refused, required_token
+from grader.errors import GraderError, HostError, NotSent
+from grader.intake.source import parse_source
+from grader.model.batch import Entry
+from grader.untrusted_text import line
+
+MARK = "<!-- ros-lab-grader feedback "
+_SCP = re.compile(r"(?:[\w.+-]+@)?(?P<host>[\w.-]+):(?P<path>(?!/).+)")
+_ISSUE = re.compile(r"/(?:issues|work_items)/(\d+)")
+API_VERSION = "2022-11-28"
+"""Of GitHub's REST API."""
+
+
+def host_and_path(address: str) -> tuple[str, str]:
+    """Return the server and the path of a repository's address, `org/name`. Raises NotSent."""
+    try:
+        source = parse_source(address)
+    except GraderError as error:
+        raise NotSent(error.message, hint=error.hint) from error
+    if not source.remote:
+        raise NotSent(
+            "no repository on a server was submitted", hint="return it by another form: --form folder"
+        )
+    found = _SCP.fullmatch(source.url) if "://" not in source.url else None
+    parts = urlsplit(source.url)
+    host = found["host"] if found else parts.netloc.rpartition("@")[2]
+    if not found and parts.scheme not in ("http", "https"):
+        host = parts.hostname or ""
+    path = unquote(found["path"] if found else parts.path).strip("/").removesuffix(".git")
+    return host.lower(), path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Post:
+    """An issue, by its `number`, or a comment; `when` is an ISO 8601 time."""
+
+    address: str
+    text: str
+    when: str = ""
+    title: str = ""
+    number: int = 0
+    is_open: bool = True
+    labels: tuple[str, ...] = ()
+
+
+class Comments(Sender):
+    """A forge on which comments are made. `server` is the host in addresses of its repositories."""
+
+    unsure = "look"
+    name = server = token = ""
+    api: Api
+
+    def place(self, feedback: Feedback) -> str:
+        """Return the commit, or the repository whose issue it will be. Raises NotSent."""
+        path = self.path(feedback.entry)
+        if self.settings.issues:
+            return f"{self.server}/{path}: {feedback.last_place or 'a new issue'}"
+        if not feedback.commit:
+            raise NotSent("no commit is known that was graded", hint="--issues opens an issue instead")
+        return f"{self.server}/{path}: commit {feedback.commit[:12]}"
+
+    def path(self, entry: Entry) -> str:
+        """Return the repository's path on this server. Raises NotSent."""
+        host, path = host_and_path(entry.source)
+        if host != self.server or "/" not in path:
+            raise NotSent(f"its repository is not on {self.server}: {line(entry.source, 200)}")
+        return path
+
+    def show(self, feedback: Feedback) -> str:
+        """Return the comment."""
+        return self.body(feedback)
+
+    def body(self, feedback: Feedback) -> str:
+        """Return the comment, with the mark that says what it is."""
+        return f"{feedback.text.rstrip()}\n\n{mark(feedback)}\n"
+
+    def send(self, feedback: Feedback, *, look: bool = False) -> str:
+        """Make the comment or the issue; return its address."""
+        path = self.path(feedback.entry)
+        try:
+            if not self.settings.public and self.is_public(path):
+                raise NotSent(
+                    "everybody can read this repository, and so the feedback",
+                    hint="--public returns it all the same",
+                )
+            return self._once(feedback, path, look=look)
+        except Refused as error:
+            raise self._error(error, self.place(feedback)) from error
+        except Broken as error:
+            raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
+
+    def _once(self, feedback: Feedback, path: str, *, look: bool) -> str:
+        """Make it, and look whether it is there where that is not known."""
+        for left in reversed(range(TRIES)):
+            if look and (found := self._found(feedback, path)):
+                return found
+            try:
+                return self._make(feedback, path)
+            except Broken as error:
+                look = True
+                if not left:
+                    raise Unsure(
+                        f"{self.server}: {error}", hint="the same command looks, and tries it again"
+                    ) from error
+        raise AssertionError
+
+    def _make(self, feedback: Feedback, path: str) -> str:
+        body = self.body(feedback)
+        if not self.settings.issues:
+            return self.comment(path, feedback.commit, body)
+        issue = _ISSUE.search(feedback.last_place)
+        if issue:
+            try:
+                return self.reply(path, int(issue[1]), body)
+            except Refused as error:
+                if error.status not in (404, 410):
+                    raise
+        return self.open_issue(path, feedback.subject, body)
+
+    def _found(self, feedback: Feedback, path: str) -> str:
+        issue = _ISSUE.search(feedback.last_place)
+        if not self.settings.issues:
+            found = self.comments(path, feedback.commit)
+        else:
+            found = chain(self.issues(path), self.replies(path, int(issue[1])) if issue else ())
+        return next((post.address for post in found if mark(feedback) in post.text), "")
+
+    def questions(self, entry: Entry, commit: str, label: str = "") -> Iterator[Post]:
+        """Yield what a student asks: each open issue (with that label), each answer to feedback, in an issue or on the
+        commit. Raises NotSent."""
+        path = self.path(entry)
+        try:
+            for post in self.issues(path):
+                if MARK in post.text:
+                    yield from (reply for reply in self.replies(path, post.number) if MARK not in reply.text)
+                elif post.is_open and (not label or label in post.labels):
+                    yield post
+            if commit:
+                yield from (post for post in self.comments(path, commit) if MARK not in post.text)
+        except Refused as error:
+            raise self._error(error, f"{self.server}/{path}") from error
+        except Broken as error:
+            raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
+
+    def _error(self, error: Refused, where: str) -> GraderError:
+        if error.status == 401:
+            return HostError(
+                f"{self.server} does not take the token: {error.text}", hint=f"set {self.token} again"
+            )
+        hints = {
+            403: "the token may not do that there",
+            404: "check the address, and what the token may see",
+            410: "issues are switched off there",
+        }
+        return NotSent(
+            f"{where}: {self.name} says {error.status} {error.text}".rstrip(),
+            hint=hints.get(error.status, ""),
+        )
+
+    @abstractmethod
+    def is_public(self, path: str) -> bool:
+        """Return whether everybody can read the repository, or everybody with an account."""
+
+    @abstractmethod
+    def comment(self, path: str, commit: str, body: str) -> str:
+        """Comment on a commit; return the comment's address."""
+
+    @abstractmethod
+    def comments(self, path: str, commit: str) -> Iterator[Post]:
+        """Yield each comment on a commit."""
+
+    @abstractmethod
+    def open_issue(self, path: str, title: str, body: str) -> str:
+        """Open an issue; return its address."""
+
+    @abstractmethod
+    def reply(self, path: str, issue: int, body: str) -> str:
+        """Comment on an issue; return the comment's address."""
+
+    @abstractmethod
+    def issues(self, path: str) -> Iterator[Post]:
+        """Yield each issue."""
+
+    @abstractmethod
+    def replies(self, path: str, issue: int) -> Iterator[Post]:
+        """Yield each comment on an issue."""
+
+
+def mark(feedback: Feedback) -> str:
+    """Return what is in the comment for the grader alone."""
+    return f"{MARK}{feedback.publication.digest} -->"
+
+
+class GitHub(Comments):
+    """One comment or issue for each student."""
+
+    name, token = "GitHub", "GITHUB_TOKEN"
+
+    def __init__(self, settings: Settings) -> None:
+        super().__init__(settings)
+        token = required_token(self.token, os.environ.get(self.token) or os.environ.get("GH_TOKEN", ""))
+        server = os.environ.get("GITHUB_SERVER_URL") or "https://github.com"
+        self.server = urlsplit(server).netloc.lower()
+        own = "https://api.github.com" if self.server == "github.com" else f"{server.rstrip('/')}/api/v3"
+        headers = {
+            "Accept": "application/vnd.github+json",
+            "Authorization": f"Bearer {token}",
+            "X-GitHub-Api-Version": API_VERSION,
+        }
+        self.api = Api(os.environ.get("GITHUB_API_URL") or own, headers, settings.told)
+
+    def is_public(self, path: str) -> bool:
+        """Return whether the repository is not private."""
+        return self.api.get(_repo_path(path)).get("private") is not True
+
+    def comment(self, path: str, commit: str, body: str) -> str:
+        """Comment on a commit; return the comment's address."""
+        return str(self.api.post(f"{_repo_path(path)}/commits/{commit}/comments", {"body": body})["html_url"])
+
+    def comments(self, path: str, commit: str) -> Iterator[Post]:
+        """Yield the comments on a commit."""
+        return _github_posts(self.api.pages(f"{_repo_path(path)}/commits/{commit}/comments"))
+
+    def open_issue(self, path: str, title: str, body: str) -> str:
+        """Open an issue."""
+        return str(self.api.post(f"{_repo_path(path)}/issues", {"title": title, "body": body})["html_url"])
+
+    def reply(self, path: str, issue: int, body: str) -> str:
+        """Comment on an issue."""
+        return str(self.api.post(f"{_repo_path(path)}/issues/{issue}/comments", {"body": body})["html_url"])
+
+    def issues(self, path: str) -> Iterator[Post]:
+        """Yield the issues; a pull request is none."""
+        found = self.api.pages(f"{_repo_path(path)}/issues?state=all")
+        return _github_posts(one for one in found if "pull_request" not in one)
+
+    def replies(self, path: str, issue: int) -> Iterator[Post]:
+        """Yield the comments on an issue."""
+        return _github_posts(self.api.pages(f"{_repo_path(path)}/issues/{issue}/comments"))
+
+
+def _repo_path(path: str) -> str:
+    return f"/repos/{quote(path)}"
+
+
+def _github_posts(found: Iterator[dict[str, Any]]) -> Iterator[Post]:
+    for one in found:
+        yield Post(
+            address=str(one.get("html_url", "")),
+            text=str(one.get("body") or ""),
+            when=str(one.get("created_at") or ""),
+            title=str(one.get("title") or ""),
+            number=int(one.get("number") or 0),
+            is_open=one.get("state", "open") == "open",
+            labels=tuple(str(label["name"]) for label in one.get("labels") or () if isinstance(label, dict)),
+        )
+
+
+class GitLab(Comments):
+    """One comment or issue for each student."""
+
+    name, token = "GitLab", "GITLAB_TOKEN"
+
+    def __init__(self, settings: Settings) -> None:
+        super().__init__(settings)
+        token = required_token(self.token, os.environ.get(self.token, ""))
+        server = (
+            os.environ.get("CI_SERVER_URL") or f"https://{os.environ.get('CI_SERVER_HOST') or 'gitlab.com'}"
+        )
+        self._address = server.rstrip("/")
+        self.server = urlsplit(server).netloc.lower()
+        base = os.environ.get("CI_API_V4_URL") or f"{self._address}/api/v4"
+        self.api = Api(base, {"PRIVATE-TOKEN": token}, settings.told)
+
+    def is_public(self, path: str) -> bool:
+        """Return whether everybody can read the project, or everybody with an account."""
+        return str(self.api.get(_project_path(path)).get("visibility")) != "private"
+
+    def comment(self, path: str, commit: str, body: str) -> str:
+        """Comment on a commit; GitLab tells no address of the comment, so it is the commit's."""
+        self.api.post(f"{_project_path(path)}/repository/commits/{commit}/comments", {"note": body})
+        return self._commit(path, commit)
+
+    def comments(self, path: str, commit: str) -> Iterator[Post]:
+        """Yield the comments on a commit."""
+        for one in self.api.pages(f"{_project_path(path)}/repository/commits/{commit}/comments"):
+            yield _gitlab_post(one, self._commit(path, commit), "note")
+
+    def open_issue(self, path: str, title: str, body: str) -> str:
+        """Open an issue; in a project that others can read, one that only members see."""
+        data = {"title": title, "description": body, "confidential": self.settings.public}
+        return str(self.api.post(f"{_project_path(path)}/issues", data)["web_url"])
+
+    def reply(self, path: str, issue: int, body: str) -> str:
+        """Comment on an issue."""
+        made = self.api.post(f"{_project_path(path)}/issues/{issue}/notes", {"body": body})
+        return self._note(path, issue, made)
+
+    def issues(self, path: str) -> Iterator[Post]:
+        """Yield the issues."""
+        for one in self.api.pages(f"{_project_path(path)}/issues?scope=all"):
+            yield _gitlab_post(one, str(one.get("web_url", "")), "description")
+
+    def replies(self, path: str, issue: int) -> Iterator[Post]:
+        """Yield the comments on an issue; what GitLab itself notes there is none."""
+        for note in self.api.pages(f"{_project_path(path)}/issues/{issue}/notes"):
+            if note.get("system") is not True:
+                yield _gitlab_post(note, self._note(path, issue, note), "body")
+
+    def _commit(self, path: str, commit: str) -> str:
+        return f"{self._address}/{path}/-/commit/{commit}"
+
+    def _note(self, path: str, issue: int, note: dict[str, Any]) -> str:
+        return f"{self._address}/{path}/-/issues/{issue}#note_{note.get('id', '')}"
+
+
+def _project_path(path: str) -> str:
+    return f"/projects/{quote(path, safe='')}"
+
+
+def _gitlab_post(one: dict[str, Any], address: str, body: str) -> Post:
+    return Post(
+        address=address,
+        text=str(one.get(body) or ""),
+        when=str(one.get("created_at") or ""),
+        title=str(one.get("title") or ""),
+        number=int(one.get("iid") or 0),
+        is_open=one.get("state", "opened") == "opened",
+        labels=tuple(map(str, one.get("labels") or ())),
+    )
