@@ -23,7 +23,7 @@ from grader.judging import judge
 from grader.judging.settle import settle
 from grader.judging.summary import overall_status, total_fields
 from grader.model.result import Automatic, CriterionResult, GradingResult, Lateness
-from grader.report.result_json import result_text
+from grader.report.files import result_text
 from grader.report.sentences import RUBRIC_FROM
 from grader.report.view import hidden_ids, without_hidden
 from grader.results import EVIDENCE, RESULT, read_result_file

@@ -14,7 +14,7 @@ from grader.errors import ExitCode, GraderError
 from grader.judging.summary import overall_status, reached_pass_mark
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
-from grader.report.result_json import result_text
+from grader.report.files import result_text
 from grader.report.terminal import open_console, print_report
 from grader.rubric.model import Rubric
 

@@ -18,8 +18,8 @@ from grader.files import atomic_write
 from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
 from grader.portable import cores
-from grader.report.class_page.gather import salt_in
 from grader.report.class_page.page import write_class_page
+from grader.report.class_page.submissions import salt_in
 from grader.report.forms import FORMS, ReportInput
 from grader.report.sentences import missing_hidden
 from grader.report.terminal import open_console, print_report

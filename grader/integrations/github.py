@@ -14,9 +14,8 @@ from pathlib import Path
 
 from grader.errors import GraderError, OutputError
 from grader.integrations.ci_results import TITLES, Graded, Outcome, outcome_of_error, summarize
-from grader.report.annotations import EACH_MAX, github_annotation, render_annotations
 from grader.report.classroom import render_classroom
-from grader.report.findings import Severity
+from grader.report.findings import EACH_MAX, Severity, github_annotation, render_annotations
 from grader.report.text import line, markdown
 from grader.wording import number
 

@@ -1,16 +1,25 @@
-"""What was lost, at its place in the repository: what annotations, SARIF and Code Quality are made of."""
+"""What was lost, at its place in the repository, and the forms that are made of it.
+
+GitHub's annotations are commands to its runner, printed by a step of a workflow. GitLab's Code Quality report is for
+the widget and the diff of a merge request; SARIF 2.1.0 is for code scanning and for editors. Both say what was lost at
+a line of a file.
+"""
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import PurePosixPath
+from urllib.parse import quote
 
+from grader import __version__
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
-from grader.report.text import line, text_limit
+from grader.report.text import json_text, line, text_limit
 from grader.report.view import points_of
+from grader.wording import number
 
 LIMIT = 1000
 PLACES_MAX = 10
@@ -110,3 +119,141 @@ def repository_path(prefix: str, file: str) -> str:
 def _fingerprint(rubric_id: str, criterion_id: str, places: tuple[SourceLine, ...]) -> str:
     told = (rubric_id, criterion_id, places[0].path if places else "")
     return hashlib.sha256("\0".join(told).encode("utf-8", "backslashreplace")).hexdigest()
+
+
+EACH_MAX = 10
+"""So many of each kind GitHub shows of one step."""
+TEXT_CHARS = 1000
+_DATA = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A"})
+_PROPERTY = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A", ":": "%3A", ",": "%2C"})
+
+
+def render_annotations(result: GradingResult, prefix: str = "", *, each_max: int = EACH_MAX) -> str:
+    """Return a line each, the costliest first, `each_max` of each kind at most; the rest is counted in the log.
+
+    What has no line of a file is shown at the run itself. `prefix` is the package's folder in the repository.
+    """
+    found = findings(result, prefix)
+    return "".join(
+        f"{row}\n" for row in (*_not_graded(result), *_annotations(found, each_max), _last_row(result))
+    )
+
+
+def github_annotation(severity: Severity, title: str, message: str) -> str:
+    """Return a line of ours, at the run itself. The texts are made visible and bounded here."""
+    told = "\n".join(line(row, TEXT_CHARS) for row in message.split("\n"))
+    return _github_command(severity, {"title": line(title, TEXT_CHARS)}, told) + "\n"
+
+
+def _annotations(found: tuple[Finding, ...], each_max: int) -> Iterator[str]:
+    for severity in Severity:
+        alike = [finding for finding in found if finding.severity is severity]
+        for finding in alike[:each_max]:
+            message = "\n".join(text for text in (finding.message, finding.hint) if text)
+            yield _github_command(severity, _properties(finding), message)
+        if len(alike) > each_max:
+            yield f"and {len(alike) - each_max} more of these: they are in the report"
+
+
+def _properties(finding: Finding) -> dict[str, str]:
+    where = {"file": finding.places[0].path, "line": str(finding.places[0].line)} if finding.places else {}
+    return {**where, "title": finding.title}
+
+
+def _not_graded(result: GradingResult) -> Iterator[str]:
+    if result.error is not None:
+        text = "\n".join(line(part, TEXT_CHARS) for part in (result.error.message, result.error.hint) if part)
+        yield _github_command(Severity.ERROR, {"title": "It could not be graded"}, text)
+
+
+def _last_row(result: GradingResult) -> str:
+    if result.status == "error":
+        return "not graded"
+    open_ = ", not settled yet: something could not be judged" if result.status == "inconclusive" else ""
+    return f"{number(result.points)} of {number(result.max_points)} points{open_}"
+
+
+def _github_command(severity: Severity, properties: dict[str, str], message: str) -> str:
+    told = ",".join(f"{name}={value.translate(_PROPERTY)}" for name, value in properties.items())
+    return f"::{severity.value} {told}::{message.translate(_DATA)}"
+
+
+SEVERITIES = {Severity.ERROR: "major", Severity.WARNING: "minor", Severity.NOTICE: "info"}
+
+
+def render_code_quality(result: GradingResult, prefix: str = "") -> str:
+    """JSON, a list; empty where nothing was lost at a line. `prefix` is the package's folder in the repository."""
+    return json_text([_issue(finding) for finding in findings(result, prefix) if finding.places])
+
+
+def _issue(finding: Finding) -> dict[str, object]:
+    first = finding.places[0]
+    return {
+        "type": "issue",
+        "check_name": finding.criterion.id,
+        "description": finding.said,
+        "categories": ["Bug Risk"],
+        "severity": SEVERITIES[finding.severity],
+        "fingerprint": finding.fingerprint,
+        "location": {"path": first.path, "lines": {"begin": first.line}},
+    }
+
+
+SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+ROOT = "%SRCROOT%"
+FINGERPRINT = "criterionAndFile/v1"
+HELP_CHARS = 4000
+LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTICE: "note"}
+Docs = Mapping[str, Mapping[str, str]]
+"""Of each check by name the sections of its docstring, by their headings."""
+
+
+def render_sarif(result: GradingResult, prefix: str = "", *, docs: Docs | None = None) -> str:
+    """JSON, one run. `prefix` is the package's folder in the repository, `docs` what the rules' help is made of."""
+    found = [finding for finding in findings(result, prefix) if finding.places]
+    checks = list(dict.fromkeys(finding.criterion.check for finding in found))
+    driver = {
+        "name": "ros-lab-grader",
+        "version": __version__,
+        "rules": [_rule(check, (docs or {}).get(check, {})) for check in checks],
+    }
+    run = {
+        "tool": {"driver": driver},
+        "originalUriBaseIds": {ROOT: {"description": {"text": "the repository's root"}}},
+        "columnKind": "unicodeCodePoints",
+        "results": [_result(finding, checks.index(finding.criterion.check)) for finding in found],
+    }
+    return json_text({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]})
+
+
+def _rule(check: str, sections: Mapping[str, str]) -> dict[str, object]:
+    title = line(check, 200)
+    text = "\n\n".join(f"{heading}: {words}" for heading, words in sections.items() if words)
+    marked = "\n\n".join(f"**{heading}.** {words}" for heading, words in sections.items() if words)
+    helped = {"help": {"text": text[:HELP_CHARS], "markdown": marked[:HELP_CHARS]}} if text else {}
+    return {"id": title, "shortDescription": {"text": title}, **helped}
+
+
+def _result(finding: Finding, rule: int) -> dict[str, object]:
+    first, *others = finding.places
+    related = [{"id": i, **_location(place)} for i, place in enumerate(others, start=1)]
+    return {
+        "ruleId": line(finding.criterion.check, 200),
+        "ruleIndex": rule,
+        "level": LEVELS[finding.severity],
+        "message": {"text": _unlinked(finding.said)},
+        "locations": [_location(first)],
+        **({"relatedLocations": related} if related else {}),
+        "partialFingerprints": {FINGERPRINT: finding.fingerprint},
+        "properties": {"points": finding.criterion.points, "maxPoints": finding.criterion.max_points},
+    }
+
+
+def _location(place: SourceLine) -> dict[str, object]:
+    artifact = {"uri": quote(place.path), "uriBaseId": ROOT}
+    return {"physicalLocation": {"artifactLocation": artifact, "region": {"startLine": place.line}}}
+
+
+def _unlinked(text: str) -> str:
+    """SARIF's own links, `[text](target)`, are escaped; brackets that make none stay as they are."""
+    return text.replace("[", "\\[").replace("]", "\\]") if "](" in text else text

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
-from grader.report.result_json import result_text
+from grader.report.files import result_text
 from grader.report.sentences import points_line
 from grader.report.terminal import Terminal, emit, open_console, print_report
 from grader.report.text import line

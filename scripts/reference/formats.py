@@ -6,8 +6,7 @@ import json
 from collections.abc import Callable, Iterator
 
 from grader.evidence.events import PACKAGE_TOPIC, TOPICS
-from grader.report.file_formats import FORMATS, Format, schema_of
-from grader.report.file_formats.schemas import Schema, records_in
+from grader.report.file_formats import FORMATS, Format, Schema, records_in, schema_of
 
 INTRODUCTION = """# Formats
 

@@ -18,7 +18,7 @@ from grader.cli.doctor import Row
 from grader.cli.main import run
 from grader.errors import EvidenceError
 from grader.judging.summary import criteria_bytes
-from grader.report.result_json import result_bytes
+from grader.report.files import result_bytes
 from grader.ros_env import RosInstallation
 from grader.ros_packages import RosPackages
 from grader.rubric.find import rubric_ids

@@ -14,7 +14,7 @@ from grader.cli.main import run
 from grader.intake import safe_name
 from grader.model.publication import Sent
 from grader.model.result import GradingResult, Override
-from grader.report.result_json import result_bytes
+from grader.report.files import result_bytes
 from grader.rubric.load import load_rubric
 from tests.review.a_class import Who, a_class, result_of
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from grader.model.figure import Lane, TimelineFigure
 from grader.report.figures.timeline import LANES_MAX, STRETCHES_MAX, timeline_of
-from grader.report.html.timeline import EVENTS_MAX, timeline
+from grader.report.html.figures import EVENTS_MAX, timeline
 from tests.checks.examples import runs_of
 
 OWN = ["/grader_recorder_0a1b2c3d", "/rosout"]

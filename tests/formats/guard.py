@@ -6,8 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from grader.report.file_formats import Format
-from grader.report.file_formats.schemas import records_in
+from grader.report.file_formats import Format, records_in
 
 PROSE = {"description", "title", "default", "examples"}
 Schema = Mapping[str, Any]
@@ -37,7 +36,7 @@ def _record(record: str, old: Schema, new: Schema, listed: set[str], by: str) ->
         if key in required:
             yield f"{record}.{key} is new, and files of before lack it: give it a default"
         elif by == "grader" and f"{record}.{key}" not in listed:
-            yield f"{record}.{key} is new: list it among the additions (grader/report/file_formats/known.py)"
+            yield f"{record}.{key} is new: list it among the additions (grader/report/file_formats.py)"
     for key in before.keys() & after.keys():
         if key in required - set(old.get("required", ())):
             yield f"{record}.{key} has to be there now, and files of before may lack it"

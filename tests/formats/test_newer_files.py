@@ -18,7 +18,7 @@ from grader.evidence.reader import load_run
 from grader.evidence.writer import EvidenceWriter
 from grader.model import version
 from grader.model.result import FileCitation
-from grader.report.result_json import result_text
+from grader.report.files import result_text
 from tests.formats.kept import FOLDER, ROOT
 
 COURSE = FOLDER

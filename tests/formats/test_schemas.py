@@ -21,8 +21,7 @@ from grader.cli.main import run
 from grader.evidence.events import METADATA_NAME, PACKAGE_TOPIC, TOPICS
 from grader.evidence.reader import load_run
 from grader.model import version
-from grader.report.file_formats import FORMATS, Addition, schema_of
-from grader.report.file_formats.schemas import ROOTS, records_in
+from grader.report.file_formats import FORMATS, ROOTS, Addition, records_in, schema_of
 from grader.results import RESULT
 from scripts.reference.formats import METADATA, PAGE, SCHEMAS, format_pages
 from tests.formats.guard import copy_of, faults

@@ -15,7 +15,7 @@ from grader.classes.gradebook.table import header
 from grader.cli.main import run
 from grader.cli.parser import build_parser
 from grader.model.batch import BatchRun, RosterFault
-from grader.report.result_json import result_bytes
+from grader.report.files import result_bytes
 from tests.gradebook.made import BOOK, row
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "gradebooks.md"

@@ -31,10 +31,9 @@ from grader.model.result import (
     SubmissionInfo,
 )
 from grader.model.verdict import EvidenceCitation, FileCitation, Status
-from grader.report.files import write_reports
+from grader.report.files import result_bytes, result_text, write_reports
 from grader.report.junit import render_junit
 from grader.report.markdown import render_markdown
-from grader.report.result_json import result_bytes, result_text
 from grader.report.terminal import open_console, print_report
 from grader.report.text import line
 from tests.report.hostile import result, rubric

@@ -11,8 +11,7 @@ from grader.errors import HostError, OutputError
 from grader.files import atomic_write, check_writable
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
-from grader.report.files import write_reports
-from grader.report.result_json import result_bytes
+from grader.report.files import result_bytes, write_reports
 from grader.report.view import arrange, without_hidden
 from tests.report.hostile import result, rubric
 from tests.support.a_class import criterion

@@ -17,8 +17,8 @@ from grader.classes.gradebook import Book, Row, write_gradebook
 from grader.classes.gradebook.table import Form
 from grader.model.batch import Entry
 from grader.model.result import GradingResult
+from grader.report.files import result_bytes
 from grader.report.forms import FORMS, ReportInput
-from grader.report.result_json import result_bytes
 from grader.report.terminal import open_console, print_report
 from grader.report.view import without_hidden
 from tests.report.hostile import ESCAPES

@@ -8,9 +8,9 @@ import json
 from lxml import etree
 
 from grader.model.result import Note
+from grader.report.files import result_bytes
 from grader.report.junit import render_junit
 from grader.report.markdown import render_markdown
-from grader.report.result_json import result_bytes
 from grader.report.terminal import open_console, print_report
 from tests.report.hostile import result, rubric
 

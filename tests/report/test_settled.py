@@ -11,9 +11,9 @@ from lxml import etree
 
 from grader.model.result import AppliedOverride, Automatic, ErrorInfo, GradingResult, HandedIn, Lateness
 from grader.model.verdict import Status
+from grader.report.files import result_bytes
 from grader.report.junit import render_junit
 from grader.report.markdown import render_markdown
-from grader.report.result_json import result_bytes
 from grader.report.sentences import late_words
 from grader.report.terminal import open_console, print_report
 from tests.report.hostile import result, rubric

@@ -15,9 +15,9 @@ from grader.classes.batch.judge_many import fitting_runs
 from grader.errors import EvidenceError
 from grader.judging import judge
 from grader.model.verdict import Status
+from grader.report.files import result_bytes
 from grader.report.html.page import render_html
 from grader.report.markdown import render_markdown
-from grader.report.result_json import result_bytes
 from grader.report.sentences import made_up_words
 from grader.report.terminal import render_terminal
 from grader.report.view import for_student

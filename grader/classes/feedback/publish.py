@@ -29,8 +29,8 @@ from grader.model.publication import Publication
 from grader.model.result import AppliedOverride, GradingResult
 from grader.model.version import PUBLISHED as FORMAT
 from grader.model.version import UPDATE
+from grader.report.files import result_bytes
 from grader.report.forms import FORMS, ReportInput
-from grader.report.result_json import result_bytes
 from grader.report.view import for_student, is_students_fault, not_graded
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric

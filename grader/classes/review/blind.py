@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from grader.model.batch import Entry
 from grader.model.record import Record
 from grader.model.result import GradingResult, SubmissionInfo
-from grader.report.class_page.gather import LEFT_OUT, WORDS, order, words_in
+from grader.report.class_page.submissions import LEFT_OUT, WORDS, order, words_in
 
 HASH_CHARS = (7, 8, 10, 12)
 KEPT = frozenset(

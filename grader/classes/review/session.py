@@ -33,7 +33,7 @@ from grader.errors import Busy, GraderError, RubricError, UsageError
 from grader.files import unwritable
 from grader.model.batch import Entry, State
 from grader.model.result import BankComment, GradingResult, Override, WrittenOverride
-from grader.report.class_page.gather import salt_in, words_in
+from grader.report.class_page.submissions import salt_in, words_in
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric, load_rubric, read_beside_rubric
 

@@ -15,7 +15,7 @@ from grader.intake import safe_name
 from grader.model.batch import MISSING, ROSTER, Entry
 from grader.model.result import GradingResult, Override
 from grader.model.verdict import Status
-from grader.report.class_page.gather import reduced
+from grader.report.class_page.submissions import reduced
 from grader.results import RESULT
 from grader.untrusted_text import line
 

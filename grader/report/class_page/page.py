@@ -18,8 +18,6 @@ from markupsafe import Markup
 from grader.files import atomic_write
 from grader.model.batch import BatchRun, CriterionInfo, Entry
 from grader.model.result import GradingResult
-from grader.report.class_page.gather import SALT_BYTES, Diagnosis, Gathered, gather, gather_anonymous
-from grader.report.class_page.lines import CHARS, LETTERS, REPORT, Line, link_to
 from grader.report.class_page.statistics import (
     Cost,
     HeatMap,
@@ -30,6 +28,18 @@ from grader.report.class_page.statistics import (
     span,
     spread,
     timing,
+)
+from grader.report.class_page.submissions import (
+    CHARS,
+    LETTERS,
+    REPORT,
+    SALT_BYTES,
+    Diagnosis,
+    Gathered,
+    Line,
+    gather,
+    gather_anonymous,
+    link_to,
 )
 from grader.report.class_page.todo import todos
 from grader.report.html.shell import environment, policy, script, style

@@ -10,7 +10,7 @@ from statistics import fmean, median
 from markupsafe import Markup
 
 from grader.model.batch import BatchRun, CriterionInfo
-from grader.report.class_page.lines import LETTERS, LOST, Line
+from grader.report.class_page.submissions import LETTERS, LOST_LETTERS, Line
 from grader.report.html import svg
 from grader.wording import number
 
@@ -245,7 +245,7 @@ def heat_map(lines: Sequence[Line], criteria: Sequence[CriterionInfo]) -> HeatMa
         return None
     columns = _columns(order)
     step = max(NARROW, WIDE // len(columns))
-    lost = [sum(lines[p].letters[place] in LOST for p in order) for place in range(len(criteria))]
+    lost = [sum(lines[p].letters[place] in LOST_LETTERS for p in order) for place in range(len(criteria))]
     places = sorted(range(len(criteria)), key=lambda place: lost[place])
     rows = [
         svg.element("g", *_cells(lines, place, columns, step), transform=f"translate(0 {i * ROW})")
@@ -277,7 +277,7 @@ def _cells(lines: Sequence[Line], row: int, columns: Sequence[Sequence[int]], st
 
 def _shade(letters: Sequence[str]) -> str:
     """`q0` where no one lost anything, to `q5` where all did."""
-    lost = sum(letter in LOST for letter in letters)
+    lost = sum(letter in LOST_LETTERS for letter in letters)
     return f"q{-(-5 * lost // len(letters))}"
 
 

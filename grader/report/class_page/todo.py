@@ -10,7 +10,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from grader.model.batch import BatchRun
-from grader.report.class_page.lines import CHARS, MESSAGE_CHARS, Line, link_to
+from grader.report.class_page.submissions import CHARS, MESSAGE_CHARS, Line, link_to
 from grader.report.text import html
 from grader.untrusted_text import line
 

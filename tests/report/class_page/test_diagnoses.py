@@ -6,7 +6,7 @@ import pytest
 
 from grader.model.result import GradingResult
 from grader.model.verdict import Status
-from grader.report.class_page.gather import WORDINGS_MAX, Diagnoses, reduced
+from grader.report.class_page.submissions import WORDINGS_MAX, Diagnoses, reduced
 from tests.report.class_page.made_up import made_up_rows
 
 

@@ -17,8 +17,8 @@ from grader.errors import OutputError
 from grader.model.batch import Entry, RosterFault
 from grader.model.result import AppliedOverride, Automatic, GradingResult
 from grader.model.verdict import Status
-from grader.report.class_page.gather import pseudonyms, salt_in
 from grader.report.class_page.page import write_class_page
+from grader.report.class_page.submissions import pseudonyms, salt_in
 from tests.report.class_page.made_up import FAULTS, made_up_rows, made_up_run
 
 
