@@ -70,7 +70,9 @@ def record(load: Load, path: Path) -> tuple[Taken, int]:
     """The load through an `ArenaSession` into the evidence at `path`; with what its times are ahead of monotonic time
     (ns)."""
     with make_place({SCRIPT: PUBLISHER.read_text()}, limits=WIDE) as place:
-        specs = list(process_specs(Start(name="load", script=SCRIPT, args=(load.argument,)), place))
+        specs = list(
+            process_specs(Start(name="load", script=SCRIPT, args=(load.argument,)), place, iter((1,)))
+        )
         return asyncio.run(_record(load, specs, place, path))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -73,6 +73,15 @@ def graded(jobs: Sequence[Job], most: int) -> Iterator[Grading]:
 
 def verdicts_of(criteria: Sequence[CriterionResult]) -> Verdicts:
     return {criterion.id: (criterion.status, criterion.points) for criterion in criteria}
+
+
+def uncounted(all_s: float, wall_s: float, results: Iterable[GradingResult]) -> Iterator[str]:
+    """Yield why `all_s` cannot be the CPU seconds of all that was run: each grading tells what it knows of itself."""
+    told_s = sum(result.timing.cpu_s + result.timing.student_cpu_s for result in results)
+    if all_s < told_s:
+        yield f"{all_s:.1f} s of CPU were counted, and the gradings themselves tell of {told_s:.1f} s"
+    if all_s > wall_s * cores():
+        yield f"{all_s:.1f} s of CPU were counted, more than {cores()} cores have in {wall_s:.1f} s"
 
 
 def build_cpu_s(evidence: Path) -> float:

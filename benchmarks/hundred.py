@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ from benchmarks.gradings import (
     folder_for,
     graded,
     in_flight,
+    uncounted,
     verdicts_of,
 )
 from benchmarks.machine import Meter
@@ -35,6 +36,7 @@ class Batch(NamedTuple):
     build_cpu_s: float
     again: int
     inconclusive: int
+    others: int
     faults: tuple[str, ...]
 
     @property
@@ -70,11 +72,11 @@ def _batch(out: Path, count: int, side_by_side: int, alone: dict[str, GradingRes
     ]
     meter = Meter()
     gradings = list(graded(jobs, side_by_side))
-    wall_s, all_s = meter.wall_s(), meter.own_cpu_s() + meter.children_cpu_s()
+    wall_s, all_s = meter.wall_s(), meter.all_cpu_s()
     results = {one.name: one.result for one in gradings}
     others_s = sum(result.timing.student_cpu_s for result in results.values())
     build_s = sum(build_cpu_s(out / name / "evidence") for name in results)
-    differing = [_differing(name, result, alone[name[4:]]) for name, result in sorted(results.items())]
+    differing = {name: [*_differing(name, one, alone[name[4:]])] for name, one in sorted(results.items())}
     return Batch(
         wall_s=wall_s,
         own_cpu_s=all_s - others_s,
@@ -82,7 +84,8 @@ def _batch(out: Path, count: int, side_by_side: int, alone: dict[str, GradingRes
         build_cpu_s=build_s,
         again=sum(one.again for one in gradings),
         inconclusive=sum(_is_inconclusive(result) for result in results.values()),
-        faults=tuple(fault for faults in differing for fault in faults),
+        others=sum(map(bool, differing.values())),
+        faults=(*chain.from_iterable(differing.values()), *uncounted(all_s, wall_s, results.values())),
     )
 
 
@@ -121,12 +124,8 @@ def _table(batches: list[Batch], count: int, wall_alone_s: float) -> str:
             Row("CPU of the students' processes", "s", [b.student_cpu_s for b in batches], "", 1),
             Row("CPU of the builds", "s", [b.build_cpu_s for b in batches], "", 1),
             Row("the grader's own CPU / processes and builds", "", [b.ratio for b in batches], "at most 0.6"),
-            Row("submissions with other verdicts than alone", "", [_others(b) for b in batches], "0", 0),
+            Row("submissions with other verdicts than alone", "", [b.others for b in batches], "0", 0),
             Row("runs made again", "", [b.again for b in batches], "", 0),
             Row("submissions left inconclusive", "", [b.inconclusive for b in batches], "", 0),
         ]
     )
-
-
-def _others(batch: Batch) -> int:
-    return len(Counter(fault.partition(",")[0] for fault in batch.faults))

@@ -361,9 +361,10 @@ def _wait_for_job(descriptor: int, limits: WorkerLimits | None) -> None:
 
 
 def _stop(_number: int, _frame: FrameType | None) -> None:
+    """Leave as every Python does, so that what the jobs shared (an arena's template) is ended, and waited for."""
+    if _State.stopped and not _State.busy:
+        return  # it is leaving already
     _State.stopped = True
-    if not _State.busy:
-        os._exit(130)
     raise KeyboardInterrupt
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
 import pickle
@@ -157,6 +158,17 @@ def test_an_answer_without_end_is_not_read(worker: Worker, monkeypatch) -> None:
 
 def say_much(count: int) -> str:
     return "a" * count
+
+
+def mark_at_exit(path: str) -> None:
+    atexit.register(Path(path).touch)
+
+
+def test_a_worker_that_is_closed_leaves_as_every_python_does(worker: Worker, tmp_path: Path) -> None:
+    """What jobs share, such as an arena's template, is ended at exit, and its CPU time counts as the worker's."""
+    worker.run(mark_at_exit, str(tmp_path / "mark"))
+    worker.close()
+    assert (tmp_path / "mark").exists()
 
 
 @pytest.mark.full
