@@ -52,8 +52,7 @@ from grader.recording import (
 from grader.report.files import write_reports
 from grader.report.view import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
-from grader.rubric.load import LoadedRubric, files_of, needs_package
-from grader.rubric.origin import origin_of
+from grader.rubric.load import LoadedRubric, files_of, needs_package, origin_of
 
 if TYPE_CHECKING:
     from grader.arena.static_recorder import Recording

@@ -26,10 +26,9 @@ from grader.model.submission import Submission
 from grader.model.verdict import Status
 from grader.package import read_packages
 from grader.ros_packages import look_for
-from grader.rubric.load import LoadedRubric, needs_ros, started
+from grader.rubric.load import LoadedRubric, needs_ros, rates_of, select_started, watched_of
 from grader.rubric.made_up import KEY
 from grader.rubric.model import Rubric
-from grader.rubric.rates import rates_of, watched_of
 from grader.wording import join_words
 
 if TYPE_CHECKING:
@@ -86,7 +85,7 @@ def make_recorder(
 
     make_folder(job.evidence)
     rubric, options = job.rubric.rubric, job.options
-    scenarios = started(rubric, only)
+    scenarios = select_started(rubric, only)
     reason = STATIC_ONLY if options.static_only or not needs_ros(job.rubric) else why_unrun()
     if reason:
         return StaticRecorder(

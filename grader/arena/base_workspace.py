@@ -1,19 +1,25 @@
-"""The base workspace: what CMake learns of the machine in a workspace without packages, learnt once and kept.
+"""Workspaces that are built once in a sandbox and kept: the base workspace, and that of a rubric's own packages.
 
-Every build unpacks it in its own memory before `catkin_make` runs, as if that had run there once before. It is kept in
-a folder of the user's that no other user can write (`~/.cache/grader`) and no sandbox shows. Whatever is wrong with it,
-or with a file in it, costs time and nothing else.
+The base workspace has what CMake learns of the machine in a workspace without packages. Every build unpacks it in its
+own memory before `catkin_make` runs, as if that had run there once before. The packages that a rubric brings along lie
+in a workspace of their own below the student's, as an overlay has it: the student's `find_package`, imports and launch
+files find them, and so do the grader's programs.
+
+Both are kept in a folder of the user's that no other user can write (`~/.cache/grader`) and no sandbox shows. Whatever
+is wrong with the base workspace, or with a file in it, costs time and nothing else.
 """
 
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import platform
 import shutil
 import stat
-from collections.abc import Iterator
+import tarfile
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -23,16 +29,17 @@ from grader import __version__
 from grader.arena.asynchronous import run_until_signal
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import BASE, ProcessEnvironment
-from grader.arena.sandbox import temporary_base
-from grader.arena.sandbox_files import ANSWERS, INSIDE_WORKSPACE, QUESTIONS, prepare
+from grader.arena.sandbox import Word, copy_of, scratch, temporary_base
+from grader.arena.sandbox_files import ANSWERS, COURSE, INSIDE_WORKSPACE, QUESTIONS, SOURCES, prepare
 from grader.arena.sandbox_probe import choose
 from grader.arena.session import ArenaSession
-from grader.arena.workspace import Workspace, read_member
+from grader.arena.workspace import Workspace, give_to, read_member
 from grader.errors import ArenaError, GraderError
 from grader.evidence.writer import EvidenceWriter
 from grader.files import atomic_write, open_untrusted, temporary_folder
 from grader.model.sandbox_mode import SandboxMode
 from grader.ros_env import find_ros
+from grader.rubric.course_packages import SCRIPT, folder_files
 
 NAME = "base workspace"
 MAKE_S = 60.0
@@ -41,7 +48,7 @@ ASK = "".join(
     f"answer=$({question} 2>/dev/null) && echo \"$answer\" >'{ANSWERS}/{question}'; "
     for question in QUESTIONS
 )
-SCRIPT = (
+BASE_SCRIPT = (
     f'mkdir -p {INSIDE_WORKSPACE}/src && cd "$HOME" && "$@" >/dev/null 2>&1 && cd {INSIDE_WORKSPACE}'
     f" && mkdir {ANSWERS} && shopt -s nullglob || exit 1; {ASK}"
     f"exec tar -cf - {ANSWERS} build/CMakeCache.txt build/CMakeFiles/{{*.log,*/CMake*.cmake}} >&{{collect}}"
@@ -107,7 +114,7 @@ def has_base(place: ProcessEnvironment) -> bool:
 
 def base_spec(place: ProcessEnvironment) -> dict[str, Any]:
     """Return the process that makes one: in a sandbox as the build's, with nothing of a submission's in it."""
-    argv = ["/bin/bash", "-c", SCRIPT, "bash", *catkin_make(place)]
+    argv = ["/bin/bash", "-c", BASE_SCRIPT, "bash", *catkin_make(place)]
     bare = replace(place, env={}, sees_course=False)
     return bare.spec(NAME, argv, role="grader", copy=False, as_handed_in=True, collect=BASE)
 
@@ -238,3 +245,117 @@ def _checked(data: bytes) -> bytes | None:
 
 def _sum(data: bytes) -> bytes:
     return hashlib.sha256(data).digest()
+
+
+COURSE_NAME = "course packages"
+ARCHIVE = "course.tar"
+BUILD_S = 300.0
+BUILT_BYTES_MAX = 64 << 20
+BUILT_FILES = 20_000
+LINES_MAX = 3
+MAKE = f'mkdir -p {COURSE}/src && cp -R {SOURCES}/. {COURSE}/src/ && cd "$HOME" && "$@"'
+BUILD = f"{MAKE} && tar -cf - -C {COURSE} devel >&{{collect}}"
+
+
+def copy_course(beside: Path, packages: Collection[str], folder: Path) -> None:
+    """Copy the packages from the rubric's folder into `folder`/src; scripts are executable there.
+
+    Raises ArenaError where they cannot be read any more.
+    """
+    for name in packages:
+        try:
+            files = folder_files(beside, name)
+        except (OSError, ValueError) as error:
+            raise ArenaError(f"the lab's package {name} cannot be read: {error}") from error
+        for path, data in files.items():
+            target = folder / "src" / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(data)
+            target.chmod(0o755 if data.startswith(SCRIPT) else 0o644)
+
+
+async def provide_course(place: ProcessEnvironment) -> None:
+    """Have the course's packages built, from the cache if they are there. Raises ArenaError where they do not build."""
+    if not place.course.is_dir():
+        return
+    name = f"course-{_digest(place)}.tar"
+    built = read_kept(name, BUILT_BYTES_MAX) if place.sandbox.bubblewrap else None
+    if built is None:
+        built = await _build(place)
+        if built:
+            keep(name, built)
+    if built:
+        with tarfile.open(fileobj=io.BytesIO(built)) as archive:
+            archive.extractall(place.course, filter="data")
+
+
+def _digest(place: ProcessEnvironment) -> str:
+    digest = hashlib.sha256(machine_digest(place).encode())
+    sources = place.course / "src"
+    for path in sorted(sources.rglob("*")):
+        if path.is_file():
+            digest.update(
+                f"{path.relative_to(sources)}\0{hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode()
+            )
+    return digest.hexdigest()[:32]
+
+
+async def _build(place: ProcessEnvironment) -> bytes:
+    """Return the archive of `devel/`; without a sandbox it is built in place, and nothing is returned."""
+    path, boxed = place.folder / "course.mcap", place.sandbox.bubblewrap
+    if not boxed:
+        give_to(place.course, place.sandbox.uid)
+    with EvidenceWriter(path, scenario="course", clock="real", warp=1.0, metadata={}) as writer:
+        async with ArenaSession(place, writer, master=False) as arena:
+            arena.start(_spec(place))
+            ended = await arena.wait(lambda: COURSE_NAME in arena.exit_codes, BUILD_S)
+            if not ended:
+                await arena.interrupt(COURSE_NAME, int_s=2.0, term_s=1.0)
+            await arena.finish()
+    if not ended or arena.exit_codes.get(COURSE_NAME) != 0:
+        raise ArenaError(
+            f"the lab's own packages do not build: {_last_words(path) or 'catkin_make failed'}",
+            hint="it is the course's to fix: catkin_make shows the same on the folders of the rubric's `packages`",
+        )
+    if not boxed and place.sandbox.uid is not None:
+        give_to(place.course, os.geteuid())
+    archive = place.workspace.kept / ARCHIVE
+    return archive.read_bytes() if boxed and archive.is_file() else b""
+
+
+def _spec(place: ProcessEnvironment) -> dict[str, Any]:
+    boxed = place.sandbox.bubblewrap
+    sources = place.course / "src"
+    binds: list[Word] = [
+        "--ro-bind",
+        copy_of(sources),
+        SOURCES,
+        "--bind",
+        scratch(4 * BUILT_BYTES_MAX, BUILT_FILES),
+        COURSE,
+    ]
+    make = [
+        "catkin_make", "-C", COURSE if boxed else str(place.course), "-j2", "--no-color", "--cmake-args",
+        f"-DPYTHON_EXECUTABLE={place.ros.python}",
+    ]  # fmt: skip
+    argv = ["/bin/bash", "-c", BUILD, "bash", *make] if boxed else make
+    bare = replace(place, env={}, sees_course=False)
+    return bare.spec(
+        COURSE_NAME,
+        argv,
+        role="grader",
+        copy=False,
+        as_handed_in=True,
+        collect=ARCHIVE if boxed else None,
+        collect_bytes=BUILT_BYTES_MAX,
+        binds=binds if boxed else (),
+    )
+
+
+def _last_words(path: Path) -> str:
+    """Return what the build printed last about an error."""
+    from grader.evidence.reader import load_run  # noqa: PLC0415 - only where something is wrong
+
+    lines = [line.line.strip() for _, line in load_run(path).console]
+    errors = [line for line in lines if "rror" in line]
+    return "; ".join((errors or lines)[:LINES_MAX])

@@ -111,7 +111,7 @@ class ProcessEnvironment:
 
     @property
     def course(self) -> Path:
-        """The workspace of the packages that the rubric brings along (`course_workspace.py`), if it does."""
+        """The workspace of the packages that the rubric brings along (`base_workspace.py`), if it does."""
         return self.folder / "course"
 
     @property

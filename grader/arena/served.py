@@ -1,6 +1,10 @@
-"""The services that the grader offers in a run: their types, their answers as bytes, and what they were asked.
+"""The services and actions that the grader offers in a run: their types, their answers as bytes, and what they were
+asked.
 
-The arena answers by itself (`ros/services.py`) and says what came: each request becomes an event of `/grader/actor`.
+The arena answers services by itself (`ros/services.py`) and says what came: each request becomes an event of
+`/grader/actor`. The server of an action is played from here (wiki.ros.org/actionlib/DetailedDescription). The recorder
+takes goals and cancelling as it takes all that students publish; feedback, status and result go out over the arena's
+own node, one goal after the other.
 """
 
 from __future__ import annotations
@@ -10,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 from grader.arena.session import ArenaSession
 from grader.errors import ArenaError
-from grader.evidence.events import MISFIT, OTHER_TYPE, ActorEvent
-from grader.model.definition import other_fields
+from grader.evidence.events import GOAL_STATUS, MISFIT, OTHER_TYPE, ActorEvent
+from grader.model.interfaces import other_fields
 from grader.rubric.model import Served
 
 if TYPE_CHECKING:
-    from grader.evidence.message_values import ServiceTypes
+    from grader.evidence.message_values import MessageType, ServiceTypes
+
 
 FAILS = "the service cannot do it"
 """What a client of one that `fails` is told."""
@@ -93,3 +98,105 @@ class ServedServices:
             return self._find(type_).md5sum == md5sum
         except ValueError:
             return False
+
+
+ACTIVE, PREEMPTED = 1, 2
+ENDS = {"succeeded": 3, "aborted": 4}
+"""By number (actionlib_msgs/GoalStatus)."""
+STATUS, CANCEL = "actionlib_msgs/GoalStatusArray", "actionlib_msgs/GoalID"
+GOALS_MAX, RUN_S_MAX = 1000, 3600.0
+SENT = ("status", "feedback", "result")
+
+
+class ServedAction:
+    """Plays one action's server."""
+
+    def __init__(self, served: Served, arena: ArenaSession) -> None:
+        self._served = served
+        self._arena = arena
+        self._types: dict[str, MessageType] = {}
+        self._goals = arena.watch(f"{served.name}/goal")
+        self._cancels = arena.watch(f"{served.name}/cancel")
+
+    def offer(self) -> None:
+        """Advertise its topics, before anything is started."""
+        one, place = self._served, self._arena.place
+        try:
+            self._types = self._find()
+            for feedback in one.feedback:
+                self._encode("feedback", {"feedback": feedback})
+            self._encode("result", {"result": one.result})
+        except ValueError as error:
+            if not place.is_own(one.type):
+                raise ArenaError(
+                    f"the grader cannot offer {one.name}: {error}", hint="grader doctor"
+                ) from error
+            about = {"topic": one.name, "type": one.type}
+            self._arena.note(ActorEvent(action="note", actor="grader", **about, detail=f"{MISFIT}{error}"))
+            self._types = {}
+            return
+        for name in SENT:
+            kind = self._types[name]
+            fields = {"type": kind.type, "md5sum": kind.md5sum, "definition": kind.definition}
+            topic = {"topic": f"{one.name}/{name}", "latching": name == "status"}
+            self._arena.send(do="advertise", fields={**fields, **topic}, of_server=True)
+        self._send("status", {"status_list": []})
+
+    def _find(self) -> dict[str, MessageType]:
+        from grader.evidence.message_values import MessageType, action_texts  # noqa: PLC0415 - numpy, which not every run needs
+
+        type_, place = self._served.type, self._arena.place
+        text = place.type_text(type_, "action")
+        texts = {} if text is None else action_texts(type_, text)
+
+        def find_text(name: str) -> str | None:
+            return texts.get(name) or place.type_text(name, "msg")
+
+        own = {part: f"{type_}Action{part.title()}" for part in ("goal", "feedback", "result")}
+        return {n: MessageType(t, find_text) for n, t in {**own, "status": STATUS, "cancel": CANCEL}.items()}
+
+    async def serve(self) -> None:
+        """Take goals, one after the other, until the run ends."""
+        for _ in range(GOALS_MAX if self._types else 0):
+            if not await self._arena.wait(lambda: bool(self._goals), RUN_S_MAX):
+                return
+            goal = self._types["goal"].decode(self._goals.popleft())
+            if goal is not None:
+                await self._pursue(goal["goal_id"], goal["goal"])
+
+    async def _pursue(self, goal_id: dict[str, Any], goal: dict[str, Any]) -> None:
+        """Report on the goal, end it, and note it."""
+        one, began_ns = self._served, self._arena.now_ns()
+        status = {"goal_id": goal_id, "status": ACTIVE}
+        self._send("status", {"status_list": [status]})
+        cancelled = False
+        for feedback in (*one.feedback, None):
+            await self._arena.wait(lambda: self._is_cancelled(goal_id["id"]), one.delay_s)
+            cancelled = self._is_cancelled(goal_id["id"])
+            if cancelled or feedback is None:
+                break
+            self._send("feedback", {"status": status, "feedback": feedback})
+        number = PREEMPTED if cancelled else ENDS[one.ends]
+        end = {"goal_id": goal_id, "status": number}
+        value = {"request": goal, "response": one.result}
+        about = {"topic": one.name, "type": one.type, "value": value, "detail": GOAL_STATUS[number]}
+        node = self._arena.last_from[f"{one.name}/goal"]
+        self._arena.note(ActorEvent(action="serve", actor=node, **about), began_ns)
+        self._send("status", {"status_list": [end]})
+        self._send("result", {"status": end, "result": one.result})
+        self._cancels.clear()
+
+    def _is_cancelled(self, goal: str) -> bool:
+        """A cancelling without an id is for all goals."""
+        asked = (self._types["cancel"].decode(data) for data in self._cancels)
+        return any(one and one["id"] in {"", goal} for one in asked)
+
+    def _encode(self, name: str, value: dict[str, Any]) -> bytes:
+        from grader.evidence.message_values import Moment  # noqa: PLC0415 - as above
+
+        moment = Moment(0, 1, self._arena.ros_now_ns())
+        return self._types[name].encode({"header": {"stamp": "now"}, **value}, moment)
+
+    def _send(self, name: str, value: dict[str, Any]) -> None:
+        data = base64.b64encode(self._encode(name, value)).decode()
+        self._arena.send(do="publish", topic=f"{self._served.name}/{name}", data=data, record=None)

@@ -21,12 +21,11 @@ from typing_extensions import Self
 from grader.arena.function_calls import call_functions
 from grader.arena.run_state import is_settled
 from grader.arena.scenario_inputs import make_shots
-from grader.arena.served import ServedServices
-from grader.arena.served_actions import ServedAction
+from grader.arena.served import ServedAction, ServedServices
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
 from grader.evidence.events import GOAL_STATUS, MISFIT, ActorEvent
-from grader.model.definition import other_fields
+from grader.model.interfaces import other_fields
 from grader.rubric.model import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
 

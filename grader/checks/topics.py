@@ -10,7 +10,7 @@ from grader.checks.support.nodes import GlobalName, PublishedTopic, TypeName, pl
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import cite, no_message, no_node, nodes_on, published_topics
 from grader.evidence.run import Channel, Run
-from grader.model.definition import other_fields
+from grader.model.interfaces import other_fields
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, Verdict, failed, inconclusive, passed

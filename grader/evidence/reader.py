@@ -66,7 +66,7 @@ def load_run(source: Path | BinaryIO, budget: MemoryBudget | None = None) -> Run
 
             return load_bag(source, budget)
         if head == SQLITE_MAGIC:
-            from grader.evidence.rosbag2 import load_rosbag2  # noqa: PLC0415 - few submissions hold one
+            from grader.evidence.ros2 import load_rosbag2  # noqa: PLC0415 - few submissions hold one
 
             return load_rosbag2(source, budget)
         return _load(source.name, file, budget, shown=str(source))

@@ -8,9 +8,9 @@ from typing import Any, cast
 
 from grader.checks import CHECKS, Check
 from grader.evidence.run import Run
+from grader.judging.annotate import tell_unchanged
 from grader.judging.facts import NOT_RUN, PACKAGE_RUN, Facts, views_of
 from grader.judging.judge import Requirements, result_of, verdict_of
-from grader.judging.starter import tell_unchanged
 from grader.model.package import PackageFacts
 from grader.model.result import EarlyVerdict
 from grader.rubric.model import Rubric

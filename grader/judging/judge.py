@@ -18,10 +18,8 @@ from grader.checks.support.text import texts_in
 from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
-from grader.judging.advice import add_advice
-from grader.judging.cited_lines import show_lines
+from grader.judging.annotate import add_advice, said_for_node, show_lines, tell_unchanged
 from grader.judging.facts import PACKAGE_RUN, Facts, try_facts
-from grader.judging.languages import said_for_node
 from grader.judging.other_runs import (
     judged_on_copy,
     needs_build,
@@ -30,7 +28,6 @@ from grader.judging.other_runs import (
     split_runs,
     was_built,
 )
-from grader.judging.starter import tell_unchanged
 from grader.judging.summary import leave_out, round_half_up
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive

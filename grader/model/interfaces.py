@@ -1,4 +1,4 @@
-"""Definitions of messages, services and actions (`.msg`, `.srv`, `.action`), line by line."""
+"""Definitions of messages, services and actions (`.msg`, `.srv`, `.action`), line by line, and how two differ."""
 
 from __future__ import annotations
 
@@ -11,6 +11,10 @@ from grader.model.package import Fault, Interface, InterfaceField
 FIELDS_MAX = 500
 PARTS = {".msg": ("",), ".srv": ("request", "response"), ".action": ("goal", "result", "feedback")}
 """What a file is divided into by `---`, by its ending."""
+DIVIDER = re.compile(r"^---\s*$", re.MULTILINE)
+RULE = "=" * 80
+"""Before the types that a full definition brings along, behind its own."""
+FULL_NAMES = {"byte": "int8", "char": "uint8", "Header": "std_msgs/Header"}
 _TYPE = r"(?P<type>[A-Za-z]\w*(?:/[A-Za-z]\w*)?(?:\[\d{0,9}\])?)"
 _FIELD = re.compile(rf"{_TYPE}\s+(?P<name>[A-Za-z]\w*)", re.ASCII)
 _CONSTANT = re.compile(rf"{_TYPE}\s+(?P<name>[A-Za-z]\w*)\s*=\s*(?P<value>.*)", re.ASCII)
@@ -66,3 +70,34 @@ def _other_parts(path: str, number: int, parts: tuple[str, ...]) -> Fault:
     if parts[1:]:
         message += f" between {', '.join(parts[:-1])} and {parts[-1]}"
     return Fault(file=path, line=None, kind="OtherParts", message=message, cause=message)
+
+
+def other_fields(type_: str, found: str, wanted: str) -> str:
+    """Return how the fields of a `.msg` or `.srv` text differ from those that are wanted: names, types, order.
+
+    Nothing where they are the same; constants and comments do not count.
+    """
+    there, asked = (
+        [_own_fields(type_, part) for part in DIVIDER.split(text.partition(RULE)[0])]
+        for text in (found, wanted)
+    )
+    if len(there) != len(asked):
+        return f"it has {len(there)} parts with a line --- between them, not {len(asked)}"
+    names = ("its request", "its response") if len(asked) > 1 else ("it",)
+    for name, own, other in zip(names, there, asked, strict=False):
+        if own != other:
+            has, asks = (", ".join(fields) or "no fields" for fields in (own, other))
+            return f"{name} has {has}; the handout asks for {asks}"
+    return ""
+
+
+def _own_fields(type_: str, text: str) -> list[str]:
+    """Return `type name` of each field, types in full."""
+    package, found = type_.partition("/")[0], []
+    for line in text.splitlines():
+        field = _parse_line(line, "", 0)
+        if field is not None and field.value is None:  # a constant has a value
+            kind, bracket, length = field.type.partition("[")
+            full = FULL_NAMES.get(kind, kind.removeprefix(f"{package}/"))
+            found.append(f"{full}{bracket}{length} {field.name}")
+    return found

@@ -5,11 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
-from grader.checks import Check
+from grader.checks import CHECKS, Check
 from grader.errors import RubricError, UsageError
+from grader.model.message_rate import RateBounds
 from grader.model.record import Record
 from grader.model.result import RubricOrigin
 from grader.model.version import RUBRIC, UPDATE, Versioned
@@ -18,8 +20,7 @@ from grader.rubric.course import load_course, split_name
 from grader.rubric.faults import model_faults
 from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics_folder
 from grader.rubric.instructor import Beside, known_checks, read_instructor, run_checks_file
-from grader.rubric.made_up import draw_values, with_values
-from grader.rubric.made_up_faults import made_up_faults, of_sample, sample_data
+from grader.rubric.made_up import draw_values, made_up_faults, of_sample, sample_data, with_values
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.source import Source, Value, as_map, read_source
 
@@ -241,7 +242,7 @@ def _faults(source: Source, samples: Sequence[Value], beside: Beside) -> list[st
     return [*told, *(f"{file}:{line}: {message}" for line, message in beside.own.faults)]
 
 
-def started(rubric: Rubric, only: Collection[str] | None = None) -> Rubric:
+def select_started(rubric: Rubric, only: Collection[str] | None = None) -> Rubric:
     """Return the rubric without the scenarios for which nothing is run, and with `only` these of the others."""
     scenarios = {
         name: s
@@ -273,13 +274,13 @@ def names_in(criterion: Criterion) -> set[str]:
 def needs_package(loaded: LoadedRubric) -> bool:
     """Return whether there is anything to run, or any check that looks at the package's files."""
     rubric, checks = loaded.rubric, loaded.checks
-    return bool(started(rubric).scenarios) or any(_looks_at_files(c, checks) for c in rubric.criteria)
+    return bool(select_started(rubric).scenarios) or any(_looks_at_files(c, checks) for c in rubric.criteria)
 
 
 def needs_ros(loaded: LoadedRubric) -> bool:
     """Return whether anything is to be built or run: files alone decide everything else."""
     rubric, checks = loaded.rubric, loaded.checks
-    return bool(started(rubric).scenarios) or any(_needs_build(c, checks) for c in rubric.criteria)
+    return bool(select_started(rubric).scenarios) or any(_needs_build(c, checks) for c in rubric.criteria)
 
 
 def _needs_build(criterion: Criterion, checks: Mapping[str, Check]) -> bool:
@@ -290,3 +291,50 @@ def _needs_build(criterion: Criterion, checks: Mapping[str, Check]) -> bool:
 def _looks_at_files(criterion: Criterion, checks: Mapping[str, Check]) -> bool:
     check = checks.get(criterion.check)
     return check is not None and not check.messages_only and bool({"package", "build"} & set(check.facts))
+
+
+def rates_of(rubric: Rubric) -> dict[str, tuple[RateBounds, ...]]:
+    """Return them by scenario."""
+    found: dict[str, list[RateBounds]] = defaultdict(list)
+    for criterion in rubric.criteria:
+        check = CHECKS.get(criterion.check)
+        bounds = check.rate_bounds(criterion.parameters) if check and criterion.scenario else None
+        if bounds is not None:
+            found[criterion.scenario or ""].append(bounds)
+    return {scenario: tuple(rates) for scenario, rates in found.items()}
+
+
+def watched_of(rubric: Rubric) -> dict[str, float]:
+    """Return, by scenario, for how many seconds its nodes have to be watched for all to be judged."""
+    found: dict[str, float] = defaultdict(float)
+    for criterion in rubric.criteria:
+        check = CHECKS.get(criterion.check)
+        for one in check.references(criterion.parameters) if check and criterion.scenario else ():
+            if one.to == "watched_s" and isinstance(one.value, int | float):
+                found[criterion.scenario or ""] = max(found[criterion.scenario or ""], one.value)
+    return dict(found)
+
+
+def origin_of(rubric: LoadedRubric, students: Iterable[Path | None]) -> RubricOrigin:
+    """Return where the rubric came from; `students` are the folders that the student can change, if they are known.
+
+    A checkout of another repository in one of them is not the student's; a submodule is, since the student names it.
+    """
+    if rubric.origin != "elsewhere":
+        return rubric.origin
+    # A link of the student's chooses a file, too.
+    files = {rubric.path.parent.resolve() / rubric.path.name, rubric.path.resolve()}
+    roots = [folder.resolve() for folder in students if folder is not None]
+    return "submission" if any(_holds(root, file) for root in roots for file in files) else "elsewhere"
+
+
+def checkout_around(path: Path) -> Path | None:
+    """Return the top of the git checkout around a path; None where there is none. A submodule, whose `.git` is a file,
+    belongs to the one around it."""
+    absolute = path.resolve()
+    return next((folder for folder in (absolute, *absolute.parents) if (folder / ".git").is_dir()), None)
+
+
+def _holds(root: Path, file: Path) -> bool:
+    checkout = checkout_around(file.parent)
+    return file.is_relative_to(root) and (checkout is None or root.is_relative_to(checkout))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.judging.advice import add_advice
+from grader.judging.annotate import add_advice
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status

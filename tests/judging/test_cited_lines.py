@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.judging.cited_lines import LINE_CHARS, show_lines
+from grader.judging.annotate import LINE_CHARS, show_lines
 from grader.model.verdict import FileCitation, failed, passed
 from tests.support.timeline import build_runs
 

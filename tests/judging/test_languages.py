@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from grader.checks.support.idioms import LOOP, in_language, init, publisher, set_param
+from grader.judging.annotate import said_for_node
 from grader.judging.facts import Facts
-from grader.judging.languages import said_for_node
 from grader.model.verdict import failed
 from grader.package.facts import read_package
 from tests.judging.rubrics import rubric

@@ -65,7 +65,7 @@ def check(
         from grader.cli.checking import check_packages
         from grader.cli.select_rubric import choose_all
         from grader.pipeline import GradeOptions
-        from grader.rubric.origin import checkout_around
+        from grader.rubric.load import checkout_around
     keep_files = watch or out is not None
     options = GradeOptions(
         sandbox=sandbox,

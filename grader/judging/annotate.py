@@ -1,0 +1,245 @@
+"""What is added to verdicts once they are judged; no status and no points change by it.
+
+Hints speak the language of the node that they are for, cited lines have their text, and a loss says where a file is
+still as the course handed it out. What no criterion asks for, but stops a student later, is added as advice.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import PurePosixPath
+
+from grader.checks.support.exit_causes import SYNTAX, syntax_hint
+from grader.checks.support.idioms import Language, in_language
+from grader.checks.support.launch import node_slip, not_executable, own_script
+from grader.checks.support.scripts import (
+    PYTHON,
+    chmod_hint,
+    find_script,
+    installed,
+    is_product,
+    names_script,
+    programs,
+)
+from grader.checks.support.text import texts_in
+from grader.evidence.run import Run
+from grader.judging.facts import Facts
+from grader.model.package import LaunchFile, PackageFacts
+from grader.model.result import CriterionResult
+from grader.model.verdict import Citation, FileCitation, Status, Verdict
+from grader.rubric.load import names_in
+from grader.rubric.model import Criterion, Rubric, Scenario
+from grader.wording import join_words
+
+POINTS_MAX = 3
+OF_FILES = ("build", "cmake", "manifest")
+"""Checks whose criterion takes the advice: it is of the package as a whole."""
+
+
+def add_advice(
+    results: Sequence[CriterionResult], package: PackageFacts, rubric: Rubric
+) -> tuple[CriterionResult, ...]:
+    """Return the criteria, with what none of them tells as the hint of one that passed."""
+    visible = {c.id for c in rubric.criteria if c.visibility == "visible"}
+    good = [c for c in results if c.status is Status.PASS and c.id in visible]
+    host = next((c for check in OF_FILES for c in good if c.check == check), None)
+    points = [text for place, text in _points(package) if not _is_told(place, results)][:POINTS_MAX]
+    if host is None or not points:
+        return tuple(results)
+    told = host.model_copy(update={"hint": "; ".join(filter(None, (host.hint, *points)))})
+    return tuple(told if c is host else c for c in results)
+
+
+def _points(package: PackageFacts) -> Iterator[tuple[FileCitation, str]]:
+    for file in package.files:
+        fault = file.python_fault
+        if fault is not None and fault.kind in SYNTAX and not is_product(file.path):
+            why = fault.cause or fault.message
+            text = f"{file.path} does not parse: {why}; {syntax_hint(fault)}"
+            yield FileCitation(file=file.path), text
+    for launch in package.launch_files:
+        if launch.fault is not None:
+            why = launch.fault.cause or launch.fault.message
+            yield launch.fault.place, f"{launch.path}, line {launch.fault.line}, is not well-formed: {why}"
+        yield from _nodes(package, launch)
+
+
+def _nodes(package: PackageFacts, launch: LaunchFile) -> Iterator[tuple[FileCitation, str]]:
+    """Nodes whose program is not there, or not executable: roslaunch prints an error, and starts the others."""
+    for node in launch.brings:
+        if node.pkg != package.name or node.uncertain:
+            continue
+        script, slip = own_script(package, node), node_slip(package, node)
+        if slip is not None:
+            text = f"roslaunch leaves a <node> out: {slip.file}, line {slip.line}: {slip.why}; {slip.fix}"
+            yield FileCitation(file=slip.file, line=slip.line), text
+        elif script and script.executable is False and not _is_installed(package, script.path):
+            text = f"{not_executable(script.path).why} ({node.file}, line {node.line}); {chmod_hint(script.path)}"
+            yield FileCitation(file=script.path), text
+
+
+def _is_installed(package: PackageFacts, path: str) -> bool:
+    return any(one.call.name == PYTHON and names_script(one, path) for one in installed(package))
+
+
+def _is_told(place: FileCitation, results: Sequence[CriterionResult]) -> bool:
+    """Return whether a lost criterion cites the place, or a hint names it. Without a line it is the whole file."""
+    words = place.file if place.line is None else f"{place.file}, line {place.line}"
+    return any(words in c.hint or (c.status.is_lost and _cites(c, place)) for c in results)
+
+
+def _cites(criterion: CriterionResult, place: FileCitation) -> bool:
+    cited = (one for one in criterion.citations if isinstance(one, FileCitation))
+    return any(one.file == place.file and place.line in {None, one.line} for one in cited)
+
+
+SOURCES = {".c", ".cc", ".cpp", ".cxx"}
+
+
+def said_for_node(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
+    """Return the verdict with its hint in the language of the node that it judges."""
+    if in_language(verdict.hint, "python") == verdict.hint:
+        return verdict
+    hint = in_language(verdict.hint, _language_of(verdict, criterion, facts))
+    return verdict.model_copy(update={"hint": hint})
+
+
+def _language_of(verdict: Verdict, criterion: Criterion, facts: Facts) -> Language | None:
+    """The one of the nodes that the message names, that the criterion names, that publish on its topic, or of all.
+
+    None where the scenario runs nodes of both and nothing tells which is meant.
+    """
+    name = criterion.scenario or ""
+    scenario, run = facts.rubric.scenarios.get(name), facts.runs.get(name)
+    if scenario is None or facts.package is None:
+        return "python"
+    asked = set(texts_in(criterion.parameters))
+    known = _languages(facts, scenario, run)
+    graph = run.graph if run else ()
+    publishing = {node for _, event in graph for topic in asked for node in event.publishers.get(topic, ())}
+    for nodes in (set(re.findall(r"[\w/-]+", verdict.message)), asked, publishing, known):
+        found = {known[one] for one in nodes if one in known}
+        if len(found) == 1:
+            return found.pop()
+    return None if known else "python"
+
+
+def _languages(facts: Facts, scenario: Scenario, run: Run | None) -> dict[str, Language]:
+    """What each process and each node of the scenario is written in, by its name."""
+    found: dict[str, Language] = {}
+    for start in scenario.start:
+        package = facts.package_of(start)
+        if package is None:
+            continue
+        if start.built:
+            found[start.name] = "cpp"
+        elif start.script:
+            found[start.name] = _written_in(package, start.script)
+        for launch in package.launch_files:
+            own = [n for n in launch.brings if PurePosixPath(launch.path).name == start.launch and n.type]
+            packages = {one.name: one for one in (*package.also, package)}
+            found |= {
+                n.full_name: _written_in(packages[n.pkg], str(n.type)) for n in own if n.pkg in packages
+            }
+    for _, event in run.graph if run else ():
+        for node, process in event.processes.items():
+            name = process.partition("/")[0]
+            found |= {node: found[name]} if name in found else {}
+    return found
+
+
+def _written_in(package: PackageFacts, path: str) -> Language:
+    file, name = find_script(package, path), PurePosixPath(path)
+    if file is not None and file.python:
+        return "python"
+    built = any(name.stem == one.target or one.is_called(name.name) for one in programs(package))
+    return "cpp" if built or name.suffix in SOURCES else "python"
+
+
+LINE_CHARS = 200
+"""A longer line stays out of the result."""
+
+
+def show_lines(verdict: Verdict, build: Run) -> Verdict:
+    """Return a verdict whose cited lines have their text; one that loses nothing, or cites none, stays as it is."""
+    if not verdict.status.is_lost or not any(isinstance(c, FileCitation) for c in verdict.citations):
+        return verdict
+    cited = tuple(_with_text(citation, build) for citation in verdict.citations)
+    return verdict.model_copy(update={"citations": cited})
+
+
+def _with_text(citation: Citation, build: Run) -> Citation:
+    if not isinstance(citation, FileCitation) or citation.line is None:
+        return citation
+    if citation.line == 1 and citation.column is None:
+        return citation  # it stands for the whole file
+    lines = build.file_lines(citation.file)
+    text = lines[citation.line - 1].rstrip() if 0 < citation.line <= len(lines) else ""
+    if not text.strip() or len(text) > LINE_CHARS:
+        return citation
+    if not citation.source:
+        return citation.model_copy(update={"source": text})
+    if citation.end_column is None or text.strip() != citation.source:
+        return citation
+    # Python prints a line without its indentation, and its carets stand below that
+    indent = len(text) - len(text.lstrip())
+    begin, end = (citation.column or 1) + indent, citation.end_column + indent
+    return citation.model_copy(update={"source": text, "column": begin, "end_column": end})
+
+
+CPP = frozenset({".cpp", ".cc", ".cxx"})
+
+
+def tell_unchanged(
+    result: CriterionResult, rubric: Rubric, package: PackageFacts, handed_out: Collection[str]
+) -> CriterionResult:
+    """Return the criterion; where it is lost, with those of its files whose sha256 is among `handed_out`.
+
+    Its files are those that it cites or its parameters name, and the programs of its run.
+    """
+    if result.status not in {Status.FAIL, Status.PARTIAL} or not handed_out:
+        return result
+    criterion = next(c for c in rubric.criteria if c.id == result.id)
+    cited = {one.file for one in result.citations if isinstance(one, FileCitation)}
+    names = names_in(criterion).union(_programs(criterion, rubric, package))
+    own = rubric.package_of(criterion) if rubric.package_of(criterion) != rubric.package else ""
+    unchanged = [
+        path
+        for one in (package, *package.also)
+        for file in one.files
+        if file.sha256 in handed_out
+        and (
+            (path := posixpath.normpath(f"{package.way_to(one)}/{file.path}")) in cited
+            or (_is_named(path, names) and one.asked == own)
+        )
+    ]
+    if not unchanged:
+        return result
+    verb, them = ("is", "it") if len(unchanged) == 1 else ("are", "them")
+    told = f"{join_words(unchanged)} {verb} still as the course handed {them} out"
+    return result.model_copy(update={"message": f"{result.message}; {told}"})
+
+
+def _is_named(path: str, names: Collection[str]) -> bool:
+    """A program in C++ is named without its suffix."""
+    file = PurePosixPath(path)
+    return file.name in names or (file.suffix in CPP and file.stem in names)
+
+
+def _programs(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> Iterator[str]:
+    """Yield the names of the student's programs in the criterion's run: of its process, where it judges one."""
+    scenario = rubric.scenarios.get(criterion.scenario or "")
+    starts = scenario.start if scenario is not None else ()
+    process = criterion.parameters.get("process")
+    for start in [one for one in starts if one.name == process] or starts:
+        if start.script is not None:
+            yield PurePosixPath(start.script).name
+        for launch in (file for one in (package, *package.also) for file in one.launch_files):
+            if (
+                start.launch is not None
+                and PurePosixPath(launch.path).name == PurePosixPath(start.launch).name
+            ):
+                names = {one.name for one in (package, *package.also)}
+                yield from (node.type for node in launch.brings if node.pkg in names and node.type)
