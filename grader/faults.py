@@ -146,7 +146,7 @@ def error_result(
 
 def _not_judged(criterion: Criterion, fault: GraderError) -> CriterionResult:
     own = fault.blame == "submission"
-    lost = "not judged" if own else "not judged, which is not the submission's fault, so no mark is lost"
+    lost = "not judged" if own else "not judged, which is not the submission's fault, so this costs no marks"
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,

@@ -81,7 +81,7 @@ def test_a_package_that_is_missing_costs_its_own_criteria_and_is_named(copy, tmp
     assert found["definition"].status is Status.PASS
     for name in ("manifest", "executable"):
         assert found[name].status is Status.FAIL
-        assert found[name].message == f"package {STATION} is not here; packages found: {MSGS}"
+        assert found[name].message == f"package {STATION} is missing; packages found: {MSGS}"
 
 
 def test_without_the_main_package_nothing_is_graded(copy, tmp_path):

@@ -129,7 +129,7 @@ def _fault(package: PackageFacts, run: Run, goal: Goal, params: ActionResultPara
     found = list(differences(goal.end.value, params.result, params.tolerance))
     if found:
         message = f"{goal.name} of {params.action} ends {status} with {join_words(map(str, found))}"
-        return failed(message, hint=f"fill the result in before you give it: {hint}")
+        return failed(message, hint=f"fill in the result before you send it: {hint}")
     return _too_late(run, goal, params) or _no_feedback(run, goal, params)
 
 
@@ -147,7 +147,8 @@ def _no_result(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
         return end.verdict(failed, f"{said}: {end.cause}")
     message = f"{said}: {shown(goal.end.detail) if goal.end else ''}"
     verdict = failed(
-        message, hint="every way through the callback ends with set_succeeded, set_aborted or set_preempted"
+        message,
+        hint="every path through the callback must end with set_succeeded, set_aborted or set_preempted",
     )
     return excused(verdict.once(), run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
 
@@ -160,7 +161,8 @@ def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
         return end.verdict(failed, f"{message}: {end.cause}")
     if params.status == "PREEMPTED" and goal.cancelled_ns is None:
         verdict = failed(
-            f"{message}: it was over before it could be cancelled", hint="let it last as the handout asks"
+            f"{message}: it was over before it could be cancelled",
+            hint="let it take as long as the handout says",
         )
         return excused(verdict.once(), run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
     return failed(message, hint=HINTS[params.status])
@@ -176,9 +178,9 @@ def _too_late(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | Non
     since = "its cancelling" if goal.cancelled_ns else "it was sent"
     message = f"the result of {goal.name} of {params.action} comes {took_s:.2f} s after {since}"
     hint = (
-        "look at is_preempt_requested() in each turn of the loop"
+        "check is_preempt_requested() each time around the loop"
         if goal.cancelled_ns
-        else "do not sleep longer than asked"
+        else "do not sleep longer than the handout asks"
     )
     verdict = failed(message, hint=hint)
     if took_s > params.within_s + NEVER_LATE_S * run.warp:
@@ -191,8 +193,8 @@ def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | 
     if came >= params.feedback:
         return None
     count = plural(came, "feedback", "feedbacks")
-    message = f"{count} came on {goal.name} of {params.action}, and {params.feedback} are asked"
-    verdict = failed(message, hint="call server.publish_feedback(feedback) in each turn of the loop")
+    message = f"{count} came on {goal.name} of {params.action}, but {params.feedback} are expected"
+    verdict = failed(message, hint="call server.publish_feedback(feedback) each time around the loop")
     return (
         verdict
         if came == 0
@@ -219,7 +221,7 @@ def _not_sent(package: PackageFacts, run: Run, goals: Sequence[Goal], params: Ac
     notes = [e.detail for _, e in run.actors if e.action == "note" and e.topic == params.action]
     if notes and any(one.path.endswith(".action") for one in package.interfaces):
         why = shown(notes[0].partition(": ")[2] or notes[0])
-        hint = "give the .action file the names and types of the handout, and build again"
+        hint = "use the handout's names and types in the .action file, and build again"
         return unjudged(f"{params.action} cannot be used as the handout asks: {why}", hint=hint)
     if notes:
         return inconclusive(shown(notes[0]), hint="grade again")

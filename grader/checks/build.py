@@ -240,7 +240,7 @@ def _not_started(package: PackageFacts, made: dict[str, Executable]) -> Verdict:
             f"catkin_make succeeded, but rosrun finds no {away.name}: {call.file}, line {call.line}, puts it into "
             f"{shown(away.folder)}",
             measured="built, not where rosrun looks",
-            hint="take RUNTIME_OUTPUT_DIRECTORY out: catkin puts programs into lib/<package>",
+            hint="remove RUNTIME_OUTPUT_DIRECTORY: catkin puts programs into lib/<package>",
             citations=(FileCitation(file=call.file, line=call.line),),
         )
     set_at = next(iter(cmake_calls(package, "catkin_package")), None)
@@ -253,7 +253,7 @@ def _not_started(package: PackageFacts, made: dict[str, Executable]) -> Verdict:
         return inconclusive(message, measured="built, not started", hint="grade again")
     message = (
         f"catkin_make succeeded, but rosrun finds no {join_words(early, 'or')}: "
-        "add_executable(…) stands above catkin_package(…)"
+        "add_executable(…) comes before catkin_package(…)"
     )
     cited = tuple(FileCitation(file=c.file, line=c.line) for c in early.values())
     hint = "move add_executable(…) below catkin_package(…), which says where programs go"
@@ -265,7 +265,7 @@ def _broken(package: PackageFacts, run: Run, programs: list[Life]) -> Iterator[B
         if not one.ended_early or one.end is None or _gave_way(run, one):
             continue
         code, words = one.end.exit_code, _last_words(run, one)
-        quoted = f"; its last words: {words}" if words else ""
+        quoted = f"; its last output: {words}" if words else ""
         unloaded = next((mark for mark in LOADER if mark in words), None)
         if one.end.signal is not None or one.end.stopped_by is not None:
             end = explain_end(one, run, package)

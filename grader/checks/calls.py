@@ -105,7 +105,7 @@ def requests(run: Run, service: str) -> tuple[Request, ...]:
 
 
 def _text(request: Request) -> str:
-    return "what is no request" if request.fields is None else fields_text(request.fields)
+    return "something that is not a valid request" if request.fields is None else fields_text(request.fields)
 
 
 def _span(made: tuple[Request, ...]) -> tuple[int | None, int | None]:
@@ -138,13 +138,15 @@ def _fault(
         nearest = min(left, key=lambda one: len(list(_differences(one, wanted, params))))
         found = join_words(map(str, _differences(nearest, wanted, params)))
         message = f"{params.service} is called with {_text(nearest)}: {found}"
-        return failed(message, hint="give the fields of the request by name, with the values that are asked")
+        return failed(
+            message, hint="pass the request's fields by name, with the values that the handout asks for"
+        )
     came = len(requests(run, params.service))
     with_fields = f" with {fields_text(wanted)}" if wanted else ""
-    what = f"{params.service} is called {plural(came, 'time')}, and no other call{with_fields} came"
+    what = f"{params.service} is called {plural(came, 'time')}, but there was no other call{with_fields}"
     if end := explain_early_end(package, run) or explain_error(package, run):
         return end.verdict(failed, f"{what}: {end.cause}")
-    return failed(what, hint=f"{plural(len(params.wanted), 'call')} are asked: call it again").once()
+    return failed(what, hint=f"{plural(len(params.wanted), 'call')} are expected: call it again").once()
 
 
 def _never(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
@@ -156,14 +158,14 @@ def _never(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
     if refused := _refused(run, service):
         return refused
     if near and service not in looked:
-        hint = f"name it {service} where it is waited for, and where it is called"
+        hint = f"use the name {service} both where you wait for it and where you call it"
         return unjudged(f"{what}: {looked[near[0]]} asks for {near[0]}", hint=hint)
     if end := explain_error(package, run):
         return end.verdict(unjudged, f"{what}: {end.cause}")
     if service in looked:
-        hint = f"to wait for it is not enough: {_call(run, service)} calls it"
+        hint = f"waiting for it is not enough: {_call(run, service)} calls it"
         return _unless_over(
-            unjudged(f"{looked[service]} looks where {service} is, and never calls it", hint=hint), run
+            unjudged(f"{looked[service]} looks {service} up, but never calls it", hint=hint), run
         )
     if absent := no_node(package, run, what):
         return absent
@@ -205,7 +207,7 @@ def _refused(run: Run, service: str) -> Verdict | None:
             if note.type == note.value:
                 theirs = f"another definition of {note.type}" + (f" ({shown(why)})" if why else "")
             message = f"{note.actor} calls {service} with {theirs}; the server has {note.value}"
-            return unjudged(message, hint="call it with the type of the handout")
+            return unjudged(message, hint="call it with the handout's type")
     return None
 
 

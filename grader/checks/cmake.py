@@ -219,7 +219,7 @@ def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) ->
         return _misplaced(package, by_python[0])
     blurred = next((o for o in all_named if o.call.name == PYTHON and not o.known), None)
     if blurred is not None:
-        why = f"which scripts {blurred.path} holds is known to CMake alone, and it did not finish"
+        why = f"only CMake knows which scripts {blurred.path} holds, and it did not finish"
         return Lack(why, "build the package with catkin_make", _line(blurred), unsure=True)
     return _unnamed(package, all_named, hits, paths[0])
 
@@ -233,11 +233,9 @@ def _misplaced(package: PackageFacts, one: Installed) -> Lack:
         why = f"{where}: {BIN} has no value, because catkin_package() is not called before it"
         return Lack(why, "call catkin_package() above catkin_install_python(…)", _line(one), follows=True)
     if one.destination is None:
-        why = f"{where}: catkin_install_python(…) gives {{}} no DESTINATION"
+        why = f"{where}: catkin_install_python(…) has no DESTINATION for {{}}"
     elif not one.destination:
-        why = (
-            f"{where}: nothing follows DESTINATION, or only a variable that has no value (its name misspelt?)"
-        )
+        why = f"{where}: nothing follows DESTINATION, or only a variable that has no value (is its name misspelt?)"
     else:
         why = f"{where}: the destination of {{}} is {shown(one.destination)}, not {BIN} (lib/{package.name})"
     return Lack(why, f"write DESTINATION {BIN}, below find_package(catkin …)", _line(one))

@@ -94,7 +94,7 @@ def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
     first, second = (_on(run, params.topic, end, params)[0] for end in ENDS)
     if first == second:
         message = f"{first} is alone on {params.topic}: it hears only itself"
-        return failed(message, hint=f"let a second node subscribe to {params.topic}")
+        return failed(message, hint=f"have a second node subscribe to {params.topic}")
     if absent := no_node(package, run, f"{first} and {second} were not seen connected over {params.topic}"):
         return absent
     message = f"{first} and {second} are both on {params.topic}, but not connected"

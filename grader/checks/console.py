@@ -167,7 +167,7 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
 
     What it checks
         That no traceback is printed while the node runs. rospy catches an exception of a callback, prints it,
-        and lets the node live on.
+        and the node keeps running.
 
     Why it matters on a robot
         A callback that fails does nothing with its message. The node looks healthy, and the robot drives on

@@ -98,7 +98,7 @@ def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:
         return passed(f"{params.topic} begins with {params.start}")
     if run.foreign:
         message = f"{run.evidence} may have begun after the first message on {params.topic}"
-        return inconclusive(message, hint="start the recording, and then the node")
+        return inconclusive(message, hint="start the recording before the node")
     if missed_the_first(run, params.topic, first):
         message = f"the recorder missed the first messages on {params.topic}"
         return inconclusive(message, hint="grade again")
@@ -107,7 +107,7 @@ def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:
     # a full queue drops values again and again: where the next ones came whole, it was not full
     drops = first.is_flood(run, params.rate_hz) and any(s.change > 1 for s in first.steps[:FIRST_STEPS])
     if first.values[0] > params.start and drops:
-        why = f"{message}; but its node floods its topics, and a publisher's queue drops values of a flood"
+        why = f"{message}; but the node floods its topics, and in a flood the publisher's queue drops values"
         return inconclusive(why, hint="grade again")
     verdict = failed(message, hint=hint)
     return verdict.once() if _may_follow_others(run, first, params) else verdict
@@ -140,7 +140,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
         the publisher itself throws some away; those skips are left out.
 
     How to fix
-        Add one to the counter in one place only, once in each turn of the loop. `rostopic echo <topic>`
+        Add one to the counter in one place only, once each time around the loop. `rostopic echo <topic>`
         shows the values.
     """
     expected = f"each value on {params.topic} is the one before plus one"
@@ -201,7 +201,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
 def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     """There is no counter on the topic."""
     if losses(run, topic):
-        return inconclusive(f"too little is recorded of {topic}", measured="no number", hint="grade again")
+        return inconclusive(f"too little was recorded of {topic}", measured="no number", hint="grade again")
     if any(c.messages for c in run.student_channels(topic)):
         hint = "publish the counter itself, as an Int8"
         return unjudged(f"{topic} carries no numbers", measured="no number", hint=hint)
@@ -238,7 +238,7 @@ def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
     if not found.own:
         missing = sum(int(min(s.change, LARGEST)) - 1 for s in found.lost)
         message = f"{plural(missing, 'value')} of {params.topic} were lost on the way, with a gap in time"
-        return inconclusive(message, hint="grade again while the machine has less to do")
+        return inconclusive(message, hint="grade again when the machine is less busy")
     first, usual = found.own[0], count.usual_step()
     after = seconds(first.to_ns - count.times_ns[0])
     comes = f"after {significant(first.before)} comes {significant(first.after)}"
@@ -248,9 +248,9 @@ def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
     else:
         kinds: dict[float, str] = {0: "repeats a value", -1: "goes back"}
         message = join_words(dict.fromkeys(kinds.get(s.change, "skips values") for s in found.own))
-    hint = "add one to the counter in one place only, once in each turn of the loop"
+    hint = "add one to the counter in one place only, once each time around the loop"
     if usual == 0:
-        hint = "set the counter before the loop, and add one to it in each turn: nothing in the loop may set it back"
+        hint = "set the counter before the loop, and add one each time around it: nothing inside the loop may reset it"
     verdict = failed(f"the counter {message}: {place}", hint=hint)
     return verdict.once() if count.is_single(found.own) else verdict
 

@@ -143,7 +143,7 @@ def _faults(
     found: Interface, wanted: list[InterfaceField], package: PackageFacts, params: DefinitionParams
 ) -> Iterator[_Fault]:
     if found.fault is not None:
-        yield _Fault(shown(found.fault.message), found.fault.line, "one field a line, type before name")
+        yield _Fault(shown(found.fault.message), found.fault.line, "one field per line, type before name")
         return
     there = {(one.part, one.name): one for one in found.fields}
     asked = {(one.part, one.name) for one in wanted}
@@ -169,23 +169,23 @@ def _differs(
         other = others.get((wanted.part, near))
         apart = next((one for one in others.values() if one.name == wanted.name), None)
         if other is not None:
-            message = f"line {other.line} names it {near}, and the handout {wanted.name}"
+            message = f"line {other.line} calls it {near}, but the handout calls it {wanted.name}"
             yield _Fault(message, other.line, f"write `{line}`")
         elif apart is not None:
             message = f"{wanted.name} is in the {apart.part} (line {apart.line}), not in the {wanted.part}"
-            yield _Fault(message, apart.line, "--- divides the parts: put the field into the other one")
+            yield _Fault(message, apart.line, "--- separates the parts: put the field into the other part")
         else:
             kind = "constant" if wanted.value is not None else "field"
             yield _Fault(f"there is no {kind} {name}", None, f"add the line `{line}`")
     elif (wanted.value is None) != (found.value is None):
         kinds = ("constant", "field") if wanted.value is None else ("field", "constant")
-        message = f"{name} is a {kinds[0]} (line {found.line}), and the handout asks for a {kinds[1]}"
+        message = f"{name} is a {kinds[0]} (line {found.line}), but the handout asks for a {kinds[1]}"
         yield _Fault(message, found.line, f"write `{line}`")
     elif wanted.type and _plain(wanted.type, package) != _plain(found.type, package):
-        message = f"{name} is {found.type} (line {found.line}), and the handout asks for {wanted.type}"
+        message = f"{name} is {found.type} (line {found.line}), but the handout asks for {wanted.type}"
         yield _Fault(message, found.line, f"write `{line}`")
     elif wanted.value is not None and not _equal(wanted.value, found.value or ""):
-        message = f"{name} is {shown(found.value or '')} (line {found.line}), and not {wanted.value}"
+        message = f"{name} is {shown(found.value or '')} (line {found.line}), not {wanted.value}"
         yield _Fault(
             message, found.line, f"write `{found.type} {line}`" if not wanted.type else f"write `{line}`"
         )

@@ -111,7 +111,7 @@ def _syntax_fault(file: SourceFile) -> Fault | None:
 
 def _unparsed(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -> Verdict:
     where = f"line {fault.line}" if fault.line else "cannot be parsed"
-    others = f"; besides, it {' and '.join(o.why for o in obstacles)}" if obstacles else ""
+    others = f"; it also {' and '.join(o.why for o in obstacles)}" if obstacles else ""
     fixes = [
         syntax_hint(fault),
         *(o.fix for o in obstacles),

@@ -117,7 +117,7 @@ def _outside(outside: Sequence[Reading], readings: Sequence[Reading], params: Fi
     message = (
         f"{params.field} of {params.topic} is not {params.words} {count}: it {seen}, {after} after the first"
     )
-    return failed(message, hint=f"keep {params.field} {params.words} before you publish it")
+    return failed(message, hint=f"make sure that {params.field} is {params.words} before you publish it")
 
 
 def _share(readings: Sequence[Reading], outside: Sequence[Reading]) -> str:

@@ -148,7 +148,9 @@ def file_left(package: PackageFacts, run: Run, params: FileLeftParams) -> Verdic
         `rosbag info <file>` shows what a bag holds.
     """
     if run.metadata.get("sandbox", "").startswith("none"):
-        verdict = inconclusive("files are only kept of runs in a sandbox", hint="grade where bubblewrap is")
+        verdict = inconclusive(
+            "files are only kept from runs in a sandbox", hint="grade on a machine that has bubblewrap"
+        )
         return verdict.about(expected=params.words)
     files = [file for file in run.left_files if params.process in {"", file.process}]
     found = sorted((f for f in files if params.fits(f.path)), key=lambda f: (f.data is None, -f.size_bytes))
@@ -161,7 +163,7 @@ def file_left(package: PackageFacts, run: Run, params: FileLeftParams) -> Verdic
         message = f"{found[0].path} is too large to be read: {found[0].size_bytes >> 20} MB"
         verdict = failed(message, hint="write only what the handout asks for")
     else:
-        verdict = params.finding(found[0], run) or passed(f"{found[0].path} was left")
+        verdict = params.finding(found[0], run) or passed(f"{found[0].path} was written")
     return verdict.about(
         expected=params.words,
         measured=verdict.measured
@@ -175,22 +177,22 @@ def _not_left(files: Sequence[LeftFile], package: PackageFacts, run: Run, params
     paths = list(dict.fromkeys(file.path for file in files))
     name = PurePosixPath(params.file).name
     if any(params.fits(path, ACTIVE) for path in paths):
-        message = f"{name} was never closed: {name}{ACTIVE} was left, for rosbag record was killed"
+        message = f"{name} was never closed: {name}{ACTIVE} was left behind, because rosbag record was killed"
         hint = "end rosbag record with Ctrl-C (SIGINT), or start it in the launch file"
         return failed(message, hint=hint)
     if elsewhere := [path for path in paths if PurePosixPath(path).match(name)]:
-        message = f"{params.file} was left in another folder: {_listed(elsewhere)}"
+        message = f"{params.file} was written to another folder: {_listed(elsewhere)}"
         return failed(message, hint=f"write it to {params.file}, below ~ or below the package")
     names = [PurePosixPath(path).name for path in paths]
     alike = [one for one in names if PurePosixPath(one).suffix == PurePosixPath(name).suffix != ""]
     if near := near_names(name, names) or alike:
-        return failed(f"{params.file} was not left; {_listed(near)} was", hint=f"name the file {name}")
-    what = f"{params.file} was not left"
+        return failed(f"{params.file} was not written; {_listed(near)} was", hint=f"name the file {name}")
+    what = f"{params.file} was not written"
     if end := explain_early_end(package, run):
         return end.verdict(unjudged, f"{what}: the program ended before ({end.cause})")
     hint = f"write {params.file} before the program ends"
     if paths:
-        return failed(f"{what}; what was left is {_listed(paths)}", hint=hint).once()
+        return failed(f"{what}; what it wrote is {_listed(paths)}", hint=hint).once()
     return failed(f"{what}, and no other file", hint=hint).once()
 
 
@@ -243,7 +245,7 @@ def _table(file: LeftFile, params: FileLeftParams, run: Run) -> Verdict | None:
     try:
         rows = [row for row in csv.reader(data.decode("utf-8-sig", errors="replace").splitlines()) if row]
     except csv.Error as error:
-        return failed(f"{file.path} is no table: {error}", hint="write it with csv.writer(file)")
+        return failed(f"{file.path} is not a table: {error}", hint="write it with csv.writer(file)")
     names = [name.strip() for name in rows[0]] if rows else []
     lacking = [name for name in params.columns if name not in names]
     if lacking:
@@ -283,7 +285,7 @@ def _map(file: LeftFile) -> Verdict | None:
     head = PGM.match(data[:PGM_HEAD_BYTES])
     hint = "rosrun map_server map_saver -f <name> writes a map"
     if head is None:
-        return failed(f"{file.path} is no PGM map", hint=hint)
+        return failed(f"{file.path} is not a PGM map", hint=hint)
     width, height = int(head[1]), int(head[2])
     if data.startswith(b"P5") and len(data) - head.end() < width * height:
         return failed(f"{file.path} is cut short: it has less than {width} by {height} cells", hint=hint)

@@ -168,9 +168,9 @@ def _page(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams
         if blank := _blanks(run, mine):
             where = f"{PurePosixPath(blank['file']).name}, line {blank['line']}"
             message += (
-                f": in {where}, the shell takes {blank['name']} for a command, since a blank follows it"
+                f": in {where}, the shell takes {blank['name']} for a command, because a space follows it"
             )
-            hint = f"write {blank['name']}=… in {where}, without blanks around the `=`"
+            hint = f"write {blank['name']}=… in {where}, without spaces around the `=`"
         return failed(message, hint=hint, citations=cited)
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))

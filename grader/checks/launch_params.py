@@ -260,12 +260,12 @@ def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wan
         known = [place + name for name in wanted if place + name in before]
         verb = "is" if len(missing) == 1 else "are"
         message = f"{join_words(place + name for name in missing)} {verb} not set, only {join_words(known)}"
-        hint = "write one <param> for each inside the <node>, the names letter by letter"
+        hint = "write one <param> for each inside the <node>, with exactly these names"
         return failed(message, hint=hint)
     name = next(name for name, value in wanted.items() if not _fits(before[place + name], value))
     found, value = before[place + name], wanted[name]
     if isinstance(found, str) and found.strip() == str(value):
-        message = f'{place}{name} is the text "{found}", which the node does not take for a number'
+        message = f'{place}{name} is the text "{found}", which the node does not read as a number'
         return failed(message, hint=f'write <param name="{name}" type="int" value="{value}"/>')
     seen = ", ".join(_shown(before[place + n]) for n in wanted)
     right = ", ".join(map(_shown, wanted.values()))

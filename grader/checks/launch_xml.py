@@ -128,7 +128,7 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     for tag, line in unknown:
         cited = (FileCitation(file=file.path, line=line),)
         message = f"{message}: roslaunch skips the tag <{tag}> of line {line}"
-        return failed(message, hint="the tag is <node …>, in small letters", citations=cited)
+        return failed(message, hint="the tag is <node …>, in lower case", citations=cited)
     return failed(message, hint=f'add <node pkg="{pkg}" type="{name}" name="…" output="screen"/>')
 
 

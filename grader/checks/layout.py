@@ -96,7 +96,7 @@ def _slips(package: PackageFacts, params: LayoutParams) -> Iterator[Slip]:
         found = find_script(package, script)
         if found is None or _is_below(found.path, script) or found.path.startswith(moved):
             continue
-        what = f"{PurePosixPath(script).name} lies at {found.path}, not at {script}"
+        what = f"{PurePosixPath(script).name} is at {found.path}, not at {script}"
         yield Slip(what, f"git mv {found.path} {script}", found.path)
 
 

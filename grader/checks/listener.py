@@ -79,7 +79,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     places = places_of(run, probes, lines, params.template)
     missing = [] if places is None else [p for p, found in zip(probes, places, strict=True) if not found]
     if places is None:
-        message = "it prints so many numbers that it cannot be told which of them it heard"
+        message = "it prints so many numbers that there is no telling which of them it heard"
         verdict = failed(message, hint="print each number once, in the callback")
     elif missing:
         verdict = _other_words(probes, missing, lines, params) or not_printed(
@@ -112,7 +112,7 @@ def _other_words(
     message = f"{_how_many(missing, probes)} printed, but not as '{wanted}'{seen}"
     blank = params.template.removesuffix(VALUE).endswith(" ")
     glued = params.template.replace(f" {VALUE}", VALUE)
-    hint = f"print '{wanted}', with the handout's own words"
+    hint = f"print '{wanted}', in the handout's own words"
     if any(f'data: "{missing[0].value}"' in line for line in said):
         hint = "print the message's .data, which is the text, not the whole message around it"
     elif blank and said and all(text_places(missing, lines, glued)):
@@ -178,9 +178,9 @@ def _types_differ(run: Run, topic: str) -> Verdict | None:
     if asked is None:
         return None
     other = f"another definition of {asked.type}" if asked.type == asked.value else asked.type
-    message = f"{asked.actor} subscribes to {topic} with {other}, so that nothing arrives"
+    message = f"{asked.actor} subscribes to {topic} with {other}, so nothing arrives"
     wanted = f"{asked.value}, the type" if isinstance(asked.value, str) else "the type"
-    return failed(message, hint=f"give {subscriber(topic)} {wanted} that the handout asks for")
+    return failed(message, hint=f"use {wanted} that the handout asks for in {subscriber(topic)}")
 
 
 def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]) -> Verdict | None:
@@ -204,10 +204,8 @@ def _only_again(probes: Sequence[Probe], missing: Sequence[Probe]) -> Verdict | 
     printed = {str(p.value) for p in probes if p not in missing}
     if not all(str(p.value) in printed for p in missing):
         return None
-    message = f"{missing[0].value!r} came twice, and is printed once only"
-    return failed(
-        message, hint="print in the callback each time, also where the message is one that came before"
-    )
+    message = f"{missing[0].value!r} came twice but was printed only once"
+    return failed(message, hint="print every message in the callback, even one that came before")
 
 
 def _by_number(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]) -> Verdict:

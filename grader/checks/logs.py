@@ -104,7 +104,7 @@ def _only_printed(run: Run, params: LogsParams) -> Verdict | None:
         message = f"{params.text!r} is logged at level {of_logger[0].upper()}, not {params.level.upper()}"
         return failed(message, hint=_call(params))
     if _is_late(run, params):
-        return passed(f"{shown(said[0].line)!r} is logged, so late that the node was being stopped")
+        return passed(f"{shown(said[0].line)!r} is logged too late: the node was already being stopped")
     message = f"{shown(said[0].line)!r} was logged on the console, and did not arrive on /rosout"
     return inconclusive(message, hint="grade again")
 

@@ -64,7 +64,7 @@ def _judged(package: PackageFacts, params: ManifestParams) -> Verdict:
         return _unreadable(package.manifest_fault)
     place = (FileCitation(file=found.file, line=found.name_line),)
     if found.name != params.name:
-        slip = " (a slip of the name)" if near_names(params.name, [found.name]) else ""
+        slip = " (a typo in the name)" if near_names(params.name, [found.name]) else ""
         message = f"{found.file} names the package {found.name!r}, the handout calls it {params.name!r}{slip}"
         hint = "; ".join([_rename(package, found, params.name), *package.general_hints()])
         return failed(message, measured=f"name {found.name}", hint=hint, citations=place)
@@ -73,7 +73,7 @@ def _judged(package: PackageFacts, params: ManifestParams) -> Verdict:
         hint = "add <buildtool_depend>catkin</buildtool_depend>"
         message = f"{found.file} does not name catkin as its build tool"
         if (found.build_type or "").startswith("ament"):
-            message = f"{found.file} is of a package for ROS 2 (its build type is {found.build_type})"
+            message = f"{found.file} is for a ROS 2 package (its build type is {found.build_type})"
             hint = (
                 f"make a package for ROS 1: catkin_create_pkg {' '.join((params.name, *params.dependencies))}"
             )
@@ -131,7 +131,7 @@ def maintainer(package: PackageFacts) -> Verdict:
         Open `package.xml` and write your own address: `<maintainer email="you@university.ac.uk">Your
         Name</maintainer>`. The comments with examples beside it may go.
     """
-    expected = "a maintainer's e-mail address of one's own, none that ends in @todo.todo"
+    expected = "your own e-mail address as maintainer, not one that ends in @todo.todo"
     found = package.manifest
     if found is None:
         message = "package.xml cannot be read, so its maintainer is not known"
@@ -146,7 +146,7 @@ def maintainer(package: PackageFacts) -> Verdict:
         message = f"{found.file} still has {shown(left[0].email)}, which catkin_create_pkg fills in"
         verdict = failed(message, hint=hint)
     elif not any(p.email.strip() for p in people):
-        verdict = failed(f"{found.file} gives no maintainer's e-mail address", hint=hint)
+        verdict = failed(f"{found.file} has no maintainer e-mail address", hint=hint)
     else:
         verdict = passed(f"the maintainer is {measured}")
     return verdict.about(expected=expected, measured=measured, citations=cited)

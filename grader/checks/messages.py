@@ -66,11 +66,11 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         clock, though at 1 Hz it grows as the time does. A right time in other words than the handout's earns half.
 
     How to fix
-        Build the text in each turn of the loop: `"hello world %s" % rospy.get_time()`. `rostopic echo
+        Build the text each time around the loop: `"hello world %s" % rospy.get_time()`. `rostopic echo
         <topic>` shows what is sent.
     """
     heard = [c for c in run.student_channels(params.topic) if c.messages]
-    grows = ", the seconds growing as the clock does" if SECONDS in params.template else ""
+    grows = ", with seconds that count up like the clock" if SECONDS in params.template else ""
     expected = f"each message on {params.topic} is '{in_words(params.template)}'{grows}"
     if not heard or not all(isinstance(text, str) for c in heard for text in c.data):
         return _no_text(package, run, heard, params).about(expected=expected)
@@ -88,7 +88,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
 
 def _no_text(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:
     if heard:
-        message = f"{params.topic} carries {heard[0].type}, and no text that could be compared"
+        message = f"{params.topic} carries {heard[0].type}, not text that could be compared"
         return unjudged(message, hint="publish std_msgs/String", measured=heard[0].type)
     return no_message(package, run, params.topic)
 

@@ -81,7 +81,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
         and catch `rospy.ROSInterruptException` around the call of your main function.
     """
     named = f", named {wanted_names(params.names, params.anonymous)}" if params.names else ""
-    expected = f"one node{named}, alive {params.min_s:g} s and more after its first message, ending on Ctrl-C"
+    expected = f"one node{named}, alive {params.min_s:g} s or more after its first message, ending on Ctrl-C"
     one = life(run, params.process)
     if one is None:
         return not_started(params.process).about(expected=expected)
@@ -173,7 +173,7 @@ def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None
         hint = f"call {INIT} before anything that waits"
         return failed(f"{_script(one)} runs, but never registers as a node", hint=hint).once()
     if len(nodes) > (1 if are_noted(run) else max(1, len(lives(run)))):
-        hint = f"one script is one node: call {INIT} once, start no other process"
+        hint = f"one script is one node: call {INIT} once, and start no other process"
         return failed(f"{_script(one)} registers as {len(nodes)} nodes: {join_words(nodes)}", hint=hint)
     return None
 

@@ -153,7 +153,7 @@ def _missing(
     above, _, last = name.rpartition("/")
     shallow = f"{above.rpartition('/')[0]}/{last}"
     moved = _column(name, shallow, keys)
-    hint = f"write it so that rosparam list shows {name}, letter by letter"
+    hint = f"write it so that rosparam list shows exactly {name}"
     if shallow in found:
         readers = join_words(_readers(package, build, shallow, above))
         hint = f"{moved}; then read it there in {readers} too" if readers else moved
@@ -224,7 +224,9 @@ def _in_its_place(found: dict[str, object], name: str, path: str) -> Verdict | N
         value = found[above]
         if isinstance(value, list):
             why = f"{above} is a list, so there is no {name}"
-            return failed(f"{path} loads, but {why}", hint="take the `-` away: write names below each other")
+            return failed(
+                f"{path} loads, but {why}", hint="remove the `-`: write the names one below the other"
+            )
         if isinstance(value, str) and f"{last}:" in value:
             why = f"{above} is the text {shown(value)!r}, so there is no {name}"
             return failed(f"{path} loads, but {why}", hint=f"write a space after each colon: `{last}: …`")
@@ -307,8 +309,10 @@ def _not_printed(
     lines = printed_lines(run)
     copied = (n for n in missing if any(is_printed(v, lines) for v in _in_file(build, params.file, n)))
     if (hard := next(copied, None)) is not None:
-        message = f"{hard} is printed as {params.file} has it, not as the parameter server has it"
-        hint = f"read it with {get_param(hard)}, and not from the file or the script"
+        message = (
+            f"{hard} is printed with the value in {params.file}, not with the one on the parameter server"
+        )
+        hint = f"read it with {get_param(hard)}, not from the file or the script"
         return _share_printed(params, missing, message, hint)
     texts = [line.text.strip() for line in lines if line.text.strip()]
     seen = f"; it prints {shown(texts[-1])!r}" if texts else "; it prints nothing at all"
@@ -424,7 +428,7 @@ def _set_to_another(mine: Sequence[ParamEvent], got: object, params: ParamsSetPa
     now = shown(str(got))
     if any(absolute_name(e.name) == params.name and _is_value(e.value, params.value) for e in mine):
         message = f"{params.name} is set to {params.value}, and to {now} after that"
-        return failed(message, hint=f"take out the later line that sets {params.name} to {now}")
+        return failed(message, hint=f"remove the later line that sets {params.name} to {now}")
     hint = f"write {set_param(params.name, params.value)}"
     return failed(f"{params.name} is set to {now}, not to {params.value}", hint=hint)
 
@@ -436,7 +440,7 @@ def _clobbered(run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verd
         was = known[name].value if name in known else before.get(name)
         if was is None or after.get(name) == was:
             continue
-        hint = f"set the one value alone: {set_param(params.name, params.value)}"
+        hint = f"set only that one value: {set_param(params.name, params.value)}"
         if name in after:
             message = f"{name} was {shown(str(was))} and is {shown(str(after[name]))} afterwards"
             return failed(message, hint=hint)
@@ -549,7 +553,7 @@ def _not_there(package: PackageFacts, run: Run, names: Iterable[str], params: Pa
     near = near_names(params.name, names)
     if near:
         message = f"there is no parameter {params.name}; there is {join_words(near)}"
-        hint = "with ~, or within <node>, a parameter's name is below the node's own; without, it is not"
+        hint = "with ~, or inside <node>, a parameter gets the node's name in front; otherwise it does not"
         return failed(message, hint=hint)
     if absent := no_node(package, run, f"there is no parameter {params.name}"):
         return absent

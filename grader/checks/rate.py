@@ -116,8 +116,8 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         95 % confidence interval.
 
     How to fix
-        `rate = rospy.Rate(10)` once before the loop, `rate.sleep()` (with its brackets) once in each turn
-        of it, and nothing slow beside it. `rostopic hz <topic>` shows the rate.
+        `rate = rospy.Rate(10)` once before the loop, `rate.sleep()` (with the brackets) once each
+        time around it, and nothing slow beside it. `rostopic hz <topic>` shows the rate.
     """
     expected = f"{params.low_hz:g} to {params.high_hz:g} Hz on {params.topic}, evenly"
     if run.clock != "real":
@@ -209,17 +209,17 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     if found.tail_ns <= max(5 * params.period_ns, 2 * before_ns, 0.5e9):
         return None
     lasted = seconds(found.times_ns[-1] - found.times_ns[0])
-    message = f"{params.topic} falls silent {lasted} after its first message, while its node lives on"
+    message = f"{params.topic} falls silent {lasted} after its first message, although its node keeps running"
     callers = (c.callerid for c in run.student_channels(params.topic))
     slip = next((s for one in callers for s in slips_of(package, run, one, "spin-in-loop")), None)
     if slip is not None:
         cited = (FileCitation(file=slip.file, line=slip.line),)
         return failed(
             f"{message}: {slip.message}",
-            hint="take spin() out: the loop keeps the node alive",
+            hint="remove spin(): the loop keeps the node alive",
             citations=cited,
         )
-    hint = f"publish in a loop `{LOOP}`, not a number of times"
+    hint = f"publish in a loop `{LOOP}`, not a fixed number of times"
     return failed(message, hint=hint).once()
 
 
@@ -231,9 +231,7 @@ def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -
     share = f"{len(outside)} of {len(found.gaps_ns)} gaps are far from {1 / params.rate_hz:g} s"
     kind = "in bursts" if found.comes_in_bursts else "unevenly"
     message = f"{params.topic} comes {kind}: {hertz(found.mean_hz)} on average, but {share}"
-    return failed(
-        message, hint="publish one message in each turn of the loop, and sleep once in each turn"
-    ).once()
+    return failed(message, hint="publish one message and sleep once each time around the loop").once()
 
 
 def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
@@ -288,13 +286,13 @@ def _by_parameter(verdict: Verdict, run: Run, package: PackageFacts, params: Rat
 def _rate_hint(ratio: float, nominal: str, *, even: bool) -> str:
     """Return what may be wrong where a loop comes round `ratio` times as often as it should."""
     if abs(ratio - 0.5) < 0.05:
-        halved = "two of them halve the rate, as does an `if` before publish(…)"
-        return f"use {loop_rate(nominal)}, and one rate.sleep() in each turn: {halved}"
+        halved = "two of them halve the rate, and so does an `if` around publish(…)"
+        return f"use {loop_rate(nominal)}, and call rate.sleep() once per loop: {halved}"
     if abs(ratio - 2) < 0.2 and not even:
         return f"twice the rate: does the loop, or a second publisher, publish twice? {loop_rate(nominal)}"
     if ratio < 1:
-        return f"use {loop_rate(nominal)} and one rate.sleep() in each turn, with nothing slow beside it"
-    return f"the number is in Hz, turns in a second: {loop_rate(nominal)}"
+        return f"use {loop_rate(nominal)} and call rate.sleep() once per loop, with nothing slow beside it"
+    return f"the number is in Hz, loops per second: {loop_rate(nominal)}"
 
 
 def _why_late(found: Rhythm, late: Lateness, params: RateParams) -> str:
@@ -305,10 +303,10 @@ def _why_late(found: Rhythm, late: Lateness, params: RateParams) -> str:
         return ""
     if was_late(late, params) or sleeps_explain(found, late, params):
         by = f"by up to {late.max_ms:.0f} ms, 95 % within {late.p95_ms:.0f} ms"
-        return f"late itself ({by}), so nothing follows from it"
+        return f"late itself ({by}), so this proves nothing"
     if stalls_explain(found, late, params):
         busy = f"{(late.busy or 0) * 100:.0f} % busy"
-        return f"{busy}, and without the few long gaps the rate would be right, so nothing follows from it"
+        return f"{busy}, and without the few long gaps the rate would be right, so this proves nothing"
     return ""
 
 

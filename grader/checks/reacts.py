@@ -78,7 +78,7 @@ class Condition(Record):
     def _fits(self, value: object) -> bool:
         if self.value is not None:
             return next(differences(value, self.value, self.tolerance), None) is None
-        assert isinstance(value, int | float)  # noqa: S101 - what is no number was left out
+        assert isinstance(value, int | float)  # noqa: S101 - what is not a number was left out
         return is_within(value, self.min, self.max)
 
 
@@ -197,7 +197,7 @@ def _early(
         return None
     lead_s = to_s(first) - to_s(between[0].time_ns)
     message = f"{params.effect.words} comes {lead_s:.2f} s before {params.cause.words}"
-    hint = "publish it only when the message that you hear asks for it"
+    hint = "publish it only when the message that you receive calls for it"
     verdict = failed(message, hint=hint, measured=f"{plural(len(between), 'message')} too early")
     if to_s(between[-1].time_ns) >= from_s + params.within_s:
         return verdict

@@ -134,7 +134,7 @@ def _judged(found: Track, run: Run, params: PathParams) -> Verdict:
         count = f"{len(params.points)} points" if len(params.points) > 1 else "its point"
         return passed(f"the path passes {count} within {significant(params.tolerance_m)} m", measured=figures)
     if stands(taken):
-        hint = "publish a velocity that is not 0, again and again while it has to drive"
+        hint = "publish a velocity that is not 0, again and again for as long as it should drive"
         return unjudged("it never moves", measured=figures, hint=hint)
     words = _in_degrees(run) or what_is_wrong(taken, params.way, course, mirror=params.relative)
     verdict = failed(words.message, hint=words.hint, measured=figures)
@@ -199,7 +199,8 @@ def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: boo
     """The likeliest cause; `mirror` where the way is seen from the path's own start."""
     if max(math.dist(p.point, path[0].point) for p in path) <= MOVED_M:
         return Words(
-            "it never moves", "publish a linear.x that is not 0, again and again while it has to drive"
+            "it never moves",
+            "publish a linear.x that is not 0, again and again for as long as it should drive",
         )
     return (
         (_mirrored(path, way) if mirror else None)
@@ -210,7 +211,12 @@ def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: boo
 
 def _mirrored(path: Sequence[Pose], way: Way) -> Words | None:
     for sign_x, sign_y, message, hint in (
-        (1, -1, "the path is mirrored: it turns right for left", "a positive angular.z turns to the left"),
+        (
+            1,
+            -1,
+            "the path is mirrored: it turns right instead of left",
+            "a positive angular.z turns to the left",
+        ),
         (-1, -1, "the path is driven backwards", "a positive linear.x drives forward"),
         (-1, 1, "the path is driven backwards and mirrored", "a positive linear.x drives forward"),
     ):
@@ -280,7 +286,7 @@ def _too_early(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
     if along <= 0 or short_m <= way.tolerance_m or aside * _along(following, start, end)[1] <= 0:
         return None
     message = f"it leaves the way {metres(short_m)} before {way.name(course.reached)}, {_after(path, pose)}"
-    return Words(message, "drive on to the point before you turn: distance is speed times time")
+    return Words(message, "drive all the way to the point before you turn: distance is speed times time")
 
 
 def _ends_short(path: Sequence[Pose], way: Way, course: Course) -> Words:
@@ -291,7 +297,7 @@ def _ends_short(path: Sequence[Pose], way: Way, course: Course) -> Words:
     message = f"{points} and ends at {spot(path[-1].point)}, {left} from {way.name(goal)}"
     if every:
         return Words(message, "publish a zero velocity once you are at the last point")
-    return Words(message, "drive longer, or let the node live until it is there")
+    return Words(message, "drive longer, or keep the node alive until it gets there")
 
 
 def _peak(path: Sequence[Pose], way: Way, course: Course) -> tuple[Pose, float]:

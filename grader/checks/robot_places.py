@@ -47,7 +47,7 @@ ROUNDING = 1e-9
 SAME_M = 0.005
 NEARLY = 1.25
 """A loss by no more than this factor is one that a single run's timing could have made."""
-DRIVE = "publish a velocity that is not 0, again and again while it has to drive"
+DRIVE = "publish a velocity that is not 0, again and again for as long as it should drive"
 
 
 class Place(Record):
@@ -212,7 +212,7 @@ def _arrived(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> Ve
         message = (
             f"it is at {spot(params.goal)} after {came_s:.1f} s; {significant(params.within_s)} s are allowed"
         )
-        hint = "drive faster while the goal is far, and turn on the shorter side"
+        hint = "drive faster while the goal is far away, and turn the shorter way"
         return failed(message, hint=hint, measured=figures)
     return passed(f"it ends {metres(apart_m)} from {spot(params.goal)}", measured=figures)
 
@@ -395,7 +395,7 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         verdict = _outside(path, out, region, inside, params)
     elif long_m < params.least_m:
         message = f"its path is {metres(long_m)} long; {significant(params.least_m)} m are asked for"
-        verdict = failed(message, hint="drive on, as long as the way is free")
+        verdict = failed(message, hint="keep driving while the way is clear")
     else:
         always = f"for {inside:.0%} of the time" if any(out) else "all the time"
         return passed(f"it is {region.words} {always}", measured=figures)
@@ -431,7 +431,7 @@ def _keep(point: Point, region: Region) -> str:
         and region.min_m is not None
         and Band(region.walls, region.min_m, None).out_m(point)
     ):
-        return "turn away, or stop, earlier: look at all ranges in front of the robot, and not at the middle one alone"
+        return "turn away, or stop, earlier: look at all ranges in front of the robot, not only at the middle one"
     if isinstance(region, Band):
         return "steer towards what you follow while the distance is too large"
     return "turn, or stop, before you are at the border"

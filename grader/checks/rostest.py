@@ -154,7 +154,7 @@ def _faulty(found: Results, run: Run, params: RostestParams) -> Verdict | None:
         why = f"{unfinished[0]} was not over when the run ended: raise limit_s of the scenario's until"
     else:
         return None
-    message = "the instructor's tests could not be run; no mark is lost by this"
+    message = "the instructor's tests could not be run; this costs no marks"
     return Verdict(status=Status.ERROR, score=0.0, message=message, hint=f"for the instructor: {why}")
 
 

@@ -258,9 +258,9 @@ def _other_owner(run: Run, service: str) -> str:
 
 def _rename_hint(wanted: str, found: str, node: str) -> str:
     if found == f"{node}{wanted}":
-        return f"a name with ~ is put below the node's own: write {service_call(wanted)}"
+        return f"a name with ~ gets the node's name in front: write {service_call(wanted)}"
     if wanted == f"{node}{found}":
-        return f"a name with ~ is put below the node's own: write {service_call(f'~{found[1:]}')}"
+        return f"a name with ~ gets the node's name in front: write {service_call(f'~{found[1:]}')}"
     return f"name it {wanted} in {SERVICE}"
 
 
@@ -305,7 +305,9 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         return failed(f"{asked} fails: its callback returns nothing", hint=hint)
     if "returned invalid value" in one.detail or "wrong number of values" in one.detail:
         message = f"{asked} fails: its callback returns something that is not a {kind}Response ({shown(one.detail)})"
-        return failed(message, hint=f"end the callback with return {kind}Response(…), its fields by name")
+        return failed(
+            message, hint=f"end the callback with return {kind}Response(…), passing its fields by name"
+        )
     owner = life_of(run, offers(run)[service].node)
     if owner is not None and owner.ended_early:
         end = explain_end(owner, run, package)

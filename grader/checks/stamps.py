@@ -181,7 +181,7 @@ def _constant(found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
     message = (
         f"{_name(params)} of {params.topic} is {first.told_s:.3f} in all of {plural(len(found), 'message')}"
     )
-    return failed(f"{message}: the time was asked for once", hint=_now(params))
+    return failed(f"{message}: the time was read only once", hint=_now(params))
 
 
 def _other_clock(run: Run, found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
@@ -230,7 +230,7 @@ def _far(run: Run, found: Sequence[Stamp], params: StampsParams) -> Verdict | No
         f"{_name(params)} of {params.topic} is up to {abs(worst.age_s):.2f} s {how} than the message {count}"
     )
     whole = len(found) > FEW and all(one.whole for one in found)
-    verdict = failed(f"{message}: it has whole seconds only" if whole else message, hint=_now(params))
+    verdict = failed(f"{message}: it has only whole seconds" if whole else message, hint=_now(params))
     gross_s = limit_s + NEVER_LATE_S * run.warp
     if whole or (len(off) == len(found) and min(abs(one.age_s) for one in off) > gross_s):
         return verdict
@@ -253,7 +253,7 @@ def _other_frame(found: Sequence[Stamp], params: StampsParams) -> Verdict | None
         return failed(message, hint=f"make {params.field} a std_msgs/Header, frame_id {asked}")
     count = f"in {len(wrong)} of {plural(len(found), 'message')}"
     message = f"{params.field}.frame_id of {params.topic} is '{shown(seen)}', not {asked}, {count}"
-    slash = "; tf2 takes no frames that begin with a slash" if seen == f"/{params.frame_id}" else ""
+    slash = "; tf2 does not accept frames that start with a slash" if seen == f"/{params.frame_id}" else ""
     return failed(message, hint=f"set msg.{params.field}.frame_id = {asked}{slash}")
 
 

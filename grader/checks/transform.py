@@ -162,7 +162,7 @@ def _not_sent(
     slashed = [edge for edge in edges if tuple(name.lstrip("/") for name in edge) == wanted]
     if slashed:
         message = (
-            f"the frames are {_edge_words(slashed)}: tf2 takes no names of frames that begin with a slash"
+            f"the frames are {_edge_words(slashed)}: tf2 does not accept frame names that start with a slash"
         )
         return failed(message, hint=hint)
     if params.through:
@@ -194,9 +194,9 @@ def _other_topic(own: Sequence[Sent], params: TransformParams) -> Verdict | None
     why = (
         "it never changes"
         if params.static
-        else "it changes, and tf takes what is static for valid at all times"
+        else "it changes, but tf treats a static transform as valid for all time"
     )
-    message = f"{params.name} is on {wrong}, and belongs on {TOPICS[1 if params.static else 0]}: {why}"
+    message = f"{params.name} is on {wrong}, but belongs on {TOPICS[1 if params.static else 0]}: {why}"
     return failed(message, hint=f"send it with a tf2_ros.{kind}")
 
 
@@ -210,7 +210,7 @@ def _no_rotation(seen: Sequence[Seen], params: TransformParams) -> Verdict | Non
     hint = (
         "a quaternion without rotation has w = 1.0; quaternion_from_euler(roll, pitch, yaw) gives any other"
     )
-    return failed(f"{message}: its quaternion is 0, or holds what is no number", hint=hint)
+    return failed(f"{message}: its quaternion is 0, or contains something that is not a number", hint=hint)
 
 
 def _fits(value: Transform, wanted: Transform, params: TransformParams) -> bool:
@@ -241,7 +241,7 @@ def _why(value: Transform, wanted: Transform, params: TransformParams) -> str:
         return f": it is the one from {params.child} to {params.parent}"
     as_degrees = turn_of([math.degrees(angle) for angle in wanted.rpy_deg])
     if any(wanted.rpy_deg) and _fits(value, Transform(value.at, as_degrees), params):
-        return ": its angles are degrees where radians are asked for"
+        return ": its angles are in degrees instead of radians"
     metres, degrees = value.apart(wanted)
     if metres <= params.tolerance_m:
         return f": the rotation is off by {degrees:.0f}°"

@@ -65,10 +65,10 @@ class Trio(NamedTuple):
 
 @check("copies", params=CopiesParams)
 def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
-    """Two copies of the node live at once, and the listener hears both.
+    """Two copies of the node run at the same time, and the listener hears both.
 
     What it checks
-        That a second copy of the script can be started beside the first: both live on, under two names, and
+        That a second copy of the script can be started beside the first: both keep running, under two names, and
         the listener prints messages of both.
 
     Why it matters on a robot
@@ -84,7 +84,7 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
         `rospy.init_node('<name>', anonymous=True)` adds a number of its own to each copy's name. `rosnode
         list` shows both.
     """
-    expected = f"two copies alive under two names, and {params.listener} printing messages of both"
+    expected = f"two copies running under two names, and {params.listener} printing messages of both"
     trio = _trio(package, run, params)
     if isinstance(trio, Verdict):
         return trio.about(expected=expected)
@@ -139,7 +139,7 @@ def _taken_over(run: Run, trio: Trio, params: CopiesParams) -> Verdict | None:
         down = "the first takes it back, and both are shut down"
     message = f"the second copy takes the name {name} over, and {down}: ROS allows each name once"
     base = name.strip("/")
-    hint = f"write {init(base, anonymous=True)}: then each copy has a name of its own"
+    hint = f"write {init(base, anonymous=True)}: then each copy has its own name"
     return partial(params.taken_over_score, message, hint=hint, measured=f"one name for two copies: {name}")
 
 
@@ -155,10 +155,14 @@ def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | No
         message = f"both copies ended by themselves: {end.cause}"
         return (inconclusive if end.of_machine else unjudged)(message, hint=end.hint, citations=cited)
     message = (
-        f"the {word} copy ended by itself after {ended_after(one)}, while the other lived on: {end.cause}"
+        f"the {word} copy ended by itself after {ended_after(one)}, while the other kept running: {end.cause}"
     )
     if word == "second":
-        hint = end.hint if end.citations else "it lives alone: take out what ends it where another copy runs"
+        hint = (
+            end.hint
+            if end.citations
+            else "it runs when alone: remove whatever ends it when another copy is running"
+        )
         return failed(message, hint=hint, citations=cited)
     return unjudged(message, hint=end.hint, citations=cited)  # the first would have ended alone too
 
@@ -181,7 +185,7 @@ def _listener_gone(package: PackageFacts, run: Run, trio: Trio) -> Verdict | Non
     if not trio.listener.ended_early:
         return None
     end = explain_end(trio.listener, run, package)
-    message = f"both copies live, but {trio.listener.name} ended before it could hear both: {end.cause}"
+    message = f"both copies run, but {trio.listener.name} ended before it could hear both: {end.cause}"
     return end.verdict(unjudged, message)
 
 
@@ -191,8 +195,8 @@ def _heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) ->
     from_ns = both_from_ns(run, params.topic, *copies)
     if from_ns is None:
         silent = next(nodes for nodes in copies if not sent_by(run, params.topic, nodes))
-        message = f"both copies live, but {join_words(silent)} sends no text on {params.topic}"
-        return unjudged(message, hint=f"publish on {params.topic} in the loop, as a copy alone does")
+        message = f"both copies run, but {join_words(silent)} sends no text on {params.topic}"
+        return unjudged(message, hint=f"publish on {params.topic} in the loop, as a single copy does")
     first, second = (sent_by(run, params.topic, nodes, from_ns) for nodes in copies)
     if first.total() + second.total() > LOOKED_AT:  # the listener lags behind a flood
         first, second = (sent_by(run, params.topic, nodes) for nodes in copies)
@@ -209,7 +213,7 @@ def _heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) ->
 def _other_words(params: CopiesParams) -> Verdict:
     wanted = in_words(params.template)
     message = f"{params.listener} prints what both copies send, but not as '{wanted}'"
-    return unjudged(message, hint=f"print '{wanted}', with the handout's own words")
+    return unjudged(message, hint=f"print '{wanted}', in the handout's own words")
 
 
 def _judged(
@@ -224,7 +228,7 @@ def _judged(
     if first.total() + second.total() > LOOKED_AT:
         heard = f"at least {heard}"
     return passed(
-        f"{names} live at once, and {params.listener} prints messages of both",
+        f"{names} run at the same time, and {params.listener} prints messages of both",
         measured=f"{names}; printed: {heard}",
     )
 
@@ -241,20 +245,22 @@ def _unheard(
     fewest = min(first.total(), second.total())
     if fewest < FEW and trio.watched_ns(run) >= ENOUGH_NS:
         message = (
-            f"both copies live, but one sends {plural(fewest, 'message')} in {seconds(trio.watched_ns(run))}"
+            f"both copies run, but one sends {plural(fewest, 'message')} in {seconds(trio.watched_ns(run))}"
         )
         return unjudged(message, hint=f"publish on {params.topic} in the loop `{LOOP}`, again and again")
     if fewest < FEW:
         message = "the two copies were watched too briefly to see their messages printed"
         return inconclusive(message, hint="grade again")
     if not printed:
-        message = f"both copies live, but {params.listener} prints nothing of what they send"
+        message = f"both copies run, but {params.listener} prints nothing of what they send"
         return unjudged(message, hint="first make the listener print what it hears")
     counts = heard_of(first, second, printed), heard_of(second, first, printed)
     if not any(counts):
         message = f"{names[0]} and {names[1]} send the same texts, and not all of them are printed twice"
-        return unjudged(message, hint=f"let each message tell the time: {GET_TIME}")
+        return unjudged(message, hint=f"put the time into each message: {GET_TIME}")
     lost = names[0] if counts[1] else names[1]
-    message = f"{names[0]} and {names[1]} live at once, but {params.listener} prints nothing of {lost}"
+    message = (
+        f"{names[0]} and {names[1]} run at the same time, but {params.listener} prints nothing of {lost}"
+    )
     hint = f"subscribe with a callback and {SPIN}; a subscriber hears every publisher of its topic"
     return unjudged(message, hint=hint)

@@ -48,7 +48,7 @@ TITLES = {
 }
 STUDENTS = {SubmissionError.kind, PackageNotFound.kind}
 """The kinds of error that are the student's fault."""
-NO_MARK_LOST = "this is not the submission's fault, and no mark is lost"
+NO_MARK_LOST = "this is not the submission's fault, and this costs no marks"
 WITH_LINES = ("junit", "code-quality", "sarif")
 """Forms that are rendered once more, or only here, with files as the repository has them."""
 REPORT_NAMES = frozenset(
@@ -107,10 +107,10 @@ def describe_outcome(
         return f"{reached}; {points_to_pass(rubric, counted.max_points)}", ""
     waiting = arrange(counted, rubric).open
     if not waiting:
-        return f"{reached}; something could not be judged, and no mark is lost", ""
+        return f"{reached}; something could not be judged, and this costs no marks", ""
     points = number(sum(loss.points for loss in waiting))
     first = waiting[0].criterion
-    return f"{reached}; {points} more are not settled, and no mark is lost: {first.message}", first.hint
+    return f"{reached}; {points} more are not settled, and this costs no marks: {first.message}", first.hint
 
 
 def points_to_pass(rubric: Rubric, points: float) -> str:

@@ -101,7 +101,7 @@ def _package(text: str) -> str:
 def _attempts(text: str) -> int | None:
     if text and not re.fullmatch(r"[1-9]\d{0,5}", text):
         raise UsageError(
-            f"attempts: {_quoted(text)} is no number of attempts", hint="write 5, say, or nothing"
+            f"attempts: {_quoted(text)} is not a number of attempts", hint="write 5, say, or nothing"
         )
     return int(text) if text else None
 

@@ -82,7 +82,7 @@ class Facts:
         known = (self.package, *self.others.values())
         found = join_words(one.name for one in known if one is not None)
         return unjudged(
-            f"package {name} is not here; packages found: {found}",
+            f"package {name} is missing; packages found: {found}",
             expected=f"a package {name}",
             measured=f"no package {name}",
             hint=f"hand in {name} too, beside {self.rubric.package}: its folder, with the package.xml that names it",

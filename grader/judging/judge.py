@@ -116,7 +116,7 @@ def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Ver
 def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
     """Return what the criterion's check says; an exception inside it is not the student's fault and says so."""
     if criterion.check == MANUAL:
-        return Verdict(status=Status.MANUAL, score=0.0, message="a person gives these points")
+        return Verdict(status=Status.MANUAL, score=0.0, message="a person awards these points")
     check = checks.get(criterion.check)
     if check is None:
         message = f"this grader has no check {criterion.check!r}"
@@ -165,7 +165,7 @@ def _sound(verdict: object) -> Verdict:
 
 def _broken(check: Check, error: Exception) -> Verdict:
     kind = type(error).__name__
-    message = f"the check {check.name!r} itself failed ({kind}); no mark is lost by this"
+    message = f"the check {check.name!r} itself failed ({kind}); this costs no marks"
     hint = "please report this with the evidence file"
     if check.source:
         lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == check.source]

@@ -272,11 +272,11 @@ def _explained(text: str, end: int, file: str, message: str) -> Fault:
     tokens = [t for t in tokenize(text) if t.kind != "COMMENT" and t.span.start >= end]
     first = tokens[0] if tokens else Token("RAW", "", slice(end, end), text.count("\n") + 1, 1)
     unparsed = next((t for t in tokens if t.kind == "UNPARSEABLE"), None)
-    line, cause = first.line, f"`{_word(first)}` is no command: CMake expects name(...)"
+    line, cause = first.line, f"`{_word(first)}` is not a command: CMake expects name(...)"
     if unparsed is not None and text[unparsed.span].startswith('"'):
         line, cause = unparsed.line, 'a quote `"` is opened here and never closed'
     elif first.kind == "RPAREN":
-        cause = "there is a `)` too many"
+        cause = "there is one `)` too many"
     elif "unexpected end of file" in message and len(tokens) > 1 and tokens[1].kind == "LPAREN":
         cause = f"the `(` of `{_word(first)}(` is never closed by `)`"
     elif end == 0 and len(text) <= _LINK_CHARS_MAX and _LINK_TEXT.fullmatch(text):

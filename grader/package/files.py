@@ -231,11 +231,11 @@ def _near(data: bytes) -> str:
     if not data.strip():
         return "the file is empty"
     if data.startswith(_BOM + b"#!"):
-        return "an invisible byte order mark (BOM) stands before `#!`: save as UTF-8 without BOM"
+        return "an invisible byte order mark (BOM) comes before `#!`: save as UTF-8 without BOM"
     if later == 1:
-        return "a space stands before `#!`: it must be the very first thing in the file"
+        return "a space comes before `#!`: it must be the very first thing in the file"
     if _NO_SHEBANG.match(first):
-        return f"line 1 is `{first[:60]}`, which is no shebang: {_ADVICE}"
+        return f"line 1 is `{first[:60]}`, which is not a shebang: {_ADVICE}"
     if later is None:
         return f"there is no `#!` line at the top: {_ADVICE}"
     before = f"line 1 is `{first[:40]}`" if first else "line 1 is blank"

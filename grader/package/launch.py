@@ -145,13 +145,13 @@ def _unknown(parent: etree._Element) -> Iterator[tuple[str, int]]:
 
 
 def _wrong_root(path: str, root: str, line: int | None) -> Fault:
-    letters = " in small letters" if root.lower() == "launch" else ""
+    letters = " in lower case" if root.lower() == "launch" else ""
     cause = f"the file begins with `<{root}>`; roslaunch wants `<launch>`{letters}"
     return Fault(file=path, line=line, kind="WrongRoot", message=f"root tag is {root}", cause=cause)
 
 
 def _nested_root(path: str, line: int | None) -> Fault:
-    cause = "a second `<launch>` stands inside the first: roslaunch wants exactly one"
+    cause = "there is a second `<launch>` inside the first: roslaunch wants exactly one"
     return Fault(file=path, line=line, kind="WrongRoot", message="more than one <launch>", cause=cause)
 
 

@@ -38,18 +38,18 @@ _CAUSES = (
     (r'not contain more than one "(\w+)"', "{0}", "there may be only one `<{0}>` tag"),
     (r'"(\w+)" tag must have the attribute "(\w+)"', "{0}", '`<{0}>` needs {1}="..."'),
     (r'Invalid email ""', "maintainer", '`<maintainer>` needs email="name@place.org"'),
-    (r'Invalid email "(.*?)"', "maintainer", "`{0}` is no e-mail address: write name@place.org"),
+    (r'Invalid email "(.*?)"', "maintainer", "`{0}` is not an e-mail address: write name@place.org"),
     (r"must have an email", "maintainer", '`<maintainer>` needs email="name@place.org"'),
     (r"name must not be empty", "name", "`<name>` is empty"),
     (r'Package name "(.*?)" does not follow naming', "name",
-     "`{0}` is no package name: it takes letters, digits, `_` and `-`, no spaces, and begins with a letter"),
+     "`{0}` is not a package name: use letters, digits, `_` and `-`, no spaces, and start with a letter"),
     (r"version must not be empty", "version", "`<version>` is empty: write 0.0.0"),
-    (r'version "(.*?)" does not follow version', "version", "`{0}` is no version: write 0.0.0"),
+    (r'version "(.*?)" does not follow version', "version", "`{0}` is not a version: write 0.0.0"),
     (r"description must not be empty", "description", "`<description>` is empty: write a sentence"),
     (r"at least one maintainer", "", '`<maintainer email="...">` is missing'),
     (r'at least one "license"', "", "`<license>` is missing"),
     (r"license tag must neither", "license", "`<license>` is empty"),
-    (r"must not contain the following tags: (.*)", "{0}", "format {format} knows no `<{0}>`"),
+    (r"must not contain the following tags: (.*)", "{0}", "format {format} has no `<{0}>`"),
     (r"must not contain the following children: (.*)", "",
      "there is a tag inside another where only text belongs (`<{0}>`): a closing tag is missing before it"),
     (r'"(\w+)" tag must not have the following attributes: (.*)', "{0}", "`<{0}>` takes no attribute `{1}`"),
@@ -81,7 +81,7 @@ def _missing(folder: Path, fault: Fault) -> Fault:
     similar = next((p.name for p in sorted(folder.glob("*")) if p.name.lower() == MANIFEST), None)
     if similar is None or similar == MANIFEST:
         return fault
-    cause = f"the file is called `{similar}`; catkin wants `{MANIFEST}` in small letters"
+    cause = f"the file is called `{similar}`; catkin wants `{MANIFEST}` in lower case"
     return fault.model_copy(update={"cause": cause})
 
 

@@ -57,30 +57,30 @@ _LINES = (
 
 _MESSAGES = (
     (r"inconsistent use of tabs", "tabs and spaces are mixed in the indentation: use four spaces everywhere"),
-    (r"unindent does not match", "this line is indented like none of the lines above it"),
-    (r"unexpected indent", "this line is indented further than the one above, and nothing asks for it"),
+    (r"unindent does not match", "this line's indentation matches none of the lines above it"),
+    (r"unexpected indent", "this line is indented further than the one above for no reason"),
     (r"expected an indented block", "the line after a `:` must be indented (by four spaces)"),
     (r"Missing parentheses in call to '(\w+)'", "this is Python 2: `{0}` needs brackets, `{0}(...)`"),
     (r"multiple exception types", "this is Python 2: write `except Error as name:`"),
     (r"leading zeros in decimal", "a number may not begin with 0: write 777, or 0o777 for an octal one"),
     (r"expected ':'", "a colon `:` is missing at the end of the line"),
     (r"'(.)' was never closed", "the bracket `{0}` is opened in this line and never closed"),
-    (r"unmatched '(.)'", "there is a `{0}` too many, or its opening bracket is missing"),
+    (r"unmatched '(.)'", "there is one `{0}` too many, or its opening bracket is missing"),
     (r"closing parenthesis '(.)' does not match opening parenthesis '(.)'",
-     "a `{1}` is closed by `{0}`: the two must be of one kind"),
-    (r"triple-quoted", "a text in triple quotes is opened and never closed"),
+     "a `{1}` is closed by `{0}`: the two must match"),
+    (r"triple-quoted", "a triple-quoted string is opened and never closed"),
     (r"EOL while scanning|unterminated (f-)?string", "a quote is opened in this line and never closed"),
     (r"Maybe you meant '=='|cannot assign to", "`=` gives a value to a name; to compare, write `==`"),
     (r"forgot a comma", "a comma is missing between two values"),
-    (r"'return' outside function", "`return` stands outside every function: is its indentation right?"),
-    (r"'(break|continue)'? .*loop", "`{0}` stands outside every loop: is its indentation right?"),
-    (r"'yield' outside", "`yield` stands outside every function: is its indentation right?"),
+    (r"'return' outside function", "`return` is outside every function: is its indentation right?"),
+    (r"'(break|continue)'? .*loop", "`{0}` is outside every loop: is its indentation right?"),
+    (r"'yield' outside", "`yield` is outside every function: is its indentation right?"),
     (r"UTF-16", "the file is saved as UTF-16: save it as UTF-8"),
     (r"Non-UTF-8 code|codec can't decode byte|invalid or missing encoding",
      "the file is not saved as UTF-8 (accents of an old encoding): save it as UTF-8"),
-    (r"unicodeescape", r"a backslash in a text is read as `\U...`: write the text as r\"...\""),
+    (r"unicodeescape", r"a backslash in a string is read as `\U...`: write the string as r\"...\""),
     (r"encoding", "line 1 or 2 names an encoding that Python does not know: write `# -*- coding: utf-8 -*-`"),
-    (r"null bytes", "the file holds null bytes: it is no text, or saved as UTF-16; save it as UTF-8"),
+    (r"null bytes", "the file holds null bytes: it is not text, or was saved as UTF-16; save it as UTF-8"),
     (r"after line continuation", r"nothing may follow a backslash `\` at the end of a line"),
     (r"duplicate argument '(\w+)'", "two parameters are both called `{0}`"),
     (r"unexpected EOF", "the file ends in the middle of something: a bracket, or a block without a body"),
@@ -309,4 +309,4 @@ def _character_words(char: str) -> str:
     plain = unicodedata.normalize("NFKC", char)
     if plain != char and plain.isascii():
         return f"`{char}` ({code}) is not the plain `{plain}`: type it again"
-    return f"`{char}` ({code}) cannot stand in Python code outside a text or a comment"
+    return f"`{char}` ({code}) cannot appear in Python code outside a string or a comment"

@@ -15,11 +15,11 @@ _TYPOGRAPHIC = re.compile("[\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u2033\u00
 # libxml2's message and what it means ({0}, {1}: the pattern's groups, {root}: the root tag)
 _CAUSES = (
     (r"Document is empty", "the file is empty"),
-    (r"Start tag expected", "something stands before the first tag: the file must begin with `<{root}>`"),
+    (r"Start tag expected", "there is something before the first tag: the file must start with `<{root}>`"),
     (r"Premature end of data in tag (\S+) line (\d+)", "`<{0}>` of line {1} is never closed: add `</{0}>`"),
-    (r"hyphen|must not contain '--'", "`--` may not stand inside a comment `<!-- ... -->`"),
+    (r"hyphen|must not contain '--'", "`--` is not allowed inside a comment `<!-- ... -->`"),
     (r"Comment not terminated", "a comment is opened by `<!--` and never closed by `-->`"),
-    (r"Extra content at the end", "something stands behind the end of the first block: one `<{root}>` only"),
+    (r"Extra content at the end", "there is text after the first block: only one `<{root}>` is allowed"),
     (r"XML declaration allowed only", "delete what comes before `<?xml ... ?>`, blank lines too"),
     (r"Attribute (\S+) redefined", "the attribute `{0}` is given twice in one tag"),
     (r"Unescaped '<' not allowed in attr", "a closing quote is missing: the value runs on into the next tag"),
@@ -33,7 +33,7 @@ _CAUSES = (
     (r"Invalid character|invalid Char|xmlChar", "an invisible control character: type the line again"),
     (r"[Ee]ntity", "entities are not read: write the text out"),
     (r"Excessive depth", "tags are nested more than 250 deep"),
-    (r"Namespace prefix (\S+)", "`{0}:` stands before a name: no colons in the names of tags and attributes"),
+    (r"Namespace prefix (\S+)", "`{0}:` is in front of a name: tags and attributes have no colons in their names"),
 )  # fmt: skip
 
 
@@ -177,7 +177,7 @@ def cause_of(message: str, log: list[str], line: str, *, root: str) -> str:
 
 def _mismatch(opened: str, line: str, closed: str, root: str) -> str:
     if opened.lower() == closed.lower():
-        return f"`<{opened}>` of line {line} is closed by `</{closed}>`: capital and small letters must agree"
+        return f"`<{opened}>` of line {line} is closed by `</{closed}>`: upper and lower case must match"
     if get_close_matches(closed, [opened], cutoff=0.7):
         return f"`<{opened}>` of line {line} is closed by `</{closed}>`: write `</{opened}>`"
     if opened == root:

@@ -114,7 +114,7 @@ class _Writer:
         if self._detail.folded:
             told = [row for loss in (*lost, *still) for row in self._told(loss)]
             lines += self._folded("Details, and how to fix it", told)
-            lines += self._folded(_counted("Advice, costs nothing", view.advice), self._advice(view.advice))
+            lines += self._folded(_counted("Advice (costs nothing)", view.advice), self._advice(view.advice))
             lines += self._folded(
                 _counted(sentences.NOTICED_TITLE, result.notes), self._noticed(result.notes)
             )

@@ -49,7 +49,7 @@ def gate_words(result: GradingResult) -> tuple[str, ...]:
             f"{before}, {number(gate.at_most)} after: without {gate.criterion}, no more than that counts",
         )
     below = sum(c.points for c in result.criteria)
-    return ("Penalties take no more points than there are.",) if below < 0 else ()
+    return ("Penalties never take the total below zero.",) if below < 0 else ()
 
 
 def repair_words(result: GradingResult) -> tuple[str, ...]:
@@ -72,12 +72,12 @@ def _repair_words(repair: Repair, criteria: list[CriterionResult]) -> str:
         share = min(c.repaired.share for c in others if c.repaired)
         earned = "" if share == 1 else f", for {share:.0%} of the points"
         were = "was" if len(others) == 1 else "were"
-        words += f"; {join_words(c.id for c in others)} {were} judged with it repaired{earned}"
+        words += f"; {join_words(c.id for c in others)} {were} judged with this repaired{earned}"
     return f"{words[:1].upper()}{words[1:]}"
 
 
 def judged_repaired(result: GradingResult) -> dict[str, list[str]]:
-    """Return by the criterion that a fault is charged to, which others were judged with it repaired."""
+    """Return by the criterion that a fault is charged to, which others were judged with this repaired."""
     found: dict[str, list[str]] = {}
     with_copy = [(c.id, c.repaired) for c in result.criteria if c.repaired is not None]
     for name, charged in with_copy:
@@ -208,7 +208,7 @@ def verdict_words(result: GradingResult, rubric: Rubric, hidden: int) -> str:
 
 
 NOTICED_TITLE = "Noticed while it ran"
-COSTS_NOTHING = "No points were taken for any of this."
+COSTS_NOTHING = "None of this cost any points."
 
 
 def note_place(note: Note) -> str:
@@ -239,7 +239,7 @@ def without_sandbox(label: str) -> str:
     else:
         why = f"The grading machine has no sandbox ({found['reason']})"
     who = "an unprivileged user there" if found["other"] else "the user who grades"
-    return f"{why}: students' code runs with all rights of {who}."
+    return f"{why}: students' code runs with all the rights of {who}."
 
 
 RUBRIC_FROM = {
@@ -262,7 +262,7 @@ def students_rubric(result: GradingResult) -> str:
     if result.rubric_origin != "submission":
         return ""
     where = f"The rubric is {RUBRIC_FROM['submission']}, where the student can change it"
-    return f"{where}: these points are a help, no mark."
+    return f"{where}: these points are guidance, not a mark."
 
 
 SIGNS = {
@@ -278,7 +278,7 @@ MEANINGS = {
     Status.PASS: "reached",
     Status.PARTIAL: "partly reached",
     Status.FAIL: "not reached",
-    Status.BLOCKED: "could not be judged because something before it was not reached",
+    Status.BLOCKED: "could not be judged because something that it depends on failed",
     Status.INCONCLUSIVE: "could not be decided this time; no points are lost for good",
     Status.ERROR: "the grader could not judge it; no points are lost for good",
     Status.MANUAL: "a person awards these points",
@@ -335,7 +335,7 @@ def pass_mark(result: GradingResult, rubric: Rubric, hidden: int) -> str:
     if not_graded(result):
         return f"{mark}."
     if hidden:
-        return f"{mark}, those of criteria that run at grading included."
+        return f"{mark}, including those of criteria that run at grading."
     missing = rubric.pass_mark - result.points
     return (
         f"{mark}: {count_points(missing)} {'is' if missing == 1 else 'are'} missing."
@@ -351,8 +351,8 @@ def in_short(result: GradingResult, view: ReportView) -> str:
         return "Nothing could be judged."
     late = result.late.points_before - result.late.points if result.late else 0.0
     if lost <= 0 and late <= 0 and not view.open and not result.gate:
-        return "Nothing was lost: every criterion that counts is reached. Well done!"
-    said = [] if late > 0 or result.gate else ["Nothing was lost."]
+        return "You lost nothing: every criterion that counts is met. Well done!"
+    said = [] if late > 0 or result.gate else ["You lost nothing."]
     if lost > 0:
         costs = "costs" if len(view.lost) == 1 else "cost"
         said = [f"{plural(len(view.lost), 'thing')} {costs} you {count_points(lost)}."]
@@ -378,11 +378,11 @@ def points_line(result: GradingResult, view: ReportView) -> str:
 
 
 def lost_words(criterion: CriterionResult, blocked: float, alike: float = 0.0) -> str:
-    """`10 points lost, and 25 more in what it holds back`; points that are open are not lost. `alike` are those of
+    """`10 points lost, and 25 more in what it blocks`; points that are open are not lost. `alike` are those of
     other criteria that the same mistake costs."""
     own = criterion.missing
     state = "still open" if criterion.status.is_open else "lost"
-    said = f"{count_points(own)} {state}" if own else "costs nothing itself"
+    said = f"{count_points(own)} {state}" if own else "costs nothing by itself"
     more = [f"{number(alike)} more where the same mistake shows"] if alike else []
-    more += [f"{number(blocked)} more in what it holds back"] if blocked else []
+    more += [f"{number(blocked)} more in what it blocks"] if blocked else []
     return ", and ".join([said, *more])

@@ -152,7 +152,7 @@ class Terminal:
         )
         parts += self._section(NOTICED_TITLE, self._noticed(result.notes))
         parts += self._reached(result, unrun, full=full)
-        parts += self._section("Advice, costs nothing", [self._advice(c) for c in view.advice])
+        parts += self._section("Advice (costs nothing)", [self._advice(c) for c in view.advice])
         parts += [Text(f"\n{visible_words(result, hidden)}")] if hidden else []
         parts += remarks
         if unrun:
@@ -219,7 +219,7 @@ class Terminal:
             ("also at", ", ".join(others)),
             ("see", c.reproduce),
             ("also costs", ", ".join(f"{a.id} {self._cost(a)}" for a in loss.alike)),
-            ("judged with it repaired", ", ".join(name for name in repaired if name not in alike)),
+            ("judged with this repaired", ", ".join(name for name in repaired if name not in alike)),
             ("holds back", ", ".join(f"{b.id} {self._cost(b)}" for b in loss.blocked)),
         ]
         words = self._words(without_place(c.message, place) or c.title)

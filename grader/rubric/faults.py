@@ -57,7 +57,7 @@ BOUNDS = {
 def model_faults(model: type[BaseModel], data: object, base: KeyPath = ()) -> list[Fault]:
     """Return every fault of `data` as a `model`, as the key's path (below `base`) and what is wrong there.
 
-    `data` is read as JSON, strictly: text is no number, and a number no text.
+    `data` is read as JSON, strictly: text is not a number, and a number no text.
     """
     try:
         model.model_validate_json(json.dumps(data), strict=True)

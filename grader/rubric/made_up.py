@@ -367,7 +367,7 @@ def _faults_of(one: dict[str, Any], above: Mapping[str, MadeUp]) -> Iterator[tup
         if name not in above:
             yield (kind,), f'no value "{name}" is declared above it{did_you_mean(name, above)}'
         elif not above[name].is_number:
-            yield (kind,), f'"{name}" is no number'
+            yield (kind,), f'"{name}" is not a number'
 
 
 def _range_faults(one: dict[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:

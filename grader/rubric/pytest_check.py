@@ -76,7 +76,7 @@ def run_tests(folder: Path, evidence: Evidence, params: PytestParams) -> Verdict
 
     How it is measured
         Each test reads what was recorded while the package ran, and passes or fails. Tests that are skipped
-        do not count. If the tests themselves are broken, no mark is lost.
+        do not count. If the tests themselves are broken, this costs no marks.
 
     How to fix
         The hint names each test that failed, and what it said.
@@ -85,7 +85,7 @@ def run_tests(folder: Path, evidence: Evidence, params: PytestParams) -> Verdict
         path, _ = read_beside(folder, params.file)
         return _verdict(_session(path, evidence, params), params)
     except (FileFault, TestsBroken) as error:
-        message = f"the tests in {params.file} could not be run; no mark is lost by this"
+        message = f"the tests in {params.file} could not be run; this costs no marks"
         hint = f"for the instructor: {error}"
         return Verdict(status=Status.ERROR, score=0.0, message=message, hint=hint)
 

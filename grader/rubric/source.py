@@ -288,7 +288,7 @@ class _Reader:
             return str(node.value)
         shown = node.value if isinstance(node, yaml.ScalarNode) else "this"
         line = node.start_mark.line + 1
-        self.faults.append((path, f"{shown} in line {line} is no text: put the key in quotes"))
+        self.faults.append((path, f"{shown} in line {line} is not a string: put the key in quotes"))
         return None
 
     def _scalar(self, node: yaml.Node, path: KeyPath) -> Value:

@@ -125,7 +125,7 @@ def _reason(failure: GitFailed, seconds: float) -> str:
 
 
 def _unknown(reason: str) -> GitStatus:
-    text = f"What git has of this package is not known: {reason}."
+    text = f"Can't tell what git has of this package: {reason}."
     return GitStatus(points=(Point(kind="unknown", text=text, remark=True),))
 
 
@@ -151,7 +151,7 @@ class _Advice:
         if points:
             return GitStatus(points=tuple(points))
         where = printable(server.marked or "the server")
-        return GitStatus(summary=f"All of it is committed and pushed: {where} has it ({LAST_FETCH}).")
+        return GitStatus(summary=f"Everything is committed and pushed: {where} has it ({LAST_FETCH}).")
 
     def _in_git(self) -> Iterator[Point]:
         """What is on the disk and not in a commit. What is staged just before a commit is on its way into one."""
@@ -162,9 +162,7 @@ class _Advice:
             fix = commands.add_and_commit([p for p in files.changed if p not in files.staged])
             yield Point(kind="uncommitted", text=text, fix=commands.git("status") if files.conflicts else fix)
         for in_git, on_disk in list(files.renamed.items())[:NAMED_AT_MOST]:
-            text = (
-                f"git calls it {printable(in_git)}, this disk {printable(on_disk)}: on Linux these are two."
-            )
+            text = f"git calls it {printable(in_git)}, this disk {printable(on_disk)}: on Linux they differ."
             yield Point(kind="uncommitted", text=text, fix=commands.rename(in_git, on_disk))
         if files.untracked:
             number = "1 file" if len(files.untracked) == 1 else f"{len(files.untracked)} files"
@@ -175,7 +173,7 @@ class _Advice:
             text = f"Of {listing(list(files.pointers))} git has only a pointer to another repository, not the files."
             yield Point(kind="untracked", text=text, fix=commands.git("submodule", "status"))
         if files.ignored:
-            text = f"A .gitignore hides what the package uses, so git will not have it: {listing(list(files.ignored))}"
+            text = f"A .gitignore file keeps out of git what the package uses: {listing(list(files.ignored))}"
             yield Point(kind="ignored", text=text, fix=commands.add_and_commit(files.ignored, force=True))
         if files.modes:
             text = f"git does not have the executable bit of {listing(list(files.modes))}"

@@ -108,7 +108,7 @@ def write_staged(package: Path, base: Path, *, index: str = "") -> Path:
     package = package.resolve()
     top = repository_around(package)
     if top is None:
-        raise UsageError(f"{printable(str(package))} is in no git repository", hint="leave out --staged")
+        raise UsageError(f"{printable(str(package))} is not in a git repository", hint="leave out --staged")
     into = base / "staged"
     try:
         view = _open_index(top, base, index)

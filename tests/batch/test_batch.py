@@ -209,7 +209,7 @@ def test_ten_rows_that_are_bad_in_ten_ways(tmp_path, asking, capsys) -> None:
         "none (roster.csv:7)": "no package.xml was found",
         "outside": f"roster.csv:9: source: ../../etc {OUT}",
         "private (roster.csv:10)": "it does not exist, or it needs a password",
-        "soon": "roster.csv:12: extension_days: soon is no number of days",
+        "soon": "roster.csv:12: extension_days: soon is not a number of days",
     }
     for name, words in told.items():
         (line,) = [line for line in shown.out.splitlines() if line.startswith(f"{name}: error: ")]

@@ -35,7 +35,7 @@ def node(name: str, namespace: str = "/") -> LaunchNode:
         ),
         (["Resource not found: pubsub_exampl", "ROS path [0]=/tmp"], "no package pubsub_exampl"),
         (["RLException: [/w/launch/arg.launch] requires the 'nm' arg to be set"], 'name="nm"'),
-        (["RLException: Invalid <node> tag: output must be one of 'log', 'screen'. "], "small letters"),
+        (["RLException: Invalid <node> tag: output must be one of 'log', 'screen'. "], "lower case"),
         (
             ["RLException: Unable to launch [ns-10]. ", "If it is a script, you may be missing a '#!'"],
             "of ns",

@@ -14,7 +14,7 @@ from tests.faulty import ROOT
 
 LAB = "leeds-comp3631-lab1"
 SOLUTION = str(ROOT / "reference_solutions" / LAB)
-SAID = "grader: The grading machine has no sandbox (bwrap is not installed): students' code runs with all rights of"
+SAID = "grader: The grading machine has no sandbox (bwrap is not installed): students' code runs with all the rights of"
 GRADE = "grader.pipeline.grade"
 COMMANDS = {
     "grade": (["grade", SOLUTION, "--rubric", LAB, "--out", "o"], GRADE),

@@ -67,7 +67,7 @@ Statuses = dict[str, Status | tuple[Status, ...]]
 
 
 class Bytes(Record):
-    """A file's content that is no text."""
+    """A file's content that is not text."""
 
     base64: str
 

@@ -58,7 +58,7 @@ def automatic(criteria: tuple[CriterionResult, ...], error: ErrorInfo | None = N
 
 
 RATE = criterion("rate", Status.FAIL, 0, 10, message="5 Hz, not 10 Hz", measured="5 Hz", hint="sleep less")
-STYLE = criterion("style", Status.MANUAL, 0, 10, message="a person gives these points")
+STYLE = criterion("style", Status.MANUAL, 0, 10, message="a person awards these points")
 BUILD = criterion("build", Status.PASS, 80, 80, message="it builds")
 TALK = criterion("talk", Status.MANUAL, 0, 0)
 CRITERIA = (BUILD, RATE, STYLE)
@@ -82,7 +82,7 @@ def test_a_person_gives_the_points_of_a_manual_criterion():
     assert (applied.criterion, applied.points, applied.date) == ("style", 7, date(2026, 11, 2))
     assert (applied.automatic.status, applied.automatic.message) == (
         Status.MANUAL,
-        "a person gives these points",
+        "a person awards these points",
     )
     assert applied.was == applied.automatic
     assert not applied.changed

@@ -91,7 +91,7 @@ def test_included_files_of_the_package_count_and_no_others(tmp_path):
         ),
         ("project(lab1)\n)\n", 2, "`)` too many", 1),
         ('project(lab1)\n\nset(a "b)\n', 3, "a quote", 1),
-        ("project(lab1)\nhello world\n", 2, "`hello` is no command", 1),
+        ("project(lab1)\nhello world\n", 2, "`hello` is not a command", 1),
         ("project(lab1)\nif(x)\nset(a b)\n", 2, "`if()` is never closed by `endif()`", 1),
         ("project(lab1)\nendif()\n", 2, "no `if()` before it", 1),
         ("project(lab1)\nset(a ${b)\ncatkin_package()", 2, "`${...}` is never closed", 3),

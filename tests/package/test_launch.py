@@ -47,8 +47,8 @@ def test_attributes_that_are_not_there_are_none():
     ("text", "line", "cause"),
     [
         ("", 1, "the file is empty"),
-        ("hello <launch/>", 1, "something stands before the first tag"),
-        ("<launch>\n<!-- a -- b -->\n</launch>", 2, "`--` may not stand inside a comment"),
+        ("hello <launch/>", 1, "there is something before the first tag"),
+        ("<launch>\n<!-- a -- b -->\n</launch>", 2, "`--` is not allowed inside a comment"),
         ("<launch>\n<!-- a\n</launch>", 3, "never closed by `-->`"),
         (
             '<launch>\n<node pkg="a">\n</launch>',
@@ -65,9 +65,9 @@ def test_attributes_that_are_not_there_are_none():
         ("<launch>\n<group>\n</gruop>\n</launch>", 3, "write `</group>`"),
         ("<launch>\n<node pkg/></launch>", 2, "`pkg` has no value"),
         ('<launch>\n<node a="1" a="2"/></launch>', 2, "`a` is given twice"),
-        ("<launch></launch>\n<launch></launch>", 2, "one `<launch>` only"),
-        ("<launch></launch>\nbye", 2, "one `<launch>` only"),
-        ("<Launch></Launch>", 1, "`<Launch>`; roslaunch wants `<launch>` in small letters"),
+        ("<launch></launch>\n<launch></launch>", 2, "only one `<launch>`"),
+        ("<launch></launch>\nbye", 2, "only one `<launch>`"),
+        ("<Launch></Launch>", 1, "`<Launch>`; roslaunch wants `<launch>` in lower case"),
         ("<robot/>", 1, "`<robot>`; roslaunch wants `<launch>`"),
         ("<launch>\n<launch/></launch>", 2, "a second `<launch>`"),
         ("<launch>a & b</launch>", 1, "`&amp;`"),

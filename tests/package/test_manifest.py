@@ -53,11 +53,11 @@ def test_what_catkin_warns_of_is_advice(old, new, advice, capfd):
     ("old", "new", "line", "cause"),
     [
         ("  <name>lab1</name>\n", "", 2, "exactly one `<name>`"),
-        ("<name>lab1<", "<name>my lab<", 3, "`my lab` is no package name"),
+        ("<name>lab1<", "<name>my lab<", 3, "`my lab` is not a package name"),
         ("<name>lab1<", "<name><", 3, "`<name>` is empty"),
-        ("0.0.0", "1.0", 4, "`1.0` is no version"),
+        ("0.0.0", "1.0", 4, "`1.0` is not a version"),
         ("The lab1 package", "", 5, "`<description>` is empty"),
-        ("ada@example.org", "ada", 6, "`ada` is no e-mail address"),
+        ("ada@example.org", "ada", 6, "`ada` is not an e-mail address"),
         ('"ada@example.org"', '""', 6, '`<maintainer>` needs email="name@place.org"'),
         (' email="ada@example.org"', "", 6, '`<maintainer>` needs email="..."'),
         ("<license>MIT</license>", "", 2, "`<license>` is missing"),
@@ -70,7 +70,7 @@ def test_what_catkin_warns_of_is_advice(old, new, advice, capfd):
         ("</package>", "", 2, "`<package>` of line 2 is never closed"),
         ("<?xml", "\n<?xml", 2, "delete what comes before"),
         ("<depend>rospy</depend>", "<<<<<<< HEAD", 9, ""),
-        ("<package format", "<Package format", 10, "capital and small letters"),
+        ("<package format", "<Package format", 10, "upper and lower case"),
     ],
 )
 def test_what_catkin_refuses_is_a_fault(old, new, line, cause):

@@ -28,7 +28,7 @@ CASES = {
     "bracket": ("x = f(1\ny = 2\n", None, "never closed"),
     "bracket_end": ("x = f(1\n", 1, "never closed"),
     "bracket_many": ("x = 1)\n", 1, "too many"),
-    "bracket_kind": ("x = (1]\n", 1, "one kind"),
+    "bracket_kind": ("x = (1]\n", 1, "must match"),
     "text": ("x = 'a\n", 1, "a quote is opened"),
     "quote": ("x = \u2018a\u2019\n", 1, "typographic quote \u2018"),
     "double_quote": ("x = \u201ca b\u201d\n", 1, "typographic quote \u201c"),
@@ -40,7 +40,7 @@ CASES = {
     "tabs_unindent": ("if 1:\n\tif 2:\n\t\tx = 1\n  y = 2\n", 4, "tabs and spaces are mixed"),
     "indent_missing": ("if 1:\nx = 1\n", 2, "must be indented"),
     "indent_more": ("x = 1\n  y = 2\n", 2, "further than the one above"),
-    "indent_less": ("if 1:\n    x = 1\n  y = 2\n", 3, "like none of the lines above"),
+    "indent_less": ("if 1:\n    x = 1\n  y = 2\n", 3, "matches none of the lines above"),
     "merge": ("def f():\n    x = 1\n<<<<<<< HEAD\n    y = 1\n", 3, "merge markers"),
     "return": ("return 1\n", 1, "outside every function"),
     "plus": ("x++\n", 1, "x += 1"),
@@ -272,8 +272,8 @@ def test_a_script_that_counts_and_reads_no_clock(tmp_path, value, imported, told
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("counter = 0\nprint(conter)\n", ["`conter` is defined nowhere: did you mean `counter`?"]),
-        ("def run(speed):\n    return sped\n", ["`sped` is defined nowhere: did you mean `speed`?"]),
+        ("counter = 0\nprint(conter)\n", ["`conter` is not defined anywhere: did you mean `counter`?"]),
+        ("def run(speed):\n    return sped\n", ["`sped` is not defined anywhere: did you mean `speed`?"]),
         ("from a import *\ncounter = 0\nprint(conter)\n", []),
         ("counter = 0\nprint(unlike)\n", []),
         ("try:\n    pass\nexcept Exception as error:\n    print(error, __file__)\n", []),

@@ -18,7 +18,7 @@ NOTES = (
     Note(scenario="real", actor="talker.py", kind="refused", text="asked the master to shut down"),
     Note(scenario="package", actor="", kind="limit", text="had more than 400 processes"),
 )
-COSTS_NOTHING = "No points were taken for any of this."
+COSTS_NOTHING = "None of this cost any points."
 
 
 def test_result_json_names_them_last_and_only_where_there_are_any():

@@ -40,8 +40,8 @@ STYLE = AppliedOverride(
     comment="clear names",
     author="A. Miller",
     date=date(2026, 11, 2),
-    automatic=Automatic(status=Status.MANUAL, points=0, message="a person gives these points"),
-    was=Automatic(status=Status.MANUAL, points=0, message="a person gives these points"),
+    automatic=Automatic(status=Status.MANUAL, points=0, message="a person awards these points"),
+    was=Automatic(status=Status.MANUAL, points=0, message="a person awards these points"),
 )
 RATE = AppliedOverride(criterion="rate", points=8, automatic=PASSED, was=FAILED, changed=True)
 CRITERIA = (
@@ -100,7 +100,7 @@ def test_markdown_says_it_below_the_points():
     assert section == (
         "## Decided by a person\n\n"
         "- `style`: 7/10 by A. Miller, 2026-11-02: clear names\n"
-        "  - The check says: manual 0/10: a person gives these points\n"
+        "  - The check says: manual 0/10: a person awards these points\n"
         "- `rate`: 8/10 by a person\n"
         "  - The check says: pass 10/10: 10 Hz\n"
         f"  - **{AGAIN}**\n\n"

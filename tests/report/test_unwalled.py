@@ -23,7 +23,7 @@ from grader.rubric.load import LoadedRubric
 from tests.report.class_page.made_up import made_up_rows, made_up_run
 from tests.report.hostile import ESCAPES, result, rubric
 
-RAN = "students' code runs with all rights of"
+RAN = "students' code runs with all the rights of"
 MISSING = f"The grading machine has no sandbox (bwrap is not installed): {RAN} the user who grades."
 OFF = f"The sandbox is switched off (--sandbox none): {RAN} an unprivileged user there."
 

@@ -66,7 +66,7 @@ GIVEN = AppliedOverride(
     author="A. Müller </script>",
     date=date(2026, 11, 2),
     automatic=Automatic(status=Status.FAIL, points=0, message=MERMAID),
-    was=Automatic(status=Status.MANUAL, points=0, message="a person gives these points"),
+    was=Automatic(status=Status.MANUAL, points=0, message="a person awards these points"),
     changed=True,
 )
 LATE = Lateness(

@@ -42,12 +42,12 @@ def test_every_fault_by_its_line(tmp_path: Path) -> None:
         "roster.csv:3: no source",
         f"roster.csv:4: source: ../../secret {OUT}",
         "roster.csv:5: submitted_at: yesterday is no time such as 2026-11-20 23:59 or 2026-11-20T23:59:00+01:00",
-        "roster.csv:5: extension_days: many is no number of days",
+        "roster.csv:5: extension_days: many is not a number of days",
         (
             "roster.csv:6: submitted_at: 20/11/2026 23:59 can be read with the day or the month first: "
             "write it as 2026-11-20 23:59"
         ),
-        "roster.csv:7: extension_days: -1 is no number of days",
+        "roster.csv:7: extension_days: -1 is not a number of days",
         "roster.csv:8: source: a\\nb does not exist",
         "roster.csv:11: id: hui is there already, in roster.csv:10",
         "roster.csv:12: 6 fields, but the first line names 4 columns",

@@ -143,7 +143,11 @@ def test_three_faults_are_all_named_with_file_and_line(tmp_path):
             "6: pass_mark: 101 is more than all the points, 100",
         ),
         ("package: lab1\n", "package: lab1\ndigits: 9\n", "6: digits: must be at most 3, not 9"),
-        ("package: lab1\n", "package: lab1\n12: x\n", "1: 12 in line 6 is no text: put the key in quotes"),
+        (
+            "package: lab1\n",
+            "package: lab1\n12: x\n",
+            "1: 12 in line 6 is not a string: put the key in quotes",
+        ),
         (
             "package: lab1\n",
             "package: [1]\n",

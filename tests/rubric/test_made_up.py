@@ -140,7 +140,7 @@ def test_faulty_declarations(declared: str, fault: str, tmp_path: Path) -> None:
 
 def test_only_numbers_above_are_counted_with(tmp_path: Path) -> None:
     path = making_up(tmp_path, f"{{word: {{letters: 4}}, twice: {{product: [word, 2]}}, rate: {RATE}}}")
-    assert 'lab.yaml:6: made_up.twice.product: "word" is no number' in faults(path)
+    assert 'lab.yaml:6: made_up.twice.product: "word" is not a number' in faults(path)
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def test_it_says_what_it_took_and_that_all_is_pushed(lab: Clone) -> None:
     done = check(cwd=lab.package / "launch")
     assert done.returncode == 0, done.stderr
     assert done.stderr.startswith("grader: Checking lab1 in .. against leeds-comp3631-lab1\n")
-    assert "All of it is committed and pushed: origin/main has it" in done.stdout
+    assert "Everything is committed and pushed: origin/main has it" in done.stdout
 
 
 @pytest.mark.full
@@ -117,7 +117,7 @@ def test_staged_outside_of_a_repository(tmp_path: Path) -> None:
     shutil.copytree(SOLUTIONS / "leeds-comp3631-lab1" / "lab1", tmp_path / "lab1")
     done = check("--staged", cwd=tmp_path / "lab1")
     assert done.returncode == 2
-    assert "is in no git repository" in done.stderr
+    assert "is not in a git repository" in done.stderr
 
 
 @pytest.mark.full

@@ -20,7 +20,7 @@ def _texts(found) -> str:
 def test_all_pushed_is_one_line(clone: Clone, tmp_path: Path) -> None:
     found = clone.standing(tmp_path)
     assert found.points == ()
-    assert found.summary.startswith("All of it is committed and pushed: origin/main has it")
+    assert found.summary.startswith("Everything is committed and pushed: origin/main has it")
 
 
 def test_a_changed_file(clone: Clone, tmp_path: Path) -> None:

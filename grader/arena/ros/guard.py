@@ -101,7 +101,7 @@ class Rules:
             if isinstance(text, str) and number < 2 and (len(text) > most or not text.isprintable()):
                 return "called the master with a name that is none: {}".format(shown(text))
         if args and not isinstance(args[0], str):
-            return "called the master with a name that is no text"
+            return "called the master with a name that is not a string"
         return ""
 
     def _foreign_name(self, node):

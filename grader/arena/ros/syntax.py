@@ -273,7 +273,7 @@ def never_reached(tree):
                 if behind and not any(is_call(n, "publish") for n in ast.walk(loop)):
                     what = "spin()" if spins else "loop"
                     message = "the %s of line %d goes on until the node ends" % (what, loop.lineno)
-                    message += ", and the publish(…) of line %d stands behind it" % behind[0].lineno
+                    message += ", and the publish(…) of line %d comes after it" % behind[0].lineno
                     yield {"line": loop.lineno, "kind": "never-reached", "message": message}
 
 
@@ -425,7 +425,7 @@ def misspelt(tree):
         if node.id not in known:
             near = difflib.get_close_matches(node.id[:TEXT_LIMIT], sorted(own), 1, 0.8)
             if near:
-                message = "`%s` is defined nowhere: did you mean `%s`?" % (node.id[:TEXT_LIMIT], near[0])
+                message = "`%s` is not defined anywhere: did you mean `%s`?" % (node.id[:TEXT_LIMIT], near[0])
                 yield {"line": node.lineno, "kind": "misspelt", "message": message}
 
 

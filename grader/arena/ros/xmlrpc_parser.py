@@ -88,7 +88,7 @@ class _Unmarshaller(xmlrpc.client.Unmarshaller):
     def end_map(self, data):
         mark = self._marks[-1]
         if not all(isinstance(name, str) for name in self._stack[mark::2]):
-            raise Malformed("a name that is no text")
+            raise Malformed("a name that is not a string")
         self.end_struct(data)
 
 

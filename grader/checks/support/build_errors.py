@@ -141,7 +141,7 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
     if any(one.name == name and not one.files for one in package.also):
         return Explained(f"it needs the package {name}, which is not here", f"hand in {name} too")
     if name in ROS_2:
-        return Explained(f"it needs {name}, which is of ROS 2", f"take {name} out: this lab is for ROS 1")
+        return Explained(f"it needs {name}, which is from ROS 2", f"take {name} out: this lab is for ROS 1")
     if name in known_packages() or (name in declared and not near):
         return Explained(
             f"it needs the package {name}, which this grading machine lacks",
@@ -152,19 +152,21 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
     hint = (
         f"{meant} in find_package(…) and in package.xml; a package of your own must be pushed with this one"
     )
-    return Explained(f"find_package(…) names {name}, and there is no package of that name", hint)
+    return Explained(f"find_package(…) names {name}, but there is no package of that name", hint)
 
 
 def _missing_folder(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     call, folder = found[1], posixpath.basename(found[2].rstrip("/"))
     why = f"{call}(…) needs the folder {folder}/, which is not in the package"
-    return Explained(why, f"put your .{folder} files into {folder}/ and push them, or take {call}(…) out")
+    return Explained(why, f"put your .{folder} files into {folder}/ and push them, or remove {call}(…)")
 
 
 def _missing_include(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     folder = found[1].rstrip("/")
     why = f"catkin_package(…) names the folder {folder}/, which is not in the package"
-    hint = f"take INCLUDE_DIRS {folder} out: it is for header files of C++; or put them into {folder}/ and push them"
+    hint = (
+        f"remove INCLUDE_DIRS {folder}: it is for C++ header files; or put them into {folder}/ and push them"
+    )
     return Explained(why, hint)
 
 
@@ -206,7 +208,7 @@ def _missing_script(found: re.Match[str], package: PackageFacts, _lines: Sequenc
 def _missing_file(path: str, package: PackageFacts, words: str) -> Explained:
     near = near_names(path, (f.path for f in package.files))
     seen = f"; there is {near[0]}" if near else ""
-    hint = f"write {near[0]} there" if near else f"add {path} and push it, or take it out of that call"
+    hint = f"write {near[0]} there" if near else f"add {path} and push it, or remove it from that call"
     return Explained(f"{words}, which is not in the package{seen}", hint)
 
 
@@ -247,7 +249,7 @@ def _missing_target(found: re.Match[str], _package: PackageFacts, _lines: Sequen
 
 def _depends(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     why = f"DEPENDS in catkin_package(…) names {found[1]}, which is no library that find_package(…) found"
-    return Explained(why, f"take {found[1]} out of DEPENDS; ROS packages stand behind CATKIN_DEPENDS")
+    return Explained(why, f"take {found[1]} out of DEPENDS; ROS packages go after CATKIN_DEPENDS")
 
 
 def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
@@ -270,7 +272,8 @@ def _no_semicolon(found: re.Match[str], _package: PackageFacts, _lines: Sequence
 
 def _no_brace(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     return Explained(
-        f"{found.string}: a `}}` is missing", "write a `}` for each `{`; indentation shows which one lacks it"
+        f"{found.string}: a `}}` is missing",
+        "write a `}` for each `{`; the indentation shows where one is missing",
     )
 
 
@@ -295,7 +298,7 @@ def _unlinked(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str
             "write `int main(int argc, char **argv)` in one of its sources",
         )
     name = found[1].partition("(")[0]
-    why = f"{name} is used, and nothing that is linked defines it"
+    why = f"{name} is used, but nothing that is linked defines it"
     return Explained(
         why,
         "write target_link_libraries(<program> ${catkin_LIBRARIES}) below add_executable(…); a function of your own"
@@ -306,7 +309,7 @@ def _unlinked(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str
 def _main_twice(_found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     return Explained(
         "two sources of one program have a `main` function",
-        "write an add_executable(…) of its own for each program",
+        "write a separate add_executable(…) for each program",
     )
 
 

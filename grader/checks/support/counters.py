@@ -172,7 +172,7 @@ def judged_steps(count: Count, maximum: int) -> tuple[Step, ...]:
 
 
 def counts(run: Run, topic: str) -> tuple[Count, ...]:
-    """What the student's publishers counted on a topic, the earliest first; what is no number is left out, and what
+    """What the student's publishers counted on a topic, the earliest first; what is not a number is left out, and what
     came after the recorder had lost something."""
     until_ns = whole_until_ns(run, topic)
     found = [_count(c, until_ns) for c in run.student_channels(topic)]
@@ -290,7 +290,7 @@ def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: Wra
         )
     if whose == "lost":
         message = f"values of {params.topic} were lost around the wrap, with a gap in time"
-        return inconclusive(message, hint="grade again while the machine has less to do")
+        return inconclusive(message, hint="grade again when the machine is less busy")
     verdict = failed(bad_turn_message(step, turns, params), hint=params.reset_hint)
     in_range = params.minimum <= step.after <= params.maximum
     alone = (
@@ -306,11 +306,11 @@ def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], pa
     slip = next((s for s in written if s.kind == kind and abs(int(s.message) - number) <= apart), None)
     if slip is None or turn.change > 0 or verdict.status is not Status.FAIL:
         return verdict
-    does = f"sets it to {slip.message}" if wrong_value else f"resets it by the number {slip.message}"
+    does = f"sets it to {slip.message}" if wrong_value else f"compares it with {slip.message}"
     message = f"{verdict.message}; {slip.file}, line {slip.line} {does}"
     cited = (FileCitation(file=slip.file, line=slip.line),)
     right = params.minimum if wrong_value else params.maximum
-    hint = f"set it to {right} there: write {right} for {slip.message} in line {slip.line}"
+    hint = f"in line {slip.line}, write {right} instead of {slip.message}"
     if not wrong_value:
         hint = f"let it count up to {right} there: `if counter > {right}`, or `% {right + 1}`, in line {slip.line}"
     return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
@@ -335,10 +335,10 @@ def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
     if step.after > high:
         late = next((s for s in turns if s.before > high), None)
         if late is None:
-            return f"the counter never resets: {comes}, and it counts on"
+            return f"the counter never resets: {comes}, and it keeps counting"
         return f"the counter resets too late, from {significant(late.before)} to {significant(late.after)}: {comes}"
     if step.after == -(high + 1):
-        return f"the counter runs over to {after}, as a signed number of this width does: {comes}"
+        return f"the counter overflows to {after}, as a signed integer of this size does: {comes}"
     if step.before >= high - 1:
         return f"the counter resets to {after}, not to {low}: {comes}"
     if step.after == low:
@@ -378,7 +378,9 @@ def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -
         return None
     found = [t for one in lives(run) for t in process_tracebacks(run, one.name)]
     cause = f": {explain_traceback(found[-1], package).cause}" if found else ""
-    message = f"the node stops publishing after {significant(count.values[-1])}, while it lives on{cause}"
+    message = (
+        f"the node stops publishing after {significant(count.values[-1])}, although it keeps running{cause}"
+    )
     verdict = failed(message, hint=params.reset_hint)
     return verdict if found else verdict.once()
 

@@ -27,16 +27,16 @@ RUN_IT = "run it by itself with rosrun, and read what it prints last"
 IMPORT_ERRORS = ("ImportError", "ModuleNotFoundError")
 RACE = "publish() to a closed topic"
 ARGUMENT_HINT = (
-    "give the value in the code, or take a default where `len(sys.argv)` is 1: a lab starts it by its name"
+    "put the value in the code, or use a default where `len(sys.argv)` is 1: nothing passes arguments"
 )
 LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
 CAUSES = {
-    "EOFError": ("it asks for input (`input()`), and a node is given none", "remove `input()`: a node runs by itself"),
+    "EOFError": ("it waits for input (`input()`), but a node gets none", "remove `input()`: a node runs by itself"),
     "ROSInterruptException": ("ROS was told to shut down while the node slept, and nothing caught it",
      "call your main function in `try: … except rospy.ROSInterruptException: pass`"),
     "ROSInitException": ("it uses ROS before `rospy.init_node(…)`",
      "call `rospy.init_node(…)` before the first publish, Rate or sleep"),
-    "KeyboardInterrupt": ("Ctrl-C reached it in a place where nothing expects it",
+    "KeyboardInterrupt": ("Ctrl-C came at a point where nothing handles it",
      "loop with `while not rospy.is_shutdown():` and sleep with `rospy.Rate`"),
     "ModuleNotFoundError": ("", "check the spelling of the import; a message package is imported as `std_msgs.msg`"),
     "ImportError": ("", "check the spelling of the import: the message types are at http://wiki.ros.org/std_msgs"),
@@ -45,30 +45,30 @@ CAUSES = {
     "ROSSerializationException": ("", "publish a value that fits the message's type"),
     "SerializationError": ("", "publish a value that fits the message's type"),
     "SyntaxError": ("", "fix that line, or the one above it"),
-    "IndentationError": ("", "indent every block by four spaces, and all lines of a block alike"),
+    "IndentationError": ("", "indent every block by four spaces, each of its lines the same"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }  # fmt: skip
 # what rospy says of a slip that its exception's class does not tell of
 SLIPS = {
-    "name 'raw_input' is not defined": ("`raw_input` is of Python 2, and a node is given no input",
-     "remove `raw_input(…)`, and give its value in the code: a node must not ask for anything"),
-    **{f"name '{old}' is not defined": (f"`{old}` is of Python 2", f"write `{new}`, as Python 3 has it")
+    "name 'raw_input' is not defined": ("`raw_input` is Python 2, and a node gets no input",
+     "remove `raw_input(…)`, and put its value in the code: a node cannot ask for input"),
+    **{f"name '{old}' is not defined": (f"`{old}` is Python 2", f"write `{new}`, as in Python 3")
        for old, new in {"xrange": "range", "unicode": "str", "basestring": "str", "long": "int", "unichr": "chr",
                         "reduce": "functools.reduce", "file": "open"}.items()},
-    **{f"'{kind}' object has no attribute 'data'": (f"it is no message but the {kind} in it", "leave out `.data` here")
+    **{f"'{kind}' object has no attribute 'data'": (f"it is the {kind} inside the message", "leave out `.data` here")
        for kind in ("int", "float", "str", "bool")},
     "namespaces are not allowed in node names": ("the name in `rospy.init_node(…)` has a slash in it",
      "write the node's name without a slash"),
     "init_node() has already been called with different arguments": ("`rospy.init_node(…)` is called a second time",
      "one script is one node: call `rospy.init_node(…)` once"),
-    "not enough arguments for format string": ("the text has more `%` in it than values stand behind it",
-     "give one value for each `%` of the text, or leave one out"),
-    "not all arguments converted during string formatting": ("the text has fewer `%` in it than values stand behind it",
-     "put a `%s` into the text for each value"),
-    "must be of type bytes or an ascii string": ("the message is a text, and it gets something else",
-     "publish a text here, `str(…)`; a number goes to the publisher of its own topic"),
-    "must be an integer type": ("the message is a whole number, and it gets something else",
-     "publish a whole number here, `int(…)`; a text goes to the publisher of its own topic"),
+    "not enough arguments for format string": ("the string has more `%` than there are values after it",
+     "give one value for each `%` in the string, or remove one"),
+    "not all arguments converted during string formatting": ("the string has fewer `%` than there are values after it",
+     "put one `%s` for each value into the string"),
+    "must be of type bytes or an ascii string": ("the message takes a string but gets something else",
+     "publish a string here, `str(…)`; numbers go to the publisher of their own topic"),
+    "must be an integer type": ("the message takes a whole number but gets something else",
+     "publish a whole number here, `int(…)`; strings go to the publisher of their own topic"),
     "Invalid number of arguments, args should be": (
      "the message gets a different number of values than it has fields",
      'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not by a comma'),
@@ -255,7 +255,7 @@ def explain_early_end(package: PackageFacts, run: Run) -> Ending | None:
 
 
 def explain_end(life: Life, run: Run, package: PackageFacts) -> Ending:
-    """Return why a process ended: a name that ROS refuses, its last traceback, a limit, a signal, or its last words."""
+    """Return why a process ended: a name that ROS refuses, its last traceback, a limit, a signal or its last output."""
     return _explained(life, run, package)._replace(process=life.name)
 
 
@@ -272,9 +272,9 @@ def _explained(life: Life, run: Run, package: PackageFacts) -> Ending:
         return Ending(f"{_signal_name(life.end.signal)} ended it", RUN_IT)
     if code == 0:
         hint = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
-        return _not_run(life, package) or Ending("its script came to its end", hint, by_itself=True)
+        return _not_run(life, package) or Ending("its script ran to the end", hint, by_itself=True)
     last = next((line.line for _, line in reversed(list(run.lines(life.name))) if line.line.strip()), "")
-    words = f"; its last words: {shown(last)}" if last else ""
+    words = f"; its last output: {shown(last)}" if last else ""
     return Ending(f"it exited with code {code}{words}", RUN_IT)
 
 
@@ -288,10 +288,10 @@ def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     called = re.search(r"`(.+)`", slip.message)
     hint = f"write {MAIN}"
     if slip.kind == "loop-left":
-        hint = f"take it out of line {slip.line}, or put it below an `if`"
+        hint = f"remove it from line {slip.line}, or put it inside an `if`"
     elif called and slip.kind == "never-called":
         hint = f"call {called[1]} at the end of the script, below {MAIN}"
-    cause = f"its script came to its end: {slip.message} ({slip.file}, line {slip.line})"
+    cause = f"its script ran to the end: {slip.message} ({slip.file}, line {slip.line})"
     place = FileCitation(file=slip.file, line=slip.line)
     return Ending(cause, hint, (place,), by_itself=True)
 
@@ -341,7 +341,7 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
     hint = (
         f"a {kind}'s name is made of letters, digits, _ and /: no spaces, not even before the closing quote"
     )
-    return Ending(f"ROS shuts it down, for the name of its {kind} {name!r} {what}", hint)
+    return Ending(f"ROS shuts it down because the name of its {kind} {name!r} {what}", hint)
 
 
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
@@ -387,7 +387,7 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint of a known slip, by what was said, by the module and by the line itself."""
     source = found.own_frames[-1].source if found.own_frames else ""
     if found.kind == "IndexError" and "argv" in source:
-        return "it reads an argument of the command line, and is started without any", ARGUMENT_HINT
+        return "it reads a command-line argument, but is started without any", ARGUMENT_HINT
     known = next((known for said, known in SLIPS.items() if said in found.message), None)
     return known or _other_name(found, package)
 
@@ -418,7 +418,7 @@ def _other_module(message: str) -> tuple[str, str] | None:
 def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return the name that is meant, where the file defines one that is spelt alike."""
     name = _NAME.search(found.message)
-    wrong = f"`{name[1]}` is defined nowhere" if name else None
+    wrong = f"`{name[1]}` is not defined anywhere" if name else None
     slips = (
         s.message for s in package.slips if (s.file, s.line, s.kind) == (place.file, place.line, "misspelt")
     )
@@ -445,7 +445,7 @@ def _callback_hint(slip: PythonSlip) -> str:
 
 
 def _operand(found: Traceback) -> tuple[str, str] | None:
-    """A text and something else are added: which of both is no text, where Python marks the place."""
+    """A text and something else are added: which of both is not a string, where Python marks the place."""
     if not (match := _ADDED.search(found.message)):
         return None
     kind, is_right = (
@@ -457,10 +457,10 @@ def _operand(found: Traceback) -> tuple[str, str] | None:
         tree = ast.parse(sides, mode="eval").body
         if isinstance(tree, ast.BinOp) and isinstance(tree.op, ast.Add):
             other = shown(ast.unparse(tree.right if is_right else tree.left))
-            return f"{other} is no text", f"write `str({other})` for `{other}`"
+            return f"{other} is not a string", f"write `str({other})` for `{other}`"
     return (
-        f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} is no text",
-        "put it into `str(…)` before it is added to a text",
+        f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} is not a string",
+        "wrap it in `str(…)` before you add it to a string",
     )
 
 

@@ -11,7 +11,7 @@ from pydantic import AfterValidator
 from grader.checks.support.nodes import plain_type
 from grader.evidence.run import Channel
 from grader.model.verdict import Verdict, inconclusive, unjudged
-from grader.wording import significant
+from grader.wording import plural, significant
 
 ROUNDING = 1e-6
 _STEP = r"[A-Za-z]\w*(?:\[(?:\d+|\*)\])*"
@@ -47,12 +47,12 @@ def _step(value: Any, part: str, done: str) -> list[Any]:  # noqa: ANN401 - as a
         there = ", ".join(value) if isinstance(value, Mapping) else ""
         raise NoField(f"{done or 'the message'} has no field {part}" + (f", but {there}" if there else ""))
     if not isinstance(value, list | tuple | bytes):
-        raise NoField(f"{done} is no list")
+        raise NoField(f"{done} is not a list")
     if part == "[*]":
         return list(value)
     index = int(part[1:-1])
     if index >= len(value):
-        raise NoField(f"{done} has {len(value)} items only")
+        raise NoField(f"{done} has only {plural(len(value), 'item')}")
     return [value[index]]
 
 
@@ -84,7 +84,7 @@ def _reading(time_ns: int, message: Any, path: str, *, numbers: bool) -> Reading
     if not values:
         return Reading(time_ns, (), f"{path.partition('[*]')[0]} is empty")
     if numbers and not all(isinstance(value, int | float) for value in values):
-        return Reading(time_ns, (), f"{path} is no number")
+        return Reading(time_ns, (), f"{path} is not a number")
     return Reading(time_ns, tuple(values), "")
 
 

@@ -93,7 +93,7 @@ def excused(verdict: Verdict, run: Run, from_ns: int, to_ns: int, why: Callable[
         return verdict
     if what := why(late):
         message = f"{verdict.message}; but the grading machine was {what}"
-        hint = "grade again while the machine has less to do"
+        hint = "grade again when the machine is less busy"
         return inconclusive(message, hint=hint, measured=verdict.measured)
     if why(whole):
         return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})

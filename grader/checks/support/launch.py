@@ -51,22 +51,22 @@ _FINISHED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has finished cleanly")
 _REQUIRED = re.compile(r"REQUIRED process (\[[^\s\[\]]+-\d+\]) has died")
 # what roslaunch says when it starts nothing, what it means, and what to do ({0}: the pattern's group)
 _REFUSALS = (
-    (r"multiple nodes named \[([^\[\]\n]+)\]", "two nodes are named {0}", "give each <node> a name of its own"),
+    (r"multiple nodes named \[([^\[\]\n]+)\]", "two nodes are named {0}", "give each <node> its own name"),
     (r"cannot contain a namespace", "a node's name has a slash in it",
      'write name="…" without a slash; a namespace goes into ns="…"'),
     (r"missing required attribute: '?(\w+)", "a tag has no {0}", "add the attribute"),
     (r"file does not exist \[([^\[\]\n]+)\]", "the file {0} that <rosparam> loads does not exist",
      "write $(find <package>)/config/<file>, and push the file"),
     (r"Resource not found: (\S+)", "there is no package {0}",
-     "$(find …) and pkg take the package's name, letter by letter"),
+     "$(find …) and pkg need the package's exact name"),
     (r"requires the '(\w+)' arg to be set", 'its <arg name="{0}"> has no default',
      'write <arg name="{0}" default="…"/>'),
-    (r"output must be one of", 'output is "screen" or "log", in small letters', 'write output="screen"'),
+    (r"output must be one of", 'output is "screen" or "log", in lower case', 'write output="screen"'),
     (r"multiple files named", "the package has two launch files of that name",
      "delete one of them, also one in a folder of old files: find . -name '*.launch' lists them"),
     (r"Unable to launch \[([^\s\[\]]+)-\d+\]", "the system cannot start the script of {0}",
      "its first line has to be #!/usr/bin/env python3, or #!/bin/bash for a shell script"),
-    (r"Unknown substitution command \[([^\[\]\n]+)\]", "$({0}) is nothing that roslaunch knows",
+    (r"Unknown substitution command \[([^\[\]\n]+)\]", "roslaunch does not know $({0})",
      "write $(find <package>)/…"),
     (r"error loading <rosparam> tag", "<rosparam> cannot load its file",
      "rosparam load <file> shows what is wrong with the file"),
@@ -195,7 +195,7 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
             yield _slip(node, f'name="{node.name}" has a slash in it, which roslaunch refuses', fix)
         elif node.full_name in seen and not node.uncertain:
             why = f"a second node is named {node.full_name}, like that of line {seen[node.full_name].line}"
-            yield _slip(node, why, "give each <node> a name of its own: roslaunch refuses the file")
+            yield _slip(node, why, "give each <node> its own name: roslaunch refuses the file")
         if not node.uncertain:
             seen.setdefault(node.full_name, node)
 
@@ -244,7 +244,7 @@ def _named_otherwise(package: PackageFacts, node: LaunchNode, made: Executable, 
     where = f"{call.file}, line {call.line},"
     if is_elsewhere(made, package):
         why = f"{why}: {where} puts it into {shown(made.folder)}, where roslaunch does not look"
-        return _slip(node, why, f"take RUNTIME_OUTPUT_DIRECTORY out of line {call.line} of {call.file}")
+        return _slip(node, why, f"remove RUNTIME_OUTPUT_DIRECTORY from line {call.line} of {call.file}")
     why = f"{why}: {where} names the program of the target {made.target} {shown(made.name)}"
     return _slip(node, why, f'write type="{made.name}"')
 
@@ -435,7 +435,7 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
         return not_executable(script.path)
     owner = _owner(package, node)
     if owner is not None and any(one.is_called(str(node.type)) for one in programs(owner)):
-        why = f"CMakeLists.txt makes the program {node.type}, and the build left none"
+        why = f"CMakeLists.txt makes the program {node.type}, but the build did not make it"
         return Absence(why, "first get the build to pass: catkin_make", of_script=True, unbuilt=True)
     if "Cannot locate" not in line:
         return Absence(
@@ -450,7 +450,7 @@ def _silent(run: Run, node: LaunchNode) -> Absence | None:
     hint = f"call {INIT} before anything that waits"
     others = [n for n in run.student_nodes() if re.fullmatch(r"/.+_\d+_\d{9,}", n)]
     if finished(run, node):
-        return Absence("its script came to its end without ever being a node", hint, of_script=True)
+        return Absence("its script ended without ever becoming a node", hint, of_script=True)
     started = any((m := _STARTED.search(line)) and _is(node, m[1]) for line in _lines(run))
     if not started:
         return None
@@ -458,7 +458,7 @@ def _silent(run: Run, node: LaunchNode) -> Absence | None:
         why = (
             f"{join_words(others)} came up instead: the script does not take the name that roslaunch gives it"
         )
-        return Absence(why, "start the script itself, and leave sys.argv as it is", of_script=True)
+        return Absence(why, "start the script itself, and leave sys.argv alone", of_script=True)
     return Absence("its script runs, but never registers as a node", hint, of_script=True)
 
 

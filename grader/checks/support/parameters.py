@@ -38,7 +38,7 @@ YAML_LINES_MAX = 2_000
 _YAML_KEY = re.compile(r"^( *)[\"']?([A-Za-z]\w{0,99})[\"']?\s*:(?:\s|$)")
 _PLACE = re.compile(r"line (\d+), column (\d+)")
 _IN_LINE = "line {line} has a tab after a name or a value, which YAML does not accept"
-_INDENT = "indent with spaces alone, two for each level"
+_INDENT = "indent with spaces only, two per level"
 # what is printed, what it means ({line}: where), and what to do
 _CAUSES = (
     (r"found character '\\t'", "line {line} is indented with a tab, which YAML does not accept", _INDENT),
@@ -257,7 +257,7 @@ def explain_yaml(lines: Sequence[str]) -> Words | None:
     places = _PLACE.findall(text)
     line = int(places[-1][0]) if places else None
     if "found character '\\t'" in text and _is_within(lines):
-        return Words(_IN_LINE.format(line=line), "write a space in the tab's place", line)
+        return Words(_IN_LINE.format(line=line), "replace the tab with a space", line)
     for pattern, why, hint in _CAUSES:
         if re.search(pattern, text):
             return Words(why.format(line=line or "?"), hint, line)

@@ -129,8 +129,8 @@ def _reach_hint(slip: PythonSlip) -> str:
     if slip.kind == "never-called":
         return f"call it, or move its lines to where they run: line {slip.line}"
     if slip.kind == "spin-in-loop":
-        return "take spin() out: the loop keeps the node alive"
-    return f"publish inside the loop `{LOOP}`, not behind a loop that never ends"
+        return "remove spin(): the loop keeps the node alive"
+    return f"publish inside the loop `{LOOP}`, not after a loop that never ends"
 
 
 def sent_by(run: Run, topic: str, of: Sender) -> tuple[Channel, ...]:
@@ -157,7 +157,7 @@ def misfit(run: Run, topic: str = "") -> Verdict | None:
     if note is None:
         return None
     message = f"nothing could be sent on {note.topic}: {note.detail}"
-    return failed(message, hint="give the .msg file the names and types of the handout, and build again")
+    return failed(message, hint="use the handout's names and types in the .msg file, and build again")
 
 
 def _refused(run: Run, topic: str) -> Verdict | None:
@@ -205,11 +205,11 @@ def whole_until_ns(run: Run, topic: str, until_ns: int | None = None) -> int | N
 
 
 def all_lost(run: Run, topic: str) -> Verdict | None:
-    """Return the verdict where nothing is recorded of a topic because the recorder dropped it."""
+    """Return the verdict where nothing was recorded of a topic because the recorder dropped it."""
     lost = losses(run, topic)
     if lost is None or lost.kept:
         return None
-    return inconclusive(f"nothing is recorded of {topic}", measured="no message", hint="grade again")
+    return inconclusive(f"nothing was recorded of {topic}", measured="no message", hint="grade again")
 
 
 def heed_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> Verdict:

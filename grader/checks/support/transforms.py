@@ -78,7 +78,7 @@ def _turned(turn: Quaternion, vector: Vector) -> Vector:
 
 
 class Sent(NamedTuple):
-    """A transform that was sent. `value` is None where its quaternion has no length, or it holds what is no number."""
+    """A transform that was sent. `value` is None where its quaternion has no length, or holds what is not a number."""
 
     time_ns: int
     parent: str

@@ -59,7 +59,7 @@ def _faults(fields: dict[str, str], base: Path, local: Local) -> Iterator[str]:
     if submitted_at and (fault := time_fault(submitted_at)):
         yield f"submitted_at: {brief(submitted_at)} {fault}"
     if extension and parse_days(extension) is None:
-        yield f"extension_days: {brief(extension)} is no number of days"
+        yield f"extension_days: {brief(extension)} is not a number of days"
 
 
 def _entry(fields: dict[str, str], extra: dict[str, str], where: str, base: Path) -> Entry:
@@ -126,7 +126,7 @@ def id_faults(submission_id: str) -> Iterator[str]:
     if not submission_id:
         return
     if not encodable(submission_id):
-        yield f"id: {brief(submission_id)} is no text"
+        yield f"id: {brief(submission_id)} is not a string"
     elif any(unicodedata.category(sign) in {"Cc", "Zl", "Zp"} for sign in submission_id):
         yield f"id: {brief(submission_id)} has a line end or a control character in it"
     elif not any(sign.isalnum() for sign in submission_id):

@@ -146,7 +146,7 @@ def _alone(page: object, path: Path) -> object:
 def _text(path: Path) -> str:
     try:
         if path.stat().st_size > BYTES_MAX:
-            raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is no list of projects")
+            raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is not a list of projects")
         return text_of(path.read_bytes(), path).strip(_BLANK)
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from error

@@ -185,7 +185,7 @@ def _close_bracket(files: Files) -> None:
     for added in ([lines[last] + ")"], [lines[last], ")"]):
         changed = "\n".join([*lines[:last], *added, *lines[last + 1 :], ""])
         if commands_of(changed.encode()) is not None:
-            message = f"line {last + 1} of {CMAKE}: a bracket that is opened is never closed"
+            message = f"line {last + 1} of {CMAKE}: an opening bracket is never closed"
             files.change("build-line", CMAKE, changed, message)
             return
 

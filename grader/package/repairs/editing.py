@@ -82,7 +82,7 @@ class Files:
     _renamed: dict[str, str] = field(default_factory=dict)
 
     def text(self, file: str) -> str | None:
-        """Return the file's text, line ends as on Linux; None where it is no text that can be repaired."""
+        """Return the file's text, line ends as on Linux; None where it is not text that can be repaired."""
         file = self._renamed.get(file, file)
         if file not in self._texts:
             data = read_data(self.folder, file)
@@ -150,7 +150,7 @@ def replace_lines(data: bytes, repair: Repair) -> bytes:
     """Return a file's bytes with the repair's lines in them; a mark and the line ends stay. Raises NotRepairable."""
     text = as_text(data)
     if text is None or repair.line is None:
-        raise NotRepairable(f"{repair.file} is no text any more")
+        raise NotRepairable(f"{repair.file} is not text any more")
     lines, old = text.split("\n"), repair.before.split("\n")
     places = [i for i in range(len(lines) - len(old) + 1) if lines[i : i + len(old)] == old]
     if not places:

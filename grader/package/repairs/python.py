@@ -145,9 +145,9 @@ def _indented(before: str, after: str) -> str:
     ]
     if len(lines) > INDENTED_SHOWN:
         first, spaces = lines[0]
-        return f"indent with spaces alone, the same for each level, in {len(lines)} lines: line {first} with {spaces}"
+        return f"indent with spaces only, the same at each level, in {len(lines)} lines: line {first} with {spaces}"
     begun = join_words(f"line {number} with {plural(spaces, 'space')}" for number, spaces in lines)
-    return f"in place of the tabs, begin {begun}"
+    return f"replace the tabs: start {begun}"
 
 
 def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[str, str]:

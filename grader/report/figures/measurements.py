@@ -163,7 +163,7 @@ def _whole(value: float) -> float:
 
 
 def _drawable(value: float) -> bool:
-    """What is no number at all has no place; what is infinite is drawn as the largest."""
+    """What is not a number at all has no place; what is infinite is drawn as the largest."""
     return value == value  # noqa: PLR0124 - NaN is not itself
 
 

@@ -185,7 +185,7 @@ def _graph(figure: GraphFigure, name: str) -> Drawn:
     plot = graph_plot(figure, name)
     alone = [node for node in figure.nodes if node not in {edge.node for edge in figure.edges}]
     words = f"{plural(len(figure.nodes), 'node')}, {plural(len(figure.topics), 'topic')}."
-    words += f" Connected to no topic: {', '.join(alone[:10])}." if alone else ""
+    words += f" Not connected to any topic: {', '.join(alone[:10])}." if alone else ""
     return Drawn(
         name=name,
         kind="graph",

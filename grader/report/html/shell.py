@@ -95,7 +95,7 @@ def _code(context: Context, text: str) -> Markup:
 
 @pass_context
 def _shown(context: Context, value: Any) -> Any:  # noqa: ANN401 - whatever a template puts out
-    """Foreign text made visible. Markup that was drawn here and what is no text stay as they are."""
+    """Foreign text made visible. Markup that was drawn here and what is not text stay as they are."""
     if isinstance(value, str) and not isinstance(value, Markup):
         return line(value, context.get("limit", LIMIT))
     return value

@@ -114,7 +114,7 @@ def test_what_a_loss_holds_back_is_named_and_linked():
         "counter-step",
         "counter-wrap",
     ]
-    assert "5 points lost, and 25 more in what it holds back" in words(found)
+    assert "5 points lost, and 25 more in what it blocks" in words(found)
 
 
 def test_every_criterion_has_its_details_once_and_its_row():
@@ -154,7 +154,7 @@ def test_a_loss_without_a_plot_shows_the_graph_of_its_run():
 def test_everything_reached_is_a_short_congratulation():
     good = result(criteria=(CRITERIA[0],), points=5, max_points=5, status="graded")
     document = parsed(page(good))
-    assert "every criterion that counts is reached. Well done!" in words(document.find(".//header"))
+    assert "every criterion that counts is met. Well done!" in words(document.find(".//header"))
     assert words(document.find_class("verdict")[0]) == "Passed"
     assert not document.xpath("//*[@id='lost' or @id='open' or @id='advice']")
 
@@ -239,7 +239,7 @@ def test_all_reached_but_late_is_no_congratulation():
     )
     text = words(parsed(page(shown)).find(".//header"))
     assert "Being late costs you 1 point." in text
-    assert "Nothing was lost" not in text
+    assert "You lost nothing" not in text
 
 
 def test_only_what_can_be_mended_says_how_to_mend_it():

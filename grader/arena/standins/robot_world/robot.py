@@ -25,7 +25,7 @@ class Robot:
         self._steps_left = 0
 
     def command(self, forward, turning):
-        """Velocities (m/s, rad/s) from now on, not faster than it can. Raises ValueError for what is no number."""
+        """Velocities (m/s, rad/s) from now on, not faster than it can. Raises ValueError for what is not a number."""
         if not (isfinite(forward) and isfinite(turning)):
             raise ValueError(f"no finite number among {(forward, turning)}")
         most, most_turn = self._fastest
