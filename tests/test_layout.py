@@ -127,7 +127,7 @@ def test_checks_see_evidence_as_records_only() -> None:
 
 
 def test_the_support_of_checks_imports_no_family_of_checks() -> None:
-    shared = {"support", "registry", "all_runs"}
+    shared = {"support", "registry"}
     found = {m for path in _sources(GRADER / "checks" / "support") for m in _imports(path)}
     assert {m.split(".")[2] for m in found if m.startswith("grader.checks.")} <= shared
 

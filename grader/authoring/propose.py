@@ -26,7 +26,7 @@ from grader.authoring.rubric_draft import (
     label_of,
     rubric_text,
 )
-from grader.checks.manifest import RUNTIME_KINDS
+from grader.checks.package_files import RUNTIME_KINDS
 from grader.errors import RosMissing, SubmissionError
 from grader.evidence.reader import load_evidence, package_facts
 from grader.evidence.run import Run

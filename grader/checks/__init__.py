@@ -7,8 +7,7 @@ from here (docs/how-to/own-checks.md), and stays.
 
 from importlib import import_module
 
-from grader.checks.all_runs import Evidence
-from grader.checks.registry import CHECKS, HEADINGS, Check, ProcessName, Refers, check
+from grader.checks.registry import CHECKS, HEADINGS, Check, Evidence, ProcessName, Refers, check
 from grader.evidence.run import Channel, Message, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -24,15 +23,13 @@ from grader.model.verdict import (
 )
 
 FAMILIES = (
-    "manifest",
+    "package_files",
     "cmake",
     "build",
     "executable",
-    "layout",
     "node",
     "topics",
     "messages",
-    "fields",
     "reacts",
     "stamps",
     "definition",
@@ -40,19 +37,16 @@ FAMILIES = (
     "rate",
     "counter",
     "listener",
-    "logs",
     "console",
     "files_left",
-    "launch_xml",
+    "launch_files",
     "launch_runs",
     "launch_params",
-    "launch_opens",
     "parameters",
     "services",
     "calls",
     "actions",
     "rostest",
-    "connections",
     "two_copies",
     "robot_path",
     "robot_places",

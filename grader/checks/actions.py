@@ -8,13 +8,12 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.clocks import run_seconds
+from grader.checks.support.clocks import NEVER_LATE_S, excused, run_seconds, why_late
 from grader.checks.support.exit_causes import explain_early_end, explain_error
-from grader.checks.support.lateness import NEVER_LATE_S, excused, why_late
-from grader.checks.support.nodes import GlobalName, plain_type
+from grader.checks.support.fields import differences, fields_text
+from grader.checks.support.processes import GlobalName, plain_type
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite, no_node, nodes_on, published_topics, topics_with
-from grader.checks.support.values import differences, fields_text
 from grader.evidence.events import ActorEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

@@ -8,14 +8,12 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import Refers, check
+from grader.checks.support.clocks import excused, why_late
 from grader.checks.support.exit_causes import explain_early_end, explain_error
-from grader.checks.support.idioms import action_client, service_client
-from grader.checks.support.lateness import excused, why_late
-from grader.checks.support.nodes import GlobalName
-from grader.checks.support.processes import lives
-from grader.checks.support.text import near_names, shown
+from grader.checks.support.fields import Difference, differences, fields_text
+from grader.checks.support.processes import GlobalName, lives
+from grader.checks.support.text import action_client, near_names, service_client, shown
 from grader.checks.support.topics import cite, no_node, nodes_on, topics_with
-from grader.checks.support.values import Difference, differences, fields_text
 from grader.evidence.events import MISFIT, OTHER_TYPE
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

@@ -21,8 +21,8 @@ from grader.checks.support.counters import (
     wrong_steps,
 )
 from grader.checks.support.exit_causes import explain_early_end
-from grader.checks.support.idioms import LOOP
-from grader.checks.support.nodes import PublishedTopic
+from grader.checks.support.processes import PublishedTopic
+from grader.checks.support.text import LOOP
 from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

@@ -11,11 +11,10 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from grader.checks.registry import ProcessName, Refers, check
+from grader.checks.support.clocks import excused, why_late
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import bounds_text, is_within
-from grader.checks.support.lateness import excused, why_late
-from grader.checks.support.nodes import GlobalName, TypeName, plain_type
-from grader.checks.support.processes import lives, not_started
+from grader.checks.support.processes import GlobalName, TypeName, lives, not_started, plain_type
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.errors import EvidenceError

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
-from grader.checks.launch_xml import missing_node
+from grader.checks.launch_files import missing_node
 from grader.checks.registry import LaunchName, check
 from grader.checks.support.console_output import printed_lines
 from grader.checks.support.launch import (

@@ -8,8 +8,8 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
+from grader.checks.launch_files import missing_node
 from grader.checks.launch_params import params_misplaced
-from grader.checks.launch_xml import missing_node
 from grader.checks.registry import LaunchName, ProgramName, check
 from grader.checks.support.launch import (
     Slip,
@@ -29,7 +29,7 @@ from grader.checks.support.launch import (
     why_died,
     why_not_up,
 )
-from grader.checks.support.nodes import GlobalName
+from grader.checks.support.processes import GlobalName
 from grader.checks.support.scripts import shebang_obstacles
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import cite, nodes_on, topics_with

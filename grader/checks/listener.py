@@ -17,10 +17,17 @@ from grader.checks.support.console_output import (
     text_places,
 )
 from grader.checks.support.exit_causes import explain_early_end, explain_error
-from grader.checks.support.idioms import SPIN, both, subscriber
-from grader.checks.support.nodes import GlobalName
-from grader.checks.support.processes import lives, not_started
-from grader.checks.support.text import OTHER_WORDS_SHARE, VALUE, in_words, near_names, shown
+from grader.checks.support.processes import GlobalName, lives, not_started
+from grader.checks.support.text import (
+    OTHER_WORDS_SHARE,
+    SPIN,
+    VALUE,
+    both,
+    in_words,
+    near_names,
+    shown,
+    subscriber,
+)
 from grader.checks.support.topics import cite, misfit, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

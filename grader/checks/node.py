@@ -14,17 +14,23 @@ from grader.checks.support.exit_causes import (
     is_rospys_own,
     process_tracebacks,
 )
-from grader.checks.support.idioms import INIT, LOOP, both
-from grader.checks.support.nodes import (
+from grader.checks.support.processes import (
     Anonymous,
+    Life,
     are_noted,
+    fell_silent,
+    is_flood,
     is_named,
+    life,
+    lives,
     name_hint,
     nodes_of,
+    not_started,
     wanted_names,
+    was_talking,
     wrong_name,
 )
-from grader.checks.support.processes import Life, fell_silent, is_flood, life, lives, not_started, was_talking
+from grader.checks.support.text import INIT, LOOP, both
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

@@ -9,8 +9,7 @@ from typing import Annotated, Any
 
 from grader.checks.registry import ProcessName, Refers, check
 from grader.checks.support.console_output import printed_lines
-from grader.checks.support.idioms import get_param, log_param, set_param
-from grader.checks.support.nodes import GlobalName
+from grader.checks.support.fields import differences, value_text
 from grader.checks.support.parameters import (
     Key,
     absolute_name,
@@ -24,11 +23,10 @@ from grader.checks.support.parameters import (
     without_system_params,
     yaml_keys,
 )
-from grader.checks.support.processes import Life, first_interrupt_ns, life, lives, not_started
+from grader.checks.support.processes import GlobalName, Life, first_interrupt_ns, life, lives, not_started
 from grader.checks.support.scripts import add_hint, can_be_moved, find_script, paths_by_name
-from grader.checks.support.text import near_names, shown
+from grader.checks.support.text import get_param, log_param, near_names, set_param, shown
 from grader.checks.support.topics import cite, no_node
-from grader.checks.support.values import differences, value_text
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

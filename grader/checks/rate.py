@@ -10,14 +10,13 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import Refers, check
+from grader.checks.support.clocks import NO_EXCUSE, Lateness, excused, lateness
 from grader.checks.support.exit_causes import explain_early_end
-from grader.checks.support.idioms import LOOP, both, loop_rate
-from grader.checks.support.lateness import NO_EXCUSE, Lateness, excused, lateness
-from grader.checks.support.nodes import PublishedTopic
+from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
-from grader.checks.support.processes import observed_until_ns, slips_of
+from grader.checks.support.processes import PublishedTopic, observed_until_ns, slips_of
+from grader.checks.support.text import LOOP, both, loop_rate
 from grader.checks.support.topics import Sender, cite, nothing_sent, sent_by, whole_until_ns
-from grader.checks.support.values import value_text
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts

@@ -8,13 +8,19 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import check
-from grader.checks.support.clocks import run_seconds
-from grader.checks.support.fields import FieldPath, Reading, bounds_text, is_within, no_field, readings
-from grader.checks.support.lateness import excused, why_late
-from grader.checks.support.nodes import GlobalName
-from grader.checks.support.processes import observed_until_ns
+from grader.checks.support.clocks import excused, run_seconds, why_late
+from grader.checks.support.fields import (
+    FieldPath,
+    Reading,
+    bounds_text,
+    differences,
+    is_within,
+    no_field,
+    readings,
+    value_text,
+)
+from grader.checks.support.processes import GlobalName, observed_until_ns
 from grader.checks.support.topics import cite, misfit, no_message
-from grader.checks.support.values import differences, value_text
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record

@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import check
-from grader.checks.support.clocks import run_seconds
+from grader.checks.support.clocks import Lateness, excused, run_seconds
 from grader.checks.support.geometry import (
     MOVED_M,
     Course,
@@ -27,8 +27,7 @@ from grader.checks.support.geometry import (
     track,
     turns_of,
 )
-from grader.checks.support.lateness import Lateness, excused
-from grader.checks.support.nodes import GlobalName
+from grader.checks.support.processes import GlobalName
 from grader.checks.support.topics import Sender, cite, nothing_sent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

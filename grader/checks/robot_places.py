@@ -11,25 +11,26 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
 from grader.checks.robot_path import metres, spot
-from grader.checks.support.clocks import run_seconds
+from grader.checks.support.clocks import Lateness, excused, run_seconds
 from grader.checks.support.geometry import (
     MOVED_M,
+    Area,
+    Band,
     Point,
     Pose,
     PoseFields,
+    Region,
     Spot,
     Track,
     length_m,
     relative,
     set_off_s,
+    shown_walls,
     stands,
     track,
 )
-from grader.checks.support.idioms import subscriber
-from grader.checks.support.lateness import Lateness, excused
-from grader.checks.support.nodes import GlobalName
-from grader.checks.support.processes import observed_until_ns
-from grader.checks.support.regions import Area, Band, Region, shown_walls
+from grader.checks.support.processes import GlobalName, observed_until_ns
+from grader.checks.support.text import subscriber
 from grader.checks.support.topics import SYSTEM_TOPICS, cite, no_message, nodes_on
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

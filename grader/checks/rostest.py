@@ -9,8 +9,8 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, ValidationError
 
 from grader.checks.registry import Refers, check
+from grader.checks.support.clocks import Lateness, excused, why_late
 from grader.checks.support.exit_causes import ended_after, explain_end
-from grader.checks.support.lateness import Lateness, excused, why_late
 from grader.checks.support.processes import Life, lives, not_started
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run

@@ -10,12 +10,10 @@ from pydantic import Field
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.exit_causes import HEADING, Traceback, explain_end, explain_traceback, tracebacks
-from grader.checks.support.idioms import SERVICE, SPIN, imports, service_call
-from grader.checks.support.nodes import GlobalName, TypeName, plain_type
-from grader.checks.support.processes import life_of
-from grader.checks.support.text import near_names, shown
+from grader.checks.support.fields import differences, fields_text
+from grader.checks.support.processes import GlobalName, TypeName, life_of, plain_type
+from grader.checks.support.text import SERVICE, SPIN, imports, near_names, service_call, shown
 from grader.checks.support.topics import cite, no_node
-from grader.checks.support.values import differences, fields_text
 from grader.evidence.events import MISFIT
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

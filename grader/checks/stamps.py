@@ -9,12 +9,10 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.clocks import ros_seconds
+from grader.checks.support.clocks import NEVER_LATE_S, Lateness, excused, ros_seconds
 from grader.checks.support.fields import FieldPath, no_field, readings
-from grader.checks.support.idioms import NOW, both
-from grader.checks.support.lateness import NEVER_LATE_S, Lateness, excused
-from grader.checks.support.nodes import PublishedTopic
-from grader.checks.support.text import shown
+from grader.checks.support.processes import PublishedTopic
+from grader.checks.support.text import NOW, both, shown
 from grader.checks.support.topics import cite, no_message
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts

@@ -9,12 +9,9 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import check
-from grader.checks.support.clocks import run_seconds
-from grader.checks.support.idioms import RATE
-from grader.checks.support.lateness import excused, why_late
-from grader.checks.support.nodes import GlobalName
-from grader.checks.support.processes import observed_until_ns
-from grader.checks.support.text import near_names, shown
+from grader.checks.support.clocks import excused, run_seconds, why_late
+from grader.checks.support.processes import GlobalName, observed_until_ns
+from grader.checks.support.text import RATE, near_names, shown
 from grader.checks.support.topics import cite, no_message
 from grader.checks.support.transforms import (
     TOPICS,

@@ -16,10 +16,8 @@ from grader.checks.support.console_output import (
     sent_by,
 )
 from grader.checks.support.exit_causes import ended_after, explain_end
-from grader.checks.support.idioms import GET_TIME, INIT, LOOP, SPIN, init
-from grader.checks.support.nodes import GlobalName, are_noted, nodes_of
-from grader.checks.support.processes import NO_SCRIPT_HINT, Life, life, lives
-from grader.checks.support.text import VALUE, in_words
+from grader.checks.support.processes import NO_SCRIPT_HINT, GlobalName, Life, are_noted, life, lives, nodes_of
+from grader.checks.support.text import GET_TIME, INIT, LOOP, SPIN, VALUE, in_words, init
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

@@ -12,7 +12,6 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import PurePosixPath
 
 from grader.checks.support.exit_causes import SYNTAX, syntax_hint
-from grader.checks.support.idioms import Language, in_language
 from grader.checks.support.launch import node_slip, not_executable, own_script
 from grader.checks.support.scripts import (
     PYTHON,
@@ -23,7 +22,7 @@ from grader.checks.support.scripts import (
     names_script,
     programs,
 )
-from grader.checks.support.text import texts_in
+from grader.checks.support.text import Language, in_language, texts_in
 from grader.evidence.run import Run
 from grader.judging.facts import Facts
 from grader.model.package import LaunchFile, PackageFacts

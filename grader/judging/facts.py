@@ -9,9 +9,8 @@ from pathlib import PurePosixPath
 
 from pydantic import ValidationError
 
-from grader.checks.all_runs import Evidence
 from grader.checks.build import run_hint
-from grader.checks.registry import Check
+from grader.checks.registry import Check, Evidence
 from grader.checks.support.exit_causes import SYNTAX, syntax_hint
 from grader.checks.support.launch import own_script, read_launch
 from grader.checks.support.processes import failed_program

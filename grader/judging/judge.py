@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from grader.checks import CHECKS, Check
-from grader.checks.all_runs import NotRecorded
+from grader.checks.registry import NotRecorded
 from grader.checks.support.exit_causes import SYNTAX, heed_errors
 from grader.checks.support.parameters import heed_unread
 from grader.checks.support.text import texts_in

@@ -22,7 +22,7 @@ from typing import Any
 import pytest
 
 from grader.checks import Evidence, PackageFacts, Run, inconclusive
-from grader.checks.all_runs import NoSuchScenario, NotRecorded
+from grader.checks.registry import NoSuchScenario, NotRecorded
 from grader.installable import install_hint, known_packages
 from grader.model.verdict import Status
 from grader.rubric.pytest_check import Outcome, SessionOutcome, TestOutcome

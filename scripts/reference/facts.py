@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator
 from functools import cached_property
 
-from grader.checks.all_runs import Evidence
+from grader.checks.registry import Evidence
 from grader.evidence import events
 from grader.evidence.run import Channel, Message, Run
 from grader.model import package

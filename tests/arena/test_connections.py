@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.checks.connections import ConnectedParams, connected
+from grader.checks.topics import ConnectedParams, connected
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status

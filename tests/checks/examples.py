@@ -14,8 +14,8 @@ import yaml
 
 from grader.checks import CHECKS
 from grader.checks.support.exit_causes import heed_errors
-from grader.checks.support.idioms import in_language
 from grader.checks.support.parameters import heed_unread
+from grader.checks.support.text import in_language
 from grader.checks.support.topics import heed_losses
 from grader.evidence.run import Run
 from grader.model.interfaces import parse_interface

@@ -6,7 +6,7 @@ import pytest
 
 from grader.checks.build import run_hint
 from grader.checks.executable import ExecutableParams, executable
-from grader.checks.manifest import ManifestParams, manifest
+from grader.checks.package_files import ManifestParams, manifest
 from grader.evidence.reader import package_facts
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

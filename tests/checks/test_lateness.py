@@ -9,7 +9,7 @@ from itertools import accumulate
 import pytest
 
 from grader.checks.rate import RateParams, rate
-from grader.checks.support.lateness import CALIBRATION, lateness
+from grader.checks.support.clocks import CALIBRATION, lateness
 from grader.evidence.events import HostEvent, ScenarioEvent
 from grader.evidence.run import Channel, Message, Run
 from grader.model.package import PackageFacts

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.support.nodes import base_name, is_named
+from grader.checks.support.processes import base_name, is_named
 
 NAMES = st.from_regex(r"[a-z][a-z0-9_]{0,12}[a-z]", fullmatch=True)
 NUMBERS = st.integers(0, 10**13)

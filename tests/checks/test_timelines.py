@@ -12,7 +12,7 @@ import yaml
 
 from grader.checks import CHECKS, HEADINGS, Check
 from grader.checks.parameter_docs import inner_records, parameters
-from grader.checks.support.idioms import in_language
+from grader.checks.support.text import in_language
 from grader.model.verdict import Status
 from scripts.reference.checks import checks_page
 from tests.checks.examples import LOADER, Example, differences, examples

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from grader.checks.support.idioms import LOOP, in_language, init, publisher, set_param
+from grader.checks.support.text import LOOP, in_language, init, publisher, set_param
 from grader.judging.annotate import said_for_node
 from grader.judging.facts import Facts
 from grader.model.verdict import failed

@@ -16,7 +16,7 @@ import pytest
 import yaml
 
 from grader.arena.sandbox_files import STANDIN_SOURCES
-from grader.checks.support.regions import shown_walls
+from grader.checks.support.geometry import shown_walls
 from grader.rubric.model import Scenario, Start, Step, Wait
 from tests.arena.support import make_place, run
 

@@ -1,13 +1,17 @@
-"""The run's clocks, in seconds, and whether numbers in messages are a time that grows as they do."""
+"""The run's clocks, whether numbers in messages are a time that grows as they do, and how late the machine was."""
 
 from __future__ import annotations
 
+import statistics
+import struct
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
-from grader.checks.support.idioms import GET_TIME
-from grader.evidence.run import Run
+from grader.checks.support.text import GET_TIME
+from grader.evidence.events import HostEvent
+from grader.evidence.run import Channel, Run
 from grader.model.verdict import Verdict, failed, inconclusive
 from grader.wording import plural
 
@@ -135,3 +139,154 @@ def _other_pace(told: Sequence[float], span_s: float) -> Verdict:
 
 def _plain(value: float) -> str:
     return f"{value:.0f}" if value == int(value) else f"{value:.3f}"
+
+
+CALIBRATION = "/grader/calibration"
+CALIBRATION_TYPE = "std_msgs/Header"
+PERIOD_NS = 100_000_000
+STAMP = struct.Struct("<III")
+FULL = 0.9
+"""The share of the processors' time from which who has work to do may wait for a turn, though sleepers wake in time."""
+NEVER_LATE_S = 2.0
+"""No machine is so late with every single message (s on the wall)."""
+LATE_MS = 100.0
+"""From here on, an answer may be late for the machine's sake."""
+OWN_LEAST, OTHERS_MOST = 0.6, 0.25
+"""Shares of the processors' time of half a second: a run that took so much itself, and left so little to all others,
+made the machine late in it. One busy loop takes half of two processors, and is not it; nor is who shares the machine.
+"""
+NO_EXCUSE = "the grading machine was busy with this run's own processes, which is no excuse"
+
+
+class Lateness(NamedTuple):
+    """In ms: the mean, the 95th percentile and the most, the larger of what timer and calibration say.
+
+    `sleep_ms` is what a sleep of 0.1 s took too long in the mean, `calibration_hz` the rate of a loop of such sleeps;
+    None where no calibration was recorded. `busy` is the share of the processors' time that was taken, `own` what of
+    it the run's own processes took.
+    """
+
+    mean_ms: float
+    p95_ms: float
+    max_ms: float
+    sleep_ms: float | None = None
+    calibration_hz: float | None = None
+    busy: float | None = None
+    own: float | None = None
+
+    @property
+    def full(self) -> bool:
+        """Whether the machine had next to no time to spare."""
+        return (self.busy or 0.0) >= FULL
+
+    @property
+    def described(self) -> str:
+        """`machine 97 % busy (by this run alone: 95 %) and late by 3 ms, calibration 9.97 Hz`."""
+        share = self.own or 0.0
+        own = f" (by this run alone: {share * 100:.0f} %)" if share >= OTHERS_MOST else ""
+        busy = "" if self.busy is None else f" {self.busy * 100:.0f} % busy{own} and"
+        late = f"machine{busy} late by {self.max_ms:.0f} ms"
+        return late if self.calibration_hz is None else f"{late}, calibration {self.calibration_hz:.2f} Hz"
+
+
+def lateness(run: Run, from_ns: int, to_ns: int, *, own: bool = False) -> Lateness | None:
+    """Between two times of the run; None where nothing was measured (another tool's recording).
+
+    Of what excuses a run: the half seconds that its own processes filled are left out, unless `own` asks for them too.
+    """
+    windows = [w for w in _windows(run, from_ns, to_ns) if own or not w.is_own]
+    left_out = [] if own else [w for w in _windows(run, from_ns, to_ns) if w.is_own]
+    timer = _timer(windows)
+    sleeps = [late for channel in run.channels for late in _sleeps_ms(channel, from_ns, to_ns, left_out)]
+    if not sleeps:
+        return timer if run.host else None
+    mean_ms = statistics.fmean(sleeps)
+    return Lateness(
+        max(timer.mean_ms, mean_ms),
+        max(timer.p95_ms, sorted(sleeps)[int(0.95 * (len(sleeps) - 1))]),
+        max(timer.max_ms, *sleeps),
+        sleep_ms=mean_ms,
+        calibration_hz=1e3 / (PERIOD_NS / 1e6 + mean_ms),
+        busy=timer.busy,
+        own=timer.own,
+    )
+
+
+def excused(verdict: Verdict, run: Run, from_ns: int, to_ns: int, why: Callable[[Lateness], str]) -> Verdict:
+    """Return the verdict, open where the machine was so late that nothing follows from it.
+
+    `why` gives what the machine was that explains the failure, or "". What the run's own processes did excuses nothing.
+    """
+    late, whole = (lateness(run, from_ns, to_ns, own=own) for own in (False, True))
+    if late is None or whole is None:
+        return verdict
+    if what := why(late):
+        message = f"{verdict.message}; but the grading machine was {what}"
+        hint = "grade again when the machine is less busy"
+        return inconclusive(message, hint=hint, measured=verdict.measured)
+    if why(whole):
+        return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})
+    return verdict
+
+
+def why_late(late: Lateness) -> str:
+    """Return what the machine was where it was late enough to delay an answer; "" where it was not."""
+    if not (late.full or late.max_ms >= LATE_MS):
+        return ""
+    return "busy" if late.full else f"late itself, by up to {late.max_ms:.0f} ms"
+
+
+class _Window(NamedTuple):
+    """What one event tells of."""
+
+    from_ns: int
+    to_ns: int
+    event: HostEvent
+
+    @property
+    def is_own(self) -> bool:
+        """Whether the run's own processes filled the machine."""
+        busy, own = self.event.busy, self.event.own_busy
+        return (
+            busy is not None and own is not None and own >= OWN_LEAST and round(busy - own, 3) <= OTHERS_MOST
+        )
+
+
+def _windows(run: Run, from_ns: int, to_ns: int) -> list[_Window]:
+    """Return all that touch this stretch of time."""
+    starts = [run.start_ns, *(t for t, _ in run.host)]
+    found = [_Window(start, t, event) for start, (t, event) in zip(starts, run.host, strict=False)]
+    return [w for w in found if w.to_ns > from_ns and w.from_ns < to_ns]
+
+
+def _timer(windows: Sequence[_Window]) -> Lateness:
+    """The worst that was reported."""
+    events = [w.event for w in windows]
+    return Lateness(
+        max((e.mean_ms for e in events), default=0.0),
+        max((e.p95_ms for e in events), default=0.0),
+        max((e.max_ms for e in events), default=0.0),
+        busy=_mean([e.busy for e in events if e.busy is not None]),
+        own=_mean([e.own_busy for e in events if e.own_busy is not None]),
+    )
+
+
+def _mean(shares: Sequence[float]) -> float | None:
+    return statistics.fmean(shares) if shares else None
+
+
+def _sleeps_ms(channel: Channel, from_ns: int, to_ns: int, left_out: Sequence[_Window]) -> Iterator[float]:
+    """How much too long each sleep of the calibration was, by its own stamps, of those that touch the stretch and none
+    of the windows `left_out`."""
+    if channel.topic != CALIBRATION or channel.type != CALIBRATION_TYPE or not channel.by_grader:
+        return
+    whole = [m for m in channel.messages if len(m.data) >= STAMP.size]
+    for before, after in pairwise(whole):
+        own = any(w.from_ns < after.log_time_ns and w.to_ns > before.log_time_ns for w in left_out)
+        if after.log_time_ns >= from_ns and before.log_time_ns <= to_ns and not own:
+            yield max(0.0, (_sent_ns(after.data) - _sent_ns(before.data) - PERIOD_NS) / 1e6)
+
+
+def _sent_ns(data: bytes) -> int:
+    _, seconds, nanoseconds = STAMP.unpack_from(data)
+    return int(seconds * 10**9 + nanoseconds)

@@ -12,9 +12,8 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field
 
 from grader.checks.support.exit_causes import explain_early_end, explain_traceback, process_tracebacks
-from grader.checks.support.idioms import loop_rate
-from grader.checks.support.nodes import PublishedTopic
-from grader.checks.support.processes import lives, observed_until_ns, slips_of
+from grader.checks.support.processes import PublishedTopic, lives, observed_until_ns, slips_of
+from grader.checks.support.text import loop_rate
 from grader.checks.support.topics import losses, whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts, PythonSlip

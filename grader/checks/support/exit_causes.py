@@ -10,10 +10,9 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from grader.checks.registry import Check
-from grader.checks.support.idioms import LOOP, SPIN
 from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import path_in_package
-from grader.checks.support.text import near_names, shown
+from grader.checks.support.text import LOOP, SPIN, near_names, shown
 from grader.evidence.run import Run
 from grader.installable import ROS_2, install_hint, known_packages, noetic_messages
 from grader.model.package import Fault, PackageFacts, PythonSlip

@@ -9,7 +9,6 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.support.exit_causes import explain_traceback, process_tracebacks, syntax_hint
-from grader.checks.support.idioms import INIT
 from grader.checks.support.processes import lives, observed_until_ns
 from grader.checks.support.scripts import (
     add_hint,
@@ -22,7 +21,7 @@ from grader.checks.support.scripts import (
     programs,
     shebang_obstacles,
 )
-from grader.checks.support.text import bare, near_names, shown
+from grader.checks.support.text import INIT, bare, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, unjudged

@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 from grader.checks.registry import Check
 from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
-from grader.checks.support.idioms import get_param, init
 from grader.checks.support.processes import early_end
-from grader.checks.support.text import near_names
+from grader.checks.support.text import get_param, init, near_names
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchParam, PackageFacts

@@ -7,10 +7,8 @@ from typing import Literal
 
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end, explain_error
-from grader.checks.support.idioms import INIT, LOOP, PUBLISHER, publisher
-from grader.checks.support.nodes import plain_type
-from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives
-from grader.checks.support.text import near_names, texts_in
+from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives, plain_type
+from grader.checks.support.text import INIT, LOOP, PUBLISHER, near_names, publisher, texts_in
 from grader.evidence.events import MISFIT
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts, PythonSlip

@@ -9,6 +9,7 @@ from itertools import chain
 from grader.checks.counter import StartParams, StepParams, judge_start
 from grader.checks.listener import HearsParams
 from grader.checks.rate import RateParams, judged_rhythm, sleeps_explain, was_late
+from grader.checks.support.clocks import lateness
 from grader.checks.support.console_output import (
     Line,
     Probe,
@@ -31,7 +32,6 @@ from grader.checks.support.counters import (
     wrong_steps,
 )
 from grader.checks.support.exit_causes import process_tracebacks
-from grader.checks.support.lateness import lateness
 from grader.checks.support.processes import how_it_ended, life_of
 from grader.checks.support.topics import sent_by
 from grader.evidence.events import ProcessEvent

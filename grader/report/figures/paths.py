@@ -14,8 +14,7 @@ from grader.checks.robot_places import (
     out_along,
     placed,
 )
-from grader.checks.support.geometry import Polyline, Pose, followed, relative, track
-from grader.checks.support.regions import shown_walls
+from grader.checks.support.geometry import Polyline, Pose, followed, relative, shown_walls, track
 from grader.evidence.run import Run
 from grader.model.figure import POINTS_MAX, PathFigure, PlaceFigure
 from grader.report.figures.bounds import finite, named, short, spread
