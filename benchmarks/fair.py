@@ -13,7 +13,7 @@ from benchmarks.busy import busy_loops
 from benchmarks.figures import Found, NotMeasured, Options, share, table
 from benchmarks.gradings import DATA, folder_for, graded, in_flight
 from benchmarks.machine import Meter
-from grader.classes.batch.gradings import Job
+from grader.classes.batch.job import FolderJob
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 
@@ -85,7 +85,7 @@ def measure(options: Options) -> Found:
     )
 
 
-def _right_jobs(count: int, folder: Path) -> list[Job]:
+def _right_jobs(count: int, folder: Path) -> list[FolderJob]:
     styles = [list(STYLES)[number % len(STYLES)] for number in range(count)]
     return [
         _job(f"{number:03}-{style}", DATA / "pulse" / style, style, folder / "right")
@@ -93,7 +93,7 @@ def _right_jobs(count: int, folder: Path) -> list[Job]:
     ]
 
 
-def _wrong_jobs(count: int, folder: Path) -> list[Job]:
+def _wrong_jobs(count: int, folder: Path) -> list[FolderJob]:
     """Each style at each of the wrong rates in turn."""
     pairs = list(product(WRONG_HZ, STYLES))
     sources = {pair: _at_rate(*pair, folder / "packages") for pair in pairs}
@@ -104,9 +104,9 @@ def _wrong_jobs(count: int, folder: Path) -> list[Job]:
     ]
 
 
-def _job(name: str, source: Path, style: str, out: Path) -> Job:
+def _job(name: str, source: Path, style: str, out: Path) -> FolderJob:
     rubric = DATA / ("pulse-cpp.yaml" if style == "cpp" else "pulse.yaml")
-    return Job(name=name, source=source, rubric=rubric, out=out)
+    return FolderJob(name=name, source=source, rubric=rubric, out=out)
 
 
 def _at_rate(hz: float, style: str, folder: Path) -> Path:
@@ -122,7 +122,7 @@ def _at_rate(hz: float, style: str, folder: Path) -> Path:
     return copy
 
 
-def _graded(jobs: list[Job], side_by_side: int) -> Series:
+def _graded(jobs: list[FolderJob], side_by_side: int) -> Series:
     meter = Meter()
     gradings = list(graded(jobs, side_by_side))
     results = {one.name: one.result for one in gradings}

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from benchmarks.figures import NotMeasured, Options
 from fixtures.make import faulty_package
-from grader.classes.batch.gradings import Job, grade_all
+from grader.classes.batch.job import FolderJob, grade_all
 from grader.evidence.reader import load_evidence
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
@@ -61,7 +61,7 @@ def folder_for(name: str, options: Options) -> Iterator[Path]:
         yield Path(folder)
 
 
-def graded(jobs: Sequence[Job], most: int) -> Iterator[Grading]:
+def graded(jobs: Sequence[FolderJob], most: int) -> Iterator[Grading]:
     """Each grading as it ends, `most` at a time. Raises NotMeasured where there is no result."""
     for number, one in enumerate(grade_all(jobs, most, lambda _: None), 1):
         print(f"\r{number} of {len(jobs)} graded", end="", file=sys.stderr, flush=True)

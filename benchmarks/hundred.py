@@ -20,7 +20,7 @@ from benchmarks.gradings import (
     verdicts_of,
 )
 from benchmarks.machine import Meter
-from grader.classes.batch.gradings import Job
+from grader.classes.batch.job import FolderJob
 from grader.model.result import GradingResult
 from grader.model.verdict import Status
 
@@ -60,14 +60,14 @@ def measure(options: Options) -> Found:
 
 def _alone(out: Path) -> dict[str, GradingResult]:
     """Each kind, one at a time."""
-    jobs = [Job(name=kind, source=source, rubric=RUBRIC, out=out) for kind, source in KINDS.items()]
+    jobs = [FolderJob(name=kind, source=source, rubric=RUBRIC, out=out) for kind, source in KINDS.items()]
     return {one.name: one.result for one in graded(jobs, 1)}
 
 
 def _batch(out: Path, count: int, side_by_side: int, alone: dict[str, GradingResult]) -> Batch:
     kinds = [list(KINDS)[number % len(KINDS)] for number in range(count)]
     jobs = [
-        Job(name=f"{number:03}-{kind}", source=KINDS[kind], rubric=RUBRIC, out=out)
+        FolderJob(name=f"{number:03}-{kind}", source=KINDS[kind], rubric=RUBRIC, out=out)
         for number, kind in enumerate(kinds)
     ]
     meter = Meter()

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from benchmarks.figures import Found, Options, Row, spread
 from benchmarks.gradings import KINDS, RUBRIC, Verdicts, cores, folder_for, graded, verdicts_of
 from benchmarks.machine import timed
-from grader.classes.batch.gradings import Job
+from grader.classes.batch.job import FolderJob
 
 COUNT, TIMES = 300, 5
 GRADER = (sys.executable, "-m", "grader")
@@ -65,7 +65,7 @@ def _table(many: list[Judged], single: list[Judged], count: int) -> str:
 
 def _recorded(out: Path) -> dict[Path, Verdicts]:
     """Each kind's folder of results, with what it got when it was recorded."""
-    jobs = [Job(name=kind, source=source, rubric=RUBRIC, out=out) for kind, source in KINDS.items()]
+    jobs = [FolderJob(name=kind, source=source, rubric=RUBRIC, out=out) for kind, source in KINDS.items()]
     return {out / one.name: verdicts_of(one.result.criteria) for one in graded(jobs, 1)}
 
 

@@ -9,7 +9,7 @@ from benchmarks.busy import busy_loops
 from benchmarks.figures import Found, Options, mid, table
 from benchmarks.gradings import DATA, folder_for, graded
 from benchmarks.ros import hztest, hztest_workspace
-from grader.classes.batch.gradings import Job
+from grader.classes.batch.job import FolderJob
 from grader.model.verdict import Status
 
 COUNT, LOOPS = 5, (0, 4, 8, 16)
@@ -56,7 +56,7 @@ def measure(options: Options) -> Found:
 
 def _grade(out: Path) -> Tried:
     """With the build, and with what was run again."""
-    job = Job(name="pulse", source=PACKAGE, rubric=DATA / "pulse.yaml", out=out)
+    job = FolderJob(name="pulse", source=PACKAGE, rubric=DATA / "pulse.yaml", out=out)
     (grading,) = graded([job], 1)
     found = next(criterion for criterion in grading.result.criteria if criterion.id == CRITERION)
     outcomes = {Status.PASS: "passed", Status.INCONCLUSIVE: "inconclusive"}

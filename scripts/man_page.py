@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from grader import __version__
 from grader.cli.declare import EXIT_CODES
-from grader.cli.parser import build_parser, commands, options, value_of
+from grader.cli.main import build_parser, commands, options, value_of
 
 ABOUT = (
     (

@@ -6,25 +6,23 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 from grader import pipeline
-from grader.authoring.discover import (
+from grader.authoring.observe import Observed, Topic, heard_template, observe, wraps_of
+from grader.authoring.rubric_draft import (
     INTEGER_PROBES,
     STRING,
     TEXT_PROBES,
-    Parts,
-    find_parts,
-    first_look,
-    probe_for,
-    second_look,
-)
-from grader.authoring.observe import Observed, Topic, heard_template, observe, wraps_of
-from grader.authoring.rubric_draft import (
     Entry,
+    Parts,
     Sheet,
     assign_points,
     drop_empty,
+    find_parts,
+    first_look,
     format_number,
     label_of,
+    probe_for,
     rubric_text,
+    second_look,
 )
 from grader.checks.package_files import RUNTIME_KINDS
 from grader.errors import RosMissing, SubmissionError

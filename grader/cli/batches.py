@@ -10,7 +10,7 @@ from pathlib import Path
 from grader.classes.batch.folder import open_batch
 from grader.classes.batch.job import Executor, LocalExecutor
 from grader.classes.batch.run import BatchOptions, run_batch
-from grader.classes.course.standing import with_late_days
+from grader.classes.course.labs import with_late_days
 from grader.classes.roster import Local, Roster
 from grader.classes.roster.entries import parse_time
 from grader.cli.class_display import open_class_display, print_batch

@@ -18,7 +18,7 @@ from typing import Any
 import argcomplete
 from argcomplete.shell_integration import shellcode
 
-from grader.cli.parser import build_parser, commands, options, value_of
+from grader.cli.main import build_parser, commands, options, value_of
 
 Completer = Callable[..., Mapping[str, str]]
 """Called with `prefix` and `parsed_args`; returns values, each with a description or ""."""

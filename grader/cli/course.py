@@ -16,8 +16,7 @@ from rich.table import Table
 from grader.classes.batch.folder import BatchFolder, open_batch
 from grader.classes.batch.run import BatchOptions
 from grader.classes.course.attempts import attempt_folder, combine, rounds
-from grader.classes.course.gradebook import Marks, book_of, marks_of, rows_of
-from grader.classes.course.standing import LabStatus, status_of
+from grader.classes.course.labs import LabStatus, Marks, book_of, marks_of, rows_of, status_of
 from grader.classes.feedback.forms import FORMS, Settings
 from grader.classes.feedback.send import Wanted as WantedFeedback
 from grader.classes.gradebook import write_gradebook

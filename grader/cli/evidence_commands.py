@@ -10,7 +10,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from grader.classes.batch.judge_many import Judged, judge_all
+from grader.classes.batch.existing_results import Judged, judge_all
 from grader.cli.errors import report
 from grader.cli.outcome import exit_code
 from grader.cli.output import say, say_document

@@ -1,22 +1,40 @@
-"""`grader`: parse, dispatch, exit code."""
+"""`grader`: the parser of the whole command line, what goes through it, and the exit code.
+
+Imports nothing heavy: `--help` is quick.
+"""
 
 from __future__ import annotations
 
+import argparse
 import os
+import platform
 import signal
 import sys
 import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper
+from itertools import groupby, takewhile
 from types import FrameType
+from typing import Any, NoReturn
 
-from grader.cli.declare import Command, loading
+import grader.cli.commands  # noqa: F401 - fills COMMANDS
+from grader import __version__
+from grader.cli.declare import (
+    COMMANDS,
+    EXIT_CODES,
+    INSTRUCTORS,
+    REST,
+    STUDENTS,
+    Command,
+    add_arguments,
+    loading,
+)
 from grader.cli.errors import guarded
-from grader.cli.parser import build_parser, overview
-from grader.errors import ExitCode
+from grader.errors import ExitCode, UsageError
+from grader.wording import did_you_mean
 
 
 def run(argv: Sequence[str]) -> int:
@@ -79,3 +97,187 @@ def _prepare_signals() -> None:
 
 def _interrupt(_number: int, _frame: FrameType | None) -> None:
     raise KeyboardInterrupt
+
+
+GROUPS = {
+    "course": "Grade and publish a course of several labs",
+    "rubric": "Write, check and test rubrics",
+    "overrides": "Work with what people decided about a class",
+    "export": "Write evidence as a bag, or an autograder for Gradescope or PrairieLearn",
+}
+"""Commands that have commands of their own."""
+WIDTH = 12
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse, but an error is a UsageError: one line, a suggestion where a word is mistyped, and exit code 2."""
+
+    overview = False
+    given: tuple[str, ...] = ()
+
+    def error(self, message: str) -> NoReturn:
+        """Raise UsageError. An option that is not known comes first: what else is missing may follow from it."""
+        for word in self.given:
+            name = word.partition("=")[0]
+            if name.startswith("--") and name not in self._option_string_actions:
+                message = f"unrecognized arguments: {word}{did_you_mean(name, self._option_string_actions)}"
+                break
+        raise UsageError(message, hint=f"see {self.prog} --help")
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """Parse as argparse does, but each command refuses what it does not know itself."""
+        before_command = self._subparsers is not None
+        self.given = tuple(
+            takewhile(lambda word: word != "--" and not (before_command and word[:1] != "-"), args or ())
+        )
+        found, rest = super().parse_known_args(args, namespace)
+        if rest:
+            self.error(f"unrecognized arguments: {' '.join(rest)}")
+        return found, rest
+
+    def format_help(self) -> str:
+        """Return the help; that of `grader` itself lists the commands by who uses them."""
+        if not self.overview:
+            return super().format_help()
+        formatter = self._get_formatter()
+        formatter.add_usage(self.usage, self._actions, self._mutually_exclusive_groups)
+        formatter.add_text(self.description)
+        formatter.add_text(overview())
+        formatter.start_section("options")
+        formatter.add_arguments([action for action in self._actions if action.option_strings])
+        formatter.end_section()
+        formatter.add_text(self.epilog)
+        return formatter.format_help()
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:  # noqa: ANN401 - as argparse
+        if action.choices is None or value in action.choices:
+            return
+        choices = [str(choice) for choice in action.choices]
+        near = did_you_mean(str(value), choices)
+        if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001 - argparse has no public way
+            of = self.prog.partition(" ")[2]
+            raise UsageError(
+                f'there is no command "{f"{of} {value}".strip()}"{near}', hint=f"see {self.prog} --help"
+            )
+        raise argparse.ArgumentError(
+            action, f"invalid choice: {value!r}{near}; choose from {', '.join(choices)}"
+        )
+
+
+class VersionAction(argparse.Action):
+    """Prints a line for the grader (`grader X.Y.Z`), one for Python and one for ROS, and ends the command."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, **rest: Any) -> None:  # noqa: ANN401 - as argparse
+        super().__init__(option_strings, dest, nargs=0, default=argparse.SUPPRESS, **rest)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_rest: object) -> NoReturn:
+        """Raise SystemExit with code 0."""
+        from grader.cli.output import say  # noqa: PLC0415 - `--help` does without
+
+        say(f"grader {__version__}")
+        say(f"Python {platform.python_version()} ({sys.executable})")
+        say(_ros())
+        parser.exit()
+
+
+def _ros() -> str:
+    """Return which ROS 1 the grader would use here; what is wrong with it is for `grader doctor` to explain."""
+    from grader.errors import GraderError  # noqa: PLC0415 - as above
+
+    try:
+        from grader.ros_env import find_ros  # noqa: PLC0415 - as above
+
+        ros = find_ros()
+    except (GraderError, ImportError, OSError) as error:
+        return f"ROS 1 not usable: {error}"
+    return f"ROS 1 {ros.label}" if ros else "ROS 1 not found"
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser. What it parses has `command`, and the arguments of that command's function."""
+    common = Parser(add_help=False)
+    common.add_argument(
+        "--debug", action="store_true", default=argparse.SUPPRESS, help="show tracebacks of errors"
+    )
+    alike: dict[str, Any] = {
+        "parents": [common], "allow_abbrev": False, "formatter_class": argparse.RawDescriptionHelpFormatter
+    }  # fmt: skip
+    parser = Parser(prog="grader", description="Grades introductory ROS 1 labs.", epilog=EXIT_CODES, **alike)
+    parser.overview = True
+    parser.add_argument(
+        "--version", action=VersionAction, help="show the versions of grader, Python and ROS, and exit"
+    )
+    places = {"": parser.add_subparsers(metavar="COMMAND", required=True, title="commands")}
+    for command in _ordered():
+        group, _, name = command.name.rpartition(" ")
+        if group not in places:
+            text = GROUPS[group]
+            parent = places[""].add_parser(
+                group, help=text, description=f"{text}.", epilog=EXIT_CODES, **alike
+            )
+            places[group] = parent.add_subparsers(metavar="COMMAND", required=True, title="commands")
+        below = places[group].add_parser(
+            name,
+            help=command.summary.removesuffix("."),
+            description=command.summary,
+            epilog=command.notes + command.exit_codes,
+            **alike,
+        )
+        below.set_defaults(command=command)
+        add_arguments(below, command.run)
+    return parser
+
+
+def overview() -> str:
+    """Return one line for each command: first those of students, then those of instructors, then the others."""
+    lines: list[str] = []
+    for title, commands_of in groupby(_ordered(), key=lambda command: command.group):
+        lines += ["", f"{title}:"] if lines else [f"{title}:"]
+        texts = {
+            c.name.partition(" ")[0]: GROUPS.get(c.name.partition(" ")[0], c.summary) for c in commands_of
+        }
+        lines += [f"  {name:{WIDTH}}{text.removesuffix('.')}" for name, text in texts.items()]
+    return "\n".join(lines) + "\n"
+
+
+def commands(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """Return the parser of every command that can be run, in the order of `--help`; `prog` is how it is called."""
+    below = list(_below(parser))
+    if not below:
+        yield parser
+    for each in below:
+        yield from commands(each)
+
+
+def options(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """Return what a command takes beside `--help` and further commands: positional arguments, then options."""
+    taken = [action for action in parser._actions if not _is_other(action)]  # noqa: SLF001 - argparse has no public way
+    yield from (action for action in taken if not action.option_strings)
+    yield from (action for action in taken if action.option_strings)
+
+
+def value_of(action: argparse.Action) -> str:
+    """Return what the help calls the value of an option or positional argument, or "" if it takes none."""
+    if action.nargs == 0:
+        return ""
+    if action.metavar is None and action.choices is not None:
+        return f"{{{','.join(map(str, action.choices))}}}"
+    return str(action.metavar or action.dest)
+
+
+def _ordered() -> list[Command]:
+    order = (STUDENTS, INSTRUCTORS, REST)
+    return sorted(COMMANDS.values(), key=lambda command: order.index(command.group))
+
+
+def _below(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    for action in parser._actions:  # noqa: SLF001 - as above
+        if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001 - as above
+            yield from action.choices.values()
+
+
+def _is_other(action: argparse.Action) -> bool:
+    other = (argparse._HelpAction, argparse._SubParsersAction)  # noqa: SLF001 - as above
+    return isinstance(action, other) or action.help == argparse.SUPPRESS

@@ -6,13 +6,20 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from grader.classes.batch.existing_results import (
+    Written,
+    figures_in,
+    has_result,
+    result_in,
+    write_all,
+    write_one,
+)
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch
-from grader.classes.batch.reports import Written, figures_in, has_result, result_in, write_all, write_one
 from grader.classes.batch.run import INDEX
 from grader.cli.errors import report
-from grader.cli.find_packages import package_prefix
 from grader.cli.outcome import exit_code
 from grader.cli.output import say, say_beside
+from grader.cli.select_rubric import package_prefix
 from grader.errors import EvidenceError, ExitCode, UsageError
 from grader.files import atomic_write
 from grader.model.result import GradingResult

@@ -18,13 +18,21 @@ from typing import NamedTuple, TypeVar
 from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.archive import unpack
 from grader.intake.choose import Choice, Wanted, choose, not_found
-from grader.intake.content import Content, package_content, remarks
-from grader.intake.file_modes import Modes, archive_modes, folder_modes, right_in_git, uploaded_modes
 from grader.intake.find import Candidate, enclosing_package, find_candidates, linked_candidate
 from grader.intake.git import Git, Repository
 from grader.intake.gitdir import Repositories
 from grader.intake.limits import IntakeLimits
 from grader.intake.names import brief, encodable, printable, safe_name
+from grader.intake.package_files import (
+    Content,
+    Modes,
+    archive_modes,
+    folder_modes,
+    package_content,
+    remarks,
+    right_in_git,
+    uploaded_modes,
+)
 from grader.intake.repository import clone
 from grader.intake.source import Source, parse_source
 from grader.intake.tree import NO_CONTENT, Entry, file_digest, is_there, list_entries, tree_digest, walk

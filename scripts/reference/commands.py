@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 
 from grader.cli.declare import EXIT_CODES
-from grader.cli.parser import build_parser, commands, options, value_of
+from grader.cli.main import build_parser, commands, options, value_of
 from scripts.reference.table import MADE, code, table
 
 COMMANDS = f"""# Commands

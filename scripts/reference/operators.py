@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from grader.authoring.mutation.declared import load_mutants, mutants_file
+from grader.authoring.mutation.faulty_packages import load_mutants, mutants_file
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.registry import Operator
 from grader.authoring.mutation.solution import find_reference, load_solution

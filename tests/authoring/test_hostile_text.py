@@ -6,7 +6,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.authoring.mutation.declared import mutants_text
+from grader.authoring.mutation.faulty_packages import mutants_text
 from grader.authoring.rubric_draft import rubric_text
 from grader.model.mutants import LostCriterion, Mutant, MutantResult
 from tests.report.nasty import STEERING, TEXTS

@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.authoring.discover import Parts, find_parts, second_look
 from grader.authoring.observe import heard_template, nice_rate, observe, wraps_of
 from grader.authoring.propose import Proposal
-from grader.authoring.rubric_draft import assign_points, rubric_text
+from grader.authoring.rubric_draft import Parts, assign_points, find_parts, rubric_text, second_look
 from grader.evidence.reader import package_facts
 from grader.evidence.run import Run
 from grader.rubric.load import load_rubric

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.roster.allowed_sources import OUT
+from grader.classes.roster.entries import OUT
 from tests.batch.a_class import (
     CORRECT,
     ROOT,

@@ -7,8 +7,7 @@ import io
 import pytest
 from rich.console import Console
 
-from grader.classes.batch.gradings import _Steps
-from grader.classes.batch.job import Outcome
+from grader.classes.batch.job import Outcome, _Steps
 from grader.cli.class_display import LATELY, BatchProgress, LiveClass, PlainClass, summary
 
 

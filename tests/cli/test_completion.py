@@ -22,8 +22,7 @@ from grader.cli.completion import (
     paths,
     submissions,
 )
-from grader.cli.main import run
-from grader.cli.parser import commands, options, value_of
+from grader.cli.main import commands, options, run, value_of
 from grader.report.forms import FORMS
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import all_rubrics

@@ -18,7 +18,7 @@ import grader
 from grader.cli.commands.grading import inspect
 from grader.cli.display import LiveSteps, PlainSteps
 from grader.cli.errors import guarded, report
-from grader.cli.mutants import print_test
+from grader.cli.labs import print_test
 from grader.cli.output import say, say_json
 from grader.errors import RubricError, SubmissionError
 from grader.evidence.events import ActorEvent
@@ -37,7 +37,7 @@ MAY_PRINT = {
     "cli/class_display.py",
     "cli/main.py",  # the list of commands, which is its own
     "limited_child.py",  # JSON for the process that started it
-    "integrations/github.py",  # annotations; tests/ci
+    "integrations/ci_systems.py",  # annotations; tests/ci
     "integrations/autograde.py",  # a report as in a terminal; tests/deliver
 }
 NASTY = "\x1b[2J\u202e\n::error::owned\n##[error]x\x9b31m\ud800" + "y" * 10**6

@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from grader.cli.parser import build_parser, commands, options, value_of
+from grader.cli.main import build_parser, commands, options, value_of
 from scripts.man_page import bold, man_page, text
 
 GROFF, MAN, MANDOC = (shutil.which(name) for name in ("groff", "man", "mandoc"))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.cli.parser import build_parser
+from grader.cli.main import build_parser
 from grader.errors import UsageError
 from scripts.pages import ROOT, pages
 from tests.docs.console import fences

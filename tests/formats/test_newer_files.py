@@ -11,7 +11,7 @@ import pytest
 from mcap.writer import Writer
 
 from grader import EvidenceError, RubricError, judge, load_result, load_rubric
-from grader.authoring.mutation.declared import load_mutants
+from grader.authoring.mutation.faulty_packages import load_mutants
 from grader.cli.main import run
 from grader.evidence.events import TOPICS, ConsoleLine
 from grader.evidence.reader import load_run

@@ -19,7 +19,7 @@ from grader.arena.sandbox import Sandbox
 from grader.arena.scenario_inputs import settings
 from grader.arena.session import ArenaSession
 from grader.arena.workspace import read_archive, read_member
-from grader.authoring.mutation.declared import load_mutants
+from grader.authoring.mutation.faulty_packages import load_mutants
 from grader.classes.gradebook import write_gradebook
 from grader.classes.gradebook.template import read_sheet
 from grader.classes.roster import read_roster

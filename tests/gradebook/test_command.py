@@ -12,8 +12,7 @@ import pytest
 from grader.classes.batch.folder import write_run
 from grader.classes.gradebook import FORMS, Row
 from grader.classes.gradebook.table import header
-from grader.cli.main import run
-from grader.cli.parser import build_parser
+from grader.cli.main import build_parser, run
 from grader.model.batch import BatchRun, RosterFault
 from grader.report.files import result_bytes
 from tests.gradebook.made import BOOK, row

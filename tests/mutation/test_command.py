@@ -10,7 +10,7 @@ import pytest
 
 from fixtures.make import declared
 from grader.authoring.mutation import rubric_test
-from grader.classes.batch.gradings import Graded
+from grader.classes.batch.job import Graded
 from grader.cli.main import run
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import ROOT
@@ -65,7 +65,7 @@ def judge(tmp_path, monkeypatch):
         made.declared = {m.name: dict(m.costs or {}) for m in plan.mutants}
         return original(plan, progress)
 
-    monkeypatch.setattr("grader.cli.mutants.run_test", noting)
+    monkeypatch.setattr("grader.cli.labs.run_test", noting)
     return made
 
 

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.authoring.mutation.declared import load_mutants, mutants_text, parse_parameters
+from grader.authoring.mutation.faulty_packages import load_mutants, mutants_text, parse_parameters, plan_all
 from grader.authoring.mutation.operators import OPERATORS
-from grader.authoring.mutation.plan import plan_all
 from grader.errors import RubricError
 from grader.model.mutants import LostCriterion, Mutant, MutantResult
 from grader.rubric.load import load_rubric

@@ -4,7 +4,7 @@ import pytest
 
 from grader.authoring.mutation import package_tree as tree_module
 from grader.authoring.mutation.package_tree import Entry, read_tree, unified_diff, write_tree
-from grader.authoring.mutation.text_edits import Edit, apply_edits
+from grader.authoring.mutation.source_edits import Edit, apply_edits
 from grader.errors import UsageError
 
 

@@ -2,10 +2,15 @@ from __future__ import annotations
 
 import pytest
 
-from grader.authoring.mutation.declared import LoadedMutants
+from grader.authoring.mutation.faulty_packages import (
+    LoadedMutants,
+    plan_all,
+    plan_declared,
+    refuse_unfit,
+    select_mutants,
+)
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.package_tree import Entry, unified_diff
-from grader.authoring.mutation.plan import plan_all, plan_declared, refuse_unfit, select_mutants
 from grader.authoring.mutation.solution import Solution
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import Mutant

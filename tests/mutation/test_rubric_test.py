@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from grader.authoring.mutation import rubric_test
-from grader.authoring.mutation.plan import Planned, plan_all
+from grader.authoring.mutation.faulty_packages import Planned, plan_all
 from grader.authoring.mutation.rubric_test import Comparison, Plan, compare, find_lost, run_test
 from grader.authoring.mutation.solution import Solution
-from grader.classes.batch.gradings import Graded, Job
+from grader.classes.batch.job import FolderJob, Graded
 from grader.errors import HostError
 from grader.model.mutants import Mutant
 from grader.model.progress import Silence
@@ -32,7 +32,7 @@ class Lab:
     """A rubric with two criteria, and a grader that says what `judged` wants."""
 
     folder: Path
-    judged: Callable[[Job], Statuses | str]
+    judged: Callable[[FolderJob], Statuses | str]
     calls: list[tuple[str, int]] = field(default_factory=list)
 
     def plan(self, only: str = "bit-removed", **changes: object) -> Plan:
@@ -58,7 +58,7 @@ class Lab:
             (job.out / job.name / "evidence").mkdir(exist_ok=True, parents=True)
             yield self.graded(job)
 
-    def graded(self, job: Job) -> Graded:
+    def graded(self, job: FolderJob) -> Graded:
         judged = self.judged(job)
         if isinstance(judged, str):
             return Graded(name=job.name, result=None, error=judged)
@@ -165,7 +165,7 @@ def test_declared_costs_are_compared(lab):
 def test_what_is_inconclusive_is_graded_once_more_alone(lab):
     seen: list[str] = []
 
-    def judged(job: Job) -> Statuses:
+    def judged(job: FolderJob) -> Statuses:
         seen.append(job.name)
         if job.name == "reference":
             return {}

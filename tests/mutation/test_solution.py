@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.authoring.mutation.declared import mutants_file
+from grader.authoring.mutation.faulty_packages import mutants_file
 from grader.authoring.mutation.package_tree import read_tree
 from grader.authoring.mutation.solution import Reference, find_reference, load_solution, reference_at
 from grader.errors import UsageError

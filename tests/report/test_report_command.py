@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from grader.cli.find_packages import package_prefix
 from grader.cli.main import run
+from grader.cli.select_rubric import package_prefix
 from grader.model.result import RubricInfo
 from grader.model.verdict import FileCitation, Status
 from grader.report.files import write_reports

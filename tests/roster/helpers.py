@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from grader.classes.roster import Local, read_roster
-from grader.classes.roster.allowed_sources import OWN_FOLDER
+from grader.classes.roster.entries import OWN_FOLDER
 from grader.model.batch import Roster
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.roster.allowed_sources import OUT
+from grader.classes.roster.entries import OUT
 from grader.model.batch import RosterFault
 from tests.roster.helpers import ids, read, said
 

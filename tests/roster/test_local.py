@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.roster import Local, allowed_sources, read_roster
-from grader.classes.roster import allowed_sources as local_module
-from grader.classes.roster.allowed_sources import OUT, REFUSED
+from grader.classes.roster import Local, entries, read_roster
+from grader.classes.roster.entries import OUT, REFUSED
 from grader.errors import UsageError
 from grader.intake.source import parse_source
 from tests.roster.helpers import ids, read, said
@@ -202,5 +201,5 @@ def test_what_cannot_be_followed_is_a_fault(forms: Path, monkeypatch: pytest.Mon
         raise PermissionError(13, "Permission denied")
 
     assert said(read(forms, "id,source\neve,round/x\n")) != []
-    monkeypatch.setattr(local_module, "parse_source", forbidden)
-    assert allowed_sources.source_fault("ada", forms) == "ada is no path that can be followed"
+    monkeypatch.setattr(entries, "parse_source", forbidden)
+    assert entries.source_fault("ada", forms) == "ada is no path that can be followed"

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.cli.find_packages import find
-from grader.cli.select_rubric import choose_all
+from grader.cli.select_rubric import choose_all, find
 from grader.errors import UsageError
 from tests.students.conftest import git, write_package
 

@@ -12,7 +12,7 @@ from fixtures.make import solution_of as reference_of
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.package_tree import Entry, Tree
 from grader.authoring.mutation.solution import Site, Solution
-from grader.authoring.mutation.text_edits import Edit, apply_edits
+from grader.authoring.mutation.source_edits import Edit, apply_edits
 from grader.model.repair import RepairKind
 from grader.package.repairs import wanted_of
 

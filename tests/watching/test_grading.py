@@ -12,7 +12,7 @@ import pytest
 
 from grader import pipeline
 from grader.arena.asynchronous import Stop, Stopped, run_until_signal
-from grader.cli.parser import build_parser
+from grader.cli.main import build_parser
 from grader.errors import Busy, ExitCode, HostError, OutputError, SandboxMissing, SubmissionError
 from grader.model.progress import Silence
 from grader.model.verdict import Status

@@ -7,8 +7,8 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
-from grader.authoring.mutation.python_script import Function, Script
 from grader.authoring.mutation.solution import CodePlace, Solution
+from grader.authoring.mutation.source_edits import Function, Script
 
 LOGS = frozenset({"logdebug", "loginfo", "logwarn", "logerr", "logfatal"})
 STREAMS = frozenset({"stdout", "stderr"})

@@ -10,10 +10,10 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from grader.authoring.mutation.faulty_packages import Planned
 from grader.authoring.mutation.package_tree import Tree, unified_diff, write_tree
-from grader.authoring.mutation.plan import Planned
 from grader.authoring.mutation.solution import Solution
-from grader.classes.batch.gradings import Graded, Job, grade_all
+from grader.classes.batch.job import FolderJob, Graded, grade_all
 from grader.errors import HostError
 from grader.files import temporary_folder
 from grader.model.mutants import Cost, LostCriterion, Mutant, MutantResult, ReferenceResult, RubricTest, State
@@ -201,7 +201,9 @@ def _grade_trees(
             source = folder / name
             write_tree(tree, source)
             work.append(
-                Job(name=name, source=source, rubric=plan.rubric.path, out=plan.out, sandbox=plan.sandbox)
+                FolderJob(
+                    name=name, source=source, rubric=plan.rubric.path, out=plan.out, sandbox=plan.sandbox
+                )
             )
         yield from grade_all(work, jobs, begun)
 

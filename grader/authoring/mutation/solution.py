@@ -13,9 +13,7 @@ from cmake_parser.ast import Command
 from cmake_parser.error import CMakeParseError
 
 from grader.authoring.mutation.package_tree import Entry, Tree, read_tree
-from grader.authoring.mutation.python_script import Script
-from grader.authoring.mutation.text_edits import Edit, apply_edits, line_at
-from grader.authoring.mutation.xml_document import Document
+from grader.authoring.mutation.source_edits import Document, Edit, Script, apply_edits, line_at
 from grader.errors import UsageError
 from grader.rubric.find import rubrics_folder
 from grader.rubric.load import LoadedRubric

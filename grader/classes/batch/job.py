@@ -1,12 +1,15 @@
 """One submission of a class: its `Job`, how it is fetched and graded, and its `Outcome`.
 
 An executor does many jobs: `LocalExecutor` with processes of this machine, `classes.cluster` with other machines.
+`grade_all` grades folders side by side without a class, for rubric tests and benchmarks.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -23,12 +26,12 @@ from grader.intake import safe_name, without_password
 from grader.judging.settle import settle
 from grader.judging.summary import NOTHING_RUN, passed
 from grader.model.batch import Entry
-from grader.model.progress import Silence
+from grader.model.progress import Silence, StepState
 from grader.model.record import Record
 from grader.model.result import NO_TIME, GradingResult, HandedIn, Override, SubmissionInfo
 from grader.model.sandbox_mode import SandboxMode
-from grader.pipeline import GradeOptions, grade
-from grader.rubric.load import LoadedRubric
+from grader.pipeline import GradeOptions, grade, prepare
+from grader.rubric.load import LoadedRubric, load_rubric
 from grader.workers import WorkerEnded, run_each
 
 OutcomeStatus = Literal["graded", "inconclusive", "error"]
@@ -234,3 +237,62 @@ def _outcome(
         message=f"{message}; the earlier result stays" if fault else message,
         hint=error.hint if error else "",
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FolderJob:
+    """One grading: the submission in `source`, as `name`, into `out/name/`. `rubric` is its file."""
+
+    name: str
+    source: Path
+    rubric: Path
+    out: Path
+    sandbox: SandboxMode = "auto"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Graded:
+    """A grading's result, or in one line why there is none. `again` is how many of its runs were made again."""
+
+    name: str
+    result: GradingResult | None
+    error: str = ""
+    again: int = 0
+
+
+def grade_all(jobs: Sequence[FolderJob], most: int, begun: Callable[[str], None]) -> Iterator[Graded]:
+    """Yield each job's result as it comes, `most` at a time. `begun` gets each job's name when it starts."""
+    for sandbox in {job.sandbox for job in jobs}:
+        prepare(GradeOptions(sandbox=sandbox))
+    return run_each(
+        _grade_folder, jobs, min(most, len(jobs)), ended=_grading_ended, begun=lambda job: begun(job.name)
+    )
+
+
+def _grading_ended(job: FolderJob, error: WorkerEnded) -> Graded:
+    return Graded(name=job.name, result=None, error=f"the process that graded it {error.reason}")
+
+
+def _grade_folder(job: FolderJob) -> Graded:
+    options, steps = GradeOptions(sandbox=job.sandbox, submission_id=job.name), _Steps()
+    try:
+        result = grade(str(job.source), load_rubric(str(job.rubric)), job.out, options, steps)
+    except GraderError as error:
+        return Graded(name=job.name, result=None, error=error.message)
+    return Graded(name=job.name, result=result, again=steps.again)
+
+
+class _Steps(Silence):
+    """Counts how often each was done."""
+
+    def __init__(self) -> None:
+        self._done: Counter[str] = Counter()
+
+    def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:
+        del detail, expected_s
+        if state == "done":
+            self._done[name] += 1
+
+    @property
+    def again(self) -> int:
+        return self._done.total() - len(self._done)

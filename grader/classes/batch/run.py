@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from grader import __version__
+from grader.classes.batch.existing_results import Settler, rewrite
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch, write_run
 from grader.classes.batch.job import Executor, Job, Outcome
-from grader.classes.batch.reports import Settler, rewrite
 from grader.classes.fetching import prefetch
 from grader.classes.gradebook import write_gradebook
+from grader.classes.overrides import COMMENTS_FILE as BANK
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
-from grader.classes.overrides.bank import FILE as BANK
 from grader.errors import Busy, GraderError, UsageError
 from grader.files import check_writable, keep_private, lock, make_folder
 from grader.intake import safe_name, without_password

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from grader.classes.batch.existing_results import Settler, rewrite
 from grader.classes.batch.folder import BatchFolder, write_run
-from grader.classes.batch.reports import Settler, rewrite
 from grader.classes.batch.run import alone, ids_of, write_books
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import folder_key, read_overrides

@@ -26,9 +26,9 @@ from markupsafe import Markup, escape
 from werkzeug.exceptions import Forbidden, HTTPException, NotFound
 from werkzeug.wrappers import Response as AnyResponse
 
-from grader.classes.batch.reports import figures_in
+from grader.classes.batch.existing_results import figures_in
 from grader.classes.gradebook import Row
-from grader.classes.overrides.bank import bounds
+from grader.classes.overrides import bounds
 from grader.classes.review.cards import (
     MANUAL,
     Cards,

@@ -10,9 +10,8 @@ from pathlib import Path
 
 from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.run import ids_of
-from grader.classes.overrides import FILE, read_written
-from grader.classes.overrides.bank import FILE as BANK
-from grader.classes.overrides.bank import read_bank
+from grader.classes.overrides import COMMENTS_FILE as BANK
+from grader.classes.overrides import FILE, read_bank, read_written
 from grader.classes.overrides.write import Change, write_overrides
 from grader.classes.review.session import reviewing
 from grader.errors import UsageError

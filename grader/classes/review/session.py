@@ -17,13 +17,21 @@ from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 
+from grader.classes.batch.existing_results import Settler, rewrite
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
-from grader.classes.batch.reports import Settler, rewrite
 from grader.classes.batch.run import GRADEBOOK, alone, ids_of, write_books
 from grader.classes.feedback.publish import read_published
-from grader.classes.overrides import FILE, Overrides, Written, read_written, resolve_all
-from grader.classes.overrides.bank import FILE as BANK
-from grader.classes.overrides.bank import Bank, read_bank, resolve
+from grader.classes.overrides import COMMENTS_FILE as BANK
+from grader.classes.overrides import (
+    FILE,
+    Bank,
+    Overrides,
+    Written,
+    read_bank,
+    read_written,
+    resolve,
+    resolve_all,
+)
 from grader.classes.overrides.write import write_override, write_overrides
 from grader.classes.review.background import BackgroundWriter, Pace
 from grader.classes.review.blind import Mask, aliases, mask_of

@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from grader.classes.roster.allowed_sources import OWN_FOLDER, Local
-from grader.classes.roster.entries import entries_of
+from grader.classes.roster.entries import OWN_FOLDER, Local, entries_of
 from grader.classes.roster.exports import (
     from_gitlab,
     is_classroom,

@@ -9,8 +9,7 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from grader.classes.roster.allowed_sources import Local, source_fault, whole_source
-from grader.classes.roster.entries import Found, columns_of, gather
+from grader.classes.roster.entries import Found, Local, columns_of, gather, source_fault, whole_source
 from grader.classes.roster.table import Row, Table, text_of
 from grader.errors import UsageError
 from grader.intake.names import encodable, printable

@@ -14,8 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from grader.classes.roster.allowed_sources import REFUSED, Local, local_fault
-from grader.classes.roster.entries import Found, columns_of, gather
+from grader.classes.roster.entries import REFUSED, Found, Local, columns_of, gather, local_fault
 from grader.errors import HostError, UsageError
 from grader.files import make_folder, temporary_folder, unwritable
 from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable

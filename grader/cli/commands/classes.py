@@ -350,8 +350,8 @@ def report(
 ) -> ExitCode:
     """Write the reports of a result or a class again, without ROS."""
     with loading():
+        from grader.classes.batch.existing_results import has_result
         from grader.classes.batch.folder import RUN, open_batch
-        from grader.classes.batch.reports import has_result
         from grader.cli import reports
     batch = open_batch(folder) if (folder / RUN).is_file() else None
     if batch is not None:

@@ -33,7 +33,7 @@ def labs(
     Those are the grader's own, and rubrics in the folders that --add has named or $GRADER_RUBRICS lists.
     """
     with loading():
-        from grader.cli.examples import print_labs
+        from grader.cli.labs import print_labs
         from grader.cli.output import say, say_json
         from grader.rubric.find import add_folder, example_labs, known_labs, remove_folder
         from grader.rubric.load import load_rubric
@@ -83,7 +83,7 @@ def example(
 ) -> ExitCode:
     """Write a lab's correct package to try things with, or one with a mistake."""
     with loading():
-        from grader.cli.examples import list_mistakes, write_example
+        from grader.cli.labs import list_mistakes, write_example
     if folder is not None:
         write_example(lab, folder, mistake)
     elif mistake is None:
@@ -168,8 +168,8 @@ def new_rubric(
         from grader import pipeline
         from grader.authoring.propose import propose_rubric
         from grader.cli.display import open_progress
-        from grader.cli.examples import rubric_id_from
         from grader.cli.host_support import warn_without_sandbox
+        from grader.cli.labs import rubric_id_from
         from grader.cli.select_rubric import only_package
     name = package or only_package(solution)
     chosen = rubric_id or rubric_id_from(Path(out).stem if out != STDOUT else name)
@@ -215,21 +215,19 @@ def run_rubric_test(
 ) -> ExitCode:
     """Grade a correct package, then mutants of it that must lose marks."""
     with loading():
-        from grader.cli import mutants
+        from grader.cli import labs
         from grader.cli.host_support import require_room, warn_without_sandbox
         from grader.cli.output import say_json
     require_room(gradings=jobs)
-    plan = mutants.plan_test(
-        rubric, solution, only=only, jobs=jobs, out=out, everything=write, sandbox=sandbox
-    )
+    plan = labs.plan_test(rubric, solution, only=only, jobs=jobs, out=out, everything=write, sandbox=sandbox)
     warn_without_sandbox(sandbox, plan.rubric)
-    tested = mutants.run_plan(plan, temporary=out is None)
+    tested = labs.run_plan(plan, temporary=out is None)
     if write is not None and not tested.reference.lost:
-        mutants.write_mutants(plan, tested, write)
+        labs.write_mutants(plan, tested, write)
     if as_json:
         say_json(tested.model_dump(mode="json", by_alias=True))
     else:
-        mutants.print_test(tested, sys.stdout)
+        labs.print_test(tested, sys.stdout)
     return ExitCode.PASSED if tested.passed else ExitCode.BELOW_PASS_MARK
 
 

@@ -9,8 +9,7 @@ from pydantic import Field
 
 from grader.authoring.mutation.registry import Finder, operator
 from grader.authoring.mutation.solution import CodePlace, Solution
-from grader.authoring.mutation.text_edits import Edit, misspelt_name, whole_lines
-from grader.authoring.mutation.xml_document import Document, Element
+from grader.authoring.mutation.source_edits import Document, Edit, Element, misspelt_name, whole_lines
 from grader.model.record import Record
 
 URL = re.compile(r"""https?://[^\s"'<>]+""")

@@ -9,7 +9,6 @@ from pathlib import PurePosixPath
 
 from pydantic import Field
 
-from grader.authoring.mutation.python_script import Function, Script, every_second_time
 from grader.authoring.mutation.registry import Finder, operator
 from grader.authoring.mutation.rospy_code import (
     INTEGER_TYPES,
@@ -24,7 +23,14 @@ from grader.authoring.mutation.rospy_code import (
     speech,
 )
 from grader.authoring.mutation.solution import CodePlace, Solution
-from grader.authoring.mutation.text_edits import Edit, misspelt_literal, texts_in
+from grader.authoring.mutation.source_edits import (
+    Edit,
+    Function,
+    Script,
+    every_second_time,
+    misspelt_literal,
+    texts_in,
+)
 from grader.model.interfaces import PARTS, parse_interface
 from grader.model.package import InterfaceField
 from grader.model.record import Record

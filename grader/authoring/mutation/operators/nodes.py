@@ -8,7 +8,6 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.authoring.mutation.python_script import Function, Script
 from grader.authoring.mutation.registry import operator
 from grader.authoring.mutation.rospy_code import (
     LOGS,
@@ -22,7 +21,14 @@ from grader.authoring.mutation.rospy_code import (
     text_literal,
 )
 from grader.authoring.mutation.solution import CodePlace, Solution
-from grader.authoring.mutation.text_edits import Edit, apply_edits, misspelt_literal, texts_in
+from grader.authoring.mutation.source_edits import (
+    Edit,
+    Function,
+    Script,
+    apply_edits,
+    misspelt_literal,
+    texts_in,
+)
 from grader.model.record import Record
 
 # ---- names

@@ -10,8 +10,7 @@ from cmake_parser.ast import Command, Token
 from grader.authoring.mutation.package_tree import Tree
 from grader.authoring.mutation.registry import Finder, operator
 from grader.authoring.mutation.solution import CMAKE, MANIFEST, CodePlace, Solution
-from grader.authoring.mutation.text_edits import Edit, whole_lines
-from grader.authoring.mutation.xml_document import Document, Element
+from grader.authoring.mutation.source_edits import Document, Edit, Element, whole_lines
 
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 DEPENDENCIES = ("depend", "build_depend", "build_export_depend", "exec_depend", "run_depend")

@@ -7,11 +7,10 @@ from collections.abc import Iterator
 
 import yaml
 
-from grader.authoring.mutation.python_script import Script
 from grader.authoring.mutation.registry import Finder, operator
 from grader.authoring.mutation.rospy_code import argument, calls, script_place, text_literal
 from grader.authoring.mutation.solution import CodePlace, Solution
-from grader.authoring.mutation.text_edits import Edit, misspelt_name, whole_lines
+from grader.authoring.mutation.source_edits import Edit, Script, misspelt_name, whole_lines
 
 Leaf = tuple[str, yaml.ScalarNode, yaml.ScalarNode]
 YAML = (".yaml", ".yml")

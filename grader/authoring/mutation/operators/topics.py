@@ -9,7 +9,6 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.authoring.mutation.python_script import Function, Script, every_second_time
 from grader.authoring.mutation.registry import operator
 from grader.authoring.mutation.rospy_code import (
     Assignment,
@@ -30,7 +29,7 @@ from grader.authoring.mutation.rospy_code import (
     targets,
 )
 from grader.authoring.mutation.solution import CodePlace, Solution
-from grader.authoring.mutation.text_edits import Edit, misspelt_name
+from grader.authoring.mutation.source_edits import Edit, Function, Script, every_second_time, misspelt_name
 from grader.model.record import Record
 
 OTHER_TYPES = {

@@ -1,4 +1,4 @@
-"""A Python file with the exact position of every node, and edits of it that leave the rest as it is.
+"""Files with the exact place of everything in them, and edits by these places that leave the rest as it is.
 
 Mistakes are edits of the text, not of a syntax tree: many of them are not valid Python, and a tree cannot hold those.
 """
@@ -6,11 +6,176 @@ Mistakes are edits of the text, not of a syntax tree: many of them are not valid
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
+from xml.parsers import expat
 
-from grader.authoring.mutation.text_edits import Edit
+
+@dataclass(frozen=True, order=True)
+class Edit:
+    """`text` takes the place of the characters from `start` up to `end`."""
+
+    start: int
+    end: int
+    text: str
+
+
+def apply_edits(text: str, edits: Iterable[Edit]) -> str:
+    """Return the text with all edits made. Raises ValueError where two of them overlap."""
+    parts, position = [], 0
+    for edit in sorted(edits):
+        if edit.start < position:
+            raise ValueError(f"two edits overlap at {edit.start}")
+        parts += [text[position : edit.start], edit.text]
+        position = edit.end
+    return "".join([*parts, text[position:]])
+
+
+def line_at(text: str, position: int) -> int:
+    """Return the line of a position, counted from 1."""
+    return text.count("\n", 0, position) + 1
+
+
+def whole_lines(text: str, start: int, end: int) -> tuple[int, int]:
+    """The span with its indentation and its line end, where it has its lines for itself; else the span as it is."""
+    first = text.rfind("\n", 0, start) + 1
+    last = text.find("\n", end)
+    last = len(text) if last < 0 else last + 1
+    alone = not text[first:start].strip() and not text[end:last].strip()
+    return (first, last) if alone else (start, end)
+
+
+# ---- misspellings
+
+OPENING = re.compile(r"""^[a-zA-Z]{0,2}(?:'''|\"\"\"|'|")""")
+WORD = re.compile(r"\{[^{}]*\}|%\(\w+\)\w|%[-+ #0-9.]*[a-z]|\\.|([^\W\d_]{3,})")
+
+
+def misspelt_name(name: str) -> str:
+    """A name without its last letter but one: `chattr`."""
+    return name[:-2] + name[-1:] if len(name) > 2 else f"{name}{name[-1:]}"
+
+
+def misspelt_literal(source: str) -> str:
+    """A text's source with its first word misspelt, places for values left alone; as it was where there is none."""
+    opening = OPENING.match(source)
+    start = opening.end() if opening else 0
+    for match in WORD.finditer(source, start):
+        if match[1]:
+            return source[: match.start(1)] + misspelt_name(match[1]) + source[match.end(1) :]
+    return source
+
+
+def texts_in(node: ast.AST) -> Iterator[ast.Constant | ast.JoinedStr]:
+    """The texts of an expression, an f-string as one; none that only names something (`get_param('x')`, `d['x']`)."""
+    if isinstance(node, ast.JoinedStr) or (isinstance(node, ast.Constant) and isinstance(node.value, str)):
+        yield node
+        return
+    if isinstance(node, ast.Subscript):
+        return
+    named = isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2].startswith("get_")
+    for child in ast.iter_child_nodes(node) if not named else ():
+        yield from texts_in(child)
+
+
+ATTRIBUTE = re.compile(rb"""([\w:.-]+)\s*=\s*("[^"]*"|'[^']*')""")
+START_TAG = re.compile(rb"""<[^<>"']*(?:"[^"]*"[^<>"']*|'[^']*'[^<>"']*)*>""")
+
+
+@dataclass(kw_only=True)
+class Element:
+    """`start` to `end` is the whole element, `inner` what begins after its start tag; places in bytes."""
+
+    tag: str
+    attributes: dict[str, str]
+    start: int
+    inner: int
+    end: int = 0
+    parent: Element | None = None
+    children: list[Element] = field(default_factory=list)
+
+    def all(self) -> Iterator[Element]:
+        yield self
+        for child in self.children:
+            yield from child.all()
+
+
+class Document:
+    """An XML file. Raises ValueError where it is not well-formed."""
+
+    def __init__(self, path: str, data: bytes) -> None:
+        self.path = path
+        self.data = data
+        self._open: list[Element] = []
+        self._parser = expat.ParserCreate()
+        self._parser.StartElementHandler = self._started
+        self._parser.EndElementHandler = self._ended
+        self.root: Element | None = None
+        try:
+            self._parser.Parse(data, True)
+        except expat.ExpatError as error:
+            raise ValueError(str(error)) from error
+
+    def _started(self, tag: str, attributes: dict[str, str]) -> None:
+        start = self._parser.CurrentByteIndex
+        match = START_TAG.match(self.data, start)
+        inner = match.end() if match else start
+        parent = self._open[-1] if self._open else None
+        element = Element(tag=tag, attributes=attributes, start=start, inner=inner, parent=parent)
+        if parent is None:
+            self.root = element
+        else:
+            parent.children.append(element)
+        self._open.append(element)
+
+    def _ended(self, _tag: str) -> None:
+        element = self._open.pop()
+        closed_itself = self.data[: element.inner].endswith(b"/>")
+        index = self._parser.CurrentByteIndex
+        element.end = element.inner if closed_itself else self.data.index(b">", index) + 1
+
+    def elements(self, *tags: str) -> list[Element]:
+        return [e for e in (self.root.all() if self.root else ()) if e.tag in tags]
+
+    @property
+    def text(self) -> str:
+        """One character a byte, so that places are the parser's."""
+        return self.data.decode("latin-1")
+
+    def content(self, element: Element) -> str:
+        """Return the element's own text, without the space around it."""
+        end = self.data.rfind(b"</", element.inner, element.end)
+        return self.data[element.inner : max(end, element.inner)].decode(errors="replace").strip()
+
+    def line(self, element: Element) -> int:
+        return self.data.count(b"\n", 0, element.start) + 1
+
+    # ---- edits, in places of `text`
+
+    def remove(self, element: Element) -> Edit:
+        return Edit(*whole_lines(self.text, element.start, element.end), "")
+
+    def set_content(self, element: Element, content: str) -> Edit:
+        end = self.data.rfind(b"</", element.inner, element.end)
+        return Edit(element.inner, end, content)
+
+    def set_attribute(self, element: Element, name: str, value: str) -> Edit:
+        start, end = self._attribute(element, name)
+        return Edit(start, end, f'{name}="{value}"')
+
+    def remove_attribute(self, element: Element, name: str) -> Edit:
+        start, end = self._attribute(element, name)
+        while self.data[start - 1 : start].isspace():
+            start -= 1
+        return Edit(start, end, "")
+
+    def _attribute(self, element: Element, name: str) -> tuple[int, int]:
+        found = ATTRIBUTE.finditer(self.data, element.start, element.inner)
+        return next(m.span() for m in found if m[1].decode() == name)
+
 
 NodeT = TypeVar("NodeT", bound=ast.AST)
 Function = ast.FunctionDef | ast.AsyncFunctionDef
