@@ -120,5 +120,5 @@ def test_so_many_attempts_are_graded(counter):
 
 @pytest.mark.parametrize("text", ["0", "-1", "many", "1.5", "1\n2"])
 def test_a_number_of_attempts_that_is_none(text):
-    with pytest.raises(UsageError, match="is no number of attempts"):
+    with pytest.raises(UsageError, match="is not a number of attempts"):
         read_settings({"GRADER_ATTEMPTS": text})
