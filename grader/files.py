@@ -69,7 +69,7 @@ def atomic_write(path: Path, data: bytes, *, public: bool = False) -> None:
 
 @contextmanager
 def whole_file(target: Path) -> Iterator[Path]:
-    """A new file to write to, beside `target`; it takes its place in the end, flushed to the disk.
+    """Open a new file beside `target`; it takes the target's place in the end, flushed to the disk.
 
     It is for its owner alone, whatever the umask. A link stays a link, and what is no file (`/dev/stdout`, a pipe) gets
     a copy. Raises OutputError, or HostError where the disk gives out; then `target` is as it was before, and nothing is

@@ -71,7 +71,7 @@ def run_limited(function: str, *arguments: object, limits: ChildLimits) -> Answe
 
 
 def main() -> None:
-    """The child: answer the request on standard input."""
+    """Answer the request on standard input, as the child."""
     request = json.load(sys.stdin)
     _set_limits(ChildLimits(**request["limits"]))
     module, _, name = request["function"].partition(":")

@@ -130,13 +130,13 @@ def _conda(prefix: str) -> RosInstallation | None:
 
 
 def parse_env(dump: bytes) -> dict[str, str]:
-    """What `env -0` printed."""
+    """Parse what `env -0` printed."""
     pairs = (entry.partition("=") for entry in dump.decode(errors="replace").split("\0") if "=" in entry)
     return {name: value for name, _, value in pairs}
 
 
 def excess_of(dump: bytes) -> str:
-    """What an environment that `env -0` printed has too much of, in words; empty where it keeps within bounds."""
+    """Return what an environment that `env -0` printed has too much of, in words; "" where it keeps within bounds."""
     entries = [entry for entry in dump.split(b"\0") if entry]
     longest = max(entries, key=len, default=b"")
     if len(dump) > DUMP_BYTES:
@@ -150,5 +150,6 @@ def excess_of(dump: bytes) -> str:
 
 
 def keep_ros_variables(env: Mapping[str, str]) -> dict[str, str]:
-    """Only what ROS sets: no secret of the shell's goes on to a student's process, and no other program's setting."""
+    """Keep only what ROS sets: no secret of the shell's goes on to a student's process, and no other program's
+    setting."""
     return {name: value for name, value in env.items() if name in ROS_VARIABLES}

@@ -38,7 +38,7 @@ class RosPackages:
 
     @cached_property
     def folders(self) -> dict[str, Path]:
-        """Each package's folder; of two with one name, the one that ROS finds."""
+        """Return each package's folder; of two with one name, the one that ROS finds."""
         found: dict[str, Path] = {}
         for entry in (*self._entries("ROS_PACKAGE_PATH"), *(p / "share" for p in self._prefixes()), STANDINS):
             for folder in _packages_below(entry, 1 if entry.name == "share" else DEPTH_MAX):

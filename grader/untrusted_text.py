@@ -37,7 +37,7 @@ def steers(character: str) -> bool:
 
 
 def visible(text: str, *, lines: bool = False) -> str:
-    """`text` with whatever steers, hides or commands written out. With `lines`, line ends and tabs stay.
+    """Return `text` with whatever steers, hides or commands written out. With `lines`, line ends and tabs stay.
 
     What is visible already stays as it is.
     """
@@ -47,19 +47,20 @@ def visible(text: str, *, lines: bool = False) -> str:
 
 
 def uncommanded(text: str) -> str:
-    """Lines that no CI system takes for a command to itself. Colours that are ours may stand before them."""
+    """Return lines that no CI system takes for a command to itself. Colours that are ours may stand before them."""
     if "##" in text:
         text = _COMMAND.sub(r"\\x23", text)
     return _COMMAND_AT_START.sub(r"\1\\x3a", text) if "::" in text else text
 
 
 def clip(text: str, limit: int) -> str:
-    """`text`, or its beginning and how much is left out."""
+    """Return `text`, or its beginning and how much is left out."""
     return _cut(text[:limit], max(0, len(text) - limit))
 
 
 def line(text: str, limit: int) -> str:
-    """One visible line that is hardly longer than `limit` characters; it says how many of `text` are left out."""
+    """Return one visible line that is hardly longer than `limit` characters; it says how many of `text` are left
+    out."""
     head = _fitting(text, limit, visible)
     return _cut(visible(head), len(text) - len(head))
 
@@ -70,7 +71,7 @@ def text_limit(criteria: int, most: int) -> int:
 
 
 def json_text(data: object, *, ascii_only: bool = False) -> str:
-    """JSON that can be printed anywhere: nothing in it steers or hides, and it reads back as `data`.
+    """Return JSON that can be printed anywhere: nothing in it steers or hides, and it reads back as `data`.
 
     Numbers that JSON does not have become null, lone surrogates the text of their escape.
     """
@@ -79,7 +80,7 @@ def json_text(data: object, *, ascii_only: bool = False) -> str:
 
 
 def clipped(data: Any, limit: int) -> Any:  # noqa: ANN401 - JSON
-    """The same data with every text clipped to what JSON writes in `limit` characters, and of citations the first."""
+    """Return the data with every text clipped to what JSON writes in `limit` characters, and of citations the first."""
     if isinstance(data, str):
         head = _fitting(data, limit, _json_escaped)
         return _cut(head, len(data) - len(head))
@@ -94,7 +95,7 @@ def clipped(data: Any, limit: int) -> Any:  # noqa: ANN401 - JSON
 
 
 def _fitting(text: str, limit: int, written: Callable[[str], str]) -> str:
-    """The beginning of `text` that is written in `limit` characters."""
+    """Return the beginning of `text` that is written in `limit` characters."""
     head = text[:limit]
     while (length := len(written(head))) > limit:
         head = head[: min(len(head) - 1, len(head) * limit // length)]

@@ -103,7 +103,8 @@ def _rubric_findings(result: GradingResult, rubric: LoadedRubric) -> Iterator[Fi
 
 
 def _signature_findings(folder: Path, allowed: Path | None) -> Iterator[Finding]:
-    """Unsigned, or signed by a key without a name, is wrong only where signers are asked for."""
+    """Yield what is found about the signature. None, or one without a name, is wrong only where signers are
+    asked for."""
     signature = read_signature(folder, allowed)
     yield Finding(
         about="signature",
@@ -182,7 +183,7 @@ def _unknown_terms(result: GradingResult, rubric: LoadedRubric) -> Lateness | No
 
 
 def _remarks(result: GradingResult, again: GradingResult) -> Iterator[Finding]:
-    """What changes no points. Words differ from one build of the grader to the next."""
+    """Yield what changes no points. Words differ from one build of the grader to the next."""
     texts = {c["id"]: c for c in json.loads(result_text(again))["criteria"]}
     said = {c["id"]: c for c in json.loads(result_text(result))["criteria"]}
     other = [name for name in said if name in texts and said[name] != texts[name]]

@@ -33,7 +33,8 @@ UNLIMITED_BYTES = 1 << 62
 
 
 def shared_folder() -> Path | None:
-    """The user's own folder for locks, made where it is missing; None where there is none that is ours alone."""
+    """Return the user's own folder for locks, made where it is missing; None where there is none that only this user
+    can write."""
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     places = [Path(runtime) / NAME] if runtime.startswith("/") else []
     places.append(Path(tempfile.gettempdir()) / f"{NAME}-{os.geteuid()}")
@@ -172,7 +173,7 @@ class Admission:
             leave.release()
 
     def note_lateness(self, late_ms: float) -> None:
-        """What an arena has just measured on this machine."""
+        """Take note of how late an arena has just found this machine to be."""
         if self._folder is not None:
             with suppress(OSError):  # a full disk: then admission knows less
                 note(self._folder / "lateness", late_ms)
@@ -201,7 +202,7 @@ def _has_room(runs: FileLock) -> bool:
 
 
 async def _until(look: Callable[[], T], patience_s: float) -> T:
-    """What `look` finds, as soon as it finds something, or after so long."""
+    """Return what `look` finds, as soon as it finds something; its last answer once the time is up."""
     until_s = time.monotonic() + patience_s
     while not (found := look()) and time.monotonic() < until_s:  # noqa: ASYNC110 - others' locks tell no event loop
         await asyncio.sleep(LOOK_S)
@@ -209,13 +210,14 @@ async def _until(look: Callable[[], T], patience_s: float) -> T:
 
 
 def available_bytes() -> int:
-    """What new processes can have without anything being swapped out, of the machine and of its container."""
+    """Return how many bytes new processes can have before the machine, or its container, begins to swap."""
     machine = read_numbers(MEMINFO).get("MemAvailable", UNLIMITED_BYTES >> 10) * 1024
     return min([machine, *(_left_bytes(*place) for place in CONTAINER)])
 
 
 def _left_bytes(folder: Path, limit: str, used: str, cache: str) -> int:
-    """What a control group still gives; its page cache is given up where it is needed."""
+    """Return how many bytes a control group can still give; its page cache counts, since the kernel frees that
+    first."""
     with suppress(OSError, ValueError):  # no such group, or no limit: it says "max"
         reclaimable = read_numbers(folder / "memory.stat").get(cache, 0)
         return int((folder / limit).read_text()) - int((folder / used).read_text()) + reclaimable

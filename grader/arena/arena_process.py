@@ -53,7 +53,7 @@ class ArenaProcess:
         self._watch(self._words, self._keep_errors)
 
     def send(self, command: dict[str, Any]) -> None:
-        """One command, as a line of JSON. That it has ended is told by its output's end."""
+        """Send a command as a line of JSON. The end of the arena's output tells that the arena has ended."""
         data = memoryview(json.dumps(command).encode() + b"\n")
         with contextlib.suppress(BrokenPipeError):
             while data:
@@ -79,7 +79,8 @@ class ArenaProcess:
                 os.close(descriptor)
 
     def _kill(self) -> None:
-        """With its group: a bubblewrap that is killed while it starts leaves a second process that waits for ever."""
+        """Kill it with its group: a bubblewrap that is killed while it starts leaves a second process that waits for
+        ever."""
         with contextlib.suppress(ProcessLookupError):  # all of it has ended
             os.killpg(self.pid, signal.SIGKILL)
 
@@ -126,7 +127,8 @@ class Template:
             )
 
     def start(self, descriptors: Sequence[int]) -> tuple[int, float]:
-        """A new arena with these as stdin, stdout and stderr: its process id, and the CPU seconds that making it took.
+        """Start an arena with these as stdin, stdout and stderr; return its process id and the CPU seconds that making
+        it took.
 
         Raises OSError where the template has ended or does not answer.
         """
@@ -134,7 +136,7 @@ class Template:
         return self._ask(b"s", [(socket.SOL_SOCKET, socket.SCM_RIGHTS, passed)])
 
     def forget(self, pid: int) -> None:
-        """That arena has ended, or was killed: wait for it. Only from then on its id may be another process's."""
+        """Wait for an arena that has ended or was killed. Only after that can its id become another process's."""
         with suppress(OSError):  # a template that has ended left it to someone who waits for all
             self._ask(b"e" + struct.pack("<i", pid))
 
@@ -150,7 +152,7 @@ class Template:
             self._popen.stderr.close()
 
     def last_words(self) -> str:
-        """What the template said before it ended, its last line."""
+        """Return the last line that the template wrote before it ended."""
         self._sock.close()
         with suppress(subprocess.TimeoutExpired):
             self._popen.wait(TEMPLATE_END_S)
@@ -176,7 +178,7 @@ _making = threading.Lock()
 
 
 def template_of(argv: Sequence[str], env: Mapping[str, str]) -> Template:
-    """This process's template for that command and environment, started where there is none yet."""
+    """Return this process's template for that command and environment; start one where there is none yet."""
     key = (os.getpid(), tuple(argv), tuple(sorted(env.items())))
     with _making:
         if key not in _templates:

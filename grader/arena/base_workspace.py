@@ -134,7 +134,7 @@ def catkin_make(place: ProcessEnvironment) -> list[str]:
 
 
 def _hand_answers(place: ProcessEnvironment) -> None:
-    """To the programs that stand before the real ones (`ros/known.sh`)."""
+    """Give the answers to the programs that stand before the real ones (`ros/known.sh`)."""
     for question in QUESTIONS:
         answer = read_member(place.base, f"{ANSWERS}/{question}", ANSWER_BYTES)
         if answer is not None:
@@ -180,7 +180,7 @@ def machine_digest(place: ProcessEnvironment) -> str:
 
 
 def _looks(place: ProcessEnvironment) -> Iterator[tuple[str, int, int, int]]:
-    """The files and folders in which a change of the machine shows."""
+    """Yield the files and folders in which a change of the machine shows."""
     path = place.ros.env["PATH"]
     programs = [shutil.which(name, path=path) for name in PROGRAMS]
     roots = ("/usr", "/usr/local", *place.ros.prefixes, *_entries(place.ros.env.get("CMAKE_PREFIX_PATH", "")))
@@ -222,7 +222,7 @@ def keep(name: str, data: bytes) -> None:
 
 
 def _folder() -> Path:
-    """As the XDG base directory specification says it: a relative path does not count."""
+    """Return the cache folder by the XDG base directory specification: a relative path does not count."""
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (named if named.is_absolute() else Path(os.path.expanduser("~"), ".cache")) / "grader"  # noqa: PTH111 - never raises
 

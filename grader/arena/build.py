@@ -134,14 +134,14 @@ def _catkin_make(place: ProcessEnvironment) -> list[str]:
 
 
 def _note_excess(writer: EvidenceWriter, *found: str) -> None:
-    """What the build left too much of, in words, as far as there is any."""
+    """Note what the build left too much of, given in words, as far as there is any."""
     for detail in filter(None, found):
         event = ActorEvent(action="limit", actor="catkin_make", detail=detail)
         writer.event("/grader/actor", time.time_ns(), event)
 
 
 def _syntax_spec(place: ProcessEnvironment) -> dict[str, Any]:
-    """ROS's own Python compiles every script of the package, and runs none."""
+    """Return how to start ROS's own Python, which compiles every script of the package and runs none."""
     script = 'python3 -I "$1/grader-syntax.py" "$2" < "$1/python-files.json" >' + _target(place, SYNTAX)
     argv = ["/bin/bash", "-c", script, "bash", place.shims, place.package_folder]
     room = 2 * REPORT_BYTES_MAX
@@ -149,7 +149,7 @@ def _syntax_spec(place: ProcessEnvironment) -> dict[str, Any]:
 
 
 def _target(place: ProcessEnvironment, name: str) -> str:
-    """Where a shell's output goes, to be kept under that name."""
+    """Return where a shell writes what is kept under that name."""
     return "&{collect}" if place.sandbox.bubblewrap else shlex.quote(f"{place.output}/{name}")
 
 
@@ -175,7 +175,7 @@ async def _with_setup(place: ProcessEnvironment, arena: ArenaSession) -> Process
 
 
 async def _answer(place: ProcessEnvironment, arena: ArenaSession, script: str) -> None:
-    """What `rosrun` says to a script that is not as it should be, on the package as handed in."""
+    """Record what `rosrun` says to a script that is not as it should be, in the package as handed in."""
     file = Path(script).name
     name = f"rosrun {file}"
     arena.start(place.spec(name, ["rosrun", place.package, file], as_handed_in=True))
@@ -200,7 +200,7 @@ def _trace(place: ProcessEnvironment) -> tuple[Path | None, str]:
 
 
 def _kept(place: ProcessEnvironment, name: str) -> Path | None:
-    """What a step handed over under that name; without a sandbox, a copy of the file that it left."""
+    """Return the file that a step handed over under that name; without a sandbox, a copy of the file that it left."""
     kept = place.workspace.kept / name
     if place.sandbox.bubblewrap:
         return kept if kept.is_file() and kept.stat().st_size else None

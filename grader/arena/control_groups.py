@@ -56,7 +56,7 @@ class Cgroups(Record):
 
 @lru_cache(maxsize=1)
 def find_cgroups() -> Cgroups:
-    """What is there and works: a group is made, limited and removed to see it."""
+    """Return the control groups that work here: a group is made, limited and removed to see it."""
     return Cgroups(memory=_find("memory"), pids=_find("pids"), cpuacct=_find("cpuacct"))
 
 
@@ -73,7 +73,7 @@ def remove_groups(cgroups: Cgroups, arena: int) -> bool:
 
 
 def describe() -> str:
-    """For `grader doctor`: what holds memory and tasks, and what is weaker where it is no cgroup."""
+    """Return for `grader doctor` what limits memory and tasks, and what is weaker where it is no control group."""
     found = find_cgroups()
     memory = f"memory by {found.label}"
     tasks = f"tasks by cgroup v{found.pids.version}" if found.pids else "tasks by rlimits and a watchdog"
@@ -110,7 +110,7 @@ def _find(controller: str) -> Cgroup | None:
 
 
 def own_groups(controller: str) -> list[tuple[Literal[1, 2], Path]]:
-    """The group that this process is in, as a folder, for each hierarchy that may have the controller."""
+    """Return this process's group as a folder, for each hierarchy that may have the controller."""
     mounts = _mounts()
     found: list[tuple[Literal[1, 2], Path]] = []
     for _, names, path in _memberships():
@@ -133,7 +133,7 @@ def _mounts() -> list[list[str]]:
 
 
 def _memberships() -> list[list[str]]:
-    """Number, controllers and path of each group of this process; no controllers are version 2."""
+    """Return the number, controllers and path of each group of this process; version 2 names no controllers."""
     try:
         return [line.split(":", 2) for line in MEMBERSHIP.read_text().splitlines()]
     except OSError:
@@ -146,7 +146,7 @@ def _type(mount: list[str]) -> str:
 
 
 def _below(mount: list[str], path: str) -> Path:
-    """Where the group `path` is below a mount point, whose own root may be a group already."""
+    """Return where the group `path` is below a mount point, whose own root may be a group already."""
     root, point = mount[3], Path(mount[4])
     inside = os.path.relpath(path, root) if path.startswith(root) else "."
     return point / inside
@@ -201,7 +201,8 @@ ROUNDS = 5
 
 
 def place_for_runs(own: Path) -> Path:
-    """Where groups of runs are to be made, for the group that this process is in; it is made ready where it may be."""
+    """Return where groups of runs are to be made, given this process's group, and make it ready where that is
+    allowed."""
     if own.name == LEAF:
         return own.parent
     with suppress(OSError):  # it stays as it was: `cgroups._usable` finds out what it can do
@@ -211,7 +212,7 @@ def place_for_runs(own: Path) -> Path:
 
 
 def _lacks_memory(group: Path) -> bool:
-    """Groups below it cannot be limited, and could be."""
+    """Return whether groups below it cannot have a memory limit now, but could be given one."""
     could, can = ((group / name).read_text().split() for name in ("cgroup.controllers", SWITCHED_ON))
     return "memory" in could and "memory" not in can
 
@@ -223,7 +224,8 @@ def _belongs_to_the_grader(group: Path) -> bool:
 
 
 def _handed_over(group: Path) -> bool:
-    """All of it is for what runs in it: systemd says so, root gave it to this user, or it is a container's."""
+    """Return whether all of the group is for what runs in it: by systemd's word, by root's, or because it is a
+    container's."""
     for mark in MARKS:
         with suppress(OSError):
             if os.getxattr(group, mark) == b"1":
@@ -236,14 +238,14 @@ def _handed_over(group: Path) -> bool:
 
 
 def _all_ours(group: Path, pids: list[int]) -> bool:
-    """This process and what it started; in a group that was handed over, what started it, too."""
+    """Return whether all of these are this process or its children; in a group that was handed over, or its parents."""
     own = os.getpid()
     ours = {own, *(_ancestors(own) if _handed_over(group) else ())}
     return all(pid in ours or own in _ancestors(pid) for pid in pids)
 
 
 def _ancestors(pid: int) -> Iterator[int]:
-    """Those that this process can see: the number of one outside of its namespace is 0."""
+    """Yield the parents that this process can see: a parent outside of its PID namespace has the number 0."""
     with suppress(OSError, IndexError):
         while pid := int(Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()[1]):
             yield pid

@@ -89,7 +89,7 @@ def make_room(*, gradings: int = 1, begin: bool = False) -> None:
 
 
 def limits(gradings: int = 1) -> Iterator[Checked]:
-    """Every limit, as it is once it has been raised as far as this process may."""
+    """Yield every limit, as it is once it has been raised as far as this process may raise it."""
     for need in NEEDS:
         hard = resource.getrlimit(need.number)[1]
         processes = need.option == "nproc"
@@ -106,7 +106,7 @@ def limits(gradings: int = 1) -> Iterator[Checked]:
 
 
 def group(gradings: int = 1) -> Iterator[Checked]:
-    """The control group around this process with the least room for processes, where one has a limit."""
+    """Yield the control group around this process with the least room for processes, where one has a limit."""
     wanted = NEEDS[0].run + FURTHER_TASKS * (gradings - 1)
     for room, most, folder in sorted(_rooms())[:1]:
         used = most - room
@@ -121,7 +121,7 @@ def group(gradings: int = 1) -> Iterator[Checked]:
 
 
 def _raise_soft() -> None:
-    """Up to the hard limits. The stack's is set to what is usual, as more does harm too."""
+    """Raise soft limits to the hard ones. The stack's is set to the usual value, as more does harm too."""
     for need in NEEDS:
         soft, hard = resource.getrlimit(need.number)
         wanted = _soft(need, soft, hard)
@@ -134,7 +134,8 @@ def _raise_soft() -> None:
 
 
 def _soft(need: Need, soft: int, hard: int) -> int:
-    """Not more open files than a run needs: older programs expect their numbers to be small (man 2 select)."""
+    """Return the soft limit to set. Files get no more than a run needs: older programs expect small numbers (man 2
+    select)."""
     most = need.run if need.option in {"nofile", "stack"} else resource.RLIM_INFINITY
     if need.option not in {"nproc", "stack"} and (soft < 0 or soft >= need.run):
         return soft
@@ -169,7 +170,7 @@ def tasks_of(uid: int) -> int:
 
 
 def _is_root() -> bool:
-    """The machine's, and not that of a user namespace."""
+    """Return whether the user is the machine's root, and not that of a user namespace."""
     with suppress(OSError):  # a kernel without user namespaces
         return os.geteuid() == 0 and (PROC / "self" / "uid_map").read_text().split() == ALL_UIDS
     return os.geteuid() == 0

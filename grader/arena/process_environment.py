@@ -126,7 +126,7 @@ class ProcessEnvironment:
 
     @cached_property
     def built(self) -> Built:
-        """What `rosrun` finds of the build. Asked only once the build is over."""
+        """Return what `rosrun` finds of the build. Ask only once the build is over."""
         if self.sandbox.bubblewrap:
             return read_archive(self.archive, self.package)
         return read_folder(self.workspace.built / "devel", self.package)
@@ -156,12 +156,12 @@ class ProcessEnvironment:
         return STANDINS if self.sandbox.bubblewrap else str(self.folder / "standins")
 
     def from_source(self) -> ProcessEnvironment:
-        """Without a build: ROS still finds the package's sources."""
+        """Return the environment without a build, in which ROS still finds the package's sources."""
         path = f"{self.inside_workspace}/src:{self.ros.env.get('ROS_PACKAGE_PATH', '')}"
         return replace(self, env={"ROS_PACKAGE_PATH": path.rstrip(":")})
 
     def find_program(self, script: str) -> tuple[str, str] | None:
-        """What `rosrun` would start for a script: (its path for a process, its path in the package), or None.
+        """Return what `rosrun` would start for a script: (its path for a process, its path in the package), or None.
 
         A program that the build installed wins, as with `rosrun`; then the script's own place, then any other.
         """
@@ -219,12 +219,12 @@ class ProcessEnvironment:
         return any(pattern.search(read_untrusted(path, SOURCE_BYTES_MAX) or b"") for path in files)
 
     def package_file(self, file: str) -> Path | None:
-        """Where a file of the package is on disk, found as `script_path` finds it."""
+        """Return where a file of the package is on disk, found as `script_path` finds it."""
         found = self.script_path(file)
         return None if found is None else self.workspace.repaired / self.workspace.folder / found
 
     def script_path(self, script: str) -> str | None:
-        """Where a script is in the package: at its place, else the shallowest file of that name."""
+        """Return where a script is in the package: at its place, else the shallowest file of that name."""
         package = self.workspace.repaired / self.workspace.folder
         if (package / script).is_file():
             return script
@@ -326,7 +326,7 @@ class ProcessEnvironment:
         return [*binds, "--ro-bind", copy_of(self.archive), BUILT] if self.archive.is_file() else binds
 
     def stage(self) -> dict[str, Any] | None:
-        """Where the arena makes its stage, and the user who writes there; None without a sandbox."""
+        """Return where the arena makes its stage, and the user who writes there; None without a sandbox."""
         if not self.sandbox.bubblewrap:
             return None
         folder = self.folder / STAGE

@@ -118,18 +118,19 @@ class Recorder:
         self._run(self._record_all(beside_build))
 
     def record_again(self, scenarios: Iterable[str]) -> None:
-        """These scenarios once more, one after the other, with no other run on the machine."""
+        """Record these scenarios once more, one after the other, with no other run on the machine."""
         self._run(self._record_alone(tuple(scenarios)))
 
     def repeat(self, scenarios: Iterable[str], folder: Path) -> None:
-        """These scenarios once more, side by side, into another folder: what was recorded before stays as well."""
+        """Record these scenarios once more, side by side, into another folder: what was recorded before stays as
+        well."""
         make_folder(folder)
         if self._place is not None:
             runs = [self._record_scenario(self._place, name, folder=folder) for name in scenarios]
             self._run(run_together(*runs))
 
     def _run(self, work: Coroutine[Any, Any, None]) -> None:
-        """Each time in an event loop of its own, and so with an admission of its own."""
+        """Run it in an event loop of its own, and so with an admission of its own."""
         self._admission = Admission(shared_folder())
         run_until_signal(work, self._stop)
 
@@ -152,7 +153,8 @@ class Recorder:
                 await self._record_scenario(self._place, name, alone=True)
 
     async def _record_package(self) -> None:
-        """Where the machine fails the build, it is built once more: without it, nothing can be run."""
+        """Record the package and its build. Where the machine fails the build, build once more: nothing can run without
+        it."""
         try:
             await self._write_package(self._folder / "first", last=False)
         except ArenaError as error:
@@ -280,7 +282,7 @@ class Recorder:
 
 
 def _syntax_report(path: Path | None, writer: EvidenceWriter) -> SyntaxReport | None:
-    """What ROS's own Python said; None where that is too much, and then this Python's word stands."""
+    """Return what ROS's own Python said; None where that is too much, and then this Python's report stands."""
     said = read_untrusted(path, REPORT_BYTES_MAX) if path else None
     if said is not None and len(said) == REPORT_BYTES_MAX:
         detail = f"gives more than {REPORT_BYTES_MAX >> 20} MB of remarks on its Python files"

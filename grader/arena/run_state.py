@@ -94,13 +94,14 @@ class RunState:
     arrivals_ns: dict[str, list[int]] = field(default_factory=dict)
 
     def rate(self, rates: Iterable[RateBounds]) -> None:
-        """These rates are to be seen: when their messages arrive is kept."""
+        """Keep the arrival times of the messages by which these rates are seen."""
         for bounds in rates:
             self.rates[bounds.topic].append(bounds)
             self.arrivals_ns[bounds.topic] = []
 
     def arrived(self, topic: str, count: int, time_ns: int) -> None:
-        """Messages of a student's, together. Of a flood, only the first ones and the latest are kept."""
+        """Take note of a student's messages that came together. Of a flood, only the first ones and the latest are
+        kept."""
         times_ns = self.arrivals_ns.get(topic)
         if times_ns is not None:
             room = ARRIVALS_MAX - len(times_ns)
@@ -108,7 +109,7 @@ class RunState:
             times_ns[-1] = time_ns
 
     def message(self, topic: str, count: int, now_s: float, *, active: bool = True) -> None:
-        """Messages came, of the student's (`active`) or of a program that runs beside."""
+        """Take note of messages, of the student's (`active`) or of a program that runs beside."""
         seen = self.topics[topic]
         if not seen.first_s:
             seen.first_s, seen.lost_before_s = now_s, self.lost_s
@@ -118,19 +119,19 @@ class RunState:
             self.activity_s = now_s
 
     def machine(self, busy: float, own: float, now_s: float) -> None:
-        """So busy was the machine since this was last told, `own` of it with the run's own processes."""
+        """Take note of how busy the machine was since the last report, `own` of it with the run's own processes."""
         if self.measured_s and busy >= FULL:
             self.lost_s += (now_s - self.measured_s) * min(busy - own, OTHERS_MOST)
         self.measured_s = now_s
 
     def active(self, now_s: float) -> None:
-        """Something of the student's happened, besides messages."""
+        """Take note that the student's processes did something, besides sending messages."""
         self.activity_s = self.news_s = now_s
 
     def graph(
         self, nodes: Iterable[str], processes: Mapping[str, str], now_s: float, *, picture: object = None
     ) -> None:
-        """The master's nodes of the student's, and the processes that nodes belong to.
+        """Take note of the master's nodes of the student's, and of the processes that nodes belong to.
 
         `picture` is all that counts as a change, the nodes alone where it is None.
         """
@@ -150,7 +151,8 @@ class RunState:
         self.nodes |= own
 
     def rests(self, process: str, rest: str | None, programs: int, now_s: float) -> None:
-        """A process has come to rest (`spins` or `loops`) with so many programs, or moves again (None)."""
+        """Take note that a process with so many programs has come to rest (`spins` or `loops`), or moves again
+        (None)."""
         known = self.at_rest.pop(process, None)
         if rest is not None:
             same = known is not None and known.programs == programs
@@ -163,11 +165,11 @@ class RunState:
         return self.subscribers.keys()
 
     def connections(self, topics: Iterable[str], now_s: float) -> None:
-        """The topics over which nodes are connected now; since when is kept."""
+        """Take note of the topics over which nodes are connected now, and since when."""
         self.connected_s = {topic: self.connected_s.get(topic, now_s) for topic in topics}
 
     def started(self, process: str, now_s: float, *, helper: bool) -> None:
-        """A process was started, for the first time or again."""
+        """Take note that a process was started, for the first time or again."""
         (self.helpers if helper else self.running).add(process)
         self.ended.discard(process)
         self.registered.discard(process)
@@ -175,7 +177,7 @@ class RunState:
         self.last_start_s = now_s
 
     def exited(self, process: str, now_s: float) -> None:
-        """A process is gone, and with it its subscribers."""
+        """Take note that a process has ended, and with it its subscribers."""
         self.helpers.discard(process)
         for nodes in self.subscribers.values():
             nodes.difference_update([node for node in nodes if self.owners.get(node) == process])
@@ -186,11 +188,11 @@ class RunState:
             self.active(now_s)
 
     def steps_over(self, now_s: float) -> None:
-        """From now on, what is waited for has its time to come."""
+        """Start the time in which what is waited for has to come: the steps are over."""
         self.started_s = self.news_s = now_s
 
     def sent(self, value: str, now_s: float) -> None:
-        """A probe went out: its value is to be printed, as a word of its own."""
+        """Take note that a probe went out: its value is to be printed, as a word of its own."""
         self.last_sent_s = now_s
         self.unheard[value] = re.compile(rf"(?<![\w.-]){re.escape(value)}(?![\w.])")
 
@@ -233,7 +235,7 @@ def is_settled(live: RunState, now_s: float) -> bool:
 
 
 def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
-    """(outcome, detail) once the run has seen enough or has to give up, else None.
+    """Return (outcome, detail) once the run has seen enough or has to give up, else None.
 
     `silent`: what was waited for stopped coming, or never came though the nodes were up.
     """
@@ -267,7 +269,7 @@ def _enough(live: RunState, until: Until, now_s: float) -> tuple[bool, ...]:
 
 
 def _patient(live: RunState, until: Until) -> Until:
-    """The same, with more patience for processes to which others left little of the machine."""
+    """Return `until` with more patience for processes to which others left little of the machine."""
     more_s = round(live.lost_s)
     if not more_s:
         return until
@@ -283,7 +285,7 @@ def waits(until: Until) -> bool:
 
 
 def describe_wait(live: RunState, until: Until) -> str:
-    """In a few words, what the run still waits for."""
+    """Return in a few words what the run still waits for."""
     missing = [t for t in (*until.topics, *until.messages) if not live.topics[t].count]
     if missing:
         return f"waiting for the first message on {missing[0]}"
@@ -322,7 +324,7 @@ def _seen(live: RunState, topics: Iterable[str]) -> list[TopicSeen]:
 
 
 def _talking(live: RunState) -> list[TopicSeen]:
-    """Topics with messages; what is logged says nothing of what else may come."""
+    """Return the topics with messages; log messages do not count, as they say nothing of what else may come."""
     return [seen for topic, seen in live.topics.items() if seen.count and topic != "/rosout"]
 
 
@@ -360,20 +362,21 @@ def _messages(live: RunState, until: Until) -> bool:
 
 
 def _connected(live: RunState, until: Until, now_s: float) -> bool:
-    """For so long that a node which dies as soon as it is up has done so."""
+    """Return whether the nodes have been connected for so long that one which dies as soon as it is up would
+    have died."""
     since = [live.connected_s.get(topic, now_s) for topic in until.connected]
     return all(now_s >= one_s + CONNECTED_S for one_s in since)
 
 
 def _nodes(live: RunState, until: Until, now_s: float) -> bool:
-    """Everything that is there or not there: nodes, programs asked to open something, processes that ended."""
+    """Return whether what is waited for is there or gone: nodes, opened programs, processes that ended."""
     alive = until.alive_s is None or now_s >= _lived_s(live, until.alive_s)
     up = len(live.nodes) >= until.nodes and set(until.opened) <= live.opened
     return alive and up and set(until.ended) <= live.ended
 
 
 def _lived_s(live: RunState, alive_s: float) -> float:
-    """When the nodes have been up for so long, the last process's for half of it."""
+    """Return when the nodes have been up for so long, the last process's for half of it."""
     return max(live.first_node_s + alive_s, live.registered_s + alive_s / 2) if live.nodes else math.inf
 
 
@@ -416,7 +419,8 @@ def _silent(live: RunState, until: Until, now_s: float) -> str:
 
 
 def _never(live: RunState, until: Until, now_s: float) -> str:
-    """Something that is waited for cannot come, since no node is there for it, and all the rest has been seen."""
+    """Return what is waited for and cannot come, since no node is there for it and all the rest has been seen;
+    else ""."""
     if not is_settled(live, now_s):
         return ""
     absent = {t for t in (*until.topics, *until.messages) if not live.topics[t].count} - live.published

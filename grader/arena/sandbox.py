@@ -46,17 +46,17 @@ MACHINES = ("x86_64", "aarch64")
 
 
 def copy_of(path: Path) -> Word:
-    """A copy of that file or folder, in memory, which tells nothing of where it comes from."""
+    """Return the placeholder of a copy of that file or folder in memory, which does not show where it comes from."""
     return {"copy": str(path)}
 
 
 def scratch(size_bytes: int, files: int) -> Word:
-    """New memory for files."""
+    """Return the placeholder of new memory for files."""
     return {"scratch": [size_bytes, files]}
 
 
 def descriptor(name: str) -> Word:
-    """The number of a descriptor that is passed on."""
+    """Return the placeholder of a descriptor that is passed on."""
     return {"descriptor": name}
 
 
@@ -113,15 +113,16 @@ class Sandbox(Record):
         ]  # fmt: skip
 
     def first_words(self, limits: RunLimits) -> str:
-        """What a process tree's shell does before anything else: the number of its tasks, where it is counted apart."""
+        """Return what the shell of a process tree does first: it limits the number of tasks, where the tree is counted
+        apart."""
         return f"ulimit -u {limits.tasks}; " if self._counts_apart() else ""
 
     def _counts_apart(self) -> bool:
-        """Otherwise all trees of one user share a number, and one of them can leave the others none."""
+        """Return whether the tree's tasks are counted apart. Else one tree of the user could leave the others none."""
         return self.bubblewrap and _counts_by_namespace()
 
     def rlimits(self, limits: RunLimits) -> Iterator[str]:
-        """The arguments of prlimit."""
+        """Yield the arguments of prlimit."""
         yield f"--fsize={limits.file_bytes}"
         yield f"--nofile={limits.open_files}"
         yield f"--as={limits.address_space_bytes}"
@@ -137,7 +138,7 @@ class Sandbox(Record):
 
 
 def _program(name: str) -> str:
-    """Where the machine has it; `choose` has seen that it does."""
+    """Return where the machine has the program; `choose` has seen that it does."""
     return find_host_program(name) or f"/usr/bin/{name}"
 
 

@@ -88,7 +88,7 @@ def prepare(place: Path, ros: RosInstallation) -> None:
 
 
 def _quicker(shims: Path, ros: RosInstallation) -> None:
-    """What stands before programs that start Python to say what is known: only where the program itself is there."""
+    """Put shell programs that answer known questions before programs that start Python, where those are there."""
     (shims / ANSWERS).mkdir()
     asked = sorted({question.split()[0] for question in QUESTIONS})
     _program(shims, "known.sh", "grader-answers", [name for name in asked if ros.program(name)])
@@ -113,7 +113,7 @@ def _below_shebang(path: Path) -> bytes:
 
 
 def _program(shims: Path, source: str, name: str, called: Sequence[str]) -> None:
-    """One program under the names that it is called by."""
+    """Put one program under each name that it is called by."""
     shutil.copyfile(ROS_SIDE / source, shims / name)
     (shims / name).chmod(0o755)
     for other in called:
@@ -126,7 +126,7 @@ def standin_packages() -> tuple[str, ...]:
 
 
 def missing_packages(ros: RosInstallation) -> tuple[str, ...]:
-    """Those of them that this ROS does not know."""
+    """Return those of the packages that this ROS does not know."""
     known = set(_installed(ros)) | set(_overlaid(ros))
     return tuple(name for name in standin_packages() if name not in known)
 

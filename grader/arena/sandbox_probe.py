@@ -84,7 +84,7 @@ def choose(mode: SandboxMode) -> Sandbox:
 
 @lru_cache(maxsize=1)
 def refused_limits() -> str:
-    """What this machine says to the limits of students' processes; empty where it sets them, or has no prlimit.
+    """Return why this machine refuses the limits of students' processes; "" where it sets them, or has no prlimit.
 
     They are set by the user who has them: root may do more.
     """
@@ -96,7 +96,7 @@ def refused_limits() -> str:
 
 
 def why_not() -> str:
-    """Empty where the wall and the arena's own network work, else the reason in one line for going without.
+    """Return why to go without a sandbox, in one line; "" where the sandbox and the arena's own network work.
 
     Raises SandboxMissing where that is not known.
     """
@@ -105,7 +105,8 @@ def why_not() -> str:
 
 @lru_cache(maxsize=1)
 def _walls() -> tuple[str, bool]:
-    """Why there is no sandbox, and whether what is in one can make namespaces. An error is not kept: it may pass."""
+    """Return why there is no sandbox, and whether what is in one can make namespaces. An error is not kept: it may
+    pass."""
     for program in PROGRAMS:
         if find_host_program(program) is None:
             return f"{program} is not installed", False
@@ -128,7 +129,7 @@ def _unprivileged_uid() -> int:
 
 
 def _refusal(*more: str) -> str:
-    """What this machine says to a sandbox with these arguments; empty where it makes one."""
+    """Return why this machine refuses a sandbox with these arguments; "" where it makes one."""
     calls = ["--seccomp", "0"] if system_call_filter() else []
     files = ["--ro-bind", "/", "/", "--proc", "/proc", "--clearenv", "--setenv", "LANG", "C.UTF-8"]
     walls = [*files, *WALLS, *more, *calls, "--die-with-parent", "/bin/true"]

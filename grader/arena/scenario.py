@@ -47,7 +47,7 @@ ALONE_S, ROSTEST_LOOK_S = 5.0, 0.5
 
 
 def expected_s(scenario: Scenario) -> float:
-    """About how long a run takes when all is as it should be."""
+    """Return about how long a run takes when all is as it should be."""
     until = scenario.until
     messages = (
         max(until.messages.values(), default=0)
@@ -137,7 +137,7 @@ async def _run(
 
 
 async def _await_node(process: str, scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
-    """Until a node of that process is registered with all that it has, or it has ended, or never will be.
+    """Wait until a node of that process is registered with all that it has, has ended, or cannot come any more.
 
     A node whose name is taken over while it is still registering takes it back: then both are shut down.
     """
@@ -190,7 +190,7 @@ async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple
 
 
 def _does_not_follow(scenario: Scenario, arena: ArenaSession, now_s: float) -> bool:
-    """A node that sleeps by the wall's clock stays at its own rate, however fast `/clock` runs."""
+    """Return whether a node keeps its own rate, however fast `/clock` runs: it sleeps by the wall's clock."""
     for topic in scenario.until.messages:
         seen = arena.live.topics[topic]
         seen_s = now_s - seen.first_s
@@ -264,7 +264,7 @@ def set_params(params: tuple[Param, ...], arena: ArenaSession) -> None:
 
 @asynccontextmanager
 async def release_when_up(leave: Leave, names: set[str], arena: ArenaSession) -> AsyncIterator[None]:
-    """Inside, the leave to start is given back as soon as these processes are up."""
+    """Give the start lock back as soon as these processes are up, or the block has ended."""
 
     async def give_back() -> None:
         live = arena.live

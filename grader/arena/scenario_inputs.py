@@ -55,7 +55,7 @@ class Shot(NamedTuple):
 
 
 def make_shots(probes: tuple[Probe, ...]) -> list[Shot]:
-    """All probes' messages in the order of sending: the topics take turns.
+    """Return all probes' messages in the order of sending: the topics take turns.
 
     Before a text comes a second time there is a longer pause, in which the first one can be printed.
     """
@@ -88,14 +88,14 @@ def _values(probe: Probe) -> Iterator[Any]:
 
 
 def _repeat_one(values: list[str | int]) -> None:
-    """One text comes twice running, neither first nor last: a listener may not leave out what it knows already."""
+    """Let one text come twice running, neither first nor last: a listener may not leave out what it knows already."""
     texts = [i for i, value in enumerate(values) if isinstance(value, str)]
     at = _random.choice(texts[1:-1])
     values.insert(at, values[at])
 
 
 def _integers(probe: Probe, low: int, high: int) -> Iterator[int]:
-    """Different from each other and from those of `among`."""
+    """Yield integers that differ from each other and from those of `among`."""
     taken = set(probe.among)
     for _ in range(min(probe.integers, high - low + 1 - len(taken))):
         value = _random.randint(low, high)
@@ -116,7 +116,8 @@ class Setting(NamedTuple):
 def settings(
     params: tuple[Param, ...], find: Callable[[str], Path | None]
 ) -> tuple[list[Setting], list[str]]:
-    """What to set in this order, and a remark for each file that could not be read. `find` gives a file's place."""
+    """Return what to set in this order, and a remark for each file that could not be read. `find` gives a file's
+    place."""
     found: list[Setting] = []
     remarks: list[str] = []
     for param in params:
@@ -166,7 +167,7 @@ def _like_letter(letter: str) -> str:
 
 
 def _digits(count: int) -> str:
-    """Digits of which no two neighbours are the same: nothing that a handout would print."""
+    """Return digits of which no two neighbours are the same: nothing that a handout would print."""
     found = [_random.choice("123456789")]
     while len(found) < count:
         found.append(_random.choice([d for d in "0123456789" if d != found[-1]]))
@@ -191,7 +192,7 @@ class _UnreadableError(ValueError):
 
 
 def _file(path: Path | None) -> tuple[dict[str, Any], str]:
-    """Values made up for the file's leaves, by their names, or why there are none."""
+    """Return values made up for the file's leaves, by their names, or why there are none."""
     data = read_untrusted(path, FILE_BYTES_MAX + 1) if path else None
     try:
         leaves = dict(_leaves(_content(data), "", 0))
@@ -222,7 +223,7 @@ def _content(data: bytes | None) -> dict[Any, Any]:
 
 
 def _check_size(values: list[Any]) -> None:
-    """Aliases let a few letters stand for lists without number or end."""
+    """Raise for too large a file: with aliases, a few letters can stand for lists without number or end."""
     count, waiting = 0, [(values, 0)]
     for items, depth in waiting:
         count += len(items)

@@ -68,7 +68,7 @@ class ServedServices:
         return ServiceTypes(type_, text, lambda name: place.type_text(name, "msg"))
 
     def _refuse(self, one: Served, error: str) -> None:
-        """Only the student's own file may be other than the rubric thinks: else it is this machine that lacks it."""
+        """Note that the student's own type does not fit. Any other type is this machine's fault: raise ArenaError."""
         if one.definition is not None or not self._arena.place.is_own(one.type):
             raise ArenaError(f"the grader cannot offer {one.name}: {error}", hint="grader doctor")
         about = {"topic": one.name, "type": one.type}
@@ -187,7 +187,7 @@ class ServedAction:
         self._cancels.clear()
 
     def _is_cancelled(self, goal: str) -> bool:
-        """A cancelling without an id is for all goals."""
+        """Return whether the goal was cancelled; a cancel message without an id is for all goals."""
         asked = (self._types["cancel"].decode(data) for data in self._cancels)
         return any(one and one["id"] in {"", goal} for one in asked)
 

@@ -110,7 +110,7 @@ class ArenaSession:
         await self._end()
 
     async def _end(self) -> None:
-        """With what an arena that was killed could not remove itself."""
+        """End the arena, and remove what one that was killed could not remove itself."""
         await self._process.end()
         until_s = time.monotonic() + GROUPS_S
         while not self._done and not remove_groups(self.place.sandbox.cgroups, self._process.pid):
@@ -133,7 +133,7 @@ class ArenaSession:
         self.send(do="start", spec=spec)
 
     async def interrupt(self, name: str, *, int_s: float, term_s: float, action: str = "interrupt") -> None:
-        """Ctrl-C; TERM after `int_s`, KILL after another `term_s`. Returns when the process has ended.
+        """Send Ctrl-C, TERM after `int_s`, and KILL after another `term_s`. Return when the process has ended.
 
         `action` is how the evidence calls it: with `kill`, it is KILL at once.
         """
@@ -184,7 +184,7 @@ class ArenaSession:
                 timer.cancel()
 
     def _raise_failure(self) -> None:
-        """Also where what is waited for has come: something else is missing then."""
+        """Raise the arena's failure, even where what was waited for has come: something else is missing then."""
         if self._error is not None:
             raise self._error
         if self._failure:
@@ -323,7 +323,7 @@ class ArenaSession:
             self._done = True
 
     def _asked(self, time_ns: int, fields: dict[str, Any]) -> None:
-        """A client called a service that the grader offers, by its type or by another one."""
+        """Handle a client's call of a service that the grader offers, by its type or by another one."""
         if fields["status"] == "request":
             self.live.active(time.monotonic())
             self.on_request(time_ns, fields)
@@ -331,7 +331,7 @@ class ArenaSession:
             self.on_other_type(time_ns, fields)
 
     def _note_cost(self, fields: dict[str, Any]) -> None:
-        """What the arena itself took: CPU seconds, and bytes of memory at its peak."""
+        """Take note of what the arena itself took: CPU seconds, and bytes of memory at its peak."""
         self.cpu_s += fields["cpu_s"]
         event = ProcessEvent(
             event="exit",
@@ -355,7 +355,7 @@ class ArenaSession:
 
 
 def _ignore(time_ns: int, fields: dict[str, Any]) -> None:
-    """In the place of who wants to know of the calls of the grader's services: when it was, and what the arena says."""
+    """Ignore a call of one of the grader's services: when it was, and what the arena says."""
 
 
 class Killed:
@@ -375,11 +375,11 @@ class Killed:
         self._kills_before = _kernel_kills()
 
     def stopping(self, name: str) -> None:
-        """From now on it is the grader who ends it."""
+        """Take note that from now on the grader ends the process."""
         self._stopping.add(name)
 
     def starting(self, name: str) -> None:
-        """From now on it ends by itself again."""
+        """Take note that from now on the process ends by itself again."""
         self._stopping.discard(name)
 
     def limited(self, name: str) -> None:
@@ -390,7 +390,7 @@ class Killed:
             self._names[name] = None
 
     def ended(self, record: dict[str, Any]) -> None:
-        """A process's last event."""
+        """Take note of a process's last event."""
         if record["signal"] == signal.SIGKILL and record["stopped_by"] is None:
             self._names[record["name"]] = None
             self._from_outside |= self._sandboxed and record["exit_code"] is None
@@ -405,11 +405,12 @@ class Killed:
 
 
 def _kernel_kills() -> int:
-    """How often the kernel of this machine has killed a process for want of memory (Documentation/filesystems/proc)."""
+    """Return how often this machine's kernel has killed a process for lack of memory
+    (Documentation/filesystems/proc)."""
     return read_numbers(Path("/proc/vmstat")).get("oom_kill", 0)
 
 
 def _available() -> float:
-    """The part of this machine's memory that can be had."""
+    """Return the part of this machine's memory that is available."""
     memory = read_numbers(MEMINFO)
     return memory.get("MemAvailable", 0) / memory.get("MemTotal", 1)

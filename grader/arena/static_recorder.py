@@ -72,7 +72,7 @@ class Recording:
 
 
 def metadata(submission: Submission, recording: Recording, limits: RunLimits) -> dict[str, str]:
-    """What every file of evidence says of where it comes from."""
+    """Return what every file of evidence says of where it comes from."""
     ros, sandbox = recording.labels
     return {
         "submission.id": submission.id,
@@ -100,7 +100,7 @@ def write_files(writer: EvidenceWriter, submission: Submission, facts: PackageFa
 
 
 def attachments(folder: Path, facts: PackageFacts) -> Iterable[tuple[str, bytes]]:
-    """The package's own text files that were judged, as far as they are of a size to be looked at."""
+    """Yield the package's own text files that were judged, as far as their size allows."""
     for file in _texts(facts)[:ATTACHED_FILES_MAX]:
         data = read_untrusted(folder / file.path, ATTACHED_BYTES_MAX)
         if data is not None:
@@ -108,7 +108,7 @@ def attachments(folder: Path, facts: PackageFacts) -> Iterable[tuple[str, bytes]
 
 
 def not_attached(facts: PackageFacts) -> Iterable[ActorEvent]:
-    """What `attachments` leaves out, as limits that were met."""
+    """Yield an event for each file that `attachments` leaves out, as a limit that was met."""
     for other in facts.also:
         yield from (
             event.model_copy(update={"actor": f"{other.asked}: {event.actor}"})
@@ -136,7 +136,7 @@ def copy_recorded(recorded: Mapping[str, Path], folder: Path, progress: Progress
 
 
 def why_unrun() -> str:
-    """Why no node can be run here, "" where one can. Raises RosMissing where ROS is not where it should be."""
+    """Return why no node can be run here, "" where one can. Raises RosMissing where ROS is not where it should be."""
     if system():
         return f"ROS 1's nodes run on Linux, and this is {system()}"
     return "" if find_ros() is not None else NO_ROS
@@ -167,7 +167,7 @@ class StaticRecorder:
         """Nothing was begun."""
 
     def record_all(self, _import_later: Callable[[], None]) -> None:
-        """The package's files, and what was recorded before. There is no build to wait for."""
+        """Record the package's files, and copy what was recorded before. There is no build to wait for."""
         copy_recorded(self._recorded, self.recording.folder, self._progress)
         self._write_package()
         for name in self._rubric.scenarios:
@@ -175,10 +175,10 @@ class StaticRecorder:
                 self._progress.step(name, "skipped", self._reason)
 
     def record_again(self, scenarios: Iterable[str]) -> None:
-        """None of them."""
+        """Do nothing: there are no runs."""
 
     def repeat(self, scenarios: Iterable[str], folder: Path) -> None:
-        """None of them."""
+        """Do nothing: there are no runs."""
 
     def _write_package(self) -> None:
         recording = self.recording

@@ -203,7 +203,7 @@ class StepRunner:
         self._arena.send(do="publish", topic=topic, data=base64.b64encode(data).decode(), record=record)
 
     async def _probe(self) -> None:
-        """Once the student's node has subscribed to every topic, or has had its time to."""
+        """Send the probes once the student's node has subscribed to every topic, or has had its time to."""
         live, topics = self._live, {probe.topic for probe in self._scenario.probes}
         self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
         patience_s = self._scenario.until.first_message_s
@@ -224,7 +224,7 @@ class StepRunner:
         await self._begin(self._stream(publish), background=publish.background, endless=publish.total is None)
 
     def _static(self, transform: Transform) -> None:
-        """A latched topic keeps its last message only: each holds all that were sent."""
+        """Send the transform with all that were sent before: a latched topic keeps its last message only."""
         sent = transform.published
         self._fixed[transform.child] = sent.value["transforms"][0]
         self._try_send(sent, {"transforms": list(self._fixed.values())}, 0, 1)
@@ -291,7 +291,7 @@ class StepRunner:
     # --- Recordings --------------------------------------------------------------------------------------------------
 
     def _advertise_bag(self, play: Play) -> None:
-        """The recording's topics, each by its first channel; a type that a topic has already stays."""
+        """Advertise the recording's topics, each by its first channel; a type that a topic has already stays."""
         from grader.evidence.message_values import md5_of  # noqa: PLC0415 - numpy, which not every run needs
         from grader.evidence.reader import load_run  # noqa: PLC0415 - few runs play anything
 
@@ -338,7 +338,7 @@ class StepRunner:
     # --- Waiting -----------------------------------------------------------------------------------------------------
 
     async def _until(self, time_ns: int) -> None:
-        """Until it is so late by the run's clock; by the wall's, where that stands still."""
+        """Wait until that time of the run's clock; of the wall's, where that stands still."""
         left_s = max(0.0, (time_ns - self._arena.ros_now_ns()) / NS)
         await self._arena.wait(lambda: self._arena.ros_now_ns() >= time_ns or self._is_over(), left_s)
 

@@ -132,7 +132,7 @@ def _with_repairs(workspace: Workspace, facts: PackageFacts, scripts: Iterable[s
 
 
 def run_in_place(workspace: Workspace, sandbox: Sandbox) -> None:
-    """Without a sandbox, processes see one workspace only: after the build its sources become the repaired ones."""
+    """Replace the built sources by the repaired ones: without a sandbox, processes see one workspace only."""
     sources = workspace.built / "src"
     shutil.rmtree(sources)
     shutil.copytree(workspace.repaired, sources, symlinks=True)
@@ -140,7 +140,8 @@ def run_in_place(workspace: Workspace, sandbox: Sandbox) -> None:
 
 
 def needed_packages(submission: Submission, course: Collection[str] = ()) -> list[SourcePackage]:
-    """The lab's packages and their dependencies within the submission, the lab's first; none of the `course`'s."""
+    """Return the lab's packages and their dependencies within the submission, the lab's first; none of the
+    `course`'s."""
     needed = [submission.package, *submission.also]
     others = {
         p.name: p for p in submission.packages if p.name not in {*(one.name for one in needed), *course}
@@ -153,7 +154,7 @@ def needed_packages(submission: Submission, course: Collection[str] = ()) -> lis
 
 
 def _folder_name(package: SourcePackage) -> str:
-    """The package's name where it can be a folder: spaces and accents of the student's path stay behind."""
+    """Return the package's name where it can be a folder: spaces and accents of the student's path are left out."""
     name = "".join(c if c.isascii() and (c.isalnum() or c in "_-") else "_" for c in package.name)
     return name or "package"
 
@@ -223,14 +224,14 @@ def _repair(path: Path, facts: SourceFile | None) -> Iterator[str]:
 
 
 def _replace_manifest(path: Path, name: str) -> None:
-    """rospy reads the manifest above a script as the node starts: one that cannot be read would end every node."""
+    """Replace a manifest that rospy cannot read: a node reads the one above its script, and would end."""
     if not path.is_dir():
         path.unlink(missing_ok=True)
         path.write_text(MANIFEST.format(name))
 
 
 def _give_python(path: Path, facts: SourceFile, shims: str) -> None:
-    """`/usr/bin/python` is as good as `env python` and need not be on this machine: then it becomes the arena's."""
+    """Name the arena's own Python in place of `/usr/bin/python`, where this machine has none there."""
     words = facts.shebang.text.split() if facts.shebang else []
     if not words or not ABSOLUTE_PYTHON.fullmatch(words[0]) or Path(words[0]).exists() or path.is_symlink():
         return
@@ -242,7 +243,7 @@ def _give_python(path: Path, facts: SourceFile, shims: str) -> None:
 
 
 def _give_browsers(path: Path, facts: SourceFile) -> None:
-    """`/usr/bin/firefox` is as good as `firefox`: by its name alone it is the stand-in."""
+    """Name a browser by its name alone in place of its path, so that the stand-in is found."""
     if facts.binary or path.is_symlink() or not path.is_file() or not (facts.shebang or path.suffix == ".sh"):
         return
     data = path.read_bytes()
@@ -273,7 +274,7 @@ class Built(Record):
 
 
 def read_archive(archive: Path, package: str) -> Built:
-    """From the archive that a build in a sandbox handed over; what cannot be read holds nothing."""
+    """Return what a build in a sandbox handed over as an archive; one that cannot be read holds nothing."""
     folder = f"devel/lib/{package}/"
     programs, compiled = set(), set()
     said: list[str] = []
@@ -288,7 +289,7 @@ def read_archive(archive: Path, package: str) -> Built:
 
 
 def read_folder(devel: Path, package: str) -> Built:
-    """From the folder `devel` itself, where there was no sandbox."""
+    """Return what is in the folder `devel` itself, where there was no sandbox."""
     folder = devel / "lib" / package
     if any(path.is_symlink() for path in (devel, folder.parent, folder)) or not folder.is_dir():
         return Built()
@@ -362,7 +363,7 @@ class _Member(tarfile.TarInfo):
 
 
 def _ahead(archive: tarfile.TarFile, size: int) -> bytes:
-    """The bytes that come next, which are read again."""
+    """Return the bytes that come next, without taking them."""
     stream = archive.fileobj
     assert stream is not None  # noqa: S101 - it was opened with one
     data = stream.read(size)

@@ -50,7 +50,7 @@ _OUTSIDE: dict[int, _Read] = {
 
 
 def records(stream: BinaryIO) -> Iterator[McapRecord]:
-    """Every record that carries content, those inside chunks included; indexes are passed over.
+    """Yield every record that carries content, those inside chunks included; indexes are passed over.
 
     All checksums are verified, and so is the end of the file. Raises ContainerError, and whatever `mcap`,
     `zstandard` and `lz4` raise for a damaged file.
@@ -95,7 +95,7 @@ class _Meter:
 
 
 def _next(source: ReadDataStream, meter: _Meter) -> tuple[int, bytes | Message]:
-    """The next record's kind and content. Nothing is read past its end, whatever lengths it holds.
+    """Return the next record's kind and content. Nothing is read past its end, whatever lengths it holds.
 
     Messages, which may be many and large, are read at once.
     """
@@ -136,13 +136,13 @@ def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord]:
 
 
 def _verify(said: int, found: int, what: str) -> None:
-    """A checksum of 0 says nothing."""
+    """Check the bytes against a checksum; 0 stands for none."""
     if said not in {0, found}:
         raise ContainerError(f"the checksum of {what} is wrong")
 
 
 def _unpacked(chunk: Chunk) -> bytes:
-    """Never more than the limit, whatever the chunk and the compressed data claim."""
+    """Return a chunk's unpacked bytes, never more than the limit, whatever the chunk and the compressed data claim."""
     if chunk.uncompressed_size > MAX_CHUNK_BYTES:
         raise ContainerError(f"a chunk of more than {MAX_CHUNK_BYTES >> 20} MiB")
     if chunk.compression == "zstd":

@@ -55,7 +55,7 @@ class Decoder:
         return self._plan is not None
 
     def decoded_bytes(self, message_bytes: int) -> int:
-        """What a message of that size takes in memory once decoded, at most, about."""
+        """Return about how much memory a message of that size takes once decoded, at most."""
         return self._plan.bound.decoded(message_bytes) if self._plan is not None else 0
 
     def decode(self, data: bytes) -> Value:
@@ -91,7 +91,8 @@ class Encoder:
         self._plan = plan
 
     def encode(self, value: Mapping[str, Any]) -> bytes:
-        """The message's bytes; fields that `value` leaves out are zero. Raises ValueError where it does not fit."""
+        """Return the message's bytes; fields that `value` leaves out are zero. Raises ValueError where it does
+        not fit."""
         return self._plan.encode(value)
 
 
@@ -124,7 +125,7 @@ class _Plan:
             raise ValueError(f"{self._type} cannot hold {value!r}: {error}") from error
 
     def _renamed(self, type_: str, value: Value) -> Value:
-        """The fields by the names that they have in generated code."""
+        """Return the fields by the names that they have in generated code."""
         if not isinstance(value, Mapping):
             raise ValueError(f"{type_} is made of fields, not {value!r}")  # noqa: TRY004 - as every other misfit
         fields = {f.name: f for f in self._types[type_]}
@@ -288,7 +289,7 @@ class ServiceType:
         self._response = Decoder(f"{type}Response", self.response)
 
     def decode_response(self, data: bytes) -> Value:
-        """The response's fields, None where the bytes do not fit."""
+        """Return the response's fields; None where the bytes do not fit."""
         return self._response.decode(data)
 
 

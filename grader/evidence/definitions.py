@@ -99,7 +99,7 @@ def parse(type_: str, definition: str) -> Types:
 
 
 def alias(type_: str) -> str:
-    """A name that says nothing but is the same for the same type: letters and digits only."""
+    """Return a name that says nothing but is the same for the same type: letters and digits only."""
     return "T" + type_.encode().hex()
 
 
@@ -179,12 +179,12 @@ class Bound(NamedTuple):
     growth: int
 
     def decoded(self, message_bytes: int) -> int:
-        """What a message of so many bytes takes in memory, at most."""
+        """Return what a message of so many bytes takes in memory, at most."""
         return self.decoded_bytes + self.growth * message_bytes
 
 
 def bound(types: Types) -> Bound:
-    """The bound of the first of the types, as `parse` gives them."""
+    """Return the bound of the first of the types, as `parse` gives them."""
     return _Bounds(types).check(next(iter(types)), depth=0)
 
 
@@ -196,7 +196,7 @@ class _Bounds:
         self.known: dict[str, Bound] = {}
 
     def check(self, type_: str, *, depth: int) -> Bound:
-        """Raises DefinitionError for loops, missing types and what grows out of proportion."""
+        """Raise DefinitionError for loops, missing types and what grows out of proportion."""
         if type_ in self.known:
             return self.known[type_]
         if depth > MAX_DEPTH or type_ not in self._types:

@@ -73,14 +73,14 @@ def rate_stats(times_ns: Sequence[int], *, nominal_hz: float | None = None) -> R
 
 
 def periodic_share(gaps_ns: Sequence[int], *, nominal_hz: float, spread: float = 0.5) -> float:
-    """The share (0 to 1) of gaps within ±`spread` of the nominal period, ends included; 0 without gaps."""
+    """Return the share (0 to 1) of gaps within ±`spread` of the nominal period, ends included; 0 without gaps."""
     period_ns = 1e9 / nominal_hz
     low, high = round(period_ns * (1 - spread)), round(period_ns * (1 + spread))
     return sum(low <= gap <= high for gap in gaps_ns) / len(gaps_ns) if gaps_ns else 0.0
 
 
 def _interval(times: Sequence[int]) -> tuple[float | None, float | None]:
-    """Bounds (s) of the mean period; None with fewer than two gaps."""
+    """Return bounds (s) of the mean period; None with fewer than two gaps."""
     gaps = len(times) - 1
     batches = min(BATCHES, gaps)
     if batches < 2:

@@ -143,7 +143,7 @@ def _load(name: str, stream: BinaryIO, budget: MemoryBudget, *, shown: str = "")
 
 
 def _damage(stream: BinaryIO) -> tuple[str, str]:
-    """What is wrong, and what to do."""
+    """Return what is wrong with the file, and what to do."""
     stream.seek(0)
     head = stream.read(32)
     stream.seek(-min(stream.seek(0, os.SEEK_END), len(MAGIC)), os.SEEK_END)
@@ -345,7 +345,7 @@ class _RunBuilder:
         )
 
     def _ros2_channel(self, number: int, channel: mcap.Channel) -> Channel:
-        """The same, with its messages as ROS 1's."""
+        """Return the channel with its messages as ROS 1's."""
         from grader.evidence.ros2 import as_ros1  # noqa: PLC0415 - few submissions hold one
 
         return as_ros1(self._ros_channel(number, channel), channel.metadata.get("offered_qos_profiles", ""))

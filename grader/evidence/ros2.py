@@ -37,7 +37,7 @@ _KEPT_FOR_LATE = re.compile(r"durability: *(?:1|transient_local)\b")
 
 
 def ros1_type(name: str) -> str:
-    """`std_msgs/String` for `std_msgs/msg/String`."""
+    """Return `std_msgs/String` for `std_msgs/msg/String`."""
     return name.replace("/msg/", "/")
 
 
@@ -179,7 +179,7 @@ def _topics(bag: sqlite3.Connection, path: Path) -> list[_Topic]:
 
 
 def _definitions(bag: sqlite3.Connection) -> dict[str, str]:
-    """By type, the definitions that the bag holds: those of ROS 2 before Iron hold none."""
+    """Return the definitions that the bag holds, by type: bags of ROS 2 before Iron hold none."""
     if not _columns(bag, "message_definitions"):
         return {}
     rows = bag.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
@@ -187,7 +187,7 @@ def _definitions(bag: sqlite3.Connection) -> dict[str, str]:
 
 
 def _messages(bag: sqlite3.Connection, budget: MemoryBudget) -> dict[int, list[Message]]:
-    """By topic, in the order of their times."""
+    """Return the messages by topic, in the order of their times."""
     _columns(bag, "messages")
     found: dict[int, list[Message]] = defaultdict(list)
     for number, at_ns, data in bag.execute("SELECT topic_id, timestamp, data FROM messages"):

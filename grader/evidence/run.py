@@ -99,12 +99,12 @@ class Channel:
 
     @cached_property
     def times_ns(self) -> tuple[int, ...]:
-        """When each message arrived, in ns."""
+        """Return when each message arrived, in ns."""
         return tuple(m.log_time_ns for m in self.messages)
 
     @cached_property
     def values(self) -> tuple[Any, ...]:
-        """Each message decoded to a dict of its fields; None where its definition does not fit.
+        """Return each message decoded to a dict of its fields; None where its definition does not fit.
 
         Raises EvidenceError where that would take more memory than it may.
         """
@@ -187,7 +187,7 @@ class Run:
 
     @cached_property
     def grader_nodes(self) -> frozenset[str]:
-        """Nodes of the programs that a scenario starts beside the student's (`turtlesim_node`)."""
+        """Return the nodes of the programs that a scenario starts beside the student's (`turtlesim_node`)."""
         own = {e.name for _, e in self.processes if e.role == "grader"}
         return frozenset(n for _, e in self.graph for n, process in e.processes.items() if process in own)
 

@@ -66,7 +66,7 @@ def _points(package: PackageFacts) -> Iterator[tuple[FileCitation, str]]:
 
 
 def _nodes(package: PackageFacts, launch: LaunchFile) -> Iterator[tuple[FileCitation, str]]:
-    """Nodes whose program is not there, or not executable: roslaunch prints an error, and starts the others."""
+    """Yield the nodes whose program is missing or not executable: roslaunch prints an error, and starts the others."""
     for node in launch.brings:
         if node.pkg != package.name or node.uncertain:
             continue
@@ -106,7 +106,8 @@ def said_for_node(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdi
 
 
 def _language_of(verdict: Verdict, criterion: Criterion, facts: Facts) -> Language | None:
-    """The one of the nodes that the message names, that the criterion names, that publish on its topic, or of all.
+    """Return the language of the nodes that the message names, that the criterion names, that publish on its topic, or
+    of all.
 
     None where the scenario runs nodes of both and nothing tells which is meant.
     """
@@ -126,7 +127,7 @@ def _language_of(verdict: Verdict, criterion: Criterion, facts: Facts) -> Langua
 
 
 def _languages(facts: Facts, scenario: Scenario, run: Run | None) -> dict[str, Language]:
-    """What each process and each node of the scenario is written in, by its name."""
+    """Return what each process and each node of the scenario is written in, by its name."""
     found: dict[str, Language] = {}
     for start in scenario.start:
         package = facts.package_of(start)
@@ -222,7 +223,7 @@ def tell_unchanged(
 
 
 def _is_named(path: str, names: Collection[str]) -> bool:
-    """A program in C++ is named without its suffix."""
+    """Return whether the file is among the names; a program in C++ is named without its suffix."""
     file = PurePosixPath(path)
     return file.name in names or (file.suffix in CPP and file.stem in names)
 

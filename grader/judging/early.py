@@ -86,7 +86,8 @@ class _Judging:
             self.results[name] = EarlyVerdict(criterion=result, final=final)
 
     def _facts(self, asked: set[str]) -> Facts:
-        """`asked` comes to hold what was looked at that the build makes more precise, or that only a build gives."""
+        """Return the facts; `asked` collects what was looked at that the build makes more precise, or that only a build
+        gives."""
         main, others = views_of(self._rubric, self._package)
         runs = {PACKAGE_RUN: cast("Run", _Watched(UNBUILT, asked))}
         return Facts(

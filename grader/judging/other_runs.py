@@ -169,7 +169,7 @@ def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric, *, built: boo
 
 
 def _started(scenario: Scenario) -> set[str]:
-    """The names of the files that the scenario starts."""
+    """Return the names of the files that the scenario starts."""
     return {PurePosixPath(path).name for s in scenario.start for path in (s.script, s.launch) if path}
 
 

@@ -44,7 +44,8 @@ def settle(
     handed_in: HandedIn | None,
     before: tuple[AppliedOverride, ...] = (),
 ) -> GradingResult:
-    """The result with the points that people gave (`overrides`, by criterion), and without what being late costs.
+    """Return the result with the points that people gave (`overrides`, by criterion), and without what being late
+    costs.
 
     `before` are the overrides of the earlier result: an override that was there already keeps what the check said when
     it was decided, and is marked where the check says something else now. Overrides of criteria that the result does
@@ -75,7 +76,7 @@ def settle(
 
 
 def unsettled(result: GradingResult, rubric: Rubric) -> GradingResult:
-    """The automatic result that a settled one was made from. An automatic result is given back as it is."""
+    """Return the automatic result that a settled one was made from; an automatic result as it is."""
     if not result.overrides and result.handed_in is None and result.late is None:
         return result
     said = {override.criterion: override.automatic for override in result.overrides}
@@ -141,7 +142,8 @@ def _decided(criterion: CriterionResult, override: Override, digits: int) -> Cri
 
 
 def deadline_of(rubric: Rubric, extension_days: float = 0.0) -> datetime | None:
-    """The rubric's deadline with one submission's extension, in its time zone; None where the rubric has none."""
+    """Return the rubric's deadline with one submission's extension, in its time zone; None where the rubric has
+    none."""
     if rubric.deadline is None:
         return None
     moved = rubric.deadline.astimezone(timezone.utc) + timedelta(days=extension_days)
@@ -198,7 +200,7 @@ def _grace(policy: Late | None) -> timedelta:
 
 
 def _cost(points: float, rubric: Rubric, late: timedelta) -> tuple[float, str]:
-    """The points that are left of a submission that is `late`, and the reason in plain English."""
+    """Return the points that are left of a submission that is `late`, and the reason in plain English."""
     policy = rubric.late
     if policy is None:
         return points, f"{_span(late)} late; the rubric has no late policy, so nothing is lost"
@@ -227,7 +229,7 @@ def _in_time(given: HandedIn, deadline: datetime) -> str:
 
 
 def _span(time: timedelta) -> str:
-    """`2 days 3 hours`: the two largest units, what is less than a second as one."""
+    """Return `2 days 3 hours`: the two largest units, what is less than a second as one."""
     left = max(1, int(time.total_seconds()))
     parts = []
     for unit, seconds in SPANS.items():

@@ -130,7 +130,7 @@ def take_in(results: Sequence[CriterionResult]) -> tuple[CriterionResult, ...]:
 
 
 def overall_status(results: Sequence[CriterionResult]) -> Literal["graded", "inconclusive", "error"]:
-    """`error` where a check of ours failed, `inconclusive` where points are still open, `graded` otherwise.
+    """Return `error` where a check of ours failed, `inconclusive` where points are still open, `graded` otherwise.
 
     Advice (0 points) does not hold up a result. No criteria at all are an error: nothing was judged.
     """
@@ -167,7 +167,8 @@ def criteria_text(results: Sequence[CriterionResult], *, ascii_only: bool = Fals
 def judged_text(
     rubric: Rubric, judged: Iterable[tuple[str, Sequence[CriterionResult] | str]], *, ascii_only: bool = False
 ) -> str:
-    """Several submissions as JSON, each with its points and criteria, or with the error that kept it from them."""
+    """Return several submissions as JSON, each with its points and criteria, or with the error that kept it from
+    them."""
     return json_text([_about(rubric, name, found) for name, found in judged], ascii_only=ascii_only)
 
 
@@ -194,13 +195,14 @@ def criteria_bytes(results: Sequence[CriterionResult]) -> bytes:
 
 
 def round_half_up(points: float, digits: int) -> float:
-    """`round_half_up(2.25, 1)` is 2.3, where Python's own `round` says 2.2."""
+    """Return the rounded points: `round_half_up(2.25, 1)` is 2.3, where Python's own `round` says 2.2."""
     step = Decimal(1).scaleb(-digits)
     return float(Decimal(repr(points)).quantize(step, rounding=ROUND_HALF_UP))
 
 
 def notes_of(runs: Mapping[str, Run]) -> tuple[Note, ...]:
-    """The notes of all runs, in the order of the runs and of time; equal ones once, at most 20 of each kind a run.
+    """Return the notes of all runs, in the order of the runs and of time; equal ones once, at most 20 of each kind a
+    run.
 
     What was left out is counted in a last note. Recordings of other tools have none: no one watched.
     """

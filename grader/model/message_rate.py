@@ -35,7 +35,7 @@ class Rhythm(Record):
 
     @cached_property
     def gaps_ns(self) -> tuple[int, ...]:
-        """Between messages, and the silence at the end where it lasted."""
+        """Return the gaps between messages, and the silence at the end where it lasted."""
         tail = (self.tail_ns,) if self.tail_ns else ()
         return (*(b - a for a, b in pairwise(self.times_ns)), *tail)
 
@@ -53,7 +53,7 @@ class Rhythm(Record):
         return len(self.gaps_ns) * 1e9 / self.span_ns if self.span_ns > 0 else 0.0
 
     def outside(self, low_ns: float, high_ns: float) -> list[int]:
-        """Indices of the gaps shorter than `low_ns` or longer than `high_ns`; a bound itself is inside."""
+        """Return the indices of the gaps shorter than `low_ns` or longer than `high_ns`; a bound itself is inside."""
         slack = high_ns * ROUNDING
         return [i for i, gap in enumerate(self.gaps_ns) if not low_ns - slack <= gap <= high_ns + slack]
 
@@ -75,7 +75,7 @@ class Rhythm(Record):
         return len(self.outside(EVEN_FROM * mean_ns, EVEN_TO * mean_ns)) <= UNEVEN_SHARE * len(self.gaps_ns)
 
     def is_single_stall(self, outside: Sequence[int], period_ns: float) -> bool:
-        """One message came late and the next on its schedule again: one long gap, then one short one."""
+        """Return whether one message came late and the next on its schedule again: one long gap, then one short one."""
         match outside:
             case [late]:
                 return self.gaps_ns[late] > period_ns and late < len(self.gaps_ns) - bool(self.tail_ns)

@@ -417,10 +417,10 @@ class PackageFacts(Record):
         return next((f for f in self.files if f.path == path), None)
 
     def hints_on(self, path: str) -> tuple[str, ...]:
-        """What intake remarked of one file: such hints begin with its path."""
+        """Return what intake remarked of one file: such hints begin with its path."""
         return tuple(hint for hint in self.hints if hint.startswith(f"{path} "))
 
     def general_hints(self) -> tuple[str, ...]:
-        """What intake remarked of the submission as a whole: where the package was found, and as what."""
+        """Return what intake remarked of the submission as a whole: where the package was found, and as what."""
         of_files = {hint for file in self.files for hint in self.hints_on(file.path)}
         return tuple(hint for hint in self.hints if hint not in of_files)

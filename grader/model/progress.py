@@ -20,13 +20,13 @@ class Progress(Protocol):
         detail: str = "",
         expected_s: float | None = None,
     ) -> None:
-        """One step (`intake`, `build`, a scenario's name) is now in `state`.
+        """Show that one step (`intake`, `build`, a scenario's name) is now in `state`.
 
         `detail` says what it does or waits for; `expected_s` is how long the whole step is likely to take.
         """
 
     def early(self, verdicts: Callable[[], tuple[EarlyVerdict, ...]]) -> None:
-        """The files are read, and `verdicts` works out what they alone decide. A display need not call it."""
+        """Show what the files alone decide, which `verdicts` works out. A display need not call it."""
 
 
 class Silence:
@@ -39,7 +39,7 @@ class Silence:
         detail: str = "",
         expected_s: float | None = None,
     ) -> None:
-        """Ignore it."""
+        """Show that one step (`intake`, `build`, a scenario's name) is now in `state`."""
 
     def early(self, verdicts: Callable[[], tuple[EarlyVerdict, ...]]) -> None:
-        """Ignore it."""
+        """Show what the files alone decide, which `verdicts` works out. A display need not call it."""

@@ -152,7 +152,8 @@ def failed(
 def unjudged(
     message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
 ) -> Verdict:
-    """There is nothing to judge: a fail of its own, or `blocked` where a required criterion explains it."""
+    """Return the verdict that there is nothing to judge: a fail, or `blocked` where a required criterion
+    explains it."""
     verdict = _verdict(
         Status.FAIL, 0.0, message, expected=expected, measured=measured, hint=hint, citations=citations
     )

@@ -64,7 +64,7 @@ def read_cmake(
 def refine_cmake(
     facts: CMakeFacts, names: tuple[str, ...], *, trace: Path, root: str | None = None
 ) -> CMakeFacts:
-    """`facts` of the parser, replaced by what CMake itself was told.
+    """Return the parser's `facts`, replaced by what CMake itself was told.
 
     `trace` is what CMake wrote by `--trace-expand --trace-format=json-v1`, `root` the package's folder as
     CMake saw it; without it, a folder that has one of the `names` is looked for. Where CMake gave up before
@@ -177,7 +177,7 @@ def _call(entry: dict[str, Any]) -> CMakeCall | None:
 
 
 def split_lists(args: list[str]) -> tuple[str, ...]:
-    """Arguments after expansion as CMake hands them on: a list `a;b` is two of them, an empty one is none."""
+    """Return arguments after expansion as CMake hands them on: a list `a;b` is two of them, an empty one is none."""
     parts = (part for arg in args for part in _SEPARATOR.split(arg))
     return tuple(printable(part.replace("\\;", ";")) for part in parts if part)
 
@@ -214,7 +214,7 @@ def written_calls(trace: bytes, folder: Path, root: str) -> Written:
 
 
 def _traced_call(line: bytes) -> dict[str, Any] | None:
-    """An entry that names a call, None for whatever else is in the trace."""
+    """Return an entry that names a call; None for whatever else is in the trace."""
     try:
         entry = json.loads(line)
     except (ValueError, RecursionError):  # cut short, or not CMake's
@@ -235,7 +235,7 @@ class _Files:
         self.too_much = ""
 
     def commands(self, path: str) -> _Commands | None:
-        """None where the file cannot be read through."""
+        """Return the file's commands; None where it cannot be read through."""
         if path not in self._known:
             self._known[path] = self._read(path)
         return self._known[path]
@@ -269,7 +269,7 @@ def _fits(call: dict[str, Any], found: _Commands | None) -> bool:
 
 
 def _words(command: nodes.Command) -> tuple[str, ...] | None:
-    """The arguments as they are written; None where something in them is expanded."""
+    """Return the arguments as they are written; None where something in them is expanded."""
     words = [token for token in command.args if token.kind != "COMMENT"]
     if any(t.kind != "RAW" or _EXPANDED & set(t.value) for t in words):
         return None

@@ -117,11 +117,11 @@ class _Reader:
                 self._call(node, file, depth)
 
     def _is_enough(self) -> bool:
-        """Loops in each other, and values made of each other, multiply without an end."""
+        """Return whether to stop: loops in each other, and values made of each other, multiply without an end."""
         return len(self.calls) >= _CALLS_MAX or self.steps > STEPS_MAX or self.letters > _CHARS_MAX
 
     def _branch(self, node: nodes.If, file: str, depth: int) -> None:
-        """Both branches, but for a literal `if(FALSE)`: conditions are CMake's to judge."""
+        """Follow both branches, but for a literal `if(FALSE)`: conditions are CMake's to judge."""
         condition = self._arguments(node.args, file)
         if [text.upper() for text in condition] not in [[word] for word in _FALSE]:
             self.run(node.if_true, file, depth + 1)
@@ -141,7 +141,7 @@ class _Reader:
             self.variables[variable] = before
 
     def _items(self, words: list[str]) -> Iterator[str]:
-        """`foreach(x a b)`, `foreach(x IN LISTS l ITEMS a)`; a RANGE is left out."""
+        """Yield the items of `foreach(x a b)`, `foreach(x IN LISTS l ITEMS a)`; a RANGE is left out."""
         if words[:1] == ["RANGE"]:
             return
         lists = False
@@ -180,7 +180,7 @@ class _Reader:
         self.variables[args[0]] = ";".join(values)[:_VALUE_CHARS_MAX]
 
     def _include(self, name: str, place: str, file: str, depth: int) -> None:
-        """A file of the same package; modules of CMake and of other packages are none of its facts."""
+        """Read a file of the same package; modules of CMake and of other packages are none of its facts."""
         place = place if name == "include" else posixpath.join(place, _CMAKE_FILE)
         path = posixpath.normpath(posixpath.join(posixpath.dirname(file), place))
         if path in self.read or path.startswith(("/", "../")) or "\0" in path:
@@ -249,7 +249,7 @@ def commands_of(data: bytes) -> list[nodes.Command] | None:
 
 
 def _readable(data: bytes) -> str | None:
-    """The text as the library takes it; None where that would take it too long."""
+    """Return the text as the library takes it; None where that would take it too long."""
     text = data.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\0", " ")
     if len(_OPENERS.findall(text)) * len(text) > _WORK_MAX:
         return None
@@ -289,7 +289,7 @@ def _word(token: Token) -> str:
 
 
 def _balanced(commands: list[nodes.Command], file: str) -> tuple[list[nodes.Command], Fault | None]:
-    """The commands up to the last one outside every open block, and the fault where blocks do not match."""
+    """Return the commands up to the last one outside every open block, and the fault where blocks do not match."""
     open_blocks: list[nodes.Command] = []
     whole = 0
     for count, command in enumerate(commands, 1):

@@ -82,7 +82,7 @@ def with_build_facts(
     python_faults: Mapping[str, Fault] | None = None,
     python_slips: tuple[PythonSlip, ...] | None = None,
 ) -> PackageFacts:
-    """`facts` refined by what the build showed: CMake's own trace, and ROS's own Python on the sources.
+    """Return `facts` refined by what the build showed: CMake's own trace, and ROS's own Python on the sources.
 
     What is None stays as it was. `python_faults` replace the faults of all `python_paths`.
     """

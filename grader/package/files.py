@@ -111,7 +111,7 @@ def _executable(package: SourcePackage, path: str, file: Path) -> bool | None:
 
 
 def _contents(file: Path) -> tuple[int, str, bytes]:
-    """Size, sha256 and the first 2 MB."""
+    """Return size, sha256 and the first 2 MB."""
     digest, size, head = hashlib.sha256(), 0, b""
     with file.open("rb") as stream:
         while chunk := stream.read(_CHUNK_BYTES):
@@ -224,7 +224,7 @@ def _words(text: str) -> list[str]:
 
 
 def _near(data: bytes) -> str:
-    """Why a file that does not begin with `#!` has no usable shebang."""
+    """Return why a file that does not begin with `#!` has no usable shebang."""
     lines = data[:_LOOKED_AT_BYTES].splitlines()[:50]
     first = lines[0][:_LENGTH_LIMIT_BYTES].decode("utf-8", "replace").strip() if lines else ""
     later = next((n for n, line in enumerate(lines, 1) if line.strip().startswith(b"#!")), None)

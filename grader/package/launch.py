@@ -33,7 +33,7 @@ class _Parsed(NamedTuple):
 
 
 def is_launch_file(path: str) -> bool:
-    """As `roslaunch PACKAGE NAME` finds it: by name, in any folder of the package."""
+    """Return whether `roslaunch PACKAGE NAME` finds it: by name, in any folder of the package."""
     return path.lower().endswith(_SUFFIXES)
 
 
@@ -135,7 +135,7 @@ def _record(path: str, parsed: _Parsed, own: tuple[str, ...], find: Find) -> Lau
 
 
 def _unknown(parent: etree._Element) -> Iterator[tuple[str, int]]:
-    """Tags that roslaunch skips with a warning, `<Node>` for one."""
+    """Yield the tags that roslaunch skips with a warning, `<Node>` for one."""
     for child in parent:
         if isinstance(child.tag, str):
             if child.tag not in _TAGS:

@@ -81,7 +81,7 @@ def load(root: etree._Element, scope: Scope, find: Find) -> Loaded:
 
 
 def node_of(element: etree._Element, scope: Scope, remaps: Remaps) -> LaunchNode:
-    """One `<node>` as it stands in this scope."""
+    """Return one `<node>` as it stands in this scope."""
     return LaunchNode(
         pkg=scope.get(element, "pkg"),
         type=scope.get(element, "type"),
@@ -108,7 +108,7 @@ class _Loader:
         self._find = find
 
     def walk(self, parent: etree._Element, scope: Scope, depth: int) -> None:
-        """Tag by tag: each changes the scope for those that follow it."""
+        """Read tag by tag: each changes the scope for those that follow it."""
         for child in parent:
             if not isinstance(child.tag, str) or not wanted(child, scope):
                 continue
@@ -254,7 +254,7 @@ class Scope(Record):
     uncertain: bool = False
 
     def text(self, written: str) -> str:
-        """`$(arg …)`, `$(dirname)` and `$(optenv NAME DEFAULT)` resolved; what only roslaunch knows stays as it is."""
+        """Resolve `$(arg …)`, `$(dirname)` and `$(optenv NAME DEFAULT)`; what only roslaunch knows stays as it is."""
         text = _SUBSTITUTION.sub(
             lambda match: self._value(match[0], match[1].split()), written[:_VALUE_CHARS_MAX]
         )
@@ -300,7 +300,7 @@ class Scope(Record):
 
 
 def wanted(element: etree._Element, scope: Scope | None = None) -> bool:
-    """False where `if` or `unless` switches the element off; what is not known before run time does not."""
+    """Return False where `if` or `unless` switches the element off; what only the run tells does not."""
     on, off = (element.get(name) or "" for name in ("if", "unless"))
     if scope is not None:
         on, off = scope.text(on), scope.text(off)
@@ -308,7 +308,7 @@ def wanted(element: etree._Element, scope: Scope | None = None) -> bool:
 
 
 def _plain(path: str) -> str | None:
-    """`launch/../config/a.yaml` as `config/a.yaml`; None where it leads out of the package."""
+    """Return `launch/../config/a.yaml` as `config/a.yaml`; None where it leads out of the package."""
     parts: list[str] = []
     for part in PurePosixPath(path).parts:
         if part == ".." and not parts:

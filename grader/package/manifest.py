@@ -115,7 +115,7 @@ def _fault(line: int | None, kind: str, message: str, cause: str) -> Fault:
 
 
 def _meaning(root: etree._Element, said: list[str]) -> Package:
-    """What catkin_pkg makes of it. Written again from the tree, so that no DTD reaches its XML parser."""
+    """Return what catkin_pkg makes of it. It gets the tree written anew, so that no DTD reaches its XML parser."""
     _shorten(root)
     text = etree.tostring(root, encoding="unicode", with_tail=False)
     package = parse_package_string(text, warnings=said)
@@ -172,7 +172,7 @@ def _text(element: etree._Element) -> str:
 
 
 def _dependencies(root: etree._Element) -> Iterator[Dependency]:
-    """Every `…depend` whose condition holds."""
+    """Yield every `…depend` whose condition holds."""
     for tag, element in _elements(root):
         if _is_dependency(tag) and evaluate_condition(element.get("condition"), _CONTEXT):
             yield Dependency(kind=tag, name=_text(element), line=line_of(element) or 1)

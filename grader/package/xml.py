@@ -105,7 +105,7 @@ def _set_first_lines(root: etree._Element, data: bytes) -> None:
 
 
 def line_of(element: etree._Element) -> int | None:
-    """Where the element begins."""
+    """Return the line where the element begins."""
     line = element.sourceline
     return line if isinstance(line, int) else None
 
@@ -154,7 +154,7 @@ def _line(data: bytes, number: int) -> str:
 
 
 def cause_of(message: str, log: list[str], line: str, *, root: str) -> str:
-    """libxml2's message in plain words. `log` holds all its messages, `line` the text of the faulty line."""
+    """Return libxml2's message in plain words. `log` holds all its messages, `line` the text of the faulty line."""
     if line.startswith(("<<<<<<<", "=======", ">>>>>>>")):
         return (
             "git's merge markers (`<<<<<<<`) are still in the file: keep one version and delete the markers"

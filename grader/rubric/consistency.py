@@ -158,7 +158,7 @@ def _circles(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
 
 
 def _circle(start: str, needs: dict[str, list[str]]) -> list[str]:
-    """The shortest way from `start` along `requires` back to itself; empty where there is none."""
+    """Return the shortest way from `start` along `requires` back to itself; empty where there is none."""
     ways, seen = [[start]], {start}
     for way in ways:
         for name in needs.get(way[-1], ()):

@@ -162,7 +162,7 @@ def _keys(model: type[BaseModel], path: KeyPath) -> list[str]:
 
 
 def _inside(annotation: object, part: str | int) -> Iterator[object]:
-    """The type of what is under `part`."""
+    """Yield the types of what is under `part`."""
     for model in _models(annotation):
         for name, field in model.model_fields.items():
             if part in {name, field.alias}:

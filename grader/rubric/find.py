@@ -177,6 +177,6 @@ def _write_down(folders: list[Path]) -> None:
 
 
 def _short(path: Path) -> str:
-    """Relative to where the user is, where that is shorter."""
+    """Return the path relative to where the user is, where that is shorter."""
     here = Path.cwd()
     return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)

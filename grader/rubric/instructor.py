@@ -161,11 +161,11 @@ class _Loader(ExecutionLoader):
         self._raw = raw
 
     def get_filename(self, fullname: str) -> str:  # noqa: ARG002 - importlib's interface
-        """For tracebacks."""
+        """Return the file's name, for tracebacks."""
         return str(self._path)
 
     def get_source(self, fullname: str) -> str:  # noqa: ARG002 - as above
-        """As Python reads it: by the coding that the file declares."""
+        """Return the source as Python reads it: by the coding that the file declares."""
         return importlib.util.decode_source(self._raw)
 
 
@@ -197,7 +197,7 @@ class VisibleText(io.TextIOBase):
 
 @contextmanager
 def printing_to_stderr() -> Iterator[None]:
-    """Stdout may be JSON: nothing that is printed in the block gets there."""
+    """Send what is printed in the block to stderr: stdout may be JSON."""
     with _STREAMS:
         shown = VisibleText(sys.stderr)
         try:

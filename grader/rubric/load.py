@@ -194,7 +194,7 @@ def refuse_newer(source: Source, known: Versioned) -> None:
 
 
 def _digest(raw: bytes, beside: Beside) -> str:
-    """Of the rubric alone where nothing else belongs to it."""
+    """Return the digest, of the rubric alone where nothing else belongs to it."""
     digest = hashlib.sha256(raw)
     for name, content in sorted(beside.files.items()):
         digest.update(f"\0{name}\0{hashlib.sha256(content).hexdigest()}".encode())
@@ -202,7 +202,7 @@ def _digest(raw: bytes, beside: Beside) -> str:
 
 
 def all_rubrics() -> tuple[LoadedRubric, ...]:
-    """Those that come with the grader, in order of their ids."""
+    """Return the rubrics that come with the grader, in order of their ids."""
     return tuple(load_rubric(str(rubrics_folder() / f"{name}.yaml")) for name in rubric_ids())
 
 
@@ -219,7 +219,7 @@ def find_rubric_for_package(name: str) -> str | None:
 
 
 def packages_of_labs() -> dict[str, str]:
-    """By the id of each lab that is known here, the package that it is for."""
+    """Return by the id of each lab that is known here the package that it is for."""
     return {lab.id: lab.package for lab in known_labs()}
 
 
@@ -294,7 +294,7 @@ def _looks_at_files(criterion: Criterion, checks: Mapping[str, Check]) -> bool:
 
 
 def rates_of(rubric: Rubric) -> dict[str, tuple[RateBounds, ...]]:
-    """Return them by scenario."""
+    """Return, by scenario, the rates that end a run once they are clear."""
     found: dict[str, list[RateBounds]] = defaultdict(list)
     for criterion in rubric.criteria:
         check = CHECKS.get(criterion.check)

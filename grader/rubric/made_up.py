@@ -180,7 +180,7 @@ def tell_made_up(rubric: Rubric, criterion: Criterion, hint: str, seen: str) -> 
 
 
 def _written(rubric: Rubric, criterion: Criterion) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A criterion and its scenario as the rubric has them."""
+    """Return a criterion and its scenario as the rubric has them."""
     criteria = (one for _, one in as_maps(rubric.written.get("criteria")))
     own: dict[str, Any] = next((one for one in criteria if one.get("id") == criterion.id), {})
     return own, as_map(as_map(rubric.written.get("scenarios")).get(criterion.scenario or ""))

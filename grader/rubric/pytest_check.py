@@ -126,7 +126,8 @@ def record_calls(path: Path, connection: socket.socket) -> None:
 
 
 def _command(path: Path, folder: Path, params: PytestParams) -> list[str]:
-    """pytest with nothing of the surrounding folders: no settings, no conftest.py, no cache, no other plugin."""
+    """Return the call of pytest, with nothing of the surrounding folders: no settings, conftest.py, cache or other
+    plugin."""
     own = ["-p", "grader.rubric.pytest_plugin", "--grader-evidence", str(folder / "evidence")]
     own += ["--grader-outcome", str(folder / "outcome"), "--basetemp", str(folder / "tmp")]
     alone = ["-c", os.devnull, "--rootdir", str(path.parent), "--noconftest", "-p", "no:cacheprovider"]
@@ -220,7 +221,7 @@ def _scored(counted: list[TestOutcome], score: float) -> Verdict:
 
 
 def _sub_scores(tests: tuple[TestOutcome, ...]) -> str:
-    """`test_counts 1/1, test_resets 0/2, test_extra skipped`."""
+    """Return `test_counts 1/1, test_resets 0/2, test_extra skipped`."""
     shown = [_sub_score(t) for t in tests[:SHOWN_TESTS]]
     more = [f"and {len(tests) - SHOWN_TESTS} more"] if len(tests) > SHOWN_TESTS else []
     return ", ".join([*shown, *more])

@@ -94,7 +94,7 @@ class _Notes:
         self._faults: list[str] = []
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
-        """A file that cannot be read is the instructor's fault."""
+        """Take note of a file that cannot be read: it is the instructor's fault."""
         if report.failed:
             lines = [line for line in report.longreprtext.splitlines() if line.strip()]
             self._faults.append(
@@ -160,13 +160,13 @@ class _Notes:
         return float(given)
 
     def _message(self, error: BaseException | None, report: pytest.TestReport) -> str:
-        """The first line of what was asserted."""
+        """Return the first line of what was asserted."""
         if error is None:
             return self._short(report.longreprtext.strip().partition("\n")[0])
         return self._short(str(error).strip().partition("\n")[0] or "an assertion does not hold")
 
     def _exception(self, item: pytest.Item, info: pytest.ExceptionInfo[BaseException]) -> str:
-        """What a test raised in place of an assertion, with the last line of its file that took part."""
+        """Return what a test raised in place of an assertion, with the last line of its file that took part."""
         lines = [entry.lineno + 1 for entry in info.traceback if Path(entry.path) == item.path]
         text = str(info.value).strip().partition("\n")[0]
         place = f"{item.path.name}:{lines[-1]}" if lines else item.path.name

@@ -38,7 +38,8 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def rubric_schema(checks: Mapping[str, Check] | None = None) -> dict[str, Any]:
-    """The schema; criteria are a union told apart by `check`. `checks` are those of a rubric, its own among them."""
+    """Return the schema; criteria are a union told apart by `check`. `checks` are those of a rubric, its own among
+    them."""
     known = known_checks(Path(), {}) if checks is None else checks
     members: Any = reduce(or_, [_manual(), *(_criterion(known[name]) for name in sorted(known))])
     member = Annotated[members, Field(discriminator="check")]

@@ -65,13 +65,13 @@ class Source:
         return self.lines.get(path, 1)
 
     def fault(self, path: KeyPath, message: str) -> str:
-        """`file:line: key.path: what is wrong`."""
+        """Return a fault as `file:line: key.path: what is wrong`."""
         where = f"{self.name}:{self.line(path)}: "
         return where + (f"{dotted(path)}: {message}" if path else message)
 
 
 def dotted(path: KeyPath) -> str:
-    """`criteria[2].with.rate_hz`."""
+    """Return a path as `criteria[2].with.rate_hz`."""
     text = ""
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
@@ -204,7 +204,7 @@ LIBYAML = _libyaml_loader()
 
 
 def _yaml_fault(error: yaml.YAMLError, text: str, name: str) -> str:
-    """One line out of PyYAML's several."""
+    """Return one line out of PyYAML's several."""
     if isinstance(error, yaml.reader.ReaderError):
         line = text.count("\n", 0, error.position) + 1
         return f"{name}:{line}: a character that YAML does not allow (U+{ord(_char(error)):04X})"
@@ -272,7 +272,7 @@ class _Reader:
         return data
 
     def _merge(self, node: yaml.Node, path: KeyPath) -> dict[str, Any]:
-        """`<<: *anchor`, or a list of them, of which the first wins."""
+        """Merge `<<: *anchor`, or a list of them, of which the first wins."""
         self._count(node)
         if isinstance(node, yaml.MappingNode):
             return self._mapping(node, path)
@@ -320,7 +320,7 @@ class _Reader:
 
 
 def as_map(value: object) -> dict[str, Any]:
-    """The value where it is a map, else an empty one."""
+    """Return the value where it is a map, else an empty one."""
     return value if isinstance(value, dict) else {}
 
 

@@ -43,7 +43,7 @@ def clocks_at(run: Run, times_ns: Sequence[int]) -> tuple[Seconds, ...]:
 
 
 def run_seconds(run: Run) -> ToSeconds | None:
-    """Seconds since the run began; in a warped run, those of the grader's `/clock`, None where it was not recorded."""
+    """Return the seconds since the run began; in a warped run those of `/clock`, or None where it was not recorded."""
     if run.clock != "warped":
         return lambda time_ns: (time_ns - run.start_ns) / 1e9
     ticks = _ticks(run)
@@ -51,7 +51,7 @@ def run_seconds(run: Run) -> ToSeconds | None:
 
 
 def ros_seconds(run: Run) -> ToSeconds | None:
-    """Seconds of ROS's time, as `rospy.get_time()` gives them; None where the grader's `/clock` was not recorded."""
+    """Return the seconds of ROS's time, as `rospy.get_time()` gives them; None where `/clock` was not recorded."""
     if run.clock != "warped":
         return lambda time_ns: time_ns / 1e9
     ticks = _ticks(run)
@@ -260,7 +260,7 @@ def _windows(run: Run, from_ns: int, to_ns: int) -> list[_Window]:
 
 
 def _timer(windows: Sequence[_Window]) -> Lateness:
-    """The worst that was reported."""
+    """Return the worst lateness that was reported."""
     events = [w.event for w in windows]
     return Lateness(
         max((e.mean_ms for e in events), default=0.0),

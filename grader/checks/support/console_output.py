@@ -150,7 +150,7 @@ def places_of(
 
 
 def line_finder(probes: Sequence[Probe], lines: Sequence[Line], template: str) -> Callable[[int], Line]:
-    """From a place of `places_of` to the line that begins there, or before it."""
+    """Return a function from a place of `places_of` to the line that begins there, or before it."""
     starts = _starts(lines) if _are_numbers(probes) else [offset for _, offset in _joined(lines, template)[1]]
     return lambda place: lines[bisect_right(starts, place) - 1]
 
@@ -211,7 +211,7 @@ def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -
 
 
 def _joined(lines: Sequence[Line], template: str) -> tuple[str, list[tuple[int, int]]]:
-    """All that was printed, and when and at which offset each line begins."""
+    """Return all that was printed, and when and at which offset each line begins."""
     blank = "" if template == VALUE else " "
     parts, starts, offset = [], [], 0
     for line in lines:
@@ -274,7 +274,7 @@ def _squeezed(text: str) -> str:
 
 
 def _worth_a_look(texts: Iterable[str], streams: Iterable[_Lines], most: int) -> list[str]:
-    """Texts whose last word was printed, evenly spread."""
+    """Return texts whose last word was printed, evenly spread."""
     said = {word.strip(PUNCTUATION) for lines in streams for _, line in lines for word in line.split()}
     found = [text for text in texts if text.split()[-1].strip(PUNCTUATION) in said]
     return found[:: max(1, len(found) // most)]
@@ -311,7 +311,8 @@ class Logged(NamedTuple):
 
 
 def logged_by(run: Run, nodes: Collection[str]) -> tuple[Logged, ...]:
-    """The log messages of these nodes, by time; of all nodes in another tool's recording, which knows no graph."""
+    """Return the log messages of these nodes by time; of all nodes in another tool's recording, which knows no
+    graph."""
     found = [
         Logged(
             t,
@@ -328,6 +329,6 @@ def logged_by(run: Run, nodes: Collection[str]) -> tuple[Logged, ...]:
 
 
 def console_log(line: str) -> tuple[str, str] | None:
-    """Level and text of a line as rospy and roscpp print what they log; None for any other line."""
+    """Return the level and text of a line as rospy and roscpp print what they log; None for any other line."""
     match = _CONSOLE.match(bare(line))
     return (match[1].lower(), match[2]) if match else None

@@ -75,7 +75,7 @@ class Count(Record):
 
     @cached_property
     def stuck(self) -> int:
-        """How many times the last value came at the end."""
+        """Return how many times the last value came at the end."""
         same = 0
         for value in reversed(self.values):
             if value != self.values[-1]:
@@ -85,7 +85,7 @@ class Count(Record):
 
     @cached_property
     def period_ns(self) -> float:
-        """The usual time between two values: the median, or half the mean where they come in bursts."""
+        """Return the usual time between two values: the median, or half the mean where they come in bursts."""
         gaps = [s.to_ns - s.from_ns for s in self.steps]
         if not gaps:
             return 0.0
@@ -124,14 +124,14 @@ class Count(Record):
         return sum(s.change > 1 for s in self.steps)
 
     def is_flood(self, run: Run, rate_hz: float) -> bool:
-        """So many messages that the publisher's own queue drops some."""
+        """Return whether there are so many messages that the publisher's own queue drops some."""
         span_s = (self.times_ns[-1] - self.times_ns[0]) / 1e9
         warp = run.warp if run.clock == "warped" else 1.0
         least_hz = max(FLOOD_FACTOR * rate_hz * warp, FLOOD_HZ)
         return len(self.steps) > 20 and len(self.steps) >= least_hz * span_s
 
     def usual_step(self) -> float | None:
-        """The step that at least four of five are, None where there is none."""
+        """Return the step that at least four of five are; None where there is none."""
         changes = Counter(s.change for s in self.steps)
         change, times = changes.most_common(1)[0] if changes else (0.0, 0)
         return change if times and times >= 0.8 * len(self.steps) else None
@@ -257,7 +257,7 @@ class Turns(NamedTuple):
 
 
 def turns_of(count: Count, run: Run, params: WrapParams) -> Turns:
-    """Where bad turns of a flood are let pass, all count as good."""
+    """Return the turns of the counter. Where bad turns of a flood are let pass, all count as good."""
     turns = [s for s in count.steps if s.change < 0]
     good = [s for s in turns if _is_good(s, params)]
     bad = [s for s in count.steps[int(count.begins_astray) :] if _is_bad(s, params)]

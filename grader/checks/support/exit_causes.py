@@ -278,7 +278,7 @@ def _explained(life: Life, run: Run, package: PackageFacts) -> Ending:
 
 
 def _not_run(life: Life, package: PackageFacts) -> Ending | None:
-    """The script comes to its end because what it defines is never called, or because its loop is left."""
+    """Explain a script that comes to its end because nothing calls what it defines, or because its loop is left."""
     kinds = ("main-guard", "never-called", "loop-left")
     slips = [s for s in package.slips if s.file == life.start.script and s.kind in kinds]
     if not slips:
@@ -330,7 +330,7 @@ def _limit(life: Life, run: Run) -> str:
 
 
 def _refused_name(life: Life, run: Run) -> Ending | None:
-    """rospy shuts a node down whose topic has a name that the master does not take."""
+    """Explain a node that rospy shut down because the master does not take the name of its topic."""
     found = (_ILLEGAL_NAME.search(c.line) for _, c in run.lines(life.name) if "illegal chars" in c.line)
     match = next(filter(None, found), None)
     if match is None:
@@ -344,7 +344,7 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
 
 
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
-    """One traceback, with the line of the student's own file where it names one."""
+    """Explain one traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
     slip = _slip(found, package)
     cause, hint = slip or CAUSES.get(found.kind, ("", "fix the line that is named"))
@@ -524,7 +524,7 @@ def process_tracebacks(
 
 
 def is_rospys_own(found: Traceback) -> bool:
-    """A race of rospy's own shutdown, or a thread in which no line of the student's takes part."""
+    """Return whether it is a race of rospy's own shutdown, or a thread in which no line of the student's takes part."""
     race = found.kind == "ROSException" and RACE in found.message
     if found.kind == "TypeError" and _ARITY.match(found.message):
         return False  # a callback that takes other values: rospy's line calls it

@@ -108,7 +108,8 @@ def bounds_text(low: float | None, high: float | None) -> str:
 
 
 def is_within(value: float, low: float | None, high: float | None) -> bool:
-    """A bound counts as within, also where a 32-bit field cannot hold it exactly. NaN is outside."""
+    """Return whether the value is within. A bound counts, also where a 32-bit field cannot hold it exactly; NaN does
+    not."""
     above = low is None or value >= low - ROUNDING * max(1.0, abs(low))
     below = high is None or value <= high + ROUNDING * max(1.0, abs(high))
     return above and below and value == value  # noqa: PLR0124 - NaN is not itself
@@ -128,7 +129,7 @@ class Difference(NamedTuple):
 
 
 def differences(got: object, wanted: object, tolerance: float, path: str = "") -> Iterator[Difference]:
-    """Each place in which `got` is not as `wanted`; fields that `wanted` leaves out do not matter."""
+    """Yield each place in which `got` is not as `wanted`; fields that `wanted` leaves out do not matter."""
     if isinstance(wanted, Mapping):
         yield from _in_fields(got, wanted, tolerance, path)
     elif isinstance(wanted, list | tuple):
@@ -189,7 +190,7 @@ def _kinds(got: object, wanted: object) -> str:
 
 
 def fields_text(value: Mapping[str, Any]) -> str:
-    """A request's or an answer's fields in one line."""
+    """Return a request's or an answer's fields in one line."""
     return shown(", ".join(f"{name}: {value_text(one)}" for name, one in value.items())) or "nothing"
 
 

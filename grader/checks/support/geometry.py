@@ -71,7 +71,7 @@ class Command(NamedTuple):
 
 
 def moved(pose: Pose, command: Command, duration_s: float) -> Pose:
-    """Where a command leads in that time: exactly, along the arc that it describes."""
+    """Return where a command leads in that time: exactly, along the arc that it describes."""
     half = command.turn * duration_s / 2
     chord = duration_s * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
     cos, sin = math.cos(pose.heading + half), math.sin(pose.heading + half)

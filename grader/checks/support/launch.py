@@ -131,7 +131,7 @@ def not_run(run: Run) -> Verdict | None:
 
 
 def has_program(package: PackageFacts, name: str) -> bool:
-    """A file of that name, or a program that CMake builds under it."""
+    """Return whether there is a file of that name, or a program that CMake builds under it."""
     if "/" not in name and find_script(package, name) is not None:
         return True
     return any(one.is_called(name) and not is_elsewhere(one, package) for one in programs(package))
@@ -170,7 +170,7 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
 
 
 def illegal_name(node: LaunchNode) -> Slip | None:
-    """A name at which roslaunch only warns, and which other tools stumble over."""
+    """Return a name at which roslaunch only warns, and which other tools stumble over."""
     name = node.name or ""
     if UNRESOLVED in name or re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
         return None
@@ -311,7 +311,7 @@ def is_exact(node: LaunchNode) -> bool:
 
 
 def nodes_up(run: Run, node: LaunchNode) -> tuple[str, ...]:
-    """The names in the graph under which it came up."""
+    """Return the names in the graph under which it came up."""
     pattern = name_pattern(node)
     return tuple(name for name in run.student_nodes() if pattern.fullmatch(name))
 
@@ -384,7 +384,7 @@ def not_started(*scripts: SourceFile) -> Absence:
 
 
 def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | None:
-    """Its traceback where it was printed, or what roslaunch says of its end."""
+    """Return its traceback where it was printed, or what roslaunch says of its end."""
     code = died(run, node)
     if code is None:
         return None
@@ -412,7 +412,7 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
 
 
 def quoted(run: Run) -> str:
-    """The first line in which roslaunch says what is wrong, as the end of a sentence."""
+    """Return the first line in which roslaunch says what is wrong, as the end of a sentence."""
     said = roslaunch_error(run)
     return f"; roslaunch says: {said}" if said else ""
 

@@ -61,12 +61,12 @@ _CAUSES = (
 
 
 def absolute_name(name: str) -> str:
-    """With the slash in front, and none at the end."""
+    """Return the name with the slash in front, and none at the end."""
     return "/" + name.strip("/")
 
 
 def leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 - as XML-RPC gives it
-    """A parameter as its leaves; an empty map is one of its own."""
+    """Yield a parameter as its leaves; an empty map is one of its own."""
     if isinstance(value, Mapping) and value:
         for key, item in value.items():
             yield from leaves(f"{name.rstrip('/')}/{key}", item)
@@ -99,7 +99,7 @@ def where_given(package: PackageFacts, name: str) -> LaunchParam | None:
 
 
 def without_system_params(found: Mapping[str, Any]) -> dict[str, Any]:
-    """Without what ROS itself keeps there."""
+    """Return the parameters without those that ROS itself keeps there."""
     return {name: value for name, value in found.items() if not name.startswith(SYSTEM)}
 
 
@@ -115,7 +115,7 @@ def _apply(found: dict[str, Any], event: ParamEvent) -> None:
 
 
 def describe_missing(found: Mapping[str, Any], name: str) -> str:
-    """`there is no /details/name/first` with what is there in its place."""
+    """Return `there is no /details/name/first`, with what is there in its place."""
     last = name.rpartition("/")[2]
     others = without_system_params(found)
     same = [n for n in others if n.rpartition("/")[2] == last]
@@ -251,7 +251,7 @@ class Words(NamedTuple):
 
 
 def explain_yaml(lines: Sequence[str]) -> Words | None:
-    """The cause among the lines that were printed; None where none is known."""
+    """Return the cause among the lines that were printed; None where none is known."""
     text = "\n".join(lines)
     places = _PLACE.findall(text)
     line = int(places[-1][0]) if places else None

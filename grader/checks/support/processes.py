@@ -89,7 +89,7 @@ def failed_program(run: Run, names: Collection[str]) -> str:
 
 
 def how_it_ended(end: ProcessEvent) -> str:
-    """`exit code 1`, or `signal 9`."""
+    """Return `exit code 1`, or `signal 9`."""
     return f"signal {end.signal}" if end.exit_code is None else f"exit code {end.exit_code}"
 
 
@@ -183,7 +183,8 @@ TypeName = Annotated[str, Field(pattern=r"^[A-Za-z]\w*/[A-Za-z]\w*$")]
 
 
 def nodes_of(run: Run, process: str) -> tuple[str, ...]:
-    """The nodes of one process, or the student's all where `process` is empty or no one noted whose they are."""
+    """Return the nodes of one process; all of the student's where `process` is empty, or the graph names no
+    processes."""
     return run.student_nodes(process) if process and are_noted(run) else run.student_nodes()
 
 
@@ -193,19 +194,19 @@ def are_noted(run: Run) -> bool:
 
 
 def is_named(node: str, names: Iterable[str], anonymous: Anonymous) -> bool:
-    """Anonymous is the base name with `_<digits>_<digits>` after it, as rospy makes it."""
+    """Return whether a node has this name. An anonymous one has `_<digits>_<digits>` after it, as rospy makes it."""
     bases = _bases(names)
     plain = node in bases and anonymous != "required"
     return plain or (base_name(node) != node and base_name(node) in bases and anonymous != "forbidden")
 
 
 def base_name(node: str) -> str:
-    """`/talker` for `/talker_4711_1700000000000`, and any other name as it is."""
+    """Return `/talker` for `/talker_4711_1700000000000`, and any other name as it is."""
     return _SUFFIX.sub("", node)
 
 
 def wanted_names(names: Iterable[str], anonymous: Anonymous) -> str:
-    """`/talker or /numeric_talker, plain or anonymous`."""
+    """Return `/talker or /numeric_talker, plain or anonymous`."""
     return f"{join_words(_bases(names), 'or')}, {_KINDS[anonymous]}"
 
 
@@ -241,7 +242,7 @@ def _global(name: str) -> str:
 
 
 def plain_type(name: str) -> str:
-    """`std_srvs/Empty`, also where another tool wrote `std_srvs/srv/Empty`."""
+    """Return `std_srvs/Empty`, also where another tool wrote `std_srvs/srv/Empty`."""
     return name.replace("/msg/", "/").replace("/srv/", "/")
 
 

@@ -41,7 +41,7 @@ def texts_in(value: object) -> Iterator[str]:
 
 
 def near_names(wanted: str, names: Iterable[str]) -> tuple[str, ...]:
-    """Those of `names` that look like a slip of `wanted`: case, namespace, separator, a typing error."""
+    """Return those of `names` that look like a slip of `wanted`: case, namespace, separator, a typing error."""
     looked_at = islice(dict.fromkeys(names), NAMES_MAX)
     found = [n for n in looked_at if n != wanted and _is_near(wanted, n)]
     return tuple(sorted(found, key=lambda n: -_similarity(wanted, n)))
@@ -82,7 +82,7 @@ def _squeezed(name: str) -> str:
 
 
 def bare(text: str) -> str:
-    """Without the terminal's colours."""
+    """Return the text without the terminal's colours."""
     return _ANSI.sub("", text)
 
 
@@ -98,7 +98,7 @@ def in_one_line(text: str) -> str:
 
 
 def words_pattern(words: str) -> str:
-    """A regular expression for words without regard to case and to how many blanks stand between them."""
+    """Return a regular expression for words without regard to case and to how many blanks stand between them."""
     parts = r"\s+".join(re.escape(part) for part in re.split(r"\s+", words))
     return f"(?i:{parts})" if words else ""
 

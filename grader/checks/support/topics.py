@@ -195,7 +195,7 @@ def losses(run: Run, topic: str) -> Losses | None:
 
 
 def whole_until_ns(run: Run, topic: str, until_ns: int | None = None) -> int | None:
-    """Up to when every message of the topic was recorded, `until_ns` at the most."""
+    """Return until when every message of the topic was recorded, `until_ns` at the most."""
     lost = losses(run, topic)
     if lost is None:
         return until_ns

@@ -107,7 +107,8 @@ def _rename_package(folder: Path, repair: Repair) -> None:
 def _scripts(
     files: Files, package: PackageFacts, wanted: Wanted, renames: dict[str, str]
 ) -> list[SourceFile]:
-    """The files that are run: those of the lab in its order, then those of launch files, then what they import."""
+    """Return the files that are run: those of the lab in its order, then those of launch files, then what they
+    import."""
     own = [f for f in package.files if is_own(f.path) and not f.link_problem]
     python = [f for f in own if f.python_fault is None or f.python_fault.kind not in UNREAD]
     named = [PurePosixPath(path).name for path in (*wanted.scripts, *wanted.installed)]

@@ -176,7 +176,7 @@ def _replaced(text: str, token: Token, new: str) -> str:
 
 
 def _close_bracket(files: Files) -> None:
-    """At the end of the last line that is no comment, or in a line of its own."""
+    """Close the bracket at the end of the last line that is no comment, or in a line of its own."""
     text = _cmake(files)
     if commands_of(text.encode()) is not None:
         return
@@ -191,7 +191,7 @@ def _close_bracket(files: Files) -> None:
 
 
 def _spell_commands(files: Files) -> None:
-    """Commands with nearly the name of a known one, unless the file defines them."""
+    """Spell commands right that have nearly the name of a known one, unless the file defines them."""
     defined = {words[0].value.lower() for c in _commands(files, "function", "macro") if (words := _words(c))}
     for command in reversed(commands_of(_cmake(files).encode()) or []):
         name = command.identifier
@@ -204,7 +204,7 @@ def _spell_commands(files: Files) -> None:
 
 
 def _name_project(files: Files, name: str, wanted: str) -> None:
-    """A manifest whose name is nearly the lab's gets that name later."""
+    """Name the project. A manifest whose name is nearly the lab's gets that name later."""
     right = wanted if _is_meant(files, name, wanted) else name
     for command in _commands(files, "project")[:1]:
         words = _words(command)
@@ -263,7 +263,7 @@ def _install(files: Files, package: PackageFacts, wanted: Wanted) -> None:
 
 
 def _place(own: Sequence[str], files: Files, script: str) -> str:
-    """Where the script lies; the empty text where it is not there."""
+    """Return where the script lies; "" where it is not there."""
     name = PurePosixPath(script).name
     copies = [p for p in own if PurePosixPath(p).name == name]
     renamed = [
@@ -277,7 +277,7 @@ def _plain(word: str) -> str:
 
 
 def _name_script(files: Files, own: Sequence[str], path: str) -> None:
-    """In place of a file that does not exist and has nearly its name, or beside the others."""
+    """Name the script in place of a file that does not exist and has nearly its name, or beside the others."""
     text, name = _cmake(files), PurePosixPath(path).name
     call = next((c for c in _commands(files, INSTALL) if any(t.value == "PROGRAMS" for t in _words(c))), None)
     if call is None:

@@ -51,7 +51,7 @@ def _bare(name: str, role: str) -> str:
 
 
 def _resolved(name: Name, node: str) -> str:
-    """The whole name, as ROS resolves it for a node in the root namespace."""
+    """Return the whole name, as ROS resolves it for a node in the root namespace."""
     if name.role == "node":
         return name.value.strip("/")
     if name.value.startswith("~"):
@@ -66,7 +66,7 @@ def _is_slip(name: Name, right: str, node: str) -> bool:
 
 
 def _literal(name: Name, right: str, node: str) -> str:
-    """The right name in the way that the wrong one is written: relative, private, or whole."""
+    """Return the right name in the way that the wrong one is written: relative, private, or whole."""
     own = f"/{node.strip('/')}/"
     if name.role == "node":
         return right.strip("/")
@@ -76,7 +76,7 @@ def _literal(name: Name, right: str, node: str) -> str:
 
 
 def _replace_literal(files: Files, file: str, name: Name, value: str, right: str) -> None:
-    """Where an earlier replacement has moved the literal, it is found by its value."""
+    """Replace the literal; where an earlier replacement has moved it, it is found by its value."""
     text = files.text(file)
     if text is None:
         return
@@ -184,7 +184,7 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
 
 
 def _own_name(files: Files, given: str) -> str:
-    """The package's name once its manifest is repaired."""
+    """Return the package's name once its manifest is repaired."""
     manifest, _ = parse_manifest((files.text(MANIFEST) or "").encode())
     return manifest.name if manifest is not None else given
 

@@ -108,7 +108,7 @@ def _examined(texts: dict[str, str], types: Sequence[str]) -> Iterator[_Entry]:
 
 
 def _site() -> str:
-    """The folder that has fissix, which the child finds nowhere else."""
+    """Return the folder that has fissix, which the child finds nowhere else."""
     spec = find_spec("fissix")
     return str(Path(spec.origin).parents[1]) if spec is not None and spec.origin else ""
 
@@ -151,7 +151,7 @@ def _indented(before: str, after: str) -> str:
 
 
 def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[str, str]:
-    """What is wrong, and how it is repaired; "" where the changed line says it."""
+    """Return what is wrong, and how it is repaired; "" where the changed line says it."""
     first = steps[0]
     place, word = f"line {first.line} of {file}", first.word
     calls = ", ".join(f"{one}()" for one in word.split(", "))
