@@ -6,9 +6,11 @@ import json
 
 import pytest
 
+from grader.evidence.events import ActorEvent
+from grader.evidence.run import Run
 from grader.judging import criteria_bytes, judge, overall_status, reached_pass_mark, total_points
-from grader.judging.summary import round_half_up
-from grader.model.result import CriterionResult
+from grader.judging.summary import notes_of, round_half_up
+from grader.model.result import CriterionResult, Note
 from grader.model.verdict import FileCitation, Status
 from tests.judging.rubrics import ALL, GOOD_RUN, PACKAGE, rubric
 from tests.support.timeline import build_runs
@@ -94,3 +96,64 @@ def test_bytes_are_canonical() -> None:
     assert [c["id"] for c in json.loads(first)] == ["rate", "chatter", "node", "executable"]
     assert "größer".encode() in criteria_bytes([result()])
     assert json.loads(criteria_bytes([result()]))[0]["citations"] == [{"file": "a.py", "line": 1}]
+
+
+def run(*events: tuple[str, str, str], own: bool = True) -> Run:
+    actors = tuple(
+        (number, ActorEvent(action=action, actor=actor, detail=detail))
+        for number, (action, actor, detail) in enumerate(events)
+    )
+    metadata = {"format": "1"} if own else {}
+    return Run(
+        evidence="x.mcap",
+        scenario="x",
+        clock="real",
+        warp=1.0,
+        metadata=metadata,
+        start_ns=0,
+        end_ns=9,
+        actors=actors,
+    )
+
+
+SHUTDOWN = ("refused", "talker.py", "asked the master to shut down")
+
+
+def test_what_was_refused_and_what_was_too_much_in_the_order_of_the_runs():
+    flood = ("limit", "/talker", "sent more than 10000 messages on /chatter")
+    probe = ("publish", "grader", "")
+    found = notes_of(
+        {"package": run(("limit", "cmake", "too many processes")), "real": run(probe, flood, SHUTDOWN)}
+    )
+    assert found == (
+        Note(scenario="package", actor="cmake", kind="limit", text="too many processes"),
+        Note(scenario="real", actor="talker.py", kind="refused", text="asked the master to shut down"),
+        Note(
+            scenario="real", actor="/talker", kind="limit", text="sent more than 10000 messages on /chatter"
+        ),
+    )
+
+
+def test_equal_ones_are_told_once():
+    assert len(notes_of({"real": run(SHUTDOWN, SHUTDOWN, SHUTDOWN)})) == 1
+    assert len(notes_of({"real": run(SHUTDOWN), "fast": run(SHUTDOWN)})) == 2
+
+
+def test_of_many_the_first_are_told_and_the_others_counted():
+    many = [("refused", "x", f"called {n}") for n in range(45)] + [
+        ("limit", "x", f"sent {n}") for n in range(3)
+    ]
+    found = notes_of({"real": run(*many)})
+    assert [n.kind for n in found] == ["refused"] * 21 + ["limit"] * 3
+    assert found[20] == Note(scenario="real", actor="", kind="refused", text="and 25 more of this kind")
+
+
+def test_long_texts_are_cut():
+    (note,) = notes_of({"real": run(("limit", "a" * 10**6, "b" * 10**6))})
+    assert len(note.actor) < 200
+    assert len(note.text) < 400
+
+
+def test_a_recording_of_another_tool_has_none():
+    assert notes_of({"real": run(SHUTDOWN, own=False)}) == ()
+    assert notes_of({}) == ()

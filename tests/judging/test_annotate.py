@@ -1,0 +1,278 @@
+"""What is added to verdicts: advice, the text of cited lines, hints in the language of a node, and unchanged files."""
+
+from __future__ import annotations
+
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from grader.checks import CHECKS
+from grader.checks.support.text import LOOP, in_language, init, publisher, set_param
+from grader.integrations.bundle import Bundle, add_lab
+from grader.judging import judge
+from grader.judging.annotate import LINE_CHARS, add_advice, said_for_node, show_lines
+from grader.judging.early import judge_files
+from grader.judging.facts import Facts
+from grader.model.package import PackageFacts
+from grader.model.result import CriterionResult
+from grader.model.verdict import FileCitation, Status, failed, passed
+from grader.package import read_package
+from grader.rubric.load import load_rubric, read_beside_rubric
+from tests.judging.rubrics import ALL, EXECUTABLE, GOOD_RUN, SCRIPT, rubric
+from tests.package.trees import CMAKE, MANIFEST, NODE, make_package
+from tests.rubric.samples import faults, spoiled
+from tests.support.timeline import build_runs
+
+CMAKE_CHECK = {"id": "cmake", "check": "cmake", "with": {"name": "lab1"}}
+OUT = "roslaunch leaves a <node> out: launch/x.launch, line 2:"
+NODES = '<launch>\n<node pkg="lab1" type="talker" name="a"/>\n<node pkg="lab1" type="plain.py" name="b"/></launch>'
+
+
+def facts(folder, **files: str) -> PackageFacts:
+    tree = {"package.xml": MANIFEST, "CMakeLists.txt": CMAKE, **files}
+    return read_package(make_package(folder / "lab1", tree, executable={"src/plain.py": False}))
+
+
+def criterion(
+    hint: str = "", *, status: Status = Status.PASS, scenario: str | None = None
+) -> CriterionResult:
+    return CriterionResult(
+        id="cmake",
+        title="",
+        check="cmake",
+        scenario=scenario,
+        status=status,
+        points=0,
+        max_points=1,
+        message="",
+        expected="",
+        measured="",
+        hint=hint,
+        reproduce="",
+        citations=(),
+    )
+
+
+def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
+    script = "#!/usr/bin/env python3\n"
+    files = {
+        "src/old.py": "print 'a'\n",
+        "src/talker.py": script,
+        "src/plain.py": script,
+        "launch/x.launch": NODES,
+    }
+    package = facts(tmp_path, **files)
+    (told,) = add_advice([criterion()], package, rubric(CMAKE_CHECK))
+    assert told.hint.split("; ") == [
+        "src/old.py does not parse: this is Python 2: `print` needs brackets, `print(...)`",
+        "line 1: write `print('a')`",
+        f'{OUT} there is no talker in the package: type="talker" lacks the .py of src/talker.py',
+        'write type="talker.py"',
+        "src/plain.py has no executable bit, so that roslaunch does not find it (launch/x.launch, line 3)",
+        "chmod +x src/plain.py, then git add --chmod=+x src/plain.py, commit and push",
+    ]
+    assert add_advice([told], package, rubric(CMAKE_CHECK)) == (told,)
+    lost = criterion(status=Status.FAIL)
+    assert add_advice([lost], package, rubric(CMAKE_CHECK)) == (lost,)
+
+
+TALKER = "#!/usr/bin/env python3\nimport rospy\n\n    print('I heard ' + 5)\n" + "x" * (LINE_CHARS + 1) + "\n"
+
+
+def shown(kind=failed, **place) -> FileCitation:
+    build = build_runs({"runs": {"package": {"attachments": {"talker.py": TALKER}}}})["package"]
+    (citation,) = show_lines(
+        kind("it died", citations=(FileCitation(file="talker.py", **place),)), build
+    ).citations
+    assert isinstance(citation, FileCitation)
+    return citation
+
+
+def test_a_line_has_its_text() -> None:
+    assert shown(line=2).source == "import rospy"
+
+
+def test_pythons_carets_are_moved_by_the_indentation() -> None:
+    found = shown(line=4, column=7, end_column=21, source="print('I heard ' + 5)")
+    assert (found.column, found.end_column) == (11, 25)
+    assert found.source[found.column - 1 : found.end_column - 1] == "'I heard ' + 5"
+
+
+@pytest.mark.parametrize("place", [{"line": 1}, {"line": 3}, {"line": 5}, {"line": 99}, {}])
+def test_what_stands_for_the_file_or_is_empty_or_long_has_none(place: dict[str, int]) -> None:
+    assert shown(**place).source == ""
+
+
+def test_a_pass_stays_as_it_is() -> None:
+    assert shown(passed, line=2).source == ""
+
+
+CMAKE_CPP = CMAKE + "\nadd_executable(talker src/talker.cpp)\n"
+LAUNCH = (
+    '<launch>\n<node pkg="lab1" type="talker" name="sender"/>\n'
+    '<node pkg="lab1" type="listener.py" name="hearer"/>\n</launch>\n'
+)
+MIXED = {
+    "package.xml": MANIFEST,
+    "CMakeLists.txt": CMAKE_CPP,
+    "src/talker.cpp": "int main() {}\n",
+    "src/listener.py": "#!/usr/bin/env python3\n",
+    "launch/both.launch": LAUNCH,
+}
+PYTHON = MIXED | {"CMakeLists.txt": CMAKE, "src/talker.py": ""}
+del PYTHON["src/talker.cpp"]
+STARTS = [{"name": "talker", "script": "src/talker"}, {"name": "listener", "script": "src/listener.py"}]
+GRAPH = {
+    "nodes": ["/sender", "/hearer"],
+    "topic_types": {"/numbers": "std_msgs/Int8"},
+    "publishers": {"/numbers": ["/sender"]},
+    "subscribers": {"/numbers": ["/hearer"]},
+    "services": {},
+}
+
+
+def hint(
+    folder: Path,
+    files: dict[str, str],
+    starts: list[dict[str, str]],
+    message: str = "",
+    processes: dict[str, str] | None = None,
+    **asked: str,
+) -> str:
+    """What a student reads of `LOOP`, in a criterion with these parameters."""
+    package = read_package(make_package(folder / "lab1", files))
+    scenario = {"title": "t", "start": starts, "until": {"window_s": 6, "topics": ["/numbers"]}}
+    criterion: dict[str, Any] = {"id": "c", "check": "some", "with": asked, "scenario": "run"}
+    known = rubric(criterion, scenarios={"run": scenario})
+    runs = build_runs({"runs": {"run": {"graph": [{"at_s": 0, **GRAPH, "processes": processes or {}}]}}})
+    facts = Facts(rubric=known, runs=runs, package=package)
+    return said_for_node(failed(message, hint=LOOP), known.criteria[0], facts).hint
+
+
+ROSPY, ROSCPP = "while not rospy.is_shutdown():", "while (ros::ok())"
+OF_SCRIPTS = {"/sender": "talker", "/hearer": "listener"}
+
+
+@pytest.mark.parametrize(
+    ("said", "asked", "wanted"),
+    [
+        ("", {"process": "talker"}, ROSCPP),
+        ("", {"process": "listener"}, ROSPY),
+        ("", {"topic": "/numbers"}, ROSCPP),
+        ("/hearer never subscribes to /numbers", {"topic": "/numbers"}, ROSPY),
+        ("/sender ended", {"publisher": "sender", "subscriber": "hearer"}, ROSCPP),
+        ("nothing was published", {"topic": "/other"}, f"{ROSPY} (in C++: {ROSCPP})"),
+    ],
+)
+@pytest.mark.parametrize("launched", [False, True])
+def test_each_node_of_a_mixed_package(tmp_path, said, asked, wanted, launched) -> None:
+    starts = [{"name": "both", "launch": "both.launch"}] if launched else STARTS
+    if launched and asked.get("process"):
+        asked, said = {}, f"/{'sender' if asked['process'] == 'talker' else 'hearer'} ended"
+    processes = dict.fromkeys(OF_SCRIPTS, "both") if launched else OF_SCRIPTS
+    assert hint(tmp_path, MIXED, starts, said, processes, **asked) == wanted
+
+
+@pytest.mark.parametrize(
+    ("files", "starts", "wanted"),
+    [
+        (PYTHON, STARTS[1:], ROSPY),
+        (PYTHON, [{"name": "both", "launch": "both.launch"}], ROSPY),
+        (MIXED, STARTS[:1], ROSCPP),
+        (MIXED, [{"name": "all", "built": True}], ROSCPP),
+        (MIXED, [{"name": "talker", "script": "src/absent.py"}], ROSPY),
+    ],
+)
+def test_what_a_scenario_starts_says_it_alone(tmp_path, files, starts, wanted) -> None:
+    assert hint(tmp_path, files, starts, topic="/nothing") == wanted
+
+
+@pytest.mark.parametrize(
+    ("said", "python", "cpp"),
+    [
+        (init("a"), "rospy.init_node('a')", 'ros::init(argc, argv, "a")'),
+        (
+            init("a", anonymous=True),
+            "rospy.init_node('a', anonymous=True)",
+            'ros::init(argc, argv, "a", ros::init_options::AnonymousName)',
+        ),
+        (
+            publisher("/n", "Int8, queue_size=10", type="std_msgs::Int8"),
+            "rospy.Publisher('/n', Int8, queue_size=10)",
+            'nh.advertise<std_msgs::Int8>("/n", 10)',
+        ),
+        (set_param("/on", True), "rospy.set_param('/on', True)", 'ros::param::set("/on", true)'),
+        ("nothing of code", "nothing of code", "nothing of code"),
+    ],
+)
+def test_what_is_written_in_each(said, python, cpp) -> None:
+    assert in_language(said, "python") == python
+    assert in_language(said, "cpp") == cpp
+    assert in_language(said, None) == (python if python == cpp else f"{python} (in C++: {cpp})")
+
+
+TALKER_FILE = "src/numeric_talker.py"
+HANDED_OUT = "a" * 64
+SAID = f"; {TALKER_FILE} is still as the course handed it out"
+DIED = {"processes": [{"name": "talker", "exit_s": 0.3, "exit_code": 1}], "outcome": "ended"}
+
+
+def told(
+    digest: str, run: dict[str, Any] = GOOD_RUN, *, executable: bool = True
+) -> dict[str, tuple[str, bool]]:
+    """Each criterion's status, and whether its message ends with what is said of the script of this content."""
+    files = [{**SCRIPT, "sha256": digest, "executable": executable}]
+    runs = build_runs({"runs": {"talker": run}, "package": {"files": files}})
+    results = judge(rubric(*ALL), runs, CHECKS, {HANDED_OUT})
+    return {c.id: (c.status.value, c.message.endswith(SAID)) for c in results}
+
+
+def test_a_lost_criterion_names_its_unchanged_file() -> None:
+    assert told(HANDED_OUT, executable=False)["executable"] == ("fail", True)
+    assert told("b" * 64, executable=False)["executable"] == ("fail", False)
+    assert told(HANDED_OUT)["executable"] == ("pass", False)
+
+
+def test_the_program_of_a_run_is_named_and_what_is_blocked_names_nothing() -> None:
+    assert told(HANDED_OUT, DIED) == {
+        "rate": ("blocked", False),
+        "chatter": ("blocked", False),
+        "node": ("fail", True),
+        "executable": ("pass", False),
+    }
+
+
+def test_a_verdict_from_the_files_alone_names_it_too(tmp_path: Path) -> None:
+    tree = {"package.xml": MANIFEST, "CMakeLists.txt": CMAKE, TALKER_FILE: NODE}
+    facts = read_package(make_package(tmp_path / "lab1", tree, executable={TALKER_FILE: False}))
+    (found,) = judge_files(rubric(EXECUTABLE), facts, CHECKS, {sha256(NODE.encode()).hexdigest()})
+    assert found.criterion.message.endswith(SAID)
+
+
+def with_starter(folder: Path, **files: str) -> Path:
+    for name, text in files.items():
+        path = folder / "handed_out" / "src" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return spoiled(folder, ("package: lab1\n", "package: lab1\nstarter: handed_out\n"))
+
+
+def test_the_starter_belongs_to_the_rubric(tmp_path: Path) -> None:
+    path = with_starter(tmp_path, talker="# TODO\n", empty="")
+    loaded = load_rubric(str(path))
+    assert loaded.handed_out == {sha256(b"# TODO\n").hexdigest()}  # what is empty says nothing
+    names = {"handed_out/src/talker.py", "handed_out/src/empty.py"}
+    assert read_beside_rubric(loaded).keys() == names
+    bundle = Bundle()
+    add_lab(bundle, loaded, "lab")
+    assert {name for name, _, _ in bundle.entries()} == {"lab/lab.yaml", *(f"lab/{name}" for name in names)}
+    with_starter(tmp_path, talker="# TO DO\n")
+    assert load_rubric(str(path)).digest != loaded.digest
+
+
+@pytest.mark.parametrize("files", [{}, {"empty": ""}])
+def test_a_starter_without_files_is_a_fault(tmp_path: Path, files: dict[str, str]) -> None:
+    (fault,) = faults(with_starter(tmp_path, **files))
+    assert fault == "lab.yaml:6: starter: there is no folder handed_out with files in it beside the rubric"
