@@ -90,8 +90,20 @@ def _from_setup(setup: Path) -> RosInstallation:
     python = shutil.which("python3", path=env.get("PATH", SYSTEM_PATH)) or "/usr/bin/python3"
     distro = env.get("ROS_DISTRO", setup.parent.name)
     return RosInstallation(
-        kind="setup", where=str(setup), distro=distro, python=python, prefixes=(str(setup.parent),), env=env
+        kind="setup", where=str(setup), distro=distro, python=python, prefixes=_prefixes(setup, env), env=env
     )
+
+
+def _prefixes(setup: Path, env: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the folders that a `setup.bash` stands for: of a workspace its own, and those of all below it."""
+    named = (env.get(name, "") for name in ("CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH"))
+    paths = [
+        setup.parent,
+        *(Path(entry) for entries in named for entry in entries.split(os.pathsep) if entry),
+    ]
+    known = [path for path in paths if path.is_absolute() and path.is_dir()]
+    outside = dict.fromkeys(path for path in known if not path.resolve().is_relative_to("/usr"))
+    return tuple(str(path) for path in outside if not outside.keys() & set(path.parents))
 
 
 def _debian() -> RosInstallation | None:

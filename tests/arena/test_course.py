@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
+import tarfile
 from pathlib import Path
 
 import pytest
 
 from grader.api import grade
+from grader.arena.base_workspace import unpack
 from grader.errors import HostError
 from grader.evidence.reader import load_run
 from grader.model.result import GradingResult
@@ -139,3 +142,25 @@ def test_where_something_that_is_needed_is_missing_nothing_is_graded(
     with pytest.raises(HostError, match="the lab needs no-such-module, which this machine lacks") as caught:
         graded(tmp_path)
     assert caught.value.hint.endswith("-m pip install no-such-module")
+
+
+@pytest.mark.parametrize("newer", [True, False], ids=["a Python with filters", "Debian 12's own Python"])
+def test_what_was_built_is_unpacked_by_every_python(tmp_path: Path, monkeypatch, *, newer: bool) -> None:
+    if not newer:
+        monkeypatch.delattr(tarfile, "data_filter", raising=False)
+    devel = tmp_path / "made" / "devel" / "lib"
+    devel.mkdir(parents=True)
+    (devel / "libtank.so.1").write_bytes(b"\x7fELF")
+    (devel / "libtank.so").symlink_to("libtank.so.1")
+    built = io.BytesIO()
+    with tarfile.open(fileobj=built, mode="w") as archive:
+        archive.add(tmp_path / "made" / "devel", "devel")
+        for name, link in (("devel/out", "/etc"), ("devel/up", ".."), ("../beside", ""), ("devel/hard", "")):
+            member = tarfile.TarInfo(name)
+            member.type, member.linkname = (tarfile.SYMTYPE if link else tarfile.LNKTYPE), link or "devel/lib"
+            archive.addfile(member)
+    unpack(built.getvalue(), tmp_path / "course")
+    found = sorted(str(path.relative_to(tmp_path / "course")) for path in (tmp_path / "course").rglob("*"))
+    assert found == ["devel", "devel/lib", "devel/lib/libtank.so", "devel/lib/libtank.so.1"]
+    assert (tmp_path / "course" / "devel" / "lib" / "libtank.so").read_bytes() == b"\x7fELF"
+    assert not (tmp_path / "beside").exists()

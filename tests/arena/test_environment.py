@@ -25,6 +25,7 @@ from grader.ros_env import (
     ROS_VARIABLES,
     VALUE_BYTES,
     excess_of,
+    find_ros,
     keep_ros_variables,
     parse_env,
 )
@@ -225,3 +226,19 @@ def test_no_path_of_the_machine_is_seen(tmp_path: Path) -> None:
     assert "/proc/1/cmdline /usr/bin/bwrap --args" in text
     for word in ("grader-", str(tmp_path), "place", "pytest", os.environ.get("TMPDIR") or "/run/src"):
         assert word not in text, word
+
+
+def test_a_workspace_shows_what_it_lies_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`GRADER_ROS_SETUP` may name a course's `devel/setup.bash`, sourced over ROS's own."""
+    ros, workspace = tmp_path / "ros" / "noetic", tmp_path / "course"
+    for folder in (ros / "share", workspace / "devel", workspace / "src"):
+        folder.mkdir(parents=True)
+    setup = workspace / "devel" / "setup.bash"
+    setup.write_text(
+        f"export CMAKE_PREFIX_PATH={workspace}/devel:{ros}:/usr:/not/there:here\n"
+        f"export ROS_PACKAGE_PATH={workspace}/src:{ros}/share:/usr/share\n"
+    )
+    monkeypatch.setenv("GRADER_ROS_SETUP", str(setup))
+    found = find_ros()
+    assert found is not None
+    assert found.prefixes == tuple(map(str, (workspace / "devel", ros, workspace / "src")))
