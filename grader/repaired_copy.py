@@ -58,8 +58,13 @@ def choose_repairs(
             for one in find_repairs(package.folder, own, wanted_of(rubric, own.asked))
         ]
     counting = [one for one in found if rubric.share_of(one.kind) > 0]
-    chosen = [one for one in counting if one.kind not in DONE_BEFORE_RUNS][:REPAIRS_MAX]
     built = built or not needs_build(facts)
+
+    def helps(one: Repair) -> bool:
+        used = any(is_used_by(rubric.scenarios[name], one, rubric, built=built) for name in lost)
+        return used or any(concerns(one, c, rubric, by_id, built=built) for c in blocked)
+
+    chosen = [one for one in counting if one.kind not in DONE_BEFORE_RUNS and helps(one)][:REPAIRS_MAX]
     scenarios = {
         name
         for name in lost

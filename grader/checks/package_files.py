@@ -198,28 +198,54 @@ def _judged(package: PackageFacts, params: ManifestParams) -> Verdict:
     found = package.manifest
     if found is None:
         return _unreadable(package.manifest_fault)
-    place = (FileCitation(file=found.file, line=found.name_line),)
-    if found.name != params.name:
-        slip = " (a typo in the name)" if near_names(params.name, [found.name]) else ""
-        message = f"{found.file} names the package {found.name!r}, the handout calls it {params.name!r}{slip}"
-        hint = "; ".join([_rename(package, found, params.name), *package.general_hints()])
-        return failed(message, measured=f"name {found.name}", hint=hint, citations=place)
-    if not _builds_with_catkin(found):
-        measured = f"build tool {found.build_type or 'none'}, no dependency on catkin"
-        hint = "add <buildtool_depend>catkin</buildtool_depend>"
-        message = f"{found.file} does not name catkin as its build tool"
-        if (found.build_type or "").startswith("ament"):
-            message = f"{found.file} is for a ROS 2 package (its build type is {found.build_type})"
-            hint = (
-                f"make a package for ROS 1: catkin_create_pkg {' '.join((params.name, *params.dependencies))}"
-            )
-        return failed(message, measured=measured, hint=hint, citations=place)
+    if (found.build_type or "").startswith("ament"):
+        return _of_ros_2(found, params)
+    wrong = [v for v in (_misnamed(package, found, params.name), _unbuilt(found)) if v is not None]
     if lacking := _lacking(found, params.dependencies):
-        return lacking
+        wrong.append(lacking)
+    if wrong:
+        hints = [*(v.hint for v in wrong), *(package.general_hints() if found.name != params.name else ())]
+        others = [v.message.removeprefix(f"{found.file} ") for v in wrong[1:]]
+        update = {"message": join_words([wrong[0].message, *others]), "hint": "; ".join(hints)}
+        return wrong[0].model_copy(update=update)
+    place = (FileCitation(file=found.file, line=found.name_line),)
     declares = f", declares {join_words(params.dependencies)}" if params.dependencies else ""
     message = f"{found.file} names {found.name}, built with catkin{declares}"
     measured, hint = f"name {found.name}, format {found.format}", "; ".join(package.general_hints())
     return passed(message, measured=measured, hint=hint, citations=place)
+
+
+def _of_ros_2(found: Manifest, params: ManifestParams) -> Verdict:
+    made = " ".join((params.name, *params.dependencies))
+    return failed(
+        f"{found.file} is for a ROS 2 package (its build type is {found.build_type})",
+        measured=f"name {found.name}, build type {found.build_type}",
+        hint=f"make a package for ROS 1: catkin_create_pkg {made}",
+        citations=(FileCitation(file=found.file, line=found.name_line),),
+    )
+
+
+def _misnamed(package: PackageFacts, found: Manifest, name: str) -> Verdict | None:
+    if found.name == name:
+        return None
+    slip = " (a typo in the name)" if near_names(name, [found.name]) else ""
+    return failed(
+        f"{found.file} names the package {found.name!r}, the handout calls it {name!r}{slip}",
+        measured=f"name {found.name}",
+        hint=_rename(package, found, name),
+        citations=(FileCitation(file=found.file, line=found.name_line),),
+    )
+
+
+def _unbuilt(found: Manifest) -> Verdict | None:
+    if _builds_with_catkin(found):
+        return None
+    return failed(
+        f"{found.file} does not name catkin as its build tool",
+        measured=f"build tool {found.build_type or 'none'}, no dependency on catkin",
+        hint="add <buildtool_depend>catkin</buildtool_depend>",
+        citations=(FileCitation(file=found.file, line=found.name_line),),
+    )
 
 
 @check("dependencies", params=DependenciesParams, run_anyway=True)

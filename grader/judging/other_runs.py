@@ -16,7 +16,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.repair import Repair, advice_of, place_of
 from grader.model.result import CriterionResult, Repaired
-from grader.model.verdict import Status, Verdict, failed
+from grader.model.verdict import FileCitation, Status, Verdict, failed
 from grader.rubric.model import Criterion, Rubric, Scenario
 from grader.wording import join_words
 
@@ -31,6 +31,7 @@ DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark",
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 OF_PACKAGES = {"package.xml", "CMakeLists.txt"}
 SHARES = {1.0: "all", 0.5: "half"}
+NUMBER = re.compile(r"\d+(\.\d+)?")
 
 Runs = dict[str, Run]
 
@@ -102,12 +103,15 @@ def judged_on_copy(
     that they needed; where they are lost on the copy too, they say why.
     """
     verdicts, uses = dict(first), dict[str, Repaired]()
-    better = {
-        c.id for c in rubric.criteria if first[c.id].status.is_lost and not _is_worse(first, on_copy, c)
-    }
     needs = {
         c.id: tuple(one for one in repairs if concerns(one, c, rubric, first, built=built))
         for c in rubric.criteria
+    }
+    better = {
+        c.id
+        for c in rubric.criteria
+        if first[c.id].status.is_lost
+        and (not _is_worse(first, on_copy, c) or _is_next(first[c.id], on_copy[c.id], needs[c.id]))
     }
     charges = _charges(rubric, first, better, needs)
     for criterion in rubric.criteria:
@@ -181,6 +185,24 @@ def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], crit
     return copy.status is Status.ERROR
 
 
+def _is_next(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> bool:
+    """Return whether a loss is in what was repaired, and the copy loses the criterion by another fault."""
+    files = {repair.file for repair in repairs}
+    found = [c for c in one.citations if isinstance(c, FileCitation) and c.file in files]
+    again = {(c.file, c.line) for c in copy.citations if isinstance(c, FileCitation)}
+    return (
+        found != []
+        and not copy.unjudged
+        and not {(c.file, c.line) for c in found} & again
+        and _is_other_fault(one, copy)
+    )
+
+
+def _is_other_fault(one: Verdict, copy: Verdict) -> bool:
+    said, then = (NUMBER.sub("", verdict.message) for verdict in (one, copy))
+    return copy.status.is_lost and said != then
+
+
 def _charges(
     rubric: Rubric,
     first: Mapping[str, Verdict],
@@ -196,9 +218,10 @@ def _charges(
     criteria = [by_id[name] for name in order if name in better]
     needed = dict.fromkeys(one for repairs in needs.values() for one in repairs)
     for repair in sorted(needed, key=lambda one: one.kind not in NAMES):
-        asking = [c.id for c in rubric.criteria if c.scenario is None and _asks_for(first[c.id], repair)]
+        asking = [c for c in rubric.criteria if c.scenario is None and _asks_for(first[c.id], repair)]
+        asking = [c for c in asking if _names(c, repair)] or asking
         if asking:
-            charges[repair] = {asking[0]}
+            charges[repair] = {asking[0].id}
             continue
         possible = [c for c in criteria if repair in needs[c.id]]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
@@ -240,9 +263,29 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         verdict = failed(
             message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
         )
-    if copy.status.is_lost and verdict.hint:
-        return verdict  # the repair brings up another fault, so it is not the advice
-    return verdict.model_copy(update={"hint": "; ".join(advice_of(one) for one in repairs)})
+    if copy.status.is_lost and not _is_next(verdict, copy, repairs) and verdict.hint:
+        return verdict  # the repair brings up what its own advice is about
+    told = [one for one in repairs if _is_told(one, verdict.hint)]
+    clauses = verdict.hint.split("; ") if told else []
+    if any(one not in told for one in repairs):
+        clauses = [clause for clause in clauses if any(_is_told(one, clause) for one in told)]
+    hints = clauses + [advice_of(one) for one in repairs if one not in told]
+    said = verdict.message
+    words = [said, *(one.message for one in repairs if one.file not in said and one.message not in said)]
+    if _is_next(verdict, copy, repairs):
+        words.append(f"with that repaired, {copy.message}")
+        hints += [f"then {copy.hint}"] if copy.hint else []
+    return verdict.model_copy(update={"message": "; ".join(words), "hint": "; ".join(hints)})
+
+
+def _is_told(repair: Repair, hint: str) -> bool:
+    """Return whether the check's own hint says how this is repaired: how git learns of a bit, what has a name."""
+    if repair.kind == "executable-bit":
+        return repair.file in hint and "chmod" in hint
+    new = _words(repair.after) - _words(repair.before)
+    return (
+        repair.kind == "package-name" and repair.file in OF_PACKAGES and new <= _words(hint) and new != set()
+    )
 
 
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:

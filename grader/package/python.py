@@ -52,6 +52,8 @@ _LINES = (
     (r"^\s*(if|elif|while)\b[^=(:]*[^=!<>(:]=[^=]", "`=` gives a value to a name; to compare, write `==`"),
     (r"^\s*(if|elif|else|while|for|def|class|try|except|finally|with)\b.*;\s*$",
      "the line that begins a block ends with `:`, not with `;`"),
+    (r"^\s*(if|elif|else|while|for|def|class|try|except|finally|with)\b.*:\s*[^\s\w'\"()\[\]{}:]+\s*$",
+     "something stands behind the `:` that ends the line: delete it"),
     (r"\basync\b(?!\s+(def|for|with)\b)", "`async` is a reserved word since Python 3.7: use another name"),
 )  # fmt: skip
 
@@ -272,7 +274,7 @@ def _without_texts(line: str) -> str:
 def _lacks_colon(text: str, column: int | None) -> bool:
     code = _without_texts(text).rstrip()
     at_end = column is None or column > len(text.split("#", maxsplit=1)[0].rstrip())
-    return at_end and not code.endswith(":") and _BLOCK.match(code) is not None
+    return at_end and not re.search(r":\W*$", code) and _BLOCK.match(code) is not None
 
 
 def _character(message: str, text: str) -> str:

@@ -53,27 +53,36 @@ def gate_words(result: GradingResult) -> tuple[str, ...]:
 
 
 def repair_words(result: GradingResult) -> tuple[str, ...]:
-    """Return a sentence for each fault that a repaired copy was judged without: what it costs, and what it does not."""
+    """Return a sentence for each fault that a repaired copy was judged without: what it costs, and what it does not.
+    Faults that cost the same points are told together, those that cost nothing not at all."""
     judged: dict[Repair, list[CriterionResult]] = {}
     for criterion in result.criteria:
         for repair in criterion.repaired.repairs if criterion.repaired else ():
             judged.setdefault(repair, []).append(criterion)
-    return tuple(_repair_words(repair, criteria) for repair, criteria in judged.items())
+    together: dict[tuple[str, ...], list[Repair]] = {}
+    for repair, criteria in judged.items():
+        together.setdefault(tuple(c.id for c in criteria), []).append(repair)
+    said = (_repair_words(repairs, judged[repairs[0]]) for repairs in together.values())
+    return tuple(words for words in said if words)
 
 
-def _repair_words(repair: Repair, criteria: list[CriterionResult]) -> str:
+def _repair_words(repairs: list[Repair], criteria: list[CriterionResult]) -> str:
     charged = [c for c in criteria if c.repaired and c.repaired.charged]
     others = [c for c in criteria if c not in charged]
     cost = sum(c.missing for c in charged)
-    place = "" if repair.file in repair.message else f" ({place_of(repair)})"
-    words = f"{repair.message}{place}: this costs you {plural(cost, 'point')}"
+    if not cost and not any(c.counts for c in others):
+        return ""
+    wrong = [
+        one.message if one.file in one.message else f"{one.message} ({place_of(one)})" for one in repairs
+    ]
+    words = f"{join_words(wrong)}: this costs you {plural(cost, 'point')}"
     words += f" ({', '.join(c.id for c in charged)})" if charged else ""
     if others:
         share = min(c.repaired.share for c in others if c.repaired)
         earned = "" if share == 1 else f", for {share:.0%} of the points"
         were = "was" if len(others) == 1 else "were"
         words += f"; {join_words(c.id for c in others)} {were} judged with this repaired{earned}"
-    return f"{words[:1].upper()}{words[1:]}"
+    return words if words.startswith(repairs[0].file) else f"{words[:1].upper()}{words[1:]}"
 
 
 def judged_repaired(result: GradingResult) -> dict[str, list[str]]:

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from unicodedata import east_asian_width
 
 from grader.errors import PackageNotFound, SubmissionError
 from grader.judging.settle import lateness
 from grader.judging.summary import total_fields, total_points
+from grader.model.repair import Repair
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.rubric.model import Rubric
 from grader.untrusted_text import CITATIONS_MAX, clip, visible
 from grader.wording import number, plural
 
+ON_COPY = re.compile(r"judged on a copy with .*? repaired: ")
 NAMES_AND_NUMBERS = re.compile(r"/[\w/~]+|\d+(\.\d+)?")
 PLACE_CHARS = 300
 SOURCE_CHARS = 60
+POINTS_EQUAL = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,17 +84,27 @@ def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
     asked_first = sorted(
         losses, key=lambda loss: not (loss.criterion.repaired and loss.criterion.repaired.charged)
     )
-    return tuple(sorted(_folded(asked_first, _mistake), key=lambda loss: -loss.points))
+    charged = {
+        one: used.repairs
+        for loss in asked_first[::-1]
+        if (used := loss.criterion.repaired) and used.charged
+        for one in used.repairs
+    }
+    folded = _folded(asked_first, partial(_mistake, charged=charged))
+    return tuple(sorted(folded, key=lambda loss: -loss.points))
 
 
-def _mistake(loss: Loss) -> Hashable:
+def _mistake(loss: Loss, charged: Mapping[Repair, tuple[Repair, ...]]) -> Hashable:
+    """`charged` says of a repair with which others it is charged."""
     criterion = loss.criterion
-    if criterion.repaired is not None:
-        return criterion.repaired.repairs
+    used = criterion.repaired
+    if used is not None and (used.charged or criterion.points >= used.share * criterion.full - POINTS_EQUAL):
+        costly = min(used.repairs, key=lambda one: one not in charged)
+        return used.repairs if used.charged else charged.get(costly, used.repairs)
     lines = tuple(c for c in criterion.citations if isinstance(c, FileCitation) and c.line is not None)
     if not criterion.hint:
         return criterion.id
-    said = criterion.message
+    said = ON_COPY.sub("", criterion.message)
     if said.startswith("/"):  # how a topic behaves: of two topics of one run, one loop is the reason
         said = f"{criterion.scenario} {NAMES_AND_NUMBERS.sub('', said)}"
     return criterion.hint, lines or said

@@ -98,6 +98,25 @@ def test_what_fails_on_the_copy_too_says_why() -> None:
     assert "5" in found["rate"].measured
 
 
+def died(error: str, line: int) -> dict[str, Any]:
+    """A run in which the talker dies of an error in this line."""
+    where = f'  File "/ws/src/lab1/src/numeric_talker.py", line {line}, in main'
+    console = [{"process": "talker", "stream": "stderr", "at_s": 0.2, "lines": [where, error]}]
+    if not error.startswith("SyntaxError"):
+        console[0]["lines"] = ["Traceback (most recent call last):", where, error]
+    return {**DIED, "console": console}
+
+
+def test_the_fault_behind_a_repaired_one_is_named() -> None:
+    first, then = died("SyntaxError: invalid syntax", 7), died("KeyError: 'first'", 21)
+    node = judged(first, then, TABS)["node"]
+    assert (node.status.value, node.points) == ("fail", 0)
+    assert "SyntaxError" in node.message
+    assert "with that repaired" in node.message
+    assert "KeyError: 'first'" in node.message
+    assert node.hint.startswith("src/numeric_talker.py line 7: indent every line with four spaces; then ")
+
+
 def test_a_copy_that_helps_nothing_changes_nothing() -> None:
     runs = build_runs({"runs": {"talker": DIED}, "package": PACKAGE})
     alone = judge(rubric(*ALL), runs)

@@ -9,9 +9,11 @@ import pytest
 
 from grader.errors import HostError, OutputError
 from grader.files import atomic_write, check_writable
-from grader.model.result import ErrorInfo
+from grader.model.repair import Repair
+from grader.model.result import ErrorInfo, Repaired
 from grader.model.verdict import Status
 from grader.report.files import result_bytes, write_reports
+from grader.report.sentences import repair_words
 from grader.report.view import arrange, without_hidden
 from tests.report.hostile import result, rubric
 from tests.support.a_class import criterion
@@ -127,6 +129,40 @@ def test_one_mistake_is_told_once(messages, mistakes):
         for name, message in zip(names, messages, strict=True)
     ]
     assert len(arrange(result(criteria=tuple(same)), rubric()).lost) == mistakes
+
+
+def copied(name, status, points, *, charged=False, **fields):
+    """A criterion of 5 points that was judged on a copy without a mistake in its indentation."""
+    repair = Repair(kind="python-syntax", file="a.py", line=1, message="line 1 of a.py: tabs", fix="spaces")
+    use = Repaired(repairs=(repair,), share=0.5, charged=charged)
+    return criterion(name, status, points, 5, repaired=use, **fields)
+
+
+def test_what_is_lost_on_the_repaired_copy_too_is_told_by_itself():
+    on_copy = "judged on a copy with a.py line 1 repaired: "
+    criteria = (
+        copied("talker-node", Status.FAIL, 0, charged=True, message="tabs"),
+        copied("chatter-rate", Status.PARTIAL, 2.5, message=f"{on_copy}half of the points; 10 Hz"),
+        copied("counter-start", Status.FAIL, 0, message=f"{on_copy}/a begins with 1", hint="add later"),
+        copied("counter-step", Status.FAIL, 0, message=f"{on_copy}/b begins with 2", hint="add later"),
+    )
+    lost = arrange(result(criteria=criteria), rubric()).lost
+    told = [(loss.criterion.id, [c.id for c in loss.alike]) for loss in lost]
+    assert told == [("counter-start", ["counter-step"]), ("talker-node", ["chatter-rate"])]
+
+
+def test_repairs_of_one_loss_are_told_together():
+    bits = [
+        Repair(kind="executable-bit", file=name, message=f"{name} is not executable", fix=f"chmod +x {name}")
+        for name in ("src/a.py", "src/b.py")
+    ]
+    use = Repaired(repairs=tuple(bits), share=1, charged=True)
+    lost = criterion("launch", Status.FAIL, 0, 5, repaired=use)
+    free = criterion("advice", Status.FAIL, 0, 0, repaired=use.model_copy(update={"repairs": (bits[0],)}))
+    assert repair_words(result(criteria=(lost,))) == (
+        "src/a.py is not executable and src/b.py is not executable: this costs you 5 points (launch)",
+    )
+    assert repair_words(result(criteria=(free,))) == ()
 
 
 def test_a_blocked_criterion_whose_cause_is_not_there_is_told_by_itself():

@@ -187,7 +187,17 @@ def _rewritten(fault: Fault) -> str:
     right = source
     for pattern, new in rules:
         right = re.sub(pattern, new, right, count=0 if len(rules) > 1 else 1)
-    return right if right != source else ""
+    return right if right != source and _parses(right) else ""
+
+
+def _parses(line: str) -> bool:
+    """Return whether a line is good Python by itself, or the beginning of a block."""
+    before = {"el": "if 1: pass\n", "ex": "try: pass\n", "fi": "try: pass\n"}.get(line[:2], "")
+    try:
+        ast.parse(before + line + (" pass" if line.endswith(":") else ""))
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return False
+    return True
 
 
 def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:

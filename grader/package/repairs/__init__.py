@@ -60,7 +60,7 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     names = repair_python(files, paths, wanted.types)
     name = repair_manifest(files, package, wanted)
     repair_cmake(files, package, name, wanted)
-    rename_package(files, wanted)
+    rename_package(files, package, wanted)
     files_now = [renames.get(f.path, f.path) for f in package.files if is_own(f.path)]
     repair_launch_names(files, package, files_now, wanted)
     for script in names:

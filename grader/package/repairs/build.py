@@ -43,11 +43,11 @@ def repair_manifest(files: Files, package: PackageFacts, wanted: Wanted) -> str:
     return manifest.name
 
 
-def rename_package(files: Files, wanted: Wanted) -> None:
-    """Find a name that is nearly the lab's, in the manifest; whatever else has it follows."""
+def rename_package(files: Files, package: PackageFacts, wanted: Wanted) -> None:
+    """Find a name in the manifest in place of which the lab's is meant; whatever else has it follows."""
     text = files.text(MANIFEST)
     manifest, _ = parse_manifest(text.encode()) if text is not None else (None, None)
-    if text is None or manifest is None or not _is_meant(files, manifest.name, wanted.package):
+    if text is None or manifest is None or not _is_meant(files, package, manifest.name, wanted.package):
         return
     old, new = manifest.name, wanted.package
     message = f"line {manifest.name_line} of {MANIFEST}: the package is called {old}, not {new}"
@@ -59,10 +59,14 @@ def rename_package(files: Files, wanted: Wanted) -> None:
             files.put(file, rename_word(other, old, new))
 
 
-def _is_meant(files: Files, name: str, wanted: str) -> bool:
-    """Return whether the name is nearly the lab's, or the manifest alone has another one."""
+def _is_meant(files: Files, package: PackageFacts, name: str, wanted: str) -> bool:
+    """Return whether the name is nearly the lab's, or the package has another one elsewhere: CMakeLists.txt the lab's,
+    or all launch files the lab's or the folder's."""
     projects = [words[0].value for command in _commands(files, "project") if (words := _words(command))]
-    return is_near(name, wanted) or (name != wanted and projects == [wanted])
+    launched = {node.pkg for launch in package.launch_files for node in launch.nodes}
+    others = {wanted, PurePosixPath(package.path).name} - {name}
+    called = projects == [wanted] or (bool(launched & others) and name not in launched)
+    return is_near(name, wanted) or (name != wanted and called)
 
 
 def _parses(text: str) -> bool:
@@ -143,7 +147,7 @@ def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted)
         below = ("find_package", "project")
         _add_call(files, "catkin_package()", r"catkin_package\s*\(", "catkin_package()", below)
     _install(files, package, wanted)
-    _name_project(files, name, wanted.package)
+    _name_project(files, package, name, wanted.package)
 
 
 def _cmake(files: Files) -> str:
@@ -203,9 +207,9 @@ def _spell_commands(files: Files) -> None:
             files.change("build-line", CMAKE, text[:start] + right + text[start + len(name) :], message)
 
 
-def _name_project(files: Files, name: str, wanted: str) -> None:
-    """Name the project. A manifest whose name is nearly the lab's gets that name later."""
-    right = wanted if _is_meant(files, name, wanted) else name
+def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -> None:
+    """Name the project. A manifest in whose name the lab's is meant gets that name later."""
+    right = wanted if _is_meant(files, package, name, wanted) else name
     for command in _commands(files, "project")[:1]:
         words = _words(command)
         if words and words[0].value.strip('"') not in (name, right) and "$" not in words[0].value:

@@ -22,7 +22,7 @@ from grader.wording import join_words, plural
 EXAMINE = "grader.package.python_child:examine"
 LIMITS = {"memory_bytes": 1 << 30, "cpu_s": 20, "file_bytes": 32 << 20, "answer_bytes": 16 << 20}
 WALL_S = 10.0
-INDENTED_SHOWN = 4
+INDENTED_SHOWN = 12
 ATTEMPTS = 3
 """A source that crashes Python costs its own repairs, not those of the others."""
 
@@ -140,14 +140,21 @@ def _change(files: Files, file: str, cause: Cause, steps: list[_Step]) -> None:
 def _indented(before: str, after: str) -> str:
     """How lines that are indented with tabs have to begin, so that the file parses."""
     pairs = enumerate(zip(before.split("\n"), after.split("\n"), strict=False), start=1)
-    lines = [
-        (number, len(new) - len(new.lstrip())) for number, (old, new) in pairs if old != new and new.strip()
+    lines: dict[int, list[int]] = {}
+    for number, (old, new) in pairs:
+        if old != new and new.strip():
+            lines.setdefault(len(new) - len(new.lstrip()), []).append(number)
+    if sum(map(len, lines.values())) > INDENTED_SHOWN:
+        numbers = sorted(number for some in lines.values() for number in some)
+        return (
+            f"indent with spaces only, the same at each level, from line {numbers[0]} to {numbers[-1]}; "
+            "`grader check --fix` does it"
+        )
+    begun = [
+        f"{'line' if len(some) == 1 else 'lines'} {join_words(map(str, some))} with {plural(spaces, 'space')}"
+        for spaces, some in lines.items()
     ]
-    if len(lines) > INDENTED_SHOWN:
-        first, spaces = lines[0]
-        return f"indent with spaces only, the same at each level, in {len(lines)} lines: line {first} with {spaces}"
-    begun = join_words(f"line {number} with {plural(spaces, 'space')}" for number, spaces in lines)
-    return f"replace the tabs: start {begun}"
+    return f"replace the tabs: start {join_words(begun)}"
 
 
 def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[str, str]:
