@@ -132,7 +132,7 @@ def print_status(path: Path, *, as_json: bool) -> ExitCode:
 
 
 def _cells(one: LabStatus) -> Iterator[str]:
-    due = f"{one.deadline:%Y-%m-%d %H:%M}" if one.deadline else "-"
+    due = f"{one.deadline:%Y-%m-%d %H:%M %Z}" if one.deadline else "-"
     changed = f" ({one.changed} changed)" if one.changed else ""
     yield from (
         one.name,

@@ -15,7 +15,7 @@ from grader.classes.feedback.forges import Comments
 from grader.classes.feedback.forms import FORMS, Form, Settings
 from grader.classes.feedback.publish import Publishing, Step, plan, read_published, refuse_other_rubric
 from grader.classes.feedback.send import Delivery, Failure, Selection, Wanted, deliver, faults, selected
-from grader.classes.review.requests import Asked, fetch, rows_of, write_requests
+from grader.classes.review.requests import Asked, fetch, rows_of, waiting, write_requests
 from grader.classes.review.serve import git_user
 from grader.classes.review.session import ReviewSession, open_session
 from grader.classes.roster.entries import parse_time
@@ -85,6 +85,8 @@ def _step_lines(batch: BatchFolder, steps: Sequence[Step], *, dry_run: bool) -> 
             first, *more = step.changes
             yield f"{step.entry.id}: {first}"
             yield from (f"    {change}" for change in more)
+    for fault in batch.run.faults:
+        yield f"{fault.id or 'a row without an id'}: cannot be published: {fault}"
     counts = Counter("failed" if step.failed else step.state for step in steps)
     words = {
         "new": "would be published" if dry_run else "published",
@@ -169,12 +171,16 @@ def _end(form: Form, selection: Selection, delivery: Delivery) -> None:
         say(f"  not published: {first_few(selection.unpublished, NAMES_SHOWN)}")
 
 
-def _say_failures(failures: Sequence[Failure]) -> None:
-    if failures:
-        say_beside(f"{plural(len(failures), 'student')} got nothing:")
+def _say_failures(failures: Sequence[Failure], what: str = "got nothing") -> None:
+    """Say each reason once, with all whom it concerns."""
+    by_reason: dict[str, list[str]] = {}
     for failure in failures:
         hint = f" ({failure.hint})" if failure.hint else ""
-        say_beside(f"  {failure.id}: {failure.message}{hint}")
+        by_reason.setdefault(f"{failure.message}{hint}", []).append(failure.id)
+    if failures:
+        say_beside(f"{plural(len(failures), 'student')} {what}:")
+    for reason, ids in by_reason.items():
+        say_beside(f"  {', '.join(ids)}: {reason}")
 
 
 def _others(selection: Selection) -> Iterator[str]:
@@ -202,10 +208,12 @@ def list_requests(folder: Path, forge: str | None, label: str, *, as_json: bool)
             "text": one.text,
             "when": one.when,
             "source": one.source,
-            "answer": answer.answer if (answer := decided.get(student, {}).get(criterion)) else "",
+            "answer": "" if one in open_ or by is None else by.answer,
         }
         for student, of in asked.found.items()
         for criterion, ones in of.items()
+        for by in [decided.get(student, {}).get(criterion)]
+        for open_ in [waiting(ones, by)]
         for one in ones
     ]
     if as_json:
@@ -224,8 +232,7 @@ def list_requests(folder: Path, forge: str | None, label: str, *, as_json: bool)
         )
     for fault in asked.faults:
         say_beside(f"left out: {fault}")
-    for failure in failures:
-        say_beside(f"{failure.id}: {failure.message}" + (f" ({failure.hint})" if failure.hint else ""))
+    _say_failures(failures, "whose questions could not be fetched")
     return ExitCode.NOT_GRADED if failures else ExitCode.PASSED
 
 

@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import os
 import re
+import subprocess
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
-from urllib.parse import unquote
+from urllib.parse import unquote, urlsplit
 
 from grader.errors import UsageError
+from grader.host_programs import find_user_program, with_absolute_paths
 
+HELPER_S = 30
 USER, PASSWORD = "GRADER_LOGIN_USER", "GRADER_LOGIN_PASSWORD"
 _HELPER = (
     f'!f() {{ test "$1" = get || exit 0; printf "username=%s\\npassword=%s\\n" "${USER}" "${PASSWORD}"; }}; f'
@@ -92,6 +96,39 @@ def accesses(url: str, login: Login | None) -> tuple[Access, ...]:
         return (*first, Access())
     # A token may stand in the place of the user.
     return (*first, _named(place, login.user), _with(place, Login(user=login.user, password="")))
+
+
+def helper_password(server: str) -> str:
+    """Return what git's own helpers have as the password for a server's address; empty if they have none.
+
+    Nobody is asked for it: a program that would ask is not started.
+    """
+    parts = urlsplit(server)
+    wanted = f"protocol={parts.scheme}\nhost={parts.netloc}\n\n"
+    silent = {"GIT_TERMINAL_PROMPT": "0", "GIT_ASKPASS": "", "SSH_ASKPASS": "", "GCM_INTERACTIVE": "never"}
+    options = (
+        "-c",
+        "credential.interactive=false",
+        "-c",
+        "credential.guiPrompt=false",
+        "-c",
+        "core.askPass=",
+    )
+    with suppress(OSError, subprocess.SubprocessError):
+        done = subprocess.run(
+            [find_user_program("git") or "/usr/bin/git", *options, "credential", "fill"],
+            input=wanted,
+            env={**with_absolute_paths(os.environ), **silent},
+            cwd="/",
+            capture_output=True,
+            encoding="utf-8",
+            errors="replace",
+            timeout=HELPER_S,
+            check=True,
+        )
+        said = dict(row.split("=", 1) for row in done.stdout.splitlines() if "=" in row)
+        return said.get("password", "")
+    return ""
 
 
 def refused(stderr: str) -> bool:

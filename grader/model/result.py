@@ -85,6 +85,8 @@ class WrittenOverride(Record):
     """The ids of comments in `comments.yaml`; whatever changes there changes here."""
     answer: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
     """What the student is told who asked about the criterion."""
+    answered: Annotated[tuple[Annotated[str, Field(max_length=40)], ...], Field(max_length=100)] = ()
+    """The questions that the answer is to, by their digests; empty: all that there are."""
     together: Annotated[str, Field(max_length=40)] = ""
     """The same word for all that were decided in one go, and can be taken back in one."""
 
@@ -104,6 +106,8 @@ class Override(Record):
     """The ids of its comments in `comments.yaml`."""
     answer: str = Field(default="", max_length=COMMENT_CHARS, exclude_if=lambda value: not value)
     """What the student is told who asked about the criterion."""
+    answered: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
+    """The questions that the answer is to, by their digests; empty: all that there are."""
     together: str = Field(default="", exclude_if=lambda value: not value)
     """The same word for all that were decided in one go."""
 

@@ -257,7 +257,9 @@ def _evidence() -> Schema:
 
 def _overrides() -> Schema:
     """The file is a map, not a record. What may be left out may be left empty, too."""
-    override = _with_empty(WrittenOverride, ("comment", "author", "comments", "answer", "together"))
+    override = _with_empty(
+        WrittenOverride, ("comment", "author", "comments", "answer", "answered", "together")
+    )
     override["anyOf"] = [{"required": ["points"]}, {"required": ["comments"]}]
     return _two_levels("overrides", "What people decided: by submission, then by criterion.", override)
 

@@ -164,7 +164,8 @@ class _Writer:
         yield from (f"## {DECIDED_TITLE}", "")
         for override, criterion in self._first(found):
             yield f"- {self._code(criterion.id)}: {points_of(criterion)} {self._text(decision(override))}"
-            yield f"  - The check says: {self._text(automatic_words(override, criterion))}"
+            automatic = automatic_words(override, criterion)
+            yield from [f"  - The check says: {self._text(automatic)}"] if automatic else []
             again = look_again(override, criterion)
             yield from [f"  - **{self._text(again)}**"] if again else []
         yield from self._more(found)

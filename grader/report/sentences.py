@@ -150,7 +150,7 @@ def _time(time: datetime) -> str:
     """`2026-11-20 23:59 UTC+01:00`; seconds only where there are any."""
     clock = f"{time:%Y-%m-%d %H:%M:%S}".removesuffix(":00")
     offset = f"{time:%z}"
-    return f"{clock} UTC{offset[:3]}:{offset[3:5]}"
+    return f"{clock} UTC" + (f"{offset[:3]}:{offset[3:5]}" if int(offset) else "")
 
 
 def decision(override: AppliedOverride) -> str:
@@ -162,7 +162,9 @@ def decision(override: AppliedOverride) -> str:
 
 
 def automatic_words(override: AppliedOverride, criterion: CriterionResult) -> str:
-    """`fail 0/10: 5 Hz, not 10 Hz`."""
+    """`fail 0/10: 5 Hz, not 10 Hz`; empty where the points are a person's to award anyway."""
+    if override.automatic.status is Status.MANUAL:
+        return ""
     message = override.automatic.message
     return _said(override.automatic, criterion) + (f": {message}" if message else "")
 

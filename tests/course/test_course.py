@@ -225,7 +225,7 @@ def test_the_gradebook_has_all_who_are_in_the_course(course: Path) -> None:
     book = gradebook()
     assert list(book) == ["cem", "fay"]
     assert (book["fay"]["name"], book["fay"]["status"], book["fay"]["lab1"]) == ("Fay F", "inconclusive", "")
-    assert book["fay"]["error"] == "open: lab1"
+    assert (book["fay"]["error"], book["fay"]["points"]) == ("open: lab1", "")
 
 
 @pytest.mark.full
@@ -251,6 +251,12 @@ def test_status_says_what_to_do_next(course: Path, capsys) -> None:
     table = capsys.readouterr().out
     assert "2 of 2" in table
     assert "lab2: grader course grade course.yaml lab2" in table
+    assert "2026-10-30 12:00 UTC" in table
+    with (course / "rubric.yaml").open("a") as file:
+        file.write("# The same, in other words.\n")
+    assert status(capsys)["lab1"]["to_do"] == "grader regrade results/lab1 (its rubric has changed since)"
+    (course / "course.yaml").write_text(COURSE.replace("feedback: folder\n", ""))
+    assert status(capsys)["lab1"]["sent"] == 2
 
 
 @pytest.mark.full

@@ -133,7 +133,7 @@ def test_a_form_says_which_options_it_takes(published: Path, capsys) -> None:
 
 def test_moodles_zip(published: Path, capsys) -> None:
     assert feedback(published, "moodle") == 3
-    assert "bob: Moodle's number for this submission is not known" in capsys.readouterr().err
+    assert "  bob, fay: Moodle's number for this submission is not known" in capsys.readouterr().err
     with zipfile.ZipFile(published / "feedback-moodle.zip") as made:
         assert made.namelist() == [
             "Ada Lovelace_101_assignsubmission_file_/report.html",
@@ -169,7 +169,9 @@ def test_a_zip_has_what_was_not_in_the_one_before(published: Path) -> None:
 
 def test_the_names_of_canvas_stay_as_they_are(published: Path, capsys) -> None:
     assert feedback(published, "canvas", "--out", str(published / "up.zip")) == 3
-    assert "ada: the name of the file that was submitted to Canvas is not known" in capsys.readouterr().err
+    assert (
+        "ada, fay: the name of the file that was submitted to Canvas is not known" in capsys.readouterr().err
+    )
     with zipfile.ZipFile(published / "up.zip") as made:
         assert made.namelist() == ["bobby_LATE_12_345_lab1.zip", "cem_13_346_lab1.tar.gz"]
         bob, cem = (io.BytesIO(made.read(name)) for name in made.namelist())

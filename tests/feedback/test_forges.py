@@ -211,8 +211,23 @@ def test_without_a_token_nothing_is_asked(
     for name in ("GITHUB_TOKEN", "GH_TOKEN", "GITLAB_TOKEN"):
         monkeypatch.delenv(name, raising=False)
     assert both(published, system) == 2
-    assert "_TOKEN holds no token" in capsys.readouterr().err
+    assert "there is no token for http" in capsys.readouterr().err
     assert server.asked == []
+
+
+@pytest.mark.usefixtures("published")
+def test_a_token_of_gits_credential_helpers(
+    system: str, server: Forge, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys
+) -> None:
+    for name in ("GITHUB_TOKEN", "GH_TOKEN", "GITLAB_TOKEN"):
+        monkeypatch.delenv(name, raising=False)
+    place = "https://github.com" if system == "github" else server.address
+    helper = f'"!f() {{ test $1 = get && echo username=teacher && echo password={TOKEN}; }}; f"'
+    (tmp_path / ".gitconfig").write_text(f'[credential "{place}"]\n\thelper = {helper}\n')
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert both(tmp_path / "results", system) == 0
+    assert len(bodies(server)) == len(bodies(server, "bob")) == 1
+    assert TOKEN not in "".join(capsys.readouterr())
 
 
 def test_a_token_is_never_sent_in_the_clear(

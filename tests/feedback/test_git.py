@@ -126,6 +126,14 @@ def test_a_repository_with_settings_of_its_own_gets_nothing(
     assert git(ada, "branch", "--format=%(refname:short)") == "main"
 
 
+def test_a_bare_clone_is_a_repository_as_any(published: Path, ada: Path) -> None:
+    clone = ada.with_name("clone.git")
+    git(ada, "clone", "--quiet", "--bare", str(ada), str(clone))
+    use(published, {"ada": clone.as_uri()})
+    assert to_ada(published) == 0
+    assert "report.md" in git(clone, "ls-tree", "--name-only", "feedback")
+
+
 def test_a_working_copy_gets_nothing(published: Path, ada: Path, capsys) -> None:
     work = ada.with_name("ada.git-work")
     use(published, {"ada": work.as_uri(), "bob": str(work / "talker.py")})

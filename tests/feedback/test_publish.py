@@ -25,10 +25,18 @@ pytestmark = pytest.mark.usefixtures("without_processes")
 CRITERIA = (criterion("rate", Status.FAIL, 0, 10), criterion("style", Status.PASS, 10, 10))
 
 
-def by(author: str, points: float, comment: str = "", name: str = "rate") -> AppliedOverride:
+def by(
+    author: str, points: float, comment: str = "", name: str = "rate", answer: str = ""
+) -> AppliedOverride:
     was = Automatic(status=Status.FAIL, points=0, message="")
     return AppliedOverride(
-        criterion=name, points=points, comment=comment, author=author, automatic=was, was=was
+        criterion=name,
+        points=points,
+        comment=comment,
+        author=author,
+        automatic=was,
+        was=was,
+        answer=answer,
     )
 
 
@@ -56,6 +64,17 @@ LATE = Lateness(late_s=86400, points_before=10, points=5, text="1 day late: 5 ta
             result(5, overrides=(by("", 5, "a"),)),
             result(5, overrides=(by("", 5, "b"),)),
             ("override by a person, b (rate)",),
+        ),
+        (
+            result(5, overrides=(by("ann", 5, "a"),)),
+            result(5, overrides=(by("bob", 5, "a", answer="No."),)),
+            ("request answered (rate)",),
+        ),
+        (result(), result(overrides=(by("ann", 0, answer="No."),)), ("request answered (rate)",)),
+        (
+            result(5, overrides=(by("ann", 5, "a"),)),
+            result(10, overrides=(by("ann", 10, "a", answer="Yes."),)),
+            ("15 → 20: override by ann, a (rate)",),
         ),
         (
             result(),
@@ -218,3 +237,25 @@ def test_a_file_of_a_newer_grader_is_refused(out: Path, capsys) -> None:
     assert "written by a newer grader (grader.published/2); this one reads up to 1" in capsys.readouterr().err
     path.write_text("torn")
     assert publish(out) == 2
+
+
+def test_rows_that_are_not_in_the_class_are_named(out: Path, capsys) -> None:
+    run_ = out / "run.json"
+    data = json.loads(run_.read_text())
+    data["faults"] = [{"where": "roster.csv:9", "id": "hal", "text": "no source"}]
+    run_.write_text(json.dumps(data))
+    publish(out, "--dry-run")
+    assert "hal: cannot be published: roster.csv:9: no source\n" in capsys.readouterr().out
+
+
+def test_an_answer_alone_is_published(out: Path, capsys) -> None:
+    publish(out)
+    award(out, "ada", "style", 5, answer="It stays.")
+    capsys.readouterr()
+    publish(out)
+    assert "ada: request answered (style)\n" in capsys.readouterr().out
+    published = read_published(out)
+    assert (
+        "to your request: It stays."
+        in (published.folder(published.history["ada"][-1]) / "report.md").read_text()
+    )

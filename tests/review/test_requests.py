@@ -120,3 +120,22 @@ def test_the_answer_is_kept_and_the_student_reads_it(page, out) -> None:
 def test_a_decision_without_an_answer_leaves_it_open(page) -> None:
     page.save("ada", "style", points="9")
     assert rows(page.text("/?show=asked")) == ["ada", "dana"]
+
+
+@pytest.mark.usefixtures("asked")
+def test_who_asks_again_waits_again(page, out) -> None:
+    page.save("ada", "style", points="9", answer="No.")
+    assert rows(page.text("/?show=asked")) == ["dana"]
+    with (out / "requests.csv").open("a") as file:
+        file.write(",ada,style,But why?,\n")
+    assert rows(page.text("/?show=asked")) == ["ada", "dana"]
+    page.save("ada", "style", points="9", answer="No.")  # saved once more, for another reason
+    assert rows(page.text("/?show=asked")) == ["ada", "dana"]
+    page.save("ada", "style", points="9", answer="No: see the handout.")
+    assert rows(page.text("/?show=asked")) == ["dana"]
+
+
+@pytest.mark.usefixtures("asked")
+def test_an_answer_written_by_hand_is_to_all_questions(page, out) -> None:
+    (out / "overrides.yaml").write_text("ada: {style: {points: 9, answer: No.}}\n")
+    assert rows(page.text("/?show=asked")) == ["dana"]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from grader import __version__
@@ -96,7 +96,8 @@ def status_of(course: CourseFile) -> Iterator[LabStatus]:
 
 
 def _status(course: CourseFile, name: str) -> LabStatus:
-    rubric = load_rubric(course.rubric(name)).rubric
+    loaded = load_rubric(course.rubric(name))
+    rubric = loaded.rubric
     batch = open_lab(course, name)
     if batch is None:
         grade = f"grader course grade {course.path} {name}"
@@ -105,8 +106,7 @@ def _status(course: CourseFile, name: str) -> LabStatus:
         return LabStatus(name=name, title=rubric.title, deadline=rubric.deadline, to_do=to_do)
     counts, published = batch.run.counts, read_published(batch.path)
     states = Counter(step.state for step in plan(batch, published))
-    form = course.course.feedback
-    log = SentLog(batch.path, form) if form else None
+    log = SentLog(batch.path, course.course.feedback or "")
     last = [history[-1] for history in published.history.values()]
     now = with_late_days(Roster(file="", entries=batch.run.entries), course, name).entries
     found = LabStatus(
@@ -120,11 +120,13 @@ def _status(course: CourseFile, name: str) -> LabStatus:
         missing=counts.missing,
         published=len(last),
         changed=states["changed"],
-        sent=sum(log.state(one) == "sent" for one in last) if log else 0,
+        sent=sum(log.state(one) == "sent" for one in last),
         to_settle=sum(
             one.late_days != two.late_days for one, two in zip(batch.run.entries, now, strict=True)
         ),
     )
+    if loaded.digest != batch.run.rubric.digest:
+        return replace(found, to_do=f"grader regrade {batch.path} (its rubric has changed since)")
     return _with_next_step(course, batch, found, ready=states["new"] + states["changed"])
 
 
@@ -136,7 +138,7 @@ def _with_next_step(course: CourseFile, batch: BatchFolder, found: LabStatus, *,
         or (course.course.feedback and found.sent < found.published),
     }
     to_do = next((command for command, wanted in steps.items() if wanted), "")
-    return LabStatus(**{**vars(found), "to_do": to_do})
+    return replace(found, to_do=to_do)
 
 
 MAX_POINTS = 100.0

@@ -42,7 +42,7 @@ _RECEIVE = {
 
 _PLAIN = re.compile(
     r"core\.(?:repositoryformatversion|filemode|bare|sharedrepository|logallrefupdates|ignorecase|precomposeunicode"
-    r"|symlinks)|receive\.deny\w+|http\.receivepack|extensions\.objectformat",
+    r"|symlinks)|receive\.deny\w+|http\.receivepack|extensions\.objectformat|remote\..+\.(?:url|fetch|mirror)",
     re.IGNORECASE,
 )
 """Settings of a repository that let git run nothing."""

@@ -18,7 +18,7 @@ from typing import Any
 from urllib.parse import quote, unquote, urlsplit
 
 from grader.classes.feedback.forms import Feedback, Sender, Settings, Unsure
-from grader.classes.feedback.rest import TRIES, Api, Broken, Refused, required_token
+from grader.classes.feedback.rest import TRIES, Api, Broken, Refused, token_for
 from grader.errors import GraderError, HostError, NotSent
 from grader.intake.source import parse_source
 from grader.model.batch import Entry
@@ -218,8 +218,8 @@ class GitHub(Comments):
 
     def __init__(self, settings: Settings) -> None:
         super().__init__(settings)
-        token = required_token(self.token, os.environ.get(self.token) or os.environ.get("GH_TOKEN", ""))
         server = os.environ.get("GITHUB_SERVER_URL") or "https://github.com"
+        token = token_for(server, self.token, "GH_TOKEN")
         self.server = urlsplit(server).netloc.lower()
         own = "https://api.github.com" if self.server == "github.com" else f"{server.rstrip('/')}/api/v3"
         headers = {
@@ -283,14 +283,14 @@ class GitLab(Comments):
 
     def __init__(self, settings: Settings) -> None:
         super().__init__(settings)
-        token = required_token(self.token, os.environ.get(self.token, ""))
         server = (
             os.environ.get("CI_SERVER_URL") or f"https://{os.environ.get('CI_SERVER_HOST') or 'gitlab.com'}"
         )
+        token = token_for(server, self.token)
         self._address = server.rstrip("/")
         self.server = urlsplit(server).netloc.lower()
         base = os.environ.get("CI_API_V4_URL") or f"{self._address}/api/v4"
-        self.api = Api(base, {"PRIVATE-TOKEN": token}, settings.told)
+        self.api = Api(base, {"Authorization": f"Bearer {token}"}, settings.told)
 
     def is_public(self, path: str) -> bool:
         """Return whether everybody can read the project, or everybody with an account."""

@@ -353,11 +353,13 @@ def _criteria(before: GradingResult, after: GradingResult, hidden: Collection[st
     unseen = 0
     for change in pairs(before, after):
         was, now = (found.get(change.criterion) for found in overrides)
-        decided = _decision(was) != _decision(now)
-        if not decided and _state(change, "before") == _state(change, "after"):
+        decided, same = _decision(was) != _decision(now), _state(change, "before") == _state(change, "after")
+        if not decided and same:
             continue
         if change.criterion in hidden:
             unseen += 1
+        elif same and _is_answer(was, now):
+            yield f"request answered ({change.criterion})"
         elif decided:
             yield f"{_override(now)} ({change.criterion})"
         else:
@@ -374,7 +376,13 @@ def _state(change: Change, which: str) -> tuple[object, ...]:
 
 
 def _decision(override: AppliedOverride | None) -> tuple[object, ...]:
-    return (override.points, override.comment, override.author) if override else ()
+    return (override.points, override.comment, override.author, override.answer) if override else ()
+
+
+def _is_answer(was: AppliedOverride | None, now: AppliedOverride | None) -> bool:
+    """Return whether a decision answers a student, and says nothing else that is new."""
+    before = (was.answer, was.comment) if was else ("", "")
+    return now is not None and now.answer not in ("", before[0]) and now.comment == before[1]
 
 
 def _override(override: AppliedOverride | None) -> str:

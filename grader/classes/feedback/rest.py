@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
@@ -15,6 +16,7 @@ from urllib.request import HTTPRedirectHandler, Request, build_opener
 
 from grader import __version__
 from grader.errors import HostError, UsageError
+from grader.intake.credentials import helper_password
 from grader.untrusted_text import line
 
 TIMEOUT_S = 60.0
@@ -180,8 +182,16 @@ def _wait_s(answer: _Answer, times: int) -> float | None:
     return WAIT_S * 2.0**times
 
 
-def required_token(name: str, value: str) -> str:
-    """Return a token of the environment. Raises UsageError."""
-    if not value.strip() or not value.strip().isascii() or not value.strip().isprintable():
+def token_for(server: str, name: str, *more: str) -> str:
+    """Return the token for a server's address: of the first of these variables that is set, else what git's own
+    credential helpers have. Raises UsageError."""
+    given = next(filter(None, (os.environ.get(one, "").strip() for one in (name, *more))), "")
+    token = given or helper_password(server).strip()
+    if not token:
+        raise UsageError(
+            f"there is no token for {server}: {name} is not set, and git's credential helpers have none",
+            hint=f"export {name}=… with the right to write comments",
+        )
+    if not token.isascii() or not token.isprintable():
         raise UsageError(f"{name} holds no token", hint=f"export {name}=… with the right to write comments")
-    return value.strip()
+    return token

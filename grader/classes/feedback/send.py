@@ -51,7 +51,10 @@ FILE = "sent.jsonl"
 
 
 class SentLog:
-    """What was sent of the class in `folder` by one form. Raises UsageError if a newer grader wrote of it."""
+    """What was sent of the class in `folder` by one form, or by any if `form` is empty.
+
+    Raises UsageError if a newer grader wrote of it.
+    """
 
     def __init__(self, folder: Path, form: str) -> None:
         self.path, self.form = folder / FILE, form
@@ -109,7 +112,7 @@ class SentLog:
         return self._lines.get(safe_name(submission), [])
 
     def _remember(self, line: Sent) -> None:
-        if line.form == self.form:
+        if self.form in ("", line.form):
             self._lines.setdefault(safe_name(line.id), []).append(line)
 
 
@@ -294,6 +297,10 @@ def deliver(
     with sender:
         for feedback in selection.todo:
             publication = feedback.publication
+            if (fault := _fault(sender, feedback)) is not None:  # what has no address is not begun
+                delivery.failures.append(fault)
+                log.add([publication], "failed", message=fault.message)
+                continue
             try:
                 place = _send(sender, feedback, log, again=again)
             except NotSent as error:
@@ -319,7 +326,6 @@ def _send(sender: Sender, feedback: Feedback, log: SentLog, *, again: bool) -> s
     is_unsure = log.state(publication) == "sending"
     if is_unsure and sender.unsure == "ask" and not again:
         raise Unsure(UNKNOWN, hint=f"ask the student; --only {publication.id} --again sends it once more")
-    sender.place(feedback)  # what has no address is not begun
     if sender.unsure != "again":
         log.add([publication], "sending")
     return sender.send(feedback, look=is_unsure)

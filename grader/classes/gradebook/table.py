@@ -64,7 +64,8 @@ def cells(book: Book, row: Row) -> Iterator[Cell]:
     """What stands below each name of `header`."""
     entry, result = row.entry, row.result
     yield from (entry.id, entry.name, entry.group, result.status)
-    graded = result.status != "error"
+    counting = [c for c in result.criteria if c.counts]
+    graded = result.status != "error" and not (counting and all(c.status.is_open for c in counting))
     yield from (result.points if graded else None, result.max_points or book.max_points)
     yield (result.late.points_before if result.late else result.points) if graded else None
     yield late_text(result)

@@ -172,7 +172,8 @@ def _given(value: object) -> object:
     return {
         key: item
         for key, item in value.items()
-        if item is not None or key not in {"comment", "author", "date", "comments", "answer", "together"}
+        if item is not None
+        or key not in {"comment", "author", "date", "comments", "answer", "answered", "together"}
     }
 
 

@@ -157,7 +157,7 @@ class _Views:
         typed = Draft(points=form.get("points", ""), comment=form.get("comment", ""), comments=chosen)
         typed = replace(typed, answer=form.get("answer", ""))
         try:
-            override = self._wanted(asked)
+            override = self._wanted(item, asked)
             waits = self._saved_as(item, criterion, override)
         except Conflict:
             return self._not_saved(item, criterion, _draft(typed, conflict=True), 409)
@@ -274,12 +274,12 @@ class _Views:
             raise NotFound("The class has no such submission.")
         return item
 
-    def _wanted(self, asked: Criterion) -> WrittenOverride | None:
+    def _wanted(self, item: Item, asked: Criterion) -> WrittenOverride | None:
         form, (least, most) = request.form, bounds(asked)
         if form.get("do") in {"remove", "undo"}:
             return None
         known = self._session.decisions().bank.get(asked.id, {})
-        return override_of(
+        wanted = override_of(
             form.get("points", ""),
             form.get("comment", ""),
             _author(self._default_author),
@@ -289,6 +289,8 @@ class _Views:
             answer=form.get("answer", ""),
             comments=[name for name in dict.fromkeys(form.getlist("bank")) if name in known],
         )
+        answered = self._session.answered(item, asked.id, wanted.answer) if form.get("do") != "alike" else ()
+        return wanted.model_copy(update={"answered": answered})
 
     def _page(self, item: Item, drafts: Mapping[str, Draft]) -> str:
         row, found, troubles = self._row(item, drafts)

@@ -7,6 +7,7 @@ whole questions.
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -21,6 +22,7 @@ from grader.classes.overrides import folder_key
 from grader.errors import NotSent
 from grader.files import atomic_write, read_untrusted
 from grader.model.batch import Entry
+from grader.model.result import Override
 from grader.results import read_result
 from grader.rubric.model import Criterion
 from grader.untrusted_text import line, visible
@@ -48,6 +50,11 @@ class Request:
     when: str = ""
     source: str = ""
 
+    @property
+    def digest(self) -> str:
+        """What an answer says that it is to."""
+        return hashlib.sha256(f"{self.when}\n{self.source}\n{self.text}".encode()).hexdigest()[:12]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Requests:
@@ -70,6 +77,13 @@ class Asked:
         asked = self.request
         cells = (self.student, self.criterion, asked.text, asked.when, asked.source)
         return tuple(visible(cell, lines=True) for cell in cells)
+
+
+def waiting(asked: Sequence[Request], decided: Override | None) -> list[Request]:
+    """Return those of a criterion's questions that have no answer. One by hand, which names none, is to all."""
+    if decided is None or not decided.answer:
+        return list(asked)
+    return [one for one in asked if decided.answered and one.digest not in decided.answered]
 
 
 def request_files(folder: Path) -> tuple[Path, ...]:

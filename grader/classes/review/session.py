@@ -35,7 +35,7 @@ from grader.classes.overrides import (
 from grader.classes.overrides.write import write_override, write_overrides
 from grader.classes.review.background import BackgroundWriter, Pace
 from grader.classes.review.blind import Mask, aliases, mask_of
-from grader.classes.review.requests import Requests, read_requests, request_files
+from grader.classes.review.requests import Requests, read_requests, request_files, waiting
 from grader.classes.review.submissions import Item, Submissions, alike, stamp_of
 from grader.errors import Busy, GraderError, RubricError, UsageError
 from grader.files import unwritable
@@ -143,12 +143,12 @@ class ReviewSession:
         items = self._unnamed(item for item in self.submissions.items() if self.share(item.entry))
         with suppress(RubricError):
             decided, asked = self.overrides(), self.requests().found
-            return tuple(
-                item.with_decisions(decided.get(item.entry.id, {})).with_requests(
-                    asked.get(item.entry.id, ()), decided.get(item.entry.id, {})
-                )
-                for item in items
-            )
+            found = []
+            for item in items:
+                by = decided.get(item.entry.id, {})
+                open_ = [of for of, some in asked.get(item.entry.id, {}).items() if waiting(some, by.get(of))]
+                found.append(item.with_decisions(by).with_requests(open_))
+            return tuple(found)
         return items
 
     def requests(self) -> Requests:
@@ -162,6 +162,14 @@ class ReviewSession:
             with self._guard:
                 self._requests = found
         return found[1]
+
+    def answered(self, item: Item, criterion: str, answer: str) -> tuple[str, ...]:
+        """Return the digests of the questions that an answer is to: those of now, and as before if it is as before."""
+        before = self.decisions().written.get(item.entry.id, {}).get(criterion)
+        if not answer or (before and before.answer == answer):
+            return before.answered if before and answer else ()
+        asked = self.requests().found.get(item.entry.id, {}).get(criterion, ())
+        return tuple(dict.fromkeys(one.digest for one in asked))[:100]
 
     def item(self, address: str) -> Item | None:
         """Return the submission of an address; None where the class has none."""

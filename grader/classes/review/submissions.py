@@ -114,9 +114,8 @@ class Item:
         one = self.lines.get(criterion)
         return one.kinds if one else frozenset()
 
-    def with_requests(self, asked: Collection[str], decided: Mapping[str, Override]) -> Item:
-        """Return it with the student's requests about these criteria; those that are answered do not wait any more."""
-        waiting = [name for name in asked if name not in decided or not decided[name].answer]
+    def with_requests(self, waiting: Collection[str]) -> Item:
+        """Return it with the criteria about which its student asks and has no answer."""
         lines = {
             name: replace(self.lines[name], kinds=self.lines[name].kinds | {ASKED})
             for name in waiting
