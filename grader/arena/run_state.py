@@ -51,11 +51,13 @@ class Rest:
 @dataclass
 class RunState:
     """The state that conditions look at. `running` and `ended` are the student's processes, `helpers` the grader's own
-    programs that run beside them, `registered` the processes of which a node has registered, `here` the nodes that are
-    registered now, `published` their topics, `talking` when each first sent a message, `owners` the processes of all
-    nodes so far. `lost_s` is what others took of the run's time while they filled the machine: so much longer a node is
-    waited for. `least_s` is how long nodes are watched, even where nothing more is to come. `naps`: the package's
-    programs sleep for times of their own, which may look like `spin()` from outside."""
+    programs that run beside them, `registered` the processes of which a node has registered, `here` the nodes that
+    are registered now, `published` their topics, `talking` when each first sent a message, `owners` the processes of
+    all nodes so far. `lost_s` is what others took of the run's time while they filled the machine: so much longer a
+    node is waited for. Of that, `lost_before_s` was gone at `started_s`, `lost_before_last_s` at `last_start_s`.
+    `waited_s`: so long steps had waited in vain by `started_s`. `least_s` is how long nodes are watched, even where
+    nothing more is to come. `naps`: the package's programs sleep for times of their own, which may look like
+    `spin()` from outside."""
 
     least_s: float = 0.0
     naps: bool = False
@@ -90,6 +92,9 @@ class RunState:
     last_line_s: float = 0.0
     measured_s: float = 0.0
     lost_s: float = 0.0
+    lost_before_s: float = 0.0
+    lost_before_last_s: float = 0.0
+    waited_s: float = 0.0
     rates: dict[str, list[RateBounds]] = field(default_factory=lambda: defaultdict(list))
     arrivals_ns: dict[str, list[int]] = field(default_factory=dict)
 
@@ -174,7 +179,7 @@ class RunState:
         self.ended.discard(process)
         self.registered.discard(process)
         self.at_rest.pop(process, None)
-        self.last_start_s = now_s
+        self.last_start_s, self.lost_before_last_s = now_s, self.lost_s
 
     def exited(self, process: str, now_s: float) -> None:
         """Take note that a process has ended, and with it its subscribers."""
@@ -187,9 +192,12 @@ class RunState:
             self.ended.add(process)
             self.active(now_s)
 
-    def steps_over(self, now_s: float) -> None:
-        """Start the time in which what is waited for has to come: the steps are over."""
+    def steps_over(self, now_s: float, *, heeded: bool = True) -> None:
+        """Start the time in which what is waited for has to come: the steps are over. Where no node subscribed to what
+        they send, the time that this took was the first message's too."""
+        self.waited_s = 0.0 if heeded else now_s - self.started_s
         self.started_s = self.news_s = now_s
+        self.lost_before_s = self.lost_s
 
     def sent(self, value: str, now_s: float) -> None:
         """Take note that a probe went out: its value is to be printed, as a word of its own."""
@@ -270,7 +278,7 @@ def _enough(live: RunState, until: Until, now_s: float) -> tuple[bool, ...]:
 
 def _patient(live: RunState, until: Until) -> Until:
     """Return `until` with more patience for processes to which others left little of the machine."""
-    more_s = round(live.lost_s)
+    more_s = round(live.lost_s - live.lost_before_s)
     if not more_s:
         return until
     limit_s = until.limit_s + more_s if waits(until) else until.limit_s
@@ -303,7 +311,7 @@ def next_look_s(live: RunState, until: Until, now_s: float) -> float:
     """Return how long nothing can change by time alone."""
     until = _patient(live, until)
     looks = [live.started_s + until.limit_s, live.started_s + until.first_message_s]
-    looks += [live.last_start_s + until.silent_s + live.lost_s]
+    looks += [_starts_until_s(live, until)]
     for seen in live.topics.values():
         looks += [
             seen.first_s + (until.window_s or 0),
@@ -394,8 +402,11 @@ def _heard(live: RunState, until: Until, now_s: float) -> bool:
 
 def _is_starting(live: RunState, until: Until, now_s: float) -> bool:
     """Return whether a process may yet become a node: on a busy machine, its imports alone can take many seconds."""
-    patience_s = until.silent_s + live.lost_s
-    return bool(live.running - live.registered) and now_s <= live.last_start_s + patience_s
+    return bool(live.running - live.registered) and now_s <= _starts_until_s(live, until)
+
+
+def _starts_until_s(live: RunState, until: Until) -> float:
+    return live.last_start_s + until.silent_s + live.lost_s - live.lost_before_last_s
 
 
 def _silent(live: RunState, until: Until, now_s: float) -> str:
@@ -404,7 +415,7 @@ def _silent(live: RunState, until: Until, now_s: float) -> str:
     if waited and not seen:
         return (
             f"no message within {until.first_message_s:g} s"
-            if now_s > live.started_s + until.first_message_s
+            if now_s > live.started_s + until.first_message_s - live.waited_s
             else ""
         )
     for topic, count in until.messages.items():

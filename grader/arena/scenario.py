@@ -130,7 +130,7 @@ async def _run(
         await runner.run()
         await _await_rostests(scenario, arena, tell)
         if scenario.steps or any(start.tests or start.is_rostest for start in scenario.start):
-            arena.live.steps_over(time.monotonic())
+            arena.live.steps_over(time.monotonic(), heeded=not runner.unheeded)
             if runner.stopped_all or (arena.live.running and not waits(scenario.until)):
                 return "complete", ""
         return await _observe(scenario, arena, tell)

@@ -24,7 +24,7 @@ from grader.arena.scenario_inputs import make_shots
 from grader.arena.served import ServedAction, ServedServices
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
-from grader.evidence.events import GOAL_STATUS, MISFIT, ActorEvent
+from grader.evidence.events import GOAL_STATUS, MISFIT, UNHEARD, ActorEvent
 from grader.model.interfaces import other_fields
 from grader.rubric.model import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
@@ -157,6 +157,11 @@ class StepRunner:
         """Whether steps have stopped all that ran."""
         return not self._live.running and self._live.ended <= self._stopped
 
+    @property
+    def unheeded(self) -> bool:
+        """Whether no node subscribed to a topic on which steps were to send."""
+        return bool(self._deaf)
+
     # --- Messages ----------------------------------------------------------------------------------------------------
 
     def _advertise(self, topic: str, type_: str, *, latched: bool, find_text: FindText | None = None) -> None:
@@ -268,7 +273,7 @@ class StepRunner:
             self._deaf.discard(topic)
             return True
         self._deaf.add(topic)
-        self._note("note", topic, "nothing was published: no node has subscribed")
+        self._note("note", topic, UNHEARD)
         return False
 
     async def _come(

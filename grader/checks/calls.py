@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.clocks import excused, why_late
+from grader.checks.support.clocks import excused, run_seconds, why_late
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.fields import Difference, differences, fields_text
 from grader.checks.support.processes import GlobalName, lives
@@ -19,7 +20,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, passed, unjudged
-from grader.wording import join_words, plural
+from grader.wording import join_words, plural, significant
 
 
 class CallsParams(Record):
@@ -32,8 +33,18 @@ class CallsParams(Record):
     Calls between them, and fields that are left out, do not matter."""
     at_least: Annotated[int, Field(ge=1)] = 1
     """So many calls have to come, each of them as `expect` has it where that is one request."""
+    at_most: Annotated[int, Field(ge=1)] | None = None
+    """So many calls may come, whatever their fields; null: any number."""
+    apart_s: Annotated[float, Field(gt=0)] | None = None
+    """So far apart two calls have to come at least, by the run's clock; null: any time."""
     tolerance: Annotated[float, Field(ge=0)] = 1e-6
     """How much numbers may differ."""
+
+    @model_validator(mode="after")
+    def _some_number(self) -> CallsParams:
+        if self.at_most is not None and self.at_most < len(self.wanted):
+            raise ValueError(f"at_most is {self.at_most}, and {plural(len(self.wanted), 'call')} are asked")
+        return self
 
     @property
     def wanted(self) -> tuple[dict[str, Any], ...]:
@@ -46,7 +57,9 @@ class CallsParams(Record):
     def words(self) -> str:
         asked = (self.expect,) if isinstance(self.expect, dict) else self.expect
         requests = f" with {join_words(map(fields_text, asked), 'then')}" if any(asked) else ""
-        return f"{plural(len(self.wanted), 'call')} of {self.service}{requests}"
+        most = "" if self.at_most is None else f", {self.at_most} at most"
+        apart = "" if self.apart_s is None else f", {significant(self.apart_s)} s apart"
+        return f"{plural(len(self.wanted), 'call')} of {self.service}{requests}{most}{apart}"
 
 
 class Request(NamedTuple):
@@ -62,8 +75,8 @@ def calls(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
     """The node calls the service with the right request.
 
     What it checks
-        That a node of the package calls the grader's service as often as it should, and that the fields of its
-        requests have the right values.
+        That a node of the package calls the grader's service as often as it should, no more often and no
+        sooner again than the lab allows, and that the fields of its requests have the right values.
 
     Why it matters on a robot
         A server does what it is asked. A client that swaps two fields, or never calls, drives the robot to
@@ -80,7 +93,9 @@ def calls(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
     made = requests(run, params.service)
     missing = _first_missing(made, params)
     verdict = (
-        passed(f"{params.service} is called with {join_words(dict.fromkeys(_text(r) for r in made))}")
+        _too_many(made, params)
+        or _too_soon(made, run, params)
+        or passed(f"{params.service} is called with {join_words(dict.fromkeys(_text(r) for r in made))}")
         if missing is None
         else _excused(
             _never(package, run, params) if not made else _fault(package, run, params, *missing), run
@@ -126,6 +141,27 @@ def _first_missing(
 
 def _differences(one: Request, wanted: dict[str, Any], params: CallsParams) -> Iterator[Difference]:
     return differences(one.fields, wanted, params.tolerance)
+
+
+def _too_many(made: Sequence[Request], params: CallsParams) -> Verdict | None:
+    if params.at_most is None or len(made) <= params.at_most:
+        return None
+    message = f"{params.service} is called {plural(len(made), 'time')}, not {params.at_most} at most"
+    return failed(message, hint="count the calls, and stop after the last one that is asked")
+
+
+def _too_soon(made: Sequence[Request], run: Run, params: CallsParams) -> Verdict | None:
+    """A late machine excuses nothing: a call is noted before it is answered, and the pause begins after that."""
+    to_s = run_seconds(run)
+    if params.apart_s is None or to_s is None:
+        return None
+    apart = [to_s(later.at_ns) - to_s(one.at_ns) for one, later in pairwise(made)]
+    soon = [one for one in apart if one < params.apart_s]
+    if not soon:
+        return None
+    message = f"{params.service} is called again after {min(soon):.2f} s, not {significant(params.apart_s)} s"
+    hint = f"wait before the next call: rospy.sleep({significant(params.apart_s)})"
+    return failed(message, hint=hint)
 
 
 def _fault(

@@ -138,9 +138,10 @@ def _not_printed(
     if one.ended_early and (one.end is None or one.end.exit_code != 0):
         end = explain_end(one, run, package)
         return end.verdict(unjudged, f"it ended before it printed {params.words}: {end.cause}")
-    if not lines:
-        return failed(f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True").once()
-    return failed(f"it never prints {params.words}; it prints {shown(lines[0].text)!r}", hint=hint).once()
+    own = [line for line in lines if one.interrupt_ns is None or line.at_ns < one.interrupt_ns]
+    if not own:
+        return unjudged(f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True").once()
+    return failed(f"it never prints {params.words}; it prints {shown(own[0].text)!r}", hint=hint).once()
 
 
 def _other_end(one: Life, params: PrintsParams) -> Verdict | None:

@@ -41,7 +41,7 @@ class LaunchXmlParams(Record):
     launch: LaunchName
     """The launch file's name, in whatever folder of the package it lies."""
     scripts: tuple[str, ...] = ()
-    """The student's scripts that it has to start."""
+    """The student's scripts that it has to start, or C++ programs by their names."""
     programs: tuple[ProgramName, ...] = ()
     """Nodes of other packages that it has to start: `turtlesim/turtlesim_node`."""
 

@@ -193,7 +193,7 @@ class LaunchRunsParams(Record):
     topic: GlobalName | None = None
     """A topic over which the nodes are connected, with its slash; null: none is asked for."""
     scripts: tuple[str, ...] = ()
-    """The student's scripts that have to run."""
+    """The student's scripts that have to run, or C++ programs by their names."""
     nodes: Annotated[dict[str, str], Field(default_factory=dict)]
     """Names of nodes that have to come up, each with the package that it comes from."""
     programs: tuple[ProgramName, ...] = ()

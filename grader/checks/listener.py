@@ -28,7 +28,7 @@ from grader.checks.support.text import (
     shown,
     subscriber,
 )
-from grader.checks.support.topics import cite, misfit, topics_with
+from grader.checks.support.topics import cite, misfit, refused_type, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -146,7 +146,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         return end.verdict(unjudged, message, measured="ended")
     subscribed = topics_with(run, "subscribers")
     measured = f"subscribed to {join_words(subscribed)}" if subscribed else "no subscription"
-    verdict = _types_differ(run, topic) or misfit(run, topic)
+    verdict = refused_type(run, topic) or misfit(run, topic)
     if verdict is None and topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
         verdict = inconclusive(message, hint="grade again")
@@ -177,17 +177,6 @@ def _broken(package: PackageFacts, run: Run) -> Verdict | None:
     if end := explain_error(package, run):
         return end.verdict(failed, f"an error stops the node from printing: {end.cause}")
     return None
-
-
-def _types_differ(run: Run, topic: str) -> Verdict | None:
-    """The grader's publisher had to refuse the node, which asked for another type."""
-    asked = next((e for _, e in run.actors if e.action == "note" and e.topic == topic and e.type), None)
-    if asked is None:
-        return None
-    other = f"another definition of {asked.type}" if asked.type == asked.value else asked.type
-    message = f"{asked.actor} subscribes to {topic} with {other}, so nothing arrives"
-    wanted = f"{asked.value}, the type" if isinstance(asked.value, str) else "the type"
-    return failed(message, hint=f"use {wanted} that the handout asks for in {subscriber(topic)}")
 
 
 def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]) -> Verdict | None:

@@ -328,8 +328,11 @@ class FieldEqualsParams(Record):
     """The topic, with its slash: `/chatter`."""
     field: FieldPath
     """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item."""
-    value: Any
+    value: Any = None
     """The right value, as in YAML: a number, text, true or false, a list or a map."""
+    values: tuple[Any, ...] = ()
+    """In place of `value`: the right values of several messages, in their order. Messages between them do not
+    matter."""
     tolerance: Annotated[float, Field(ge=0)] = 0.0
     """How much numbers may differ, in the field's own unit."""
     when: Literal["every", "first", "last", "any"] = "every"
@@ -338,14 +341,26 @@ class FieldEqualsParams(Record):
     """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
     `anyone`'s."""
 
+    @model_validator(mode="after")
+    def _one_or_several(self) -> FieldEqualsParams:
+        if (self.value is None) == (not self.values):
+            raise ValueError("give one of value and values")
+        if self.values and self.when != "every":
+            raise ValueError("when is for value, not for values")
+        return self
+
     @property
     def words(self) -> str:
+        each = join_words([value_text(one) for one in self.values], "then") if self.values else ""
         near = f", within {significant(self.tolerance)}" if self.tolerance else ""
-        return f"{value_text(self.value)}{near}"
+        return f"{each or value_text(self.value)}{near}"
 
     def fits(self, reading: Reading) -> bool:
         """Return whether the field is there, and each of its values the wanted one."""
-        each = (differences(one, self.value, self.tolerance) for one in reading.values)
+        return self.is_at(reading, self.value)
+
+    def is_at(self, reading: Reading, value: object) -> bool:
+        each = (differences(one, value, self.tolerance) for one in reading.values)
         return bool(reading.values) and not any(next(found, None) for found in each)
 
 
@@ -354,7 +369,8 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     """A field of the messages has the right value.
 
     What it checks
-        That the field has this value, in every message, in the first, in the last or in any of them.
+        That the field has this value, in every message, in the first, in the last or in any of them; or several
+        values, one after the other.
 
     Why it matters on a robot
         A constant that is wrong, or a last command that is not a stop, is done all the same: the robot has
@@ -370,6 +386,8 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     """
     channels = sent_by(run, params.topic, params.of)
     found = readings(channels, params.field, numbers=False)
+    if params.values and any(r.values for r in found):
+        return _in_order(found, run, params)
     asked = {"first": found[:1], "last": found[-1:]}.get(params.when, found)
     wrong = [r for r in asked if not params.fits(r)]
     which = {"any": "any message", "every": "every message"}.get(params.when, f"the {params.when} message")
@@ -388,6 +406,33 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
         expected=f"{params.field} of {params.topic} {params.words} in {which}",
         measured=verdict.measured or _values(asked),
         citations=(*verdict.citations, cited),
+    )
+
+
+def _in_order(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> Verdict:
+    """Whether the values come one after the other; where one does not, what comes in its place."""
+    at, what = 0, f"{params.field} of {params.topic}"
+    verdict = passed(f"{what} is {params.words}")
+    for number, value in enumerate(params.values):
+        here = next((n for n in range(at, len(found)) if params.is_at(found[n], value)), None)
+        if here is None:
+            before = f" after {value_text(params.values[number - 1])}" if number else ""
+            came = (
+                f"what comes{' then' if number else ''} is {_values(found[at:])}"
+                if found[at:]
+                else "no more comes"
+            )
+            message = f"{what} is never {value_text(value)}{before}: {came}"
+            hint = f"rostopic echo {params.topic} shows what your node publishes upon each message"
+            verdict = failed(message, hint=hint)
+            later = any(params.is_at(one, v) for one in found[at:] for v in params.values[number + 1 :])
+            if later or not found[at:]:  # one alone may have been lost on its way
+                verdict = verdict.once()
+            break
+        at = here + 1
+    cited = cite(run, params.topic, found[0].time_ns, found[-1].time_ns)
+    return verdict.about(
+        expected=f"{what} {params.words}", measured=_values(found), citations=(*verdict.citations, cited)
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Annotated, Literal, NamedTuple
 
@@ -92,7 +93,8 @@ class ReactsParams(Record):
     """Cause and effect."""
 
     cause: Condition
-    """Each time that this begins to be true, an effect has to come."""
+    """Each time that this begins to be true, an effect has to come; without a `field`, after each message one of its
+    own."""
     effect: Condition
     """What has to come."""
     within_s: Annotated[float, Field(gt=0)]
@@ -121,8 +123,9 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         A robot that stops half a second late has hit the wall, and one that always stops never arrives.
 
     How it is measured
-        By when the messages reach the recorder. A cause counts where it begins: several messages in a row for
-        which it is true are one. In a run with a fast clock, time is the clock's.
+        By when the messages reach the recorder. A cause with a field counts where it begins: several messages
+        in a row for which it is true are one. Where any message is a cause, each has to have an answer of its
+        own. In a run with a fast clock, time is the clock's.
 
     How to fix
         Publish the answer in the callback of the subscriber, or let the loop look at what the callback kept.
@@ -153,23 +156,29 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
 def _answers(
     run: Run, causes: Sequence[Reading], effects: Sequence[Reading], params: ReactsParams
 ) -> list[Answer]:
-    """Return what came after each beginning of the cause of which the answer was waited for."""
+    """Return what came after each cause, or beginning of one, of which the answer was waited for."""
     to_s, until_ns = run_seconds(run), observed_until_ns(run) or run.end_ns
     if to_s is None:
         return []
+    each = params.cause.field is None
     before = (False, *(params.cause.holds(one) for one in causes))
     starts = [
-        one.time_ns for held, one in zip(before, causes, strict=False) if not held and params.cause.holds(one)
+        one.time_ns
+        for held, one in zip(before, causes, strict=False)
+        if (each or not held) and params.cause.holds(one)
     ]
     came = [one.time_ns for one in effects if params.effect.holds(one)]
-    answers = []
+    answers, first = [], 0
     for number, at_ns in enumerate(starts):
         next_ns = starts[number + 1] if number + 1 < len(starts) else run.end_ns + 1
-        later = ((t, to_s(t) - to_s(at_ns)) for t in came)
-        theirs = (s for t, s in later if s >= -ORDER_S and (t < next_ns or s <= params.within_s))
-        after_s = next((max(0.0, s) for s in theirs), None)
-        if after_s is not None or to_s(until_ns) - to_s(at_ns) >= params.within_s:
-            answers.append(Answer(at_ns, after_s))
+        while first < len(came) and to_s(came[first]) - to_s(at_ns) < -ORDER_S:
+            first += 1
+        after_s = to_s(came[first]) - to_s(at_ns) if first < len(came) else math.inf
+        if after_s <= params.within_s or (after_s < math.inf and came[first] < next_ns):
+            answers.append(Answer(at_ns, max(0.0, after_s)))
+            first += each
+        elif to_s(until_ns) - to_s(at_ns) >= params.within_s:
+            answers.append(Answer(at_ns, None))
     return answers
 
 

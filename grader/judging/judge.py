@@ -15,7 +15,7 @@ from grader.checks.registry import NotRecorded
 from grader.checks.support.exit_causes import SYNTAX, heed_errors
 from grader.checks.support.parameters import heed_unread
 from grader.checks.support.text import texts_in
-from grader.checks.support.topics import heed_losses
+from grader.checks.support.topics import heed_losses, heed_unheard
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judging.annotate import add_advice, said_for_node, show_lines, tell_unchanged
@@ -132,7 +132,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         )
         if not isinstance(asked, Verdict):
             package, run = facts.package_of(criterion), asked.get("run")
-            found = heed_unread(check, package, run, heed_errors(check, package, run, found))
+            for heed in (heed_errors, heed_unheard, heed_unread):
+                found = heed(check, package, run, found)
         return _named(said_for_node(found, criterion, facts), criterion, facts)
     except NotRecorded as missing:
         return missing.verdict

@@ -71,6 +71,7 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
     fault = ""
     if to == "program" and not re.fullmatch(PROGRAM_PATTERN, value):
         fault = f'name its package too, like turtlesim/turtlesim_node, not "{value}"'
+        fault += "; programs of the students' own go under scripts" if path[-2:-1] == ("programs",) else ""
     elif to == "program" and value.partition("/")[0] not in own:
         fault = ros_packages().program_fault(value)
     elif to in TYPES and re.fullmatch(TYPE_PATTERN, value := value.partition("[")[0]):

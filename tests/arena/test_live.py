@@ -67,6 +67,33 @@ def test_a_node_is_waited_for_longer_where_others_fill_the_machine(
     assert find_outcome(live, WINDOW, 4 * WINDOW.first_message_s) is not None
 
 
+def test_what_others_took_before_the_steps_were_over_lengthens_nothing_behind_them() -> None:
+    until = Until(messages={"/a": 1}, first_message_s=20, limit_s=20)
+    live = _live()
+    live.lost_s = 60.0
+    live.steps_over(80.0)
+    assert find_outcome(live, until, 99.0) is None
+    assert find_outcome(live, until, 101.0) == ("silent", "no message within 20 s")
+    live.lost_s = 65.0
+    assert find_outcome(live, until, 101.0) is None
+
+
+def test_what_no_node_subscribed_to_is_waited_for_once() -> None:
+    until, live = Until(messages={"/a": 1}, first_message_s=20, limit_s=60), _live()
+    live.started_s = 5.0
+    live.steps_over(15.0, heeded=False)
+    assert find_outcome(live, until, 24.0) is None
+    assert find_outcome(live, until, 26.0) == ("silent", "no message within 20 s")
+
+
+def test_what_others_took_before_a_process_started_lengthens_nothing_behind_it() -> None:
+    live, until = _live(), Until(nodes=2)
+    live.lost_s, live.nodes, live.news_s = 30.0, {"/node"}, 30.0
+    live.started("late", 40.0, helper=False)
+    assert find_outcome(live, until, 45.9) is None
+    assert find_outcome(live, until, 46.1) == ("silent", "nothing happened for 6 s")
+
+
 @pytest.mark.parametrize(
     ("until", "live", "now_s", "outcome"),
     [

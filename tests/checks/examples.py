@@ -16,7 +16,7 @@ from grader.checks import CHECKS
 from grader.checks.support.exit_causes import heed_errors
 from grader.checks.support.parameters import heed_unread
 from grader.checks.support.text import in_language
-from grader.checks.support.topics import heed_losses
+from grader.checks.support.topics import heed_losses, heed_unheard
 from grader.evidence.run import Run
 from grader.model.interfaces import parse_interface
 from grader.model.package import PackageFacts
@@ -104,7 +104,7 @@ def judge_runs(name: str, params: dict[str, Any], runs: dict[str, Run]) -> Verdi
     }
     asked = {fact: facts[fact] for fact in check.facts}
     verdict = heed_losses(check, asked, check.function(**asked))
-    for heed in (heed_errors, heed_unread):
+    for heed in (heed_errors, heed_unheard, heed_unread):
         verdict = heed(check, facts["package"], facts["run"], verdict)
     return verdict.model_copy(update={"hint": in_language(verdict.hint, "python")})
 

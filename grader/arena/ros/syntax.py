@@ -261,19 +261,42 @@ def never_run(tree):
                 yield {"line": node.lineno, "kind": "main-guard", "message": message[:TEXT_LIMIT]}
 
 
+MAKES = ("Publisher", "Subscriber", "Service")
+
+
 def never_reached(tree):
-    """Loops without an end before the first `publish(…)` that comes behind them in the same block."""
+    """Loops without an end before the first `publish(…)`, `Publisher(…)` and the like that comes behind them in the
+    same block, in a function or class of this file too.
+    """
+    own = {
+        n.name
+        for n in ast.walk(tree)
+        if isinstance(n, (ast.FunctionDef, ast.ClassDef))
+        and any(is_call(inner, name) for inner in ast.walk(n) for name in MAKES)
+    }
+
+    def word(node):
+        name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", None)
+        return name if name in own or (is_call(node, name) and name in ("publish", *MAKES)) else None
+
     for node in ast.walk(tree):
         for block in (getattr(node, "body", None), getattr(node, "orelse", None)):
             for index, loop in enumerate(block if isinstance(block, list) else ()):
                 spins = isinstance(loop, ast.Expr) and is_call(loop.value, "spin")
                 if not spins and not (isinstance(loop, ast.While) and is_endless(loop)):
                     continue
-                behind = [n for later in block[index + 1 :] for n in ast.walk(later) if is_call(n, "publish")]
-                if behind and not any(is_call(n, "publish") for n in ast.walk(loop)):
+                within = {word(n) for n in ast.walk(loop) if isinstance(n, ast.Call)}
+                behind = [
+                    n for later in block[index + 1 :] for n in ast.walk(later) if isinstance(n, ast.Call)
+                ]
+                behind = [n for n in behind if word(n) and word(n) not in within]
+                if behind and "publish" not in within:
                     what = "spin()" if spins else "loop"
                     message = "the %s of line %d goes on until the node ends" % (what, loop.lineno)
-                    message += ", and the publish(…) of line %d comes after it" % behind[0].lineno
+                    message += ", and the %s(…) of line %d comes after it" % (
+                        word(behind[0]),
+                        behind[0].lineno,
+                    )
                     yield {"line": loop.lineno, "kind": "never-reached", "message": message}
 
 

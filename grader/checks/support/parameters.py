@@ -16,6 +16,7 @@ from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
 from grader.checks.support.processes import early_end
 from grader.checks.support.text import get_param, init, near_names
+from grader.checks.support.topics import published_topics
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchParam, PackageFacts
@@ -191,8 +192,8 @@ def heed_unread(check: Check, _package: PackageFacts | None, run: object, verdic
         for name, one in params_given(run).items()
         if not any(f"{name}/".startswith(f"{n}/") or f"{n}/".startswith(f"{name}/") for n in names)
     ]
-    if not asked or not unread:
-        return verdict
+    if not asked or not unread or (verdict.unjudged and not published_topics(run)):
+        return verdict  # what no node publishes at all, no parameter explains
     name, value, _ = unread[0]
     above, _, last = name.rpartition("/")
     own = [(node, n) for node, n in asked if last in n.split("/") or near_names(last, n.split("/"))]

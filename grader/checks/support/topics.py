@@ -8,8 +8,8 @@ from typing import Literal
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end, explain_error
 from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives, plain_type
-from grader.checks.support.text import INIT, LOOP, PUBLISHER, near_names, publisher, texts_in
-from grader.evidence.events import MISFIT
+from grader.checks.support.text import INIT, LOOP, PUBLISHER, near_names, publisher, subscriber, texts_in
+from grader.evidence.events import MISFIT, UNHEARD
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts, PythonSlip
 from grader.model.record import Record
@@ -100,6 +100,15 @@ def no_message(
         return absent
     if topic in published:
         return _advertised(package, run, what, of_node)
+    return _not_advertised(package, run, topic, of_node)
+
+
+def _not_advertised(package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict]) -> Verdict:
+    published, what = published_topics(run), f"no message came on {topic}"
+    measured = join_words(published) or "no topic"
+    if slip := _unreached(package, run):
+        verdict = of_node(f"{what}: {slip.message}", measured=measured, hint=_reach_hint(slip))
+        return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
     only = f"it publishes on {join_words(published)}; " if published else ""
     hint = f"{only}add {publisher(topic)} and publish in the loop"
     return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
@@ -112,8 +121,47 @@ def _advertised(package: PackageFacts, run: Run, what: str, of_node: Callable[..
     if slip := _unreached(package, run):
         verdict = of_node(f"{message}: {slip.message}", measured="no message", hint=_reach_hint(slip))
         return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
+    if deaf := unheard(run):
+        verdict = of_node(f"{message}: {deaf.message}", measured="no message", hint=deaf.hint)
+        return verdict.model_copy(update={"cause": deaf.message})
     hint = f"call publish(…) inside the loop `{LOOP}`"
     return of_node(message, measured="no message", hint=hint)
+
+
+def refused_type(run: Run, topic: str) -> Verdict | None:
+    """Return the verdict where the grader's publisher had to refuse a node, which asked for another type."""
+    asked = next((e for _, e in run.actors if e.action == "note" and e.topic == topic and e.type), None)
+    if asked is None:
+        return None
+    other = f"another definition of {asked.type}" if asked.type == asked.value else asked.type
+    message = f"{asked.actor} subscribes to {topic} with {other}, so nothing arrives"
+    wanted = f"{asked.value}, the type" if isinstance(asked.value, str) else "the type"
+    return failed(message, hint=f"use {wanted} that the handout asks for in {subscriber(topic)}")
+
+
+def unheard(run: Run) -> Verdict | None:
+    """Return the verdict where steps would have sent messages, and no node of the student's heard them."""
+    topics = (e.topic or "" for _, e in run.actors if e.action == "note" and e.detail == UNHEARD)
+    topic = next((topic for topic in topics if not nodes_on(run, topic, "subscribers")), None)
+    if topic is None or not run.student_nodes():
+        return None
+    if refused := refused_type(run, topic):
+        return refused
+    others = topics_with(run, "subscribers")
+    near = near_names(topic, others) or others
+    seen = f"; {nodes_on(run, near[0], 'subscribers')[0]} subscribes to {join_words(near)}" if near else ""
+    message = f"the run publishes on {topic}, and no node subscribes to it{seen}"
+    return failed(message, hint=f"add {subscriber(topic, '…, callback')}")
+
+
+def heed_unheard(check: Check, _package: PackageFacts | None, run: object, verdict: Verdict) -> Verdict:
+    """Return a lost mark with the topic that the run publishes on and that no node heard, whatever it did instead."""
+    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
+    if not unexplained or not isinstance(run, Run) or early_end(run) or not (found := unheard(run)):
+        return verdict
+    cited = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
+    update = {"message": f"{verdict.message}; {found.message}", "hint": found.hint, "cause": found.message}
+    return verdict.model_copy(update={**update, "citations": (*verdict.citations, cited)})
 
 
 def _unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
