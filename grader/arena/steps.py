@@ -78,6 +78,7 @@ class StepRunner:
         self._announced: set[str] = set()
         self._fixed: dict[str, Any] = {}
         self._deaf: set[str] = set()
+        self._in_vain: set[str] = set()
         self._background: list[asyncio.Task[None]] = []
         self._endless: list[asyncio.Task[None]] = []
 
@@ -348,7 +349,7 @@ class StepRunner:
         await self._arena.wait(lambda: self._arena.ros_now_ns() >= time_ns or self._is_over(), left_s)
 
     async def _wait(self, wait: Wait) -> None:
-        live, limit_s = self._live, wait.limit_s or self._scenario.until.first_message_s
+        live, patience_s = self._live, self._scenario.until.first_message_s
         if wait.seconds is not None:
             self._tell(f"waiting for {wait.seconds:g} s")
             await self._until(self._arena.ros_now_ns() + round(wait.seconds * NS))
@@ -357,19 +358,28 @@ class StepRunner:
             return
         name = wait.topic or wait.node or ""
         self._tell(f"waiting for {name}")
+        limit_s = wait.limit_s or (min(SUBSCRIBE_S, patience_s) if name in self._in_vain else patience_s)
         wanted = wait.messages + (live.topics[name].count if wait.new else 0)
 
         def is_there() -> bool:
             return live.topics[name].count >= wanted if wait.topic else name in live.here
 
-        await self._arena.wait(lambda: is_there() or self._is_over(), limit_s)
+        def is_never() -> bool:
+            known = live.published if wait.topic else live.here
+            return name not in known and is_settled(live, time.monotonic())
+
+        begun_s = time.monotonic()
+        await self._arena.wait(lambda: is_there() or is_never() or self._is_over(), limit_s)
         what = plural(wait.messages, "message") if wait.topic else "the node"
         there = is_there()
-        self._note("wait", name, f"{what} came" if there else f"{what} did not come within {limit_s:g} s")
+        (self._in_vain.discard if there else self._in_vain.add)(name)
+        within_s = min(limit_s, time.monotonic() - begun_s)
+        self._note("wait", name, f"{what} came" if there else f"{what} did not come within {within_s:.3g} s")
 
     # --- Processes ---------------------------------------------------------------------------------------------------
 
     def _start(self, name: str) -> None:
+        self._in_vain.clear()
         for spec in self._specs(name):
             self._note("start", None, spec["name"])
             self._stopped.discard(spec["name"])

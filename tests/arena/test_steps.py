@@ -147,6 +147,23 @@ def test_a_run_whose_process_has_ended_does_no_more_steps(tmp_path: Path) -> Non
     assert (seen.end_ns - seen.start_ns) / 1e9 < 40
 
 
+def test_what_never_comes_is_not_waited_for_once_the_graph_has_settled(tmp_path: Path) -> None:
+    silent = {"topic": "/echo", "limit_s": 1}
+    steps: list[dict[str, Any]] = [{"topic": "/never"}, {"node": "/nobody"}, silent, {"topic": "/echo"}]
+    until = {"first_message_s": 45, "limit_s": 1}
+    seen = _run(tmp_path, {"scripts/echo.py": ECHO}, [{"wait": wait} for wait in steps], until=until)
+    said = [detail for _, _, detail in _did(seen, "wait")]
+    assert [detail.partition(" did ")[0] for detail in said] == [
+        "1 message",
+        "the node",
+        "1 message",
+        "1 message",
+    ]
+    never, nobody, first, again = (float(detail.split()[-2]) for detail in said)
+    assert max(never, nobody) < 44
+    assert (first, again) == (1, 6)
+
+
 FRAMES = (
     NODE
     + "from std_srvs.srv import SetBool, SetBoolResponse\nrospy.init_node('frames')\n"

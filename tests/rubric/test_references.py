@@ -229,7 +229,8 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
         pytest.param(
             "programs: [turtlesim/turtlesim_node]",
             "programs: [talker]",
-            '36: criteria[6].with.programs[0]: name its package too, like turtlesim/turtlesim_node, not "talker"',
+            '36: criteria[6].with.programs[0]: name its package too, like turtlesim/turtlesim_node, not "talker"; '
+            "programs of the students' own go under scripts",
             id="program-without-a-package",
         ),
         pytest.param(
