@@ -140,22 +140,27 @@ def refused_type(run: Run, topic: str) -> Verdict | None:
 
 
 def unheard(run: Run) -> Verdict | None:
-    """Return the verdict where steps would have sent messages, and no node of the student's heard them."""
-    topics = (e.topic or "" for _, e in run.actors if e.action == "note" and e.detail == UNHEARD)
-    topic = next((topic for topic in topics if not nodes_on(run, topic, "subscribers")), None)
-    if topic is None or not run.student_nodes():
+    """Return the verdict where no node of the student's heard what the grader sends, or one misspells its topic."""
+    topics = dict.fromkeys(
+        e.topic or ""
+        for _, e in run.actors
+        if e.actor == "grader" and (e.action == "publish" or (e.action == "note" and e.detail == UNHEARD))
+    )
+    others = topics_with(run, "subscribers")
+    missed = [topic for topic in topics if topic not in others]
+    near = next(((topic, found) for topic in missed if (found := near_names(topic, others))), None)
+    if not missed or not run.student_nodes() or (near is None and len(missed) < len(topics)):
         return None
+    topic, found = near or (missed[0], others)
     if refused := refused_type(run, topic):
         return refused
-    others = topics_with(run, "subscribers")
-    near = near_names(topic, others) or others
-    seen = f"; {nodes_on(run, near[0], 'subscribers')[0]} subscribes to {join_words(near)}" if near else ""
+    seen = f"; {nodes_on(run, found[0], 'subscribers')[0]} subscribes to {join_words(found)}" if found else ""
     message = f"the run publishes on {topic}, and no node subscribes to it{seen}"
     return failed(message, hint=f"add {subscriber(topic, '…, callback')}")
 
 
 def heed_unheard(check: Check, _package: PackageFacts | None, run: object, verdict: Verdict) -> Verdict:
-    """Return a lost mark with the topic that the run publishes on and that no node heard, whatever it did instead."""
+    """Return a lost mark with the topic on which the run publishes and that no node heard, whatever it did instead."""
     unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
     if not unexplained or not isinstance(run, Run) or early_end(run) or not (found := unheard(run)):
         return verdict
