@@ -22,7 +22,7 @@ from grader.classes.feedback.send import Wanted as WantedFeedback
 from grader.classes.gradebook import write_gradebook
 from grader.classes.gradebook.table import Form
 from grader.classes.roster import read_roster
-from grader.classes.roster.folder import is_download, unpack_download
+from grader.classes.roster.platforms import is_download, unpack_download
 from grader.cli import batches, returning
 from grader.cli.class_display import print_batch
 from grader.cli.output import say, say_beside, say_json

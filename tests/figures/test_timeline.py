@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from grader.model.figure import Lane, TimelineFigure
-from grader.report.figures.timeline import LANES_MAX, STRETCHES_MAX, timeline_of
+from grader.report.figures.runs import LANES_MAX, STRETCHES_MAX, timeline_of
 from grader.report.html.figures import EVENTS_MAX, timeline
 from tests.checks.examples import runs_of
 

@@ -10,7 +10,7 @@ import pytest
 
 from grader.classes.fetching.obtain import source_of
 from grader.classes.roster import read_roster
-from grader.classes.roster.folder import is_download, unpack_download
+from grader.classes.roster.platforms import is_download, unpack_download
 from grader.errors import UsageError
 from tests.roster.helpers import ids, said
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.roster import read_roster
-from grader.classes.roster.folder import Named, platform_name
+from grader.classes.roster.platforms import Named, platform_name
 from grader.errors import UsageError
 from grader.model.batch import RosterFault
 from tests.roster.helpers import ids, said

@@ -33,10 +33,9 @@ LOADED = (
         "cli/commands",
         "cli/declare",
         "cli/doctor",
-        "cli/evidence_commands",
+        "cli/results",
         "cli/explanation",
         "cli/main",
-        "cli/reports",
         "cli/select_rubric",
     ),
     *(

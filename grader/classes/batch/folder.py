@@ -13,12 +13,12 @@ from grader.files import atomic_write
 from grader.intake import safe_name
 from grader.model.batch import MISSING, ROSTER, UNPUBLISHED, BatchRun, CriterionInfo, Entry
 from grader.model.result import (
+    NO_TIME,
     CriterionResult,
     EnvironmentInfo,
     ErrorInfo,
     GradingResult,
     SubmissionInfo,
-    TimingInfo,
 )
 from grader.model.verdict import Status
 from grader.model.version import RUN as RUN_FORMAT
@@ -102,7 +102,7 @@ class BatchFolder:
             max_points=self.run.max_points,
             criteria=tuple(map(_not_judged, self.run.criteria)),
             environment=EnvironmentInfo(grader=__version__, ros="", python="", sandbox=""),
-            timing=TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0),
+            timing=NO_TIME,
             error=ErrorInfo(kind=kind, message=message, hint=HINTS[kind]),
         )
 

@@ -23,12 +23,12 @@ from grader.errors import UsageError
 from grader.judging.summary import round_half_up
 from grader.model.batch import Entry, Roster
 from grader.model.result import (
+    NO_TIME,
     CriterionResult,
     EnvironmentInfo,
     GradingResult,
     RubricInfo,
     SubmissionInfo,
-    TimingInfo,
 )
 from grader.model.verdict import Status
 from grader.rubric.course import CourseFile
@@ -268,5 +268,5 @@ def _result(
         max_points=MAX_POINTS,
         criteria=labs,
         environment=EnvironmentInfo(grader=__version__, ros="", python="", sandbox=""),
-        timing=TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0),
+        timing=NO_TIME,
     )

@@ -21,7 +21,7 @@ from typing_extensions import Self
 
 from grader.classes.feedback.forms import PAGE, TEXT, Feedback, Sender, Settings
 from grader.classes.gradebook.platforms import kinds
-from grader.classes.roster.folder import platform_name
+from grader.classes.roster.platforms import platform_name
 from grader.errors import NotSent, UsageError
 from grader.files import atomic_write, whole_file
 

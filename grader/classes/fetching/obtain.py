@@ -28,7 +28,7 @@ from grader.classes.fetching.mirror import (
     patiently,
     place_name,
 )
-from grader.classes.roster.folder import PLATFORMS
+from grader.classes.roster.platforms import PLATFORMS
 from grader.errors import GraderError, OutputError, SubmissionError
 from grader.files import temporary_folder
 from grader.intake import unreadable

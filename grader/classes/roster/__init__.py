@@ -9,13 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from grader.classes.roster.entries import OWN_FOLDER, Local, entries_of
-from grader.classes.roster.exports import (
+from grader.classes.roster.platforms import (
+    from_folder,
     from_gitlab,
     is_classroom,
     refuse_classroom_roster,
     with_roster_columns,
 )
-from grader.classes.roster.folder import from_folder
 from grader.classes.roster.table import read_table
 from grader.errors import UsageError
 from grader.model.batch import Entry, Roster
@@ -28,7 +28,7 @@ SOURCES: tuple[tuple[Callable[[Path], bool], Callable[[Path, Local], Roster]], .
     (lambda path: path.suffix.lower() in {".json", ".ndjson", ".jsonl"}, from_gitlab),
 )
 """The kinds of rosters: whether a path is one, and what reads it. A new kind is one file here and one line. Any other
-path is a table; `exports.py` recognises those of GitHub Classroom."""
+path is a table; `platforms.py` recognises those of GitHub Classroom."""
 
 
 def read_roster(path: Path, local: Local = OWN_FOLDER) -> Roster:

@@ -8,18 +8,23 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Literal
 
-from grader.cli.declare import INSTRUCTORS, Argument, Flag, Option, command, loading
-from grader.cli.options import (
+from grader.cli.declare import (
     BATCH_FOLDER,
     CLASS_EXIT_CODES,
+    INSTRUCTORS,
     MERGE_EXIT_CODES,
     REPORT_EXIT_CODES,
     RUBRIC,
     STATIC,
+    Argument,
+    Flag,
     JsonFlag,
+    Option,
     PackageOption,
     SandboxOption,
+    command,
     count,
+    loading,
     percent,
     port,
 )
@@ -110,7 +115,7 @@ def batch(
     with loading():
         from grader.classes.batch.run import BatchOptions
         from grader.classes.roster import read_roster
-        from grader.classes.roster.folder import is_download, unpack_download
+        from grader.classes.roster.platforms import is_download, unpack_download
         from grader.cli import batches
         from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric)
@@ -352,7 +357,7 @@ def report(
     with loading():
         from grader.classes.batch.existing_results import has_result
         from grader.classes.batch.folder import RUN, open_batch
-        from grader.cli import reports
+        from grader.cli import results
     batch = open_batch(folder) if (folder / RUN).is_file() else None
     if batch is not None:
         batch.refuse_newer()
@@ -360,18 +365,18 @@ def report(
     if form:
         if not single or anonymous:
             raise UsageError(f"{folder}: --form is for one submission", hint="give its own folder: DIR/<id>")
-        loaded = reports.rubric_of(rubric, folder)
-        return reports.write_form(folder, loaded, form, out or STDOUT, prefix, student=student)
+        loaded = results.rubric_of(rubric, folder)
+        return results.write_form(folder, loaded, form, out or STDOUT, prefix, student=student)
     if out or prefix is not None or student:
         raise UsageError("--out, --prefix and --student go with --form", hint="see grader report --help")
     if anonymous and batch is None:
         raise UsageError(
             f"{folder}: only a class has a page, and there is no {RUN}", hint="give the batch's --out"
         )
-    folders = [folder] if single else reports.folders_in(folder, batch)
-    code = reports.write_reports(folders, reports.rubric_of(rubric, folders[0], batch))
+    folders = [folder] if single else results.folders_in(folder, batch)
+    code = results.write_reports(folders, results.rubric_of(rubric, folders[0], batch))
     if batch is not None:
-        reports.write_class_pages(batch, anonymous)
+        results.write_class_pages(batch, anonymous)
     return code
 
 

@@ -4,8 +4,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-from grader.cli.declare import INSTRUCTORS, Argument, Flag, Option, command, loading
-from grader.cli.options import CLASS_EXIT_CODES, PUBLISH_EXIT_CODES, STATIC, JsonFlag, SandboxOption, count
+from grader.cli.declare import (
+    CLASS_EXIT_CODES,
+    INSTRUCTORS,
+    PUBLISH_EXIT_CODES,
+    STATIC,
+    Argument,
+    Flag,
+    JsonFlag,
+    Option,
+    SandboxOption,
+    command,
+    count,
+    loading,
+)
 from grader.errors import ExitCode
 
 COURSE = Argument("COURSE", "the course's file, course.yaml")

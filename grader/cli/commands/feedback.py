@@ -5,13 +5,18 @@ from pathlib import Path
 from typing import Annotated
 
 from grader.classes.feedback.forms import FORGES, FORMS
-from grader.cli.declare import INSTRUCTORS, Argument, Flag, Option, command, loading
-from grader.cli.options import (
+from grader.cli.declare import (
     BATCH_FOLDER,
     FEEDBACK_EXIT_CODES,
+    INSTRUCTORS,
     PUBLISH_EXIT_CODES,
     REQUESTS_EXIT_CODES,
+    Argument,
+    Flag,
     JsonFlag,
+    Option,
+    command,
+    loading,
 )
 from grader.errors import ExitCode, UsageError
 

@@ -5,16 +5,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-from grader.cli.declare import INSTRUCTORS, Argument, Option, command, loading
-from grader.cli.options import (
+from grader.cli.declare import (
+    INSTRUCTORS,
     RUBRIC,
     SIGN_EXIT_CODES,
     VERIFY_EXIT_CODES,
     AllFlag,
+    Argument,
     JsonFlag,
+    Option,
     PackageOption,
     SandboxOption,
+    command,
     count,
+    loading,
 )
 from grader.errors import ExitCode, UsageError
 
@@ -129,7 +133,7 @@ def judge(
     """Judge recorded evidence again, without ROS."""
     with loading():
         from grader.classes.batch.existing_results import submissions_in
-        from grader.cli.evidence_commands import judge_evidence, judge_submissions
+        from grader.cli.results import judge_evidence, judge_submissions
         from grader.portable import cores
         from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric)
@@ -147,8 +151,8 @@ def inspect(
 ) -> ExitCode:
     """Show what is in an evidence file or a bag: rates, gaps, nodes."""
     with loading():
-        from grader.cli.evidence_commands import print_inspection
         from grader.cli.output import say_json
+        from grader.cli.results import print_inspection
         from grader.evidence.inspect import inspect_file
     inspection = inspect_file(file)
     if as_json:
@@ -178,7 +182,7 @@ def verify(
     taken.
     """
     with loading():
-        from grader.cli.evidence_commands import compare_results, verify_results
+        from grader.cli.results import compare_results, verify_results
     if against is not None:
         if len(results) > 1 or rubric is not None or allowed_signers is not None:
             raise UsageError("--against compares two results, and takes no other option")

@@ -4,8 +4,18 @@ import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
-from grader.cli.declare import INSTRUCTORS, Argument, Flag, Option, command, loading
-from grader.cli.options import EXPORT_EXIT_CODES, PackageOption, SandboxOption, minutes
+from grader.cli.declare import (
+    EXPORT_EXIT_CODES,
+    INSTRUCTORS,
+    Argument,
+    Flag,
+    Option,
+    PackageOption,
+    SandboxOption,
+    command,
+    loading,
+    minutes,
+)
 from grader.errors import ExitCode
 from grader.model.version import ALL
 
@@ -117,7 +127,7 @@ def export_bag(
 ) -> ExitCode:
     """Write recorded evidence as a ROS 1 bag."""
     with loading():
-        from grader.cli.evidence_commands import export_bags
+        from grader.cli.results import export_bags
     export_bags(evidence, out, everything=everything)
     return ExitCode.PASSED
 

@@ -6,8 +6,19 @@ from pathlib import Path
 from typing import Annotated
 
 from grader.cli.commands.grading import PACKAGE
-from grader.cli.declare import INSTRUCTORS, Argument, Flag, Option, command, loading
-from grader.cli.options import MUTANTS_EXIT_CODES, RUBRIC, JsonFlag, SandboxOption, count
+from grader.cli.declare import (
+    INSTRUCTORS,
+    MUTANTS_EXIT_CODES,
+    RUBRIC,
+    Argument,
+    Flag,
+    JsonFlag,
+    Option,
+    SandboxOption,
+    command,
+    count,
+    loading,
+)
 from grader.errors import ExitCode, RubricError, UsageError
 
 STDOUT = "-"

@@ -4,8 +4,20 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-from grader.cli.declare import STUDENTS, Argument, Flag, Option, command, loading
-from grader.cli.options import RUBRIC, STATIC, AllFlag, JsonFlag, PackageOption, SandboxOption
+from grader.cli.declare import (
+    RUBRIC,
+    STATIC,
+    STUDENTS,
+    AllFlag,
+    Argument,
+    Flag,
+    JsonFlag,
+    Option,
+    PackageOption,
+    SandboxOption,
+    command,
+    loading,
+)
 from grader.errors import ExitCode, UsageError
 
 

@@ -19,15 +19,16 @@ from grader.model.figure import Figure, Figures
 from grader.model.result import CriterionResult
 from grader.model.verdict import Verdict
 from grader.report.figures.measurements import (
+    end_figures,
     heard_figures,
+    path_figures,
     rate_figures,
+    region_figures,
     start_figures,
     step_figures,
     wrap_figures,
 )
-from grader.report.figures.paths import end_figures, path_figures, region_figures
-from grader.report.figures.runs import code_figures, console_of, graph_of
-from grader.report.figures.timeline import timeline_of
+from grader.report.figures.runs import code_figures, console_of, graph_of, timeline_of
 from grader.rubric.made_up import as_recorded
 from grader.rubric.model import Criterion, Rubric
 

@@ -1,4 +1,7 @@
-"""What a check measured, by its own measure: values of a counter, a rate, what a listener heard."""
+"""What a check measured, by its own measure.
+
+Values of a counter, a rate, what a listener heard, the path that a robot took and where it had to be.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,16 @@ from itertools import chain
 from grader.checks.counter import StartParams, StepParams, judge_start
 from grader.checks.listener import HearsParams
 from grader.checks.rate import RateParams, judged_rhythm, sleeps_explain, was_late
+from grader.checks.robot_path import PathParams, spot
+from grader.checks.robot_places import (
+    EndsAtParams,
+    Place,
+    StaysWithinParams,
+    asked_stretch,
+    judged_path,
+    out_along,
+    placed,
+)
 from grader.checks.support.clocks import lateness
 from grader.checks.support.console_output import (
     Line,
@@ -32,6 +45,7 @@ from grader.checks.support.counters import (
     wrong_steps,
 )
 from grader.checks.support.exit_causes import process_tracebacks
+from grader.checks.support.geometry import Polyline, Pose, followed, relative, shown_walls, track
 from grader.checks.support.processes import how_it_ended, life_of
 from grader.checks.support.topics import sent_by
 from grader.evidence.events import ProcessEvent
@@ -41,6 +55,8 @@ from grader.model.figure import (
     CounterFigure,
     Heard,
     HeardFigure,
+    PathFigure,
+    PlaceFigure,
     RateFigure,
 )
 from grader.model.message_rate import Rhythm
@@ -312,3 +328,92 @@ def _shown_probes(found: Sequence[Line | None]) -> list[int]:
     missing = [i for i in every if found[i] is None][: ROWS_MAX // 2]
     others = [i for i in every if i not in set(missing)]
     return sorted([*missing, *others[: ROWS_MAX - len(missing)]])
+
+
+NEAR = 20
+CORNERS_MAX = 100
+
+
+def path_figures(run: Run, params: PathParams) -> Iterator[PathFigure]:
+    """Seen from its start where the points are."""
+    found = track(run, params.topic, params.hold_s, of=params.of)
+    if found is None or not found.path:
+        return
+    taken = relative(found.path) if params.relative else list(found.path)
+    way = params.way
+    course = followed(taken, way.points, params.tolerance_m)
+    kept = _shown_poses(taken, course.strayed)
+    yield PathFigure(
+        topic=named(params.topic),
+        scenario=named(run.scenario),
+        points=tuple(_spot(taken[i].point) for i in kept),
+        corners=tuple(map(_spot, way.points[:CORNERS_MAX])),
+        tolerance_m=finite(params.tolerance_m),
+        reached=course.reached,
+        first=0 if way.added else 1,
+        strayed=None if course.strayed is None else kept.index(course.strayed),
+        messages=sum(len(c.messages) for c in run.channels if c.topic == params.topic and not c.by_grader),
+    )
+
+
+SIDES_MAX = 1000
+
+
+def end_figures(run: Run, params: EndsAtParams) -> Iterator[PlaceFigure]:
+    """The path from when the goal was asked for."""
+    found, asked = track(run, params.topic, params.hold_s, params.fields), asked_stretch(run, params)
+    if found is None or asked is None:
+        return
+    taken = judged_path(found, asked, params)
+    if taken:
+        missed = not params.is_there(taken[-1])
+        figure = _place_figure(run, params, taken, len(taken) - 1 if missed else None)
+        goal = {"goal": _spot(params.goal), "tolerance_m": finite(params.tolerance_m)}
+        end = f"It ends at {spot(taken[-1].point)}, which is {'not ' if missed else ''}{params.words}."
+        yield figure.model_copy(update={**goal, "says": short(end)})
+
+
+def region_figures(run: Run, params: StaysWithinParams) -> Iterator[PlaceFigure]:
+    """The path, and the border of where it may be."""
+    found, region = track(run, params.topic, params.hold_s, params.fields), params.region(run)
+    taken = placed(found, params) if found is not None and found.path else []
+    if not taken:
+        return
+    out = out_along(taken, region)
+    worst = max(range(len(out)), key=out.__getitem__) if any(out) else None
+    figure = _place_figure(run, params, taken, worst, params.walls)
+    where = "" if worst is None else f"; it is {out[worst]:.2f} m outside at {spot(taken[worst].point)}"
+    says = short(f"It has to be {region.words}{where}.")
+    area = tuple(map(_spot, region.outline[:CORNERS_MAX]))
+    yield figure.model_copy(update={"area": area, "says": says})
+
+
+def _place_figure(
+    run: Run, params: Place, taken: Sequence[Pose], wrong: int | None, walls: Sequence[Polyline] = ()
+) -> PlaceFigure:
+    """The path on the map that the simulator shows. Seen from its own start, a path has no place on a map."""
+    kept = _shown_poses(taken, wrong)
+    shown = walls or (() if params.relative else shown_walls(run))
+    return PlaceFigure(
+        topic=named(params.topic),
+        scenario=named(run.scenario),
+        points=tuple(_spot(taken[i].point) for i in kept),
+        walls=tuple(tuple(map(_spot, wall[:CORNERS_MAX])) for wall in shown[:SIDES_MAX]),
+        wrong=None if wrong is None else kept.index(wrong),
+        says="",
+        messages=sum(len(c.messages) for c in run.channels if c.topic == params.topic and not c.by_grader),
+    )
+
+
+def _spot(point: tuple[float, float]) -> tuple[float, float]:
+    return round(finite(point[0]), 4), round(finite(point[1]), 4)
+
+
+def _shown_poses(path: Sequence[Pose], strayed: int | None) -> list[int]:
+    """Its ends, what is around the place where it strays, and a fair choice of the others where it moves."""
+    every = range(len(path))
+    spots = [_spot(pose.point) for pose in path]
+    moves = [i for i in every[1:] if spots[i] != spots[i - 1]]
+    near = every[max(0, strayed - NEAR) : strayed + NEAR] if strayed is not None else ()
+    own = {every[0], every[-1], *near}
+    return sorted({*own, *spread(moves, POINTS_MAX - len(own))})
