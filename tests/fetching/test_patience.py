@@ -10,7 +10,7 @@ from grader.classes.fetching import Patience, prefetch
 from grader.classes.fetching.mirror import GivenUp, patiently
 from grader.errors import SubmissionError, Unreachable
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
-from grader.intake.git_errors import explained, may_pass
+from grader.intake.repository import explained, may_pass
 from grader.intake.source import parse_source
 from tests.fetching.forge import forge
 from tests.fetching.samples import AT_ONCE, entry

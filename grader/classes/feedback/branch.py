@@ -16,9 +16,8 @@ from grader.errors import GraderError, NotSent, UsageError
 from grader.files import temporary_folder
 from grader.host_programs import find_user_program
 from grader.intake.git import Git, GitFailed, Repository
-from grader.intake.git_errors import explained
 from grader.intake.names import printable
-from grader.intake.repository import ask, parse_refs
+from grader.intake.repository import ask, explained, parse_refs
 from grader.intake.source import Source, parse_source
 
 NAME = "feedback"

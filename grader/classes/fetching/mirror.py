@@ -21,8 +21,7 @@ from grader.classes.fetching.history import Commit, read_commit
 from grader.errors import SubmissionError
 from grader.intake.credentials import split_address
 from grader.intake.git import Git, GitFailed, GitTimeout, Repository
-from grader.intake.git_errors import explained, may_pass
-from grader.intake.repository import Wanted, ask, parse_refs
+from grader.intake.repository import Wanted, ask, explained, may_pass, parse_refs
 from grader.intake.source import Source
 
 _EVERYTHING = ("+refs/heads/*:refs/heads/*", "+refs/tags/*:refs/tags/*")
