@@ -80,13 +80,13 @@ def make_recorder(
     from grader.arena.static_recorder import (  # noqa: PLC0415 - see LATER
         STATIC_ONLY,
         StaticRecorder,
-        why_unrun,
+        why_nodes_cannot_run,
     )
 
     make_folder(job.evidence)
     rubric, options = job.rubric.rubric, job.options
     scenarios = select_started(rubric, only)
-    reason = STATIC_ONLY if options.static_only or not needs_ros(job.rubric) else why_unrun()
+    reason = STATIC_ONLY if options.static_only or not needs_ros(job.rubric) else why_nodes_cannot_run()
     if reason:
         return StaticRecorder(
             job.submission,

@@ -43,10 +43,10 @@ def visible(text: str, *, lines: bool = False) -> str:
     """
     if not (text.isascii() and text.isprintable()):
         text = _unstacked(text.translate(_LINES if lines else _LINE))
-    return uncommanded(text)
+    return without_ci_commands(text)
 
 
-def uncommanded(text: str) -> str:
+def without_ci_commands(text: str) -> str:
     """Return lines that no CI system takes for a command to itself. Colours that are ours may stand before them."""
     if "##" in text:
         text = _COMMAND.sub(r"\\x23", text)

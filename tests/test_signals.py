@@ -18,13 +18,13 @@ import pytest
 
 from grader import grade
 from grader.arena import arena_process
-from grader.arena.sandbox_probe import why_not
+from grader.arena.sandbox_probe import why_no_sandbox
 from grader.errors import HostError
 from grader.portable import wait_for_children
 from tests.arena.support import printed, run_script
 from tests.faulty import ROOT, RUBRIC, VICTIM, result_in
 
-needs_sandbox = pytest.mark.skipif(bool(why_not()), reason=f"no sandbox here: {why_not()}")
+needs_sandbox = pytest.mark.skipif(bool(why_no_sandbox()), reason=f"no sandbox here: {why_no_sandbox()}")
 DEAF = """
 import os, signal, sys
 signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())

@@ -33,8 +33,8 @@ from grader.arena.static_recorder import (
     RETRIES,
     Recording,
     copy_recorded,
+    left_out_events,
     metadata,
-    not_attached,
     write_files,
 )
 from grader.arena.workspace import make_workspace
@@ -168,7 +168,7 @@ class Recorder:
         with EvidenceWriter(path, scenario=PACKAGE, clock="real", warp=1.0, metadata=about) as writer:
             await self._build(self._make_place(folder), writer, last=last)
             write_files(writer, self._submission, recording.facts)
-            for event in not_attached(recording.facts):
+            for event in left_out_events(recording.facts):
                 writer.event("/grader/actor", time.time_ns(), event)
         recording.files.append(path)
 

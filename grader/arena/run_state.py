@@ -98,13 +98,13 @@ class RunState:
     rates: dict[str, list[RateBounds]] = field(default_factory=lambda: defaultdict(list))
     arrivals_ns: dict[str, list[int]] = field(default_factory=dict)
 
-    def rate(self, rates: Iterable[RateBounds]) -> None:
+    def watch_rates(self, rates: Iterable[RateBounds]) -> None:
         """Keep the arrival times of the messages by which these rates are seen."""
         for bounds in rates:
             self.rates[bounds.topic].append(bounds)
             self.arrivals_ns[bounds.topic] = []
 
-    def arrived(self, topic: str, count: int, time_ns: int) -> None:
+    def note_arrivals(self, topic: str, count: int, time_ns: int) -> None:
         """Take note of a student's messages that came together. Of a flood, only the first ones and the latest are
         kept."""
         times_ns = self.arrivals_ns.get(topic)
@@ -113,7 +113,7 @@ class RunState:
             times_ns += [time_ns] * min(count, room)
             times_ns[-1] = time_ns
 
-    def message(self, topic: str, count: int, now_s: float, *, active: bool = True) -> None:
+    def note_messages(self, topic: str, count: int, now_s: float, *, active: bool = True) -> None:
         """Take note of messages, of the student's (`active`) or of a program that runs beside."""
         seen = self.topics[topic]
         if not seen.first_s:
@@ -123,17 +123,17 @@ class RunState:
         if active:
             self.activity_s = now_s
 
-    def machine(self, busy: float, own: float, now_s: float) -> None:
+    def note_machine(self, busy: float, own: float, now_s: float) -> None:
         """Take note of how busy the machine was since the last report, `own` of it with the run's own processes."""
         if self.measured_s and busy >= FULL:
             self.lost_s += (now_s - self.measured_s) * min(busy - own, OTHERS_MOST)
         self.measured_s = now_s
 
-    def active(self, now_s: float) -> None:
+    def note_activity(self, now_s: float) -> None:
         """Take note that the student's processes did something, besides sending messages."""
         self.activity_s = self.news_s = now_s
 
-    def graph(
+    def note_graph(
         self, nodes: Iterable[str], processes: Mapping[str, str], now_s: float, *, picture: object = None
     ) -> None:
         """Take note of the master's nodes of the student's, and of the processes that nodes belong to.
@@ -152,10 +152,10 @@ class RunState:
         own = {n for n in nodes if n not in self.helper_nodes}
         if own - self.nodes:
             self.first_node_s = self.first_node_s or now_s
-            self.active(now_s)
+            self.note_activity(now_s)
         self.nodes |= own
 
-    def rests(self, process: str, rest: str | None, programs: int, now_s: float) -> None:
+    def note_rest(self, process: str, rest: str | None, programs: int, now_s: float) -> None:
         """Take note that a process with so many programs has come to rest (`spins` or `loops`), or moves again
         (None)."""
         known = self.at_rest.pop(process, None)
@@ -169,11 +169,11 @@ class RunState:
         """The topics of the grader's to which a node has subscribed."""
         return self.subscribers.keys()
 
-    def connections(self, topics: Iterable[str], now_s: float) -> None:
+    def note_connections(self, topics: Iterable[str], now_s: float) -> None:
         """Take note of the topics over which nodes are connected now, and since when."""
         self.connected_s = {topic: self.connected_s.get(topic, now_s) for topic in topics}
 
-    def started(self, process: str, now_s: float, *, helper: bool) -> None:
+    def note_start(self, process: str, now_s: float, *, helper: bool) -> None:
         """Take note that a process was started, for the first time or again."""
         (self.helpers if helper else self.running).add(process)
         self.ended.discard(process)
@@ -181,7 +181,7 @@ class RunState:
         self.at_rest.pop(process, None)
         self.last_start_s, self.lost_before_last_s = now_s, self.lost_s
 
-    def exited(self, process: str, now_s: float) -> None:
+    def note_exit(self, process: str, now_s: float) -> None:
         """Take note that a process has ended, and with it its subscribers."""
         self.helpers.discard(process)
         for nodes in self.subscribers.values():
@@ -190,23 +190,23 @@ class RunState:
         if process in self.running:
             self.running.remove(process)
             self.ended.add(process)
-            self.active(now_s)
+            self.note_activity(now_s)
 
-    def steps_over(self, now_s: float, *, heeded: bool = True) -> None:
+    def begin_wait(self, now_s: float, *, heeded: bool = True) -> None:
         """Start the time in which what is waited for has to come: the steps are over. Where no node subscribed to what
         they send, the time that this took was the first message's too."""
         self.waited_s = 0.0 if heeded else now_s - self.started_s
         self.started_s = self.news_s = now_s
         self.lost_before_s = self.lost_s
 
-    def sent(self, value: str, now_s: float) -> None:
+    def note_probe(self, value: str, now_s: float) -> None:
         """Take note that a probe went out: its value is to be printed, as a word of its own."""
         self.last_sent_s = now_s
         self.unheard[value] = re.compile(rf"(?<![\w.-]){re.escape(value)}(?![\w.])")
 
-    def printed(self, line: str, now_s: float) -> None:
+    def note_line(self, line: str, now_s: float) -> None:
         self.last_line_s = now_s
-        self.active(now_s)
+        self.note_activity(now_s)
         unheard = {value: word for value, word in self.unheard.items() if not word.search(line)}
         if len(unheard) < len(self.unheard):
             self.last_heard_s = now_s

@@ -73,7 +73,7 @@ def choose(mode: SandboxMode) -> Sandbox:
     if refused:
         hint = ROOT_HINT if refused.startswith("setpriv: ") else ULIMIT_HINT
         raise HostError(f"the limits of students' processes cannot be set here: {refused}", hint=hint)
-    reason = "--sandbox none" if mode == "none" else why_not()
+    reason = "--sandbox none" if mode == "none" else why_no_sandbox()
     if reason and mode == "require":
         raise SandboxMissing(f"no sandbox on this machine: {reason}", hint=INSTALL_HINT)
     can_drop = os.geteuid() == 0 and find_host_program("setpriv") is not None
@@ -95,7 +95,7 @@ def refused_limits() -> str:
     return _said([*_drop(), prlimit, *limits, "--", "/bin/true"])
 
 
-def why_not() -> str:
+def why_no_sandbox() -> str:
     """Return why to go without a sandbox, in one line; "" where the sandbox and the arena's own network work.
 
     Raises SandboxMissing where that is not known.

@@ -95,7 +95,7 @@ async def run_scenario(
             session.course(ScenarioEvent(event="end", outcome="ended", detail="there was nothing to start"))
             return RunCost(cpu_s=0, student_cpu_s=0)
         try:
-            session.live.rate(rates)
+            session.live.watch_rates(rates)
             session.live.naps = place.has_line(NAPS)
             session.live.least_s = max(watched_s + WATCHED_MORE_S, expected_s(scenario) - STARTING_S)
             async with admission.start() as leave, session as arena:
@@ -130,7 +130,7 @@ async def _run(
         await runner.run()
         await _await_rostests(scenario, arena, tell)
         if scenario.steps or any(start.tests or start.is_rostest for start in scenario.start):
-            arena.live.steps_over(time.monotonic(), heeded=not runner.unheeded)
+            arena.live.begin_wait(time.monotonic(), heeded=not runner.unheeded)
             if runner.stopped_all or (arena.live.running and not waits(scenario.until)):
                 return "complete", ""
         return await _observe(scenario, arena, tell)

@@ -127,7 +127,7 @@ class ArenaSession:
         self._process.send(command)
 
     def start(self, spec: dict[str, Any]) -> None:
-        self.live.started(spec["name"], time.monotonic(), helper=spec["role"] == "grader")
+        self.live.note_start(spec["name"], time.monotonic(), helper=spec["role"] == "grader")
         self.exit_codes.pop(spec["name"], None)
         self._killed.starting(spec["name"])
         self.send(do="start", spec=spec)
@@ -251,8 +251,8 @@ class ArenaSession:
             if channel.topic in self._watched:
                 self._watched[channel.topic].extend(frame.datas)
                 self.last_from[channel.topic] = channel.callerid
-            self.live.message(channel.topic, len(frame.datas), time.monotonic(), active=own)
-            self.live.arrived(channel.topic, len(frame.datas), frame.time_ns)
+            self.live.note_messages(channel.topic, len(frame.datas), time.monotonic(), active=own)
+            self.live.note_arrivals(channel.topic, len(frame.datas), frame.time_ns)
 
     def _event(self, frame: Frame) -> None:
         topic, record = frame.fields["topic"], frame.fields["record"]
@@ -260,7 +260,7 @@ class ArenaSession:
         if topic == "/grader/graph":
             nodes = [n for n in record["nodes"] if not is_grader_node(n)]
             picture = {key: value for key, value in record.items() if key != "connections"}
-            self.live.graph(nodes, record["processes"], time.monotonic(), picture=picture)
+            self.live.note_graph(nodes, record["processes"], time.monotonic(), picture=picture)
             self.live.services = set(record["services"])
             self.live.published = {t for t, by in record["publishers"].items() if set(by) & set(nodes)}
         elif topic == "/grader/console":
@@ -269,22 +269,22 @@ class ArenaSession:
             self._exited(record)
         elif topic == "/grader/host":
             self._on_lateness(record["p95_ms"])
-            self.live.machine(record["busy"], record["own_busy"], time.monotonic())
+            self.live.note_machine(record["busy"], record["own_busy"], time.monotonic())
         elif topic == "/grader/param" and not is_grader_node(record["caller_id"]):
-            self.live.active(time.monotonic())
+            self.live.note_activity(time.monotonic())
         elif topic == "/grader/actor" and record["action"] == "limit":
             if record["detail"].startswith(STOPPED):
                 self._killed.limited(record["actor"])
         elif topic == "/grader/actor" and record["action"] == "open":
             self.live.opened.add(record["actor"])
-            self.live.active(time.monotonic())
+            self.live.note_activity(time.monotonic())
 
     def _print(self, process: str, stream: str, line: str, **_: object) -> None:
         self._killed.printed(process, line)
         if stream == "stdout" and process in self._printed:
             self._printed[process].append(line)
         if process in self.live.running | self.live.ended:
-            self.live.printed(line, time.monotonic())
+            self.live.note_line(line, time.monotonic())
 
     def _exited(self, record: dict[str, Any]) -> None:
         name = record["name"]
@@ -295,7 +295,7 @@ class ArenaSession:
         self.exit_codes[name] = record["exit_code"]
         if self._master or record["role"] != "student":  # what a build only tries out may end as it likes
             self._killed.ended(record)
-        self.live.exited(name, time.monotonic())
+        self.live.note_exit(name, time.monotonic())
 
     def _status(self, time_ns: int, fields: dict[str, Any]) -> None:
         status = fields["status"]
@@ -304,7 +304,7 @@ class ArenaSession:
         elif status == "subscribed" and not is_grader_node(fields["subscriber"]):
             self.live.subscribers.setdefault(fields["topic"], set()).add(fields["subscriber"])
         elif status == "rest":
-            self.live.rests(fields["name"], fields["rest"], fields["programs"], time.monotonic())
+            self.live.note_rest(fields["name"], fields["rest"], fields["programs"], time.monotonic())
         elif status == "answer":
             self._answers[fields["id"]] = fields
         elif status == "left":
@@ -313,7 +313,7 @@ class ArenaSession:
             self._asked(time_ns, fields)
         elif status == "graph":
             pairs = [c for c in fields["connections"] if not is_grader_node(c["subscriber"])]
-            self.live.connections({c["topic"] for c in pairs}, time.monotonic())
+            self.live.note_connections({c["topic"] for c in pairs}, time.monotonic())
             self.live.graphs += 1
         elif status == "spawn-failed":
             message = f"{fields['name']} could not be started: {fields['detail']}"
@@ -325,7 +325,7 @@ class ArenaSession:
     def _asked(self, time_ns: int, fields: dict[str, Any]) -> None:
         """Handle a client's call of a service that the grader offers, by its type or by another one."""
         if fields["status"] == "request":
-            self.live.active(time.monotonic())
+            self.live.note_activity(time.monotonic())
             self.on_request(time_ns, fields)
         else:
             self.on_other_type(time_ns, fields)

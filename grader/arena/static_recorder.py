@@ -107,12 +107,12 @@ def attachments(folder: Path, facts: PackageFacts) -> Iterable[tuple[str, bytes]
             yield file.path, data
 
 
-def not_attached(facts: PackageFacts) -> Iterable[ActorEvent]:
+def left_out_events(facts: PackageFacts) -> Iterable[ActorEvent]:
     """Yield an event for each file that `attachments` leaves out, as a limit that was met."""
     for other in facts.also:
         yield from (
             event.model_copy(update={"actor": f"{other.asked}: {event.actor}"})
-            for event in not_attached(other)
+            for event in left_out_events(other)
         )
     texts = _texts(facts)
     for file in texts[:ATTACHED_FILES_MAX]:
@@ -135,7 +135,7 @@ def copy_recorded(recorded: Mapping[str, Path], folder: Path, progress: Progress
         progress.step(name, "skipped", STILL_HOLDS)
 
 
-def why_unrun() -> str:
+def why_nodes_cannot_run() -> str:
     """Return why no node can be run here, "" where one can. Raises RosMissing where ROS is not where it should be."""
     if system():
         return f"ROS 1's nodes run on Linux, and this is {system()}"

@@ -203,7 +203,7 @@ class StepRunner:
         type_, moment = self._types[topic], Moment(index, total, self._arena.ros_now_ns())
         data, shown = type_.encode(value, moment), type_.shown(value, moment)
         if isinstance(shown, str | int) and not isinstance(shown, bool):
-            self._live.sent(str(shown), time.monotonic())
+            self._live.note_probe(str(shown), time.monotonic())
         about = deed or {"action": "publish", "topic": topic, "type": type_.type, "value": shown}
         record = {"actor": "grader", **about}
         self._arena.send(do="publish", topic=topic, data=base64.b64encode(data).decode(), record=record)

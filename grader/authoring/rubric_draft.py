@@ -19,7 +19,7 @@ from grader.model.record import Record
 from grader.rubric.consistency import TOTAL_POINTS
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Criterion, Param, Probe, Rubric, Scenario, Start, Until
-from grader.untrusted_text import line, uncommanded, visible
+from grader.untrusted_text import line, visible, without_ci_commands
 
 WEIGHTS = {
     "manifest": 1, "cmake": 1, "build": 1, "executable": 1, "node-lives": 1, "node-name": 1, "topic-type": 2, "rate": 3,
@@ -98,7 +98,7 @@ class _Dumper(yaml.SafeDumper):
 
 
 def _quoted(dumper: _Dumper, text: str) -> yaml.ScalarNode:
-    """What a CI's log could take for a command stands in double quotes, where `uncommanded` writes escapes."""
+    """What a CI's log could take for a command stands in double quotes, where `without_ci_commands` writes escapes."""
     style = '"' if "##" in text or "::" in text else None
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
@@ -146,8 +146,8 @@ def _dumped(data: object, *, flow: bool | None) -> str:
             data, Dumper=_Dumper, sort_keys=False, allow_unicode=letters, width=110, default_flow_style=flow
         )
 
-    text = uncommanded(dump(letters=True))
-    return text if visible(text, lines=True) == text else uncommanded(dump(letters=False))
+    text = without_ci_commands(dump(letters=True))
+    return text if visible(text, lines=True) == text else without_ci_commands(dump(letters=False))
 
 
 def _one_line(text: str) -> str:

@@ -13,10 +13,10 @@ from pydantic import Field, model_validator
 from grader.checks.registry import ProcessName, check
 from grader.checks.support.console_output import Level, Line, Logged, console_log, logged_by, stream_lines
 from grader.checks.support.exit_causes import (
-    ended_after,
     explain_end,
     explain_traceback,
     is_rospys_own,
+    lifetime_text,
     process_tracebacks,
 )
 from grader.checks.support.processes import Life, early_end, life, lives, nodes_of, not_started
@@ -198,7 +198,7 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
     ended = next((one for one in asked if one.ended_early and one.end and one.end.exit_code != 0), None)
     if ended is not None and (len(found) <= 1 or found[0][0] != ended):
         end = explain_end(ended, run, package)
-        message = f"{ended.name} ended by itself after {ended_after(ended)}: {end.cause}"
+        message = f"{ended.name} ended by itself after {lifetime_text(ended)}: {end.cause}"
         verdict = end.verdict(unjudged, message)
     elif found:
         end = explain_traceback(found[0][1], package)

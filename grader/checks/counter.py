@@ -16,8 +16,8 @@ from grader.checks.support.counters import (
     counts,
     first_values,
     judge_wraps,
-    judged_steps,
     longest,
+    steps_to_judge,
     wrong_steps,
 )
 from grader.checks.support.exit_causes import explain_early_end
@@ -99,7 +99,7 @@ def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:
     if run.foreign:
         message = f"{run.evidence} may have begun after the first message on {params.topic}"
         return inconclusive(message, hint="start the recording before the node")
-    if missed_the_first(run, params.topic, first):
+    if may_have_missed_first(run, params.topic, first):
         message = f"the recorder missed the first messages on {params.topic}"
         return inconclusive(message, hint="grade again")
     hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
@@ -147,7 +147,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     count = longest(run, params.topic)
     if count is None:
         return _nothing(package, run, params.topic).about(expected=expected)
-    steps = judged_steps(count, params.maximum)
+    steps = steps_to_judge(count, params.maximum)
     found = wrong_steps(count, run, maximum=params.maximum, rate_hz=params.rate_hz)
     wrong, right = found.steps, sum(s.change == 1 for s in steps)
     verdict = (
@@ -213,7 +213,7 @@ def begins_with(first: Count, start: int) -> bool:
     return first.values[0] == start and first.sequences[0] == 0
 
 
-def missed_the_first(run: Run, topic: str, first: Count) -> bool:
+def may_have_missed_first(run: Run, topic: str, first: Count) -> bool:
     """Return whether values may have come before the first one that is recorded."""
     return first.sequences[0] > 0 or _recorder_was_late(run, topic, first.callerid)
 

@@ -35,7 +35,6 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
 from grader.wording import join_words, plural, significant
 
-HAND_IN = "add the script to the package, and push it"
 CALLBACK_HINT = (
     "print the message's .data in the callback, without a condition and nothing slow beside it; "
     f"end with {SPIN}"

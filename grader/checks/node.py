@@ -8,10 +8,10 @@ from pydantic import Field
 
 from grader.checks.registry import ProcessName, Refers, check
 from grader.checks.support.exit_causes import (
-    ended_after,
     explain_end,
     explain_traceback,
     is_rospys_own,
+    lifetime_text,
     process_tracebacks,
 )
 from grader.checks.support.processes import (
@@ -144,7 +144,7 @@ def _nameless(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
     if one is None or not one.ended_early:
         return unjudged(message, measured="no node", hint=hint)
     end = explain_end(one, run, package)
-    message = f"{_script(one)} ended by itself after {ended_after(one)}, before it was a node: {end.cause}"
+    message = f"{_script(one)} ended by itself after {lifetime_text(one)}, before it was a node: {end.cause}"
     return end.verdict(unjudged, message, measured="no node")
 
 
@@ -171,7 +171,7 @@ def _early_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     if not one.ended_early:
         return None
     end = explain_end(one, run, package)
-    return end.verdict(failed, f"{_script(one)} ended by itself after {ended_after(one)}: {end.cause}")
+    return end.verdict(failed, f"{_script(one)} ended by itself after {lifetime_text(one)}: {end.cause}")
 
 
 def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None:

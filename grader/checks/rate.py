@@ -122,7 +122,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     if run.clock != "real":
         message = "rates are judged in real time only, and this run was warped"
         return inconclusive(message, expected=expected, hint="give the criterion a scenario with clock: real")
-    found = judged_rhythm(run, params, sent_by(run, params.topic, params.of))
+    found = rhythm_to_judge(run, params, sent_by(run, params.topic, params.of))
     if found is None:
         return nothing_sent(package, run, params.topic, params.of).about(expected=expected)
     verdict = (
@@ -146,7 +146,7 @@ def _excused(uneven: Verdict | None, found: Rhythm, run: Run, params: RateParams
     return excused(uneven, run, found.times_ns[0], found.until_ns, why)
 
 
-def judged_rhythm(run: Run, params: RateParams, channels: Sequence[Channel]) -> Rhythm | None:
+def rhythm_to_judge(run: Run, params: RateParams, channels: Sequence[Channel]) -> Rhythm | None:
     """Return what these channels of the topic sent, as far as it is judged."""
     until_ns = whole_until_ns(run, params.topic, observed_until_ns(run))
     return rhythm(channels, until_ns, params.period_ns)

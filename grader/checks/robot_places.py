@@ -136,10 +136,10 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
         Steer by the error: its length is `math.hypot(dx, dy)`, its direction `math.atan2(dy, dx)` minus the
         heading, brought between -pi and pi. Publish a zero velocity once you are there.
     """
-    found, asked = track(run, params.topic, params.hold_s, params.fields), asked_stretch(run, params)
+    found, asked = track(run, params.topic, params.hold_s, params.fields), stretch_to_judge(run, params)
     verdict = _unreadable(found, package, run, params) or _not_asked(asked, run, params)
     if verdict is None and found is not None and asked is not None:
-        judged = judged_path(found, asked, params)
+        judged = path_to_judge(found, asked, params)
         verdict = _arrived(judged, asked, params) if judged else _too_late(asked, params)
         verdict = _excused_end(verdict, judged, run, params) if judged else verdict
     assert verdict is not None  # noqa: S101 - one of them always is
@@ -150,13 +150,13 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
     )
 
 
-def judged_path(found: Track, asked: Stretch, params: EndsAtParams) -> list[Pose]:
+def path_to_judge(found: Track, asked: Stretch, params: EndsAtParams) -> list[Pose]:
     """Return the path from the time at which the goal was asked for."""
     path = relative(found.path) if params.relative else list(found.path)
     return [pose for pose in path if asked.from_s <= pose.time_s <= asked.to_s]
 
 
-def asked_stretch(run: Run, params: EndsAtParams) -> Stretch | None:
+def stretch_to_judge(run: Run, params: EndsAtParams) -> Stretch | None:
     """Return the time in which the robot has to get there; None where it was never asked to."""
     to_s = run_seconds(run)
     if to_s is None:

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import Lateness, excused, why_late
-from grader.checks.support.exit_causes import ended_after, explain_end
+from grader.checks.support.exit_causes import explain_end, lifetime_text
 from grader.checks.support.processes import Life, lives, not_started
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
@@ -203,7 +203,7 @@ def _judged(found: Results, run: Run, package: PackageFacts, start_ns: int) -> V
 def _with_cause(verdict: Verdict, dead: Life, run: Run, package: PackageFacts) -> Verdict:
     """Return the same with what ended the student's process, on whose messages the tests may have waited."""
     end = explain_end(dead, run, package)
-    message = f"{verdict.message}; {dead.name} ended by itself after {ended_after(dead)}: {end.cause}"
+    message = f"{verdict.message}; {dead.name} ended by itself after {lifetime_text(dead)}: {end.cause}"
     if end.of_machine:
         return inconclusive(message, hint=end.hint)
     about = {"message": message, "hint": end.hint, "citations": end.citations, "cause": end.cause}

@@ -15,7 +15,7 @@ from grader.checks.support.console_output import (
     printed_times,
     sent_by,
 )
-from grader.checks.support.exit_causes import ended_after, explain_end
+from grader.checks.support.exit_causes import explain_end, lifetime_text
 from grader.checks.support.processes import NO_SCRIPT_HINT, GlobalName, Life, are_noted, life, lives, nodes_of
 from grader.checks.support.text import GET_TIME, INIT, LOOP, SPIN, VALUE, in_words, init
 from grader.checks.support.topics import cite
@@ -152,9 +152,7 @@ def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | No
     if len(gone) > 1:
         message = f"both copies ended by themselves: {end.cause}"
         return (inconclusive if end.of_machine else unjudged)(message, hint=end.hint, citations=cited)
-    message = (
-        f"the {word} copy ended by itself after {ended_after(one)}, while the other kept running: {end.cause}"
-    )
+    message = f"the {word} copy ended by itself after {lifetime_text(one)}, while the other kept running: {end.cause}"
     if word == "second":
         hint = (
             end.hint

@@ -26,7 +26,7 @@ from grader.model.result import EarlyVerdict
 from grader.model.verdict import Status
 from grader.report.terminal import STYLES, mark
 from grader.report.text import visible
-from grader.untrusted_text import line, uncommanded
+from grader.untrusted_text import line, without_ci_commands
 
 EARLY_TITLE = "Your files, before anything is built or run:"
 SO_FAR = "Provisional: the build can still change these results."
@@ -251,6 +251,6 @@ def _wrapped(row: Text, width: int) -> Iterator[Text]:
     """Return its lines as a terminal shows them, none of which a CI system takes for a command."""
     parts = row.wrap(Console(width=width), width - ESCAPE - HANGING, overflow="fold") or [row]
     for number, part in enumerate(parts):
-        harmless = uncommanded(part.plain)
+        harmless = without_ci_commands(part.plain)
         shown = part if harmless == part.plain else Text(harmless, part.style)
         yield Text(" " * HANGING).append_text(shown) if number else shown

@@ -17,7 +17,7 @@ from pydantic import AliasChoices, Field
 from grader.arena.control_groups import describe, find_cgroups, has_memory
 from grader.arena.sandbox import NAMESPACES
 from grader.arena.sandbox_probe import ULIMIT_HINT, choose, refused_limits
-from grader.arena.static_recorder import why_unrun
+from grader.arena.static_recorder import why_nodes_cannot_run
 from grader.cli.output import say_beside
 from grader.errors import GraderError, HostError, RosMissing
 from grader.host_programs import HOST_ENV, find_host_program
@@ -155,7 +155,7 @@ def warn_without_sandbox(mode: SandboxMode, rubric: LoadedRubric | None = None) 
     A rubric that runs nothing needs no warning; if no sandbox can be chosen, the grading itself says so.
     """
     with suppress(GraderError):
-        if (rubric is not None and not needs_ros(rubric)) or why_unrun():
+        if (rubric is not None and not needs_ros(rubric)) or why_nodes_cannot_run():
             return
         words = without_sandbox(choose(mode).label)
         if words:
@@ -165,7 +165,7 @@ def warn_without_sandbox(mode: SandboxMode, rubric: LoadedRubric | None = None) 
 def why_nothing_runs() -> str:
     """Return why `grader check` only looks at files on this machine, or "" if it can run nodes."""
     with suppress(RosMissing):  # if ROS is not where GRADER_ROS_SETUP says, the grading reports it
-        return why_unrun()
+        return why_nodes_cannot_run()
     return ""
 
 

@@ -30,7 +30,7 @@ from grader.evidence.definitions import (
     parse,
 )
 from grader.evidence.memory_budget import DECODED_BYTES_MAX
-from grader.model.interfaces import DIVIDER, RULE
+from grader.model.interfaces import RULE
 
 Value: TypeAlias = Any
 """What a message holds: numbers, text, bytes, lists and dicts of these."""
@@ -270,27 +270,6 @@ FindText = Callable[[str], str | None]
 _TYPE = re.compile(r"^\s*([A-Za-z][\w/]*)\s*(?:\[\d*\])?\s+[A-Za-z]\w*\s*$", re.ASCII)
 _BUILT_IN = {*PRIMITIVES, "byte", "char", "time", "duration"}
 _PARTS_MAX = 100
-
-
-class ServiceType:
-    """Decodes responses of one service type, from the text of its `.srv` file (wiki.ros.org/srv). `request` and
-    `response` are the full definitions of its two messages.
-
-    `find_text` returns the text of messages that ROS Noetic's own packages do not have.
-
-    Raises ValueError for a text that is no service definition.
-    """
-
-    def __init__(self, type: str, text: str, find_text: FindText = lambda _: None) -> None:  # noqa: A002 - ROS's own word
-        parts = DIVIDER.split(text)
-        if len(parts) != 2:
-            raise ValueError(f"{type}: a service has a request and a response with one line --- between them")
-        self.request, self.response = (full_definition(type, part, find_text) for part in parts)
-        self._response = Decoder(f"{type}Response", self.response)
-
-    def decode_response(self, data: bytes) -> Value:
-        """Return the response's fields; None where the bytes do not fit."""
-        return self._response.decode(data)
 
 
 def full_definition(type_: str, text: str, find_text: FindText) -> str:

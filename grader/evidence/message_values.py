@@ -15,7 +15,6 @@ from grader.evidence.decode import (
     Decoder,
     Encoder,
     FindText,
-    ServiceType,
     definition,
     full_definition,
 )
@@ -103,15 +102,18 @@ class MessageType:
 
 
 class ServiceTypes:
-    """The request and the response of a service type, from the text of its `.srv` file.
+    """The request and the response of a service type, from the text of its `.srv` file (wiki.ros.org/srv).
 
     Raises ValueError for a text that is no service definition, or needs a type that is nowhere.
     """
 
     def __init__(self, type: str, text: str, find_text: FindText = lambda _: None) -> None:  # noqa: A002 - ROS's own word
-        found = ServiceType(type, text, find_text)
-        self.request = MessageType(f"{type}Request", full=found.request)
-        self.response = MessageType(f"{type}Response", full=found.response)
+        parts = DIVIDER.split(text)
+        if len(parts) != 2:
+            raise ValueError(f"{type}: a service has a request and a response with one line --- between them")
+        request, response = (full_definition(type, part, find_text) for part in parts)
+        self.request = MessageType(f"{type}Request", full=request)
+        self.response = MessageType(f"{type}Response", full=response)
 
     @property
     def md5sum(self) -> str:

@@ -97,7 +97,7 @@ def _cites(criterion: CriterionResult, place: FileCitation) -> bool:
 SOURCES = {".c", ".cc", ".cpp", ".cxx"}
 
 
-def said_for_node(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
+def choose_hint_language(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
     """Return the verdict with its hint in the language of the node that it judges."""
     if in_language(verdict.hint, "python") == verdict.hint:
         return verdict
@@ -192,7 +192,7 @@ def _with_text(citation: Citation, build: Run) -> Citation:
 CPP = frozenset({".cpp", ".cc", ".cxx"})
 
 
-def tell_unchanged(
+def name_unchanged_files(
     result: CriterionResult, rubric: Rubric, package: PackageFacts, handed_out: Collection[str]
 ) -> CriterionResult:
     """Return the criterion; where it is lost, with those of its files whose sha256 is among `handed_out`.

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from grader.checks import CHECKS, Check
 from grader.evidence.run import Run
-from grader.judging.annotate import tell_unchanged
+from grader.judging.annotate import name_unchanged_files
 from grader.judging.facts import NOT_RUN, PACKAGE_RUN, Facts, views_of
 from grader.judging.judge import Requirements, result_of, verdict_of
 from grader.model.package import PackageFacts
@@ -47,7 +47,7 @@ def judge_files(
         judging.judge(name)
     found = (judging.results[c.id] for c in rubric.criteria if c.id in judging.results)
     return tuple(
-        one.model_copy(update={"criterion": tell_unchanged(one.criterion, rubric, package, handed_out)})
+        one.model_copy(update={"criterion": name_unchanged_files(one.criterion, rubric, package, handed_out)})
         for one in found
     )
 

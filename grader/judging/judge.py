@@ -12,26 +12,26 @@ from typing import NamedTuple
 
 from grader.checks import CHECKS, Check
 from grader.checks.registry import NotRecorded
-from grader.checks.support.exit_causes import SYNTAX, heed_errors
-from grader.checks.support.parameters import heed_unread
+from grader.checks.support.exit_causes import SYNTAX, explain_by_exception
+from grader.checks.support.parameters import explain_by_unread_parameter
 from grader.checks.support.text import texts_in
-from grader.checks.support.topics import heed_losses, heed_unheard
+from grader.checks.support.topics import account_for_losses, heed_unheard
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
-from grader.judging.annotate import add_advice, said_for_node, show_lines, tell_unchanged
+from grader.judging.annotate import add_advice, choose_hint_language, name_unchanged_files, show_lines
 from grader.judging.facts import PACKAGE_RUN, Facts, try_facts
 from grader.judging.other_runs import (
-    judged_on_copy,
+    apply_repaired_copy,
+    drop_unrepeated_losses,
     needs_build,
     repairs_of,
-    seen_twice,
     split_runs,
     was_built,
 )
 from grader.judging.summary import leave_out, round_half_up
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive
-from grader.rubric.made_up import Value, as_recorded, tell_made_up, values_of
+from grader.rubric.made_up import Value, tell_made_up, values_of, with_recorded_values
 from grader.rubric.model import Criterion, Rubric
 
 MANUAL = "manual"
@@ -67,21 +67,21 @@ def judge_all_runs(
     handed_out: Collection[str] = (),
 ) -> Judgement:
     """Judge the first runs, then what repeated runs and a repaired copy say besides."""
-    rubric = as_recorded(rubric, runs)
+    rubric = with_recorded_values(rubric, runs)
     first, repeated, repaired = split_runs(runs)
     facts = try_facts(rubric, first)
     verdicts = judge_facts(rubric, facts, checks)
     doubtful = frozenset(c.scenario for c in rubric.criteria if verdicts[c.id].timing and c.scenario)
     if repeated:
         again = judge_facts(rubric, try_facts(rubric, {**first, **repeated}), checks)
-        verdicts = seen_twice(rubric, verdicts, again, repeated.keys())
+        verdicts = drop_unrepeated_losses(rubric, verdicts, again, repeated.keys())
     uses: dict[str, Repaired] = {}
     if repaired:
         of_copy = try_facts(rubric, {**first, **repaired})
         on_copy, repairs = judge_facts(rubric, of_copy, checks), repairs_of(rubric, repaired)
         needed = needs_build(of_copy.package)
         built = not needed or was_built(first) or not was_built(repaired)
-        verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=built)
+        verdicts, uses = apply_repaired_copy(rubric, verdicts, on_copy, repairs, built=built)
     build = first.get(PACKAGE_RUN)
     shown = {name: show_lines(verdict, build) for name, verdict in verdicts.items()} if build else verdicts
     results = tuple(
@@ -90,7 +90,7 @@ def judge_all_runs(
     )
     package = facts.package
     if package is not None:
-        results = tuple(tell_unchanged(result, rubric, package, handed_out) for result in results)
+        results = tuple(name_unchanged_files(result, rubric, package, handed_out) for result in results)
         results = add_advice(results, package, rubric)
     return Judgement(leave_out(rubric, results), doubtful)
 
@@ -128,13 +128,13 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         found = (
             asked
             if isinstance(asked, Verdict)
-            else heed_losses(check, asked, _sound(check.function(**asked)))
+            else account_for_losses(check, asked, _sound(check.function(**asked)))
         )
         if not isinstance(asked, Verdict):
             package, run = facts.package_of(criterion), asked.get("run")
-            for heed in (heed_errors, heed_unheard, heed_unread):
+            for heed in (explain_by_exception, heed_unheard, explain_by_unread_parameter):
                 found = heed(check, package, run, found)
-        return _named(said_for_node(found, criterion, facts), criterion, facts)
+        return _named(choose_hint_language(found, criterion, facts), criterion, facts)
     except NotRecorded as missing:
         return missing.verdict
     except EvidenceError as error:

@@ -46,7 +46,7 @@ def split_runs(runs: Mapping[str, Run]) -> tuple[Runs, Runs, Runs]:
     return first, repeated, repaired
 
 
-def seen_twice(
+def drop_unrepeated_losses(
     rubric: Rubric, first: Mapping[str, Verdict], again: Mapping[str, Verdict], scenarios: Collection[str]
 ) -> dict[str, Verdict]:
     """Return the verdicts without those losses that one run's timing could have made and that did not come again."""
@@ -89,7 +89,7 @@ def repairs_of(rubric: Rubric, repaired: Mapping[str, Run]) -> tuple[Repair, ...
     return found if all(rubric.share_of(one.kind) > 0 for one in found) else ()
 
 
-def judged_on_copy(
+def apply_repaired_copy(
     rubric: Rubric,
     first: Mapping[str, Verdict],
     on_copy: Mapping[str, Verdict],

@@ -23,7 +23,7 @@ from grader.report.sentences import (
     visible_words,
     without_sandbox,
 )
-from grader.report.text import line, uncommanded
+from grader.report.text import line, without_ci_commands
 from grader.report.view import (
     SOURCE_CHARS,
     Loss,
@@ -86,7 +86,7 @@ def emit(console: Console, parts: Iterable[RenderableType]) -> None:
     with console.capture() as capture:
         for part in parts:
             console.print(part, overflow="fold", crop=False)
-    text = uncommanded("\n".join(row.rstrip() for row in capture.get().split("\n")))
+    text = without_ci_commands("\n".join(row.rstrip() for row in capture.get().split("\n")))
     console.file.write(text.encode(console.encoding, "backslashreplace").decode(console.encoding))
 
 

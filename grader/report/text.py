@@ -19,7 +19,7 @@ import re
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from grader.untrusted_text import clip, json_text, line, text_limit, uncommanded, visible
+from grader.untrusted_text import clip, json_text, line, text_limit, visible, without_ci_commands
 
 __all__ = [
     "clip",
@@ -33,8 +33,8 @@ __all__ = [
     "markdown_block",
     "markdown_code",
     "text_limit",
-    "uncommanded",
     "visible",
+    "without_ci_commands",
 ]
 
 

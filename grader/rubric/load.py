@@ -20,7 +20,7 @@ from grader.rubric.course import load_course, split_name
 from grader.rubric.faults import model_faults
 from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics_folder
 from grader.rubric.instructor import Beside, known_checks, read_instructor, run_checks_file
-from grader.rubric.made_up import draw_values, made_up_faults, of_sample, sample_data, with_values
+from grader.rubric.made_up import draw_values, faults_of_sample, made_up_faults, sample_data, with_values
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.source import Source, Value, as_map, read_source
 
@@ -235,7 +235,7 @@ def _faults(source: Source, samples: Sequence[Value], beside: Beside) -> list[st
             *cross_faults(sample, beside.known, complete=beside.own.complete),
         ]
         known = {path for path, _ in found} if sample is not samples[0] else set()
-        found += [one for one in of_sample(faults, source.data, as_map(sample)) if one[0] not in known]
+        found += [one for one in faults_of_sample(faults, source.data, as_map(sample)) if one[0] not in known]
     unique = dict.fromkeys(found)
     told = [source.fault(*fault) for fault in sorted(unique, key=lambda fault: source.line(fault[0]))]
     file = Path(source.name).parent / str(source.data.get("checks"))

@@ -131,7 +131,7 @@ def with_values(rubric: Rubric, values: Mapping[str, Value]) -> Rubric:
     return rubric.model_copy(update=update).remember(rubric.written, values)
 
 
-def as_recorded(rubric: Rubric, runs: Mapping[str, Run]) -> Rubric:
+def with_recorded_values(rubric: Rubric, runs: Mapping[str, Run]) -> Rubric:
     """Return the rubric with the values that the runs were recorded with. Raises EvidenceError where they do not fit.
 
     A value that was declared since is drawn.
@@ -172,9 +172,9 @@ def tell_made_up(rubric: Rubric, criterion: Criterion, hint: str, seen: str) -> 
         if of_value.search(seen):
             continue
         hint = of_value.sub(f"<{name}>", hint)
-        parts = set(made_of(name, as_map(rubric.written.get(KEY))))
+        parts = set(operands_of(name, as_map(rubric.written.get(KEY))))
         comes = "follows from" if parts else "comes with"
-        found = join_words(given_in(scenario, {name, *parts}, rubric.values))
+        found = join_words(inputs_with_values(scenario, {name, *parts}, rubric.values))
         told.append(f"<{name}> is made up for each submission, {value} here, and {comes} {found}")
     return "; ".join(filter(None, (hint, *told)))
 
@@ -240,17 +240,19 @@ def names_in(part: object) -> set[str]:
     return {name for _, name in places(part)}
 
 
-def made_of(name: str, declared: Mapping[str, Any]) -> Iterator[str]:
+def operands_of(name: str, declared: Mapping[str, Any]) -> Iterator[str]:
     """Yield the names of the values that a sum or a product is made of."""
     above: dict[str, Any] = {}
     for other, one in declared.items():
         if other == name:
             parts = [part for key in ("sum", "product") for _, part in as_texts(as_map(one).get(key))]
-            yield from (found for part in parts for found in (part, *made_of(part, above)))
+            yield from (found for part in parts for found in (part, *operands_of(part, above)))
         above[other] = one
 
 
-def given_in(scenario: Mapping[str, Any], names: set[str], values: Mapping[str, Value]) -> list[str]:
+def inputs_with_values(
+    scenario: Mapping[str, Any], names: set[str], values: Mapping[str, Value]
+) -> list[str]:
     """Return where a scenario, as it is written, gives programs one of these values."""
     parts = [(key, part) for key in GIVEN for _, part in as_maps(scenario.get(key))]
     for _, step in as_maps(scenario.get("steps")):
@@ -291,7 +293,9 @@ def sample_data(data: Any) -> list[Any]:  # noqa: ANN401 - what a file holds
     return samples
 
 
-def of_sample(faults: list[Fault], written: Mapping[str, Any], sample: Mapping[str, Any]) -> Iterator[Fault]:
+def faults_of_sample(
+    faults: list[Fault], written: Mapping[str, Any], sample: Mapping[str, Any]
+) -> Iterator[Fault]:
     """Yield the faults of one sample, with the names of the values that make them. That there is no value is a fault of
     its own."""
     for path, message in faults:
@@ -318,7 +322,7 @@ def made_up_faults(data: Mapping[str, Any]) -> Iterator[Fault]:
         above = {other: made_up for other, made_up in _declared(data).items() if other in {*above, name}}
     used: set[str] = set()
     for path, name in places({key: part for key, part in data.items() if key != KEY}):
-        used |= {name, *made_of(name, declared)}
+        used |= {name, *operands_of(name, declared)}
         if name not in declared:
             yield path, f'made_up declares no value "{name}"{did_you_mean(name, declared)}'
         elif not _PLACE.match(dotted(path)):
@@ -329,7 +333,9 @@ def made_up_faults(data: Mapping[str, Any]) -> Iterator[Fault]:
     for index, criterion in as_maps(data.get("criteria")):
         scenario = as_map(as_map(data.get("scenarios")).get(str(criterion.get("scenario"))))
         for path, name in places(criterion.get("with"), ("criteria", index, "with")):
-            if name in declared and not given_in(scenario, {name, *made_of(name, declared)}, {}):
+            if name in declared and not inputs_with_values(
+                scenario, {name, *operands_of(name, declared)}, {}
+            ):
                 run = criterion.get("scenario") or "a criterion without a scenario"
                 yield path, f'{run} gives programs no "{name}": they could not know it'
 

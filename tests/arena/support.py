@@ -13,7 +13,7 @@ import pytest
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.sandbox_files import prepare
-from grader.arena.sandbox_probe import choose, why_not
+from grader.arena.sandbox_probe import choose, why_no_sandbox
 from grader.arena.scenario import run_scenario
 from grader.arena.workspace import make_workspace, run_in_place
 from grader.evidence.reader import load_run
@@ -33,7 +33,7 @@ CMAKE = (
 )
 SCRIPT = "#!/usr/bin/env python3\n"
 RUN_S = 60.0
-needs_sandbox = pytest.mark.skipif(bool(why_not()), reason=f"no sandbox here: {why_not()}")
+needs_sandbox = pytest.mark.skipif(bool(why_no_sandbox()), reason=f"no sandbox here: {why_no_sandbox()}")
 
 
 def require_ros() -> RosInstallation:

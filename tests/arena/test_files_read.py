@@ -15,7 +15,7 @@ from grader.arena.static_recorder import (
     ATTACHED_BYTES_MAX,
     ATTACHED_FILES_MAX,
     attachments,
-    not_attached,
+    left_out_events,
 )
 from grader.evidence.events import ActorEvent
 from grader.files import read_untrusted
@@ -33,11 +33,11 @@ def test_files_that_the_evidence_does_not_hold_are_named(tmp_path: Path) -> None
     held = dict(attachments(package.folder, facts))
     assert len(held) == ATTACHED_FILES_MAX
     assert len(held["a.txt"]) == ATTACHED_BYTES_MAX
-    assert [(event.action, event.actor) for event in not_attached(facts)] == [
+    assert [(event.action, event.actor) for event in left_out_events(facts)] == [
         ("limit", "a.txt"),
         ("limit", "the package"),
     ]
-    assert list(not_attached(read_package(make_package(tmp_path / "lab2", GOOD)))) == []
+    assert list(left_out_events(read_package(make_package(tmp_path / "lab2", GOOD)))) == []
 
 
 @pytest.mark.parametrize(

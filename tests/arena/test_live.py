@@ -61,7 +61,7 @@ def test_a_node_is_waited_for_longer_where_others_fill_the_machine(
 ) -> None:
     live = _live()
     for now_s in range(1, 25):
-        live.machine(busy, own, float(now_s))
+        live.note_machine(busy, own, float(now_s))
     done = find_outcome(live, WINDOW, 24.0)
     assert (done and done[0]) == outcome
     assert find_outcome(live, WINDOW, 4 * WINDOW.first_message_s) is not None
@@ -71,7 +71,7 @@ def test_what_others_took_before_the_steps_were_over_lengthens_nothing_behind_th
     until = Until(messages={"/a": 1}, first_message_s=20, limit_s=20)
     live = _live()
     live.lost_s = 60.0
-    live.steps_over(80.0)
+    live.begin_wait(80.0)
     assert find_outcome(live, until, 99.0) is None
     assert find_outcome(live, until, 101.0) == ("silent", "no message within 20 s")
     live.lost_s = 65.0
@@ -81,7 +81,7 @@ def test_what_others_took_before_the_steps_were_over_lengthens_nothing_behind_th
 def test_what_no_node_subscribed_to_is_waited_for_once() -> None:
     until, live = Until(messages={"/a": 1}, first_message_s=20, limit_s=60), _live()
     live.started_s = 5.0
-    live.steps_over(15.0, heeded=False)
+    live.begin_wait(15.0, heeded=False)
     assert find_outcome(live, until, 24.0) is None
     assert find_outcome(live, until, 26.0) == ("silent", "no message within 20 s")
 
@@ -89,7 +89,7 @@ def test_what_no_node_subscribed_to_is_waited_for_once() -> None:
 def test_what_others_took_before_a_process_started_lengthens_nothing_behind_it() -> None:
     live, until = _live(), Until(nodes=2)
     live.lost_s, live.nodes, live.news_s = 30.0, {"/node"}, 30.0
-    live.started("late", 40.0, helper=False)
+    live.note_start("late", 40.0, helper=False)
     assert find_outcome(live, until, 45.9) is None
     assert find_outcome(live, until, 46.1) == ("silent", "nothing happened for 6 s")
 
@@ -118,7 +118,7 @@ def test_a_process_that_is_no_node_yet_is_waited_for(
 
 def test_what_is_sent_has_longer_to_be_printed_where_others_fill_the_machine() -> None:
     live, until = _live(), Until(heard=True)
-    live.sent("word", 1.0)
+    live.note_probe("word", 1.0)
     assert find_outcome(live, until, 3.1) == ("complete", "")
     live.lost_s = 4.0
     assert find_outcome(live, until, 6.9) is None
@@ -127,8 +127,8 @@ def test_what_is_sent_has_longer_to_be_printed_where_others_fill_the_machine() -
 
 def test_the_last_process_is_watched_for_half_as_long_as_the_first() -> None:
     live, until = RunState(running={"first", "second"}, last_start_s=1.0), Until(alive_s=8)
-    live.graph(["/first"], {"/first": "first"}, 2.0)
-    live.graph(["/first", "/second"], {"/first": "first", "/second": "second"}, 9.0)
+    live.note_graph(["/first"], {"/first": "first"}, 2.0)
+    live.note_graph(["/first", "/second"], {"/first": "first", "/second": "second"}, 9.0)
     assert find_outcome(live, until, 12.9) is None
     assert find_outcome(live, until, 13.0) == ("complete", "")
 
@@ -147,11 +147,11 @@ TEN_HZ = RateBounds(
 def _rated(gaps_s: list[float], *topics: str, chosen: tuple[str, ...] = ("/a",)) -> bool:
     """Whether a window of 60 s ends early for these topics, all with the same gaps."""
     live = _live(**{topic: (len(gaps_s), 1.0, 9.0) for topic in topics})
-    live.rate([TEN_HZ])
+    live.watch_rates([TEN_HZ])
     times_ns = [1_000_000_000 + round(t * 1e9) for t in accumulate([0.0, *gaps_s])]
     for topic in topics:
         for time_ns in times_ns:
-            live.arrived("/" + topic, 1, time_ns)
+            live.note_arrivals("/" + topic, 1, time_ns)
     return find_outcome(live, Until(window_s=60, topics=chosen, limit_s=90), 10.0) is not None
 
 
@@ -182,38 +182,38 @@ def test_a_window_that_shows_more_than_rates_does_not_end_early() -> None:
 
 def test_of_a_flood_few_arrivals_are_kept() -> None:
     live = _live(a=(1, 1.0, 9.0))
-    live.rate([TEN_HZ])
+    live.watch_rates([TEN_HZ])
     for number in range(100):
-        live.arrived("/a", 1000, number)
+        live.note_arrivals("/a", 1000, number)
     assert len(live.arrivals_ns["/a"]) < 5000
     assert live.arrivals_ns["/a"][-1] == 99
 
 
 def test_heard_takes_numbers_as_words_of_their_own() -> None:
     live = _live()
-    live.sent("12", 1.0)
-    live.sent("-5", 1.0)
-    live.printed("[INFO] [1712.512]: I heard 128, 5 and 3.12", 1.1)
+    live.note_probe("12", 1.0)
+    live.note_probe("-5", 1.0)
+    live.note_line("[INFO] [1712.512]: I heard 128, 5 and 3.12", 1.1)
     assert set(live.unheard) == {"12", "-5"}
-    live.printed("I heard -5: 12", 1.2)
+    live.note_line("I heard -5: 12", 1.2)
     assert not live.unheard
 
 
 def test_heard_waits_only_so_long_after_the_last_line() -> None:
     live, until = _live(), Until(heard=True)
-    live.sent("12", 1.0)
-    live.printed("nothing of it", 1.5)
+    live.note_probe("12", 1.0)
+    live.note_line("nothing of it", 1.5)
     assert find_outcome(live, until, 3.4) is None
     assert find_outcome(live, until, 3.6) == ("complete", "")
 
 
 def test_a_connection_has_to_last() -> None:
     live, until = _live(), Until(connected=("/a",))
-    live.connections({"/a"}, 1.0)
-    live.connections({"/a"}, 1.9)
+    live.note_connections({"/a"}, 1.0)
+    live.note_connections({"/a"}, 1.9)
     assert find_outcome(live, until, 1.9) is None
-    live.connections((), 1.95)
-    live.connections({"/a"}, 2.0)
+    live.note_connections((), 1.95)
+    live.note_connections({"/a"}, 2.0)
     assert find_outcome(live, until, 2.5) is None
     assert find_outcome(live, until, 3.0) == ("complete", "")
 
@@ -221,20 +221,20 @@ def test_a_connection_has_to_last() -> None:
 def test_looking_at_the_graph_is_no_change_of_it() -> None:
     live, until = _live(), Until(connected=("/a",), silent_s=6, first_message_s=20)
     for now_s in (1.0, 2.0, 20.9):
-        live.graph(["/talker"], {}, now_s, picture={"publishers": {"/a": ["/talker"]}})
+        live.note_graph(["/talker"], {}, now_s, picture={"publishers": {"/a": ["/talker"]}})
     assert find_outcome(live, until, 20.9) is None
     assert find_outcome(live, until, 21.1) == ("silent", "the graph has not changed for 20 s")
-    live.graph(["/talker"], {}, 21.1, picture={"publishers": {"/b": ["/talker"]}})
+    live.note_graph(["/talker"], {}, 21.1, picture={"publishers": {"/b": ["/talker"]}})
     assert find_outcome(live, until, 21.2) is None
 
 
 def test_messages_are_no_news_of_a_node_that_is_missing() -> None:
     live, until = _live(), Until(nodes=2, alive_s=1, silent_s=6)
-    live.graph(["/turtlesim"], {}, 1.0, picture={})
-    live.message("/turtle1/pose", 1, 6.9)
+    live.note_graph(["/turtlesim"], {}, 1.0, picture={})
+    live.note_messages("/turtle1/pose", 1, 6.9)
     assert find_outcome(live, until, 6.9) is None
     assert find_outcome(live, until, 7.1) == ("silent", "nothing happened for 6 s")
-    live.graph(["/turtlesim", "/teleop"], {}, 7.1, picture={})
+    live.note_graph(["/turtlesim", "/teleop"], {}, 7.1, picture={})
     assert find_outcome(live, until, 7.2) == ("complete", "")
 
 
@@ -253,10 +253,10 @@ def _resting(**processes: tuple[str, int]) -> RunState:
     """Each process is a node since 1 s, and at rest since 2 s, as `spins` or `loops` with so many programs."""
     live = RunState()
     for name in processes:
-        live.started(name, 0.0, helper=False)
-    live.graph([f"/{name}" for name in processes], {f"/{name}": name for name in processes}, 1.0)
+        live.note_start(name, 0.0, helper=False)
+    live.note_graph([f"/{name}" for name in processes], {f"/{name}": name for name in processes}, 1.0)
     for name, (rest, programs) in processes.items():
-        live.rests(name, rest, programs, 2.0)
+        live.note_rest(name, rest, programs, 2.0)
     return live
 
 
@@ -280,16 +280,16 @@ def test_a_graph_settles_once_all_nodes_rest(
 
 def test_what_changes_or_works_or_starts_is_not_settled() -> None:
     live = _resting(node=("spins", 1))
-    live.graph(["/node", "/new"], {"/node": "node", "/new": "node"}, 3.0)
+    live.note_graph(["/node", "/new"], {"/node": "node", "/new": "node"}, 3.0)
     assert not is_settled(live, 4.4)
     assert is_settled(live, 4.6)
     live.lost_s = 5.0  # others filled the machine
     assert not is_settled(live, 9.4)
-    live.rests("node", None, 1, 5.0)
+    live.note_rest("node", None, 1, 5.0)
     assert not is_settled(live, 60.0)
-    live.rests("node", "spins", 1, 60.0)
+    live.note_rest("node", "spins", 1, 60.0)
     assert is_settled(live, 61.6)
-    live.started("late", 61.0, helper=False)
+    live.note_start("late", 61.0, helper=False)
     assert not is_settled(live, 90.0)
 
 
@@ -345,7 +345,7 @@ def test_who_naps_or_counts_aloud_is_waited_for_longer() -> None:
     live.naps = True
     assert not is_settled(live, 5.9)
     assert is_settled(live, 6.1)
-    live.printed("3 … 2 … 1", 6.0)
+    live.note_line("3 … 2 … 1", 6.0)
     assert not is_settled(live, 9.9)
     live.talking["/node"] = 6.0  # who publishes may go on printing
     assert is_settled(live, 9.9)

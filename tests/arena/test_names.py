@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.sandbox_probe import why_not
+from grader.arena.sandbox_probe import why_no_sandbox
 
 pytestmark = pytest.mark.ros
 ROOT = Path(__file__).resolve().parents[2]
@@ -16,7 +16,7 @@ LAB = "leeds-comp3631-lab1"
 
 
 @pytest.mark.full
-@pytest.mark.skipif(bool(why_not()), reason=f"no sandbox here: {why_not()}")
+@pytest.mark.skipif(bool(why_no_sandbox()), reason=f"no sandbox here: {why_no_sandbox()}")
 def test_no_name_is_needed(tmp_path: Path) -> None:
     hosts = tmp_path / "hosts"
     hosts.write_text("192.0.2.1 elsewhere\n")

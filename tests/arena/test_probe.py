@@ -75,7 +75,7 @@ def bwrap(folder: Path, monkeypatch, script: str) -> None:
 @pytest.mark.parametrize("said", FORBIDDEN)
 def test_where_the_kernel_forbids_it_grading_goes_without(monkeypatch, said: str) -> None:
     monkeypatch.setattr(sandbox_probe, "_refusal", lambda *_: said)
-    assert sandbox_probe.why_not() == said
+    assert sandbox_probe.why_no_sandbox() == said
     assert (sandbox_probe.choose("auto").bubblewrap, sandbox_probe.choose("auto").reason) == (False, said)
     with pytest.raises(SandboxMissing):
         sandbox_probe.choose("require")
@@ -103,9 +103,9 @@ def test_a_bubblewrap_that_does_not_answer_stops_the_grading(tmp_path, monkeypat
 def test_what_did_not_answer_is_asked_again(monkeypatch) -> None:
     monkeypatch.setattr(sandbox_probe, "_refusal", lambda *_: "no answer within 20 s")
     with pytest.raises(SandboxMissing):
-        sandbox_probe.why_not()
+        sandbox_probe.why_no_sandbox()
     monkeypatch.setattr(sandbox_probe, "_refusal", lambda *_: "")
-    assert sandbox_probe.why_not() == ""
+    assert sandbox_probe.why_no_sandbox() == ""
 
 
 @pytest.mark.parametrize("name", sandbox_probe.PROGRAMS)
@@ -113,7 +113,7 @@ def test_where_a_program_is_not_installed_grading_goes_without(monkeypatch, name
     monkeypatch.setattr(
         sandbox_probe, "find_host_program", lambda asked: None if asked == name else f"/usr/bin/{asked}"
     )
-    assert sandbox_probe.why_not() == f"{name} is not installed"
+    assert sandbox_probe.why_no_sandbox() == f"{name} is not installed"
 
 
 def test_a_program_that_cannot_be_started_stops_the_grading(tmp_path, monkeypatch) -> None:
@@ -152,7 +152,7 @@ def test_the_probe_sees_nothing_of_whoever_grades(tmp_path, monkeypatch) -> None
     bwrap(tmp_path, monkeypatch, f"{{ pwd; env; }} >{tmp_path}/seen; cat >{tmp_path}/input")
     for name in ("PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "BASH_ENV", "LC_ALL"):
         monkeypatch.setenv(name, str(tmp_path))
-    assert sandbox_probe.why_not() == ""
+    assert sandbox_probe.why_no_sandbox() == ""
     lines = (tmp_path / "seen").read_text().splitlines()
     assert lines[0] == "/"
     assert (tmp_path / "input").read_bytes() == (system_call_filter() or b"")

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from grader.arena.limits import RunLimits
-from grader.arena.sandbox_probe import why_not
+from grader.arena.sandbox_probe import why_no_sandbox
 from tests.arena.support import exit_of, printed, run_script
 
 pytestmark = pytest.mark.ros
 SANDBOXES = ["auto", "none"]
 NODE = "import rospy, sys, os, time\nrospy.init_node('node')\n"
-needs_sandbox = pytest.mark.skipif(bool(why_not()), reason=f"no sandbox here: {why_not()}")
+needs_sandbox = pytest.mark.skipif(bool(why_no_sandbox()), reason=f"no sandbox here: {why_no_sandbox()}")
 
 
 @pytest.mark.parametrize("sandbox", SANDBOXES)

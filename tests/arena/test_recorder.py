@@ -19,7 +19,7 @@ from grader.arena.limits import RunLimits
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.session import ARENA
 from grader.checks import CHECKS
-from grader.checks.support.topics import heed_losses, losses
+from grader.checks.support.topics import account_for_losses, losses
 from grader.judging.facts import NO_PACKAGE as PACKAGE
 from tests.arena.support import printed, run_script
 
@@ -272,6 +272,6 @@ def test_a_run_says_how_many_messages_it_dropped_and_so_do_its_verdicts(tmp_path
     params = {"topic": "/numbers", "rate_hz": 100_000}
     asked = {"package": PACKAGE, "run": seen, "params": CHECKS["counter-step"].params.model_validate(params)}
     check = CHECKS["counter-step"]
-    verdict = heed_losses(check, asked, check.function(**asked))
+    verdict = account_for_losses(check, asked, check.function(**asked))
     assert verdict.status.value == "pass"
     assert verdict.message.endswith("; the recorder kept 1000 messages of /numbers and dropped 7000")

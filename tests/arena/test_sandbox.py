@@ -12,14 +12,14 @@ from grader.arena import control_groups, sandbox, sandbox_probe
 from grader.arena.build import build
 from grader.arena.control_groups import Cgroup, Cgroups
 from grader.arena.limits import SUBMISSION_MESSAGE_BYTES, RunLimits
-from grader.arena.sandbox_probe import why_not
+from grader.arena.sandbox_probe import why_no_sandbox
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter
 from tests.arena.support import CMAKE, SCRIPT, exit_of, make_place, printed, run_script
 
 pytestmark = pytest.mark.ros
-needs_sandbox = pytest.mark.skipif(bool(why_not()), reason=f"no sandbox here: {why_not()}")
+needs_sandbox = pytest.mark.skipif(bool(why_no_sandbox()), reason=f"no sandbox here: {why_no_sandbox()}")
 SMALL = RunLimits(home_bytes=6 << 20, tmp_bytes=4 << 20, shared_bytes=2 << 20)
 
 

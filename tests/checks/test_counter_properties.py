@@ -81,7 +81,7 @@ def test_what_is_lost_again_and_again_is_the_programs(every: int) -> None:
 
 def test_a_gap_in_the_sequence_numbers_is_the_recorders() -> None:
     count = Count(callerid="/talker", values=(0, 1, 4), times_ns=(0, 10, 20), sequences=(0, 1, 4))
-    assert [count.lost_on_the_way(step, step.change) for step in count.steps] == [False, True]
+    assert [count.was_lost_in_transit(step, step.change) for step in count.steps] == [False, True]
 
 
 def test_a_decoded_value_that_is_no_number_is_left_out() -> None:

@@ -78,7 +78,9 @@ def pipeline(monkeypatch):
     fake = FakePipeline()
     monkeypatch.setitem(sys.modules, "grader.pipeline", fake)
     monkeypatch.setattr(grader, "pipeline", fake, raising=False)
-    monkeypatch.setattr("grader.cli.host_support.why_unrun", lambda: "")  # whatever this machine has
+    monkeypatch.setattr(
+        "grader.cli.host_support.why_nodes_cannot_run", lambda: ""
+    )  # whatever this machine has
     monkeypatch.delitem(sys.modules, LOADED, raising=False)
     yield fake
     sys.modules.pop(LOADED, None)

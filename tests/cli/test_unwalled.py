@@ -45,7 +45,7 @@ def _begins(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("GRADER_PATH", SOLUTION)
     monkeypatch.setenv("GRADER_LAB", LAB)
     (tmp_path / "roster.csv").write_text(f"id,source\nada,{SOLUTION}\n")
-    monkeypatch.setattr("grader.cli.host_support.why_unrun", lambda: "")
+    monkeypatch.setattr("grader.cli.host_support.why_nodes_cannot_run", lambda: "")
 
 
 @pytest.mark.usefixtures("_begins")

@@ -24,10 +24,10 @@ from grader.classes.gradebook import write_gradebook
 from grader.classes.gradebook.template import read_sheet
 from grader.classes.roster import read_roster
 from grader.errors import EvidenceError, GraderError, OutputError, RubricError, SubmissionError, UsageError
-from grader.evidence.decode import Decoder, ServiceType
+from grader.evidence.decode import Decoder
 from grader.evidence.export import export_bag
 from grader.evidence.inspect import inspect_run
-from grader.evidence.message_values import MessageType
+from grader.evidence.message_values import ServiceTypes
 from grader.evidence.reader import load_run, package_facts
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceStream
@@ -264,9 +264,9 @@ def definition(data: bytes) -> None:
 def service(data: bytes) -> None:
     text, _, answer = data.partition(b"\0")
     name, _, lines = text.decode("utf-8", "replace").partition("\n")
-    found = ServiceType(name, lines, lambda _: None)
-    MessageType(f"{name}Request", full=found.request).encode({})
-    found.decode_response(answer)
+    found = ServiceTypes(name, lines)
+    found.request.encode({})
+    found.response.decode(answer)
 
 
 def frames(data: bytes) -> None:

@@ -8,7 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
 
-from grader.arena.sandbox_probe import why_not
+from grader.arena.sandbox_probe import why_no_sandbox
 from grader.rubric.load import load_rubric
 from tests.hostile.form import PROMISES, Run, attack_names, load_attack, rubric_path
 from tests.hostile.harness import ROOT, Graded, faults, grade_in_room, why_no_groups, why_no_room
@@ -60,7 +60,7 @@ def test_declaration(name) -> None:
 @pytest.fixture(scope="module")
 def graded(request, tmp_path_factory) -> Iterator[dict[tuple[str, Run], Future[Graded]]]:
     """The selected attacks, some side by side, while the tests wait for their own one."""
-    if reason := why_no_room() or why_not():
+    if reason := why_no_room() or why_no_sandbox():
         pytest.skip(reason)
     every = [getattr(getattr(item, "callspec", None), "params", {}) for item in request.session.items]
     chosen = [(params["attack"], params["run"]) for params in every if "run" in params]

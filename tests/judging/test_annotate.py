@@ -12,7 +12,7 @@ from grader.checks import CHECKS
 from grader.checks.support.text import LOOP, in_language, init, publisher, set_param
 from grader.integrations.bundle import Bundle, add_lab
 from grader.judging import judge
-from grader.judging.annotate import LINE_CHARS, add_advice, said_for_node, show_lines
+from grader.judging.annotate import LINE_CHARS, add_advice, choose_hint_language, show_lines
 from grader.judging.early import judge_files
 from grader.judging.facts import Facts
 from grader.model.package import PackageFacts
@@ -148,7 +148,7 @@ def hint(
     known = rubric(criterion, scenarios={"run": scenario})
     runs = build_runs({"runs": {"run": {"graph": [{"at_s": 0, **GRAPH, "processes": processes or {}}]}}})
     facts = Facts(rubric=known, runs=runs, package=package)
-    return said_for_node(failed(message, hint=LOOP), known.criteria[0], facts).hint
+    return choose_hint_language(failed(message, hint=LOOP), known.criteria[0], facts).hint
 
 
 ROSPY, ROSCPP = "while not rospy.is_shutdown():", "while (ros::ok())"

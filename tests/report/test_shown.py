@@ -20,8 +20,8 @@ from grader.untrusted_text import (
     json_text,
     line,
     text_limit,
-    uncommanded,
     visible,
+    without_ci_commands,
 )
 from tests.report.nasty import ANY_TEXT, STEERING, TEXTS
 
@@ -82,7 +82,7 @@ def test_written_out(text, shown):
 
 def test_every_line_of_many_is_no_command():
     assert visible("a\n ::error::b\n\t::x", lines=True) == "a\n \\x3a:error::b\n\t\\x3a:x"
-    assert uncommanded("\x1b[31m::error::x") == "\x1b[31m\\x3a:error::x"
+    assert without_ci_commands("\x1b[31m::error::x") == "\x1b[31m\\x3a:error::x"
 
 
 def test_clip_says_how_much_is_gone():

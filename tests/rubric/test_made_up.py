@@ -22,7 +22,7 @@ from grader.report.sentences import made_up_words
 from grader.report.terminal import render_terminal
 from grader.report.view import for_student
 from grader.rubric.load import LoadedRubric, load_rubric
-from grader.rubric.made_up import MadeUp, as_recorded, tell_made_up, with_values
+from grader.rubric.made_up import MadeUp, tell_made_up, with_recorded_values, with_values
 from grader.rubric.schema import rubric_schema
 from tests.report.hostile import rubric
 from tests.rubric.samples import faults, spoiled
@@ -89,7 +89,7 @@ def test_what_is_changed_in_a_rubric_stays_changed(tmp_path: Path) -> None:
     marked = lab.model_copy(update={"rubric": lab.rubric.model_copy(update={"pass_mark": 50.0})})
     assert marked.of_submission("a").rubric.pass_mark == 50.0
     few = lab.rubric.model_copy(update={"criteria": lab.rubric.criteria[:1]})
-    assert len(as_recorded(few, {}).criteria) == 1
+    assert len(with_recorded_values(few, {}).criteria) == 1
 
 
 def test_values_stand_in_texts_keys_and_words(tmp_path: Path) -> None:
@@ -238,7 +238,7 @@ def test_evidence_is_judged_by_the_values_that_it_was_recorded_with(tmp_path: Pa
         first, other = judge(lab, runs)
         assert (first.status, first.made_up) == (Status.PASS, {"rate": rate})
         assert (other.status, other.made_up) == (Status.FAIL, {"rate": rate})
-        placed = as_recorded(lab, runs)
+        placed = with_recorded_values(lab, runs)
         assert placed.values == {"rate": rate}
         digest = placed.scenarios["real"].digest
         fitting = runs_of(rate, {"made_up": f'{{"rate": {rate}}}', "scenario.digest": digest})

@@ -91,7 +91,7 @@ class Count(Record):
             return 0.0
         return max(median(gaps), sum(gaps) / len(gaps) / 2)
 
-    def lost_on_the_way(self, step: Step, jump: float) -> bool:
+    def was_lost_in_transit(self, step: Step, jump: float) -> bool:
         """Return whether `jump - 1` values between these two were published and did not arrive.
 
         The recording says so, or the time between them fits, or that of a stall just before: a process that the host
@@ -152,18 +152,19 @@ class Wrong(NamedTuple):
 
 
 def wrong_steps(count: Count, run: Run, *, maximum: int, rate_hz: float) -> Wrong:
-    """Of `judged_steps`. Where the counter falls by more than one, it may have started again: that is no such step."""
-    wrong = tuple(s for s in judged_steps(count, maximum) if s.change in {0, -1} or s.change > 1)
+    """Return the wrong ones of `steps_to_judge`. Where the counter falls by more than one, it may have started again:
+    that is no such step."""
+    wrong = tuple(s for s in steps_to_judge(count, maximum) if s.change in {0, -1} or s.change > 1)
     skips = tuple(s for s in wrong if s.change > 1)
     usual = count.usual_step()
     if wrong and skips == wrong and usual in {None, 1} and count.is_flood(run, rate_hz):
         return Wrong(wrong, flood=True, excused=usual == 1)
-    lost = tuple(s for s in skips if count.lost_on_the_way(s, s.change))
+    lost = tuple(s for s in skips if count.was_lost_in_transit(s, s.change))
     numbers = {s.number for s in lost}
     return Wrong(wrong, own=tuple(s for s in wrong if s.number not in numbers), lost=lost)
 
 
-def judged_steps(count: Count, maximum: int) -> tuple[Step, ...]:
+def steps_to_judge(count: Count, maximum: int) -> tuple[Step, ...]:
     """Return all of them but those of another criterion: from a first value that is wrong, which is the start's fault,
     and the repeats of a counter that stays at its maximum, which are the wrap's."""
     stays = count.values[-1] == maximum and count.stuck > 1
@@ -323,7 +324,7 @@ def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Litera
     if count.is_flood(run, params.rate_hz):
         return "flood"
     jump = (high - step.before) + (step.after - low) + 1
-    return "lost" if count.lost_on_the_way(step, jump) else "program"
+    return "lost" if count.was_lost_in_transit(step, jump) else "program"
 
 
 def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:

@@ -316,7 +316,9 @@ def explain_error(package: PackageFacts, run: Run) -> Ending | None:
     return explain_traceback(found[-1], package) if found else None
 
 
-def heed_errors(check: Check, package: PackageFacts | None, run: object, verdict: Verdict) -> Verdict:
+def explain_by_exception(
+    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
+) -> Verdict:
     """Return a lost mark with the exception that a callback raised, which rospy prints and outlives."""
     unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
     if not unexplained or package is None or not isinstance(run, Run) or early_end(run):
@@ -541,7 +543,7 @@ def is_rospys_own(found: Traceback) -> bool:
     return race or (bool(found.frames) and not found.own_frames)
 
 
-def ended_after(life: Life) -> str:
+def lifetime_text(life: Life) -> str:
     return seconds((life.end_ns or life.start_ns) - life.start_ns)
 
 

@@ -176,7 +176,9 @@ def params_given(run: Run) -> dict[str, Given]:
     return {n: Given(n, e.value, NOT_IN_FILE not in e.detail) for n, e in zip(names, events, strict=True)}
 
 
-def heed_unread(check: Check, _package: PackageFacts | None, run: object, verdict: Verdict) -> Verdict:
+def explain_by_unread_parameter(
+    check: Check, _package: PackageFacts | None, run: object, verdict: Verdict
+) -> Verdict:
     """Return a lost mark with the parameter that the run sets and that no node asked for, whatever it did instead."""
     unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
     if not unexplained or not isinstance(run, Run) or early_end(run):

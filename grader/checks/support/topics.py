@@ -263,7 +263,7 @@ def all_lost(run: Run, topic: str) -> Verdict | None:
     return inconclusive(f"nothing was recorded of {topic}", measured="no message", hint="grade again")
 
 
-def heed_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> Verdict:
+def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> Verdict:
     """Return the verdict with what the recorder lost of its topics.
 
     A lost mark becomes `inconclusive`, unless the check rests on what came whole (`heeds_losses`).

@@ -27,7 +27,7 @@ from grader.report.forms import ReportInput
 from grader.report.sentences import missing_hidden
 from grader.results import EVIDENCE, RESULT, Results, read_result
 from grader.rubric.load import LoadedRubric
-from grader.rubric.made_up import as_recorded
+from grader.rubric.made_up import with_recorded_values
 from grader.rubric.model import Rubric
 from grader.workers import WorkerEnded, run_each
 
@@ -84,7 +84,7 @@ def _judge_one(rubric: LoadedRubric, fitting: bool, folder: Path) -> Judged:
 
 def fitting_runs(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
     """Return the runs that were recorded with the rubric's present scenarios; evidence that does not say counts."""
-    scenarios = as_recorded(rubric, runs).scenarios
+    scenarios = with_recorded_values(rubric, runs).scenarios
     digests = {name: scenario.digest for name, scenario in scenarios.items()}
     return {
         name: run

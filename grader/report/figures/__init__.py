@@ -29,7 +29,7 @@ from grader.report.figures.measurements import (
     wrap_figures,
 )
 from grader.report.figures.runs import code_figures, console_of, graph_of, timeline_of
-from grader.rubric.made_up import as_recorded
+from grader.rubric.made_up import with_recorded_values
 from grader.rubric.model import Criterion, Rubric
 
 FIGURES_MAX = 4
@@ -56,7 +56,7 @@ def figures_of(rubric: Rubric, runs: Mapping[str, Run], criteria: Sequence[Crite
     `runs` are the recorded runs by scenario, and `package`, as the judge takes them. A criterion without any figure, a
     scenario without nodes and one in which nothing was printed are not in it.
     """
-    rubric = as_recorded(rubric, runs)
+    rubric = with_recorded_values(rubric, runs)
     facts, on_copy = (_made(try_facts, rubric, found) for found in _first_and_copy(runs))
     known = facts.runs if facts else runs
     shown = {

@@ -11,16 +11,16 @@ from itertools import chain
 
 from grader.checks.counter import StartParams, StepParams, judge_start
 from grader.checks.listener import HearsParams
-from grader.checks.rate import RateParams, judged_rhythm, sleeps_explain, was_late
+from grader.checks.rate import RateParams, rhythm_to_judge, sleeps_explain, was_late
 from grader.checks.robot_path import PathParams, spot
 from grader.checks.robot_places import (
     EndsAtParams,
     Place,
     StaysWithinParams,
-    asked_stretch,
-    judged_path,
     out_along,
+    path_to_judge,
     placed,
+    stretch_to_judge,
 )
 from grader.checks.support.clocks import lateness
 from grader.checks.support.console_output import (
@@ -215,7 +215,7 @@ def rate_figures(run: Run, params: RateParams) -> Iterator[RateFigure]:
     channels = [c for c in sent_by(run, params.topic, params.of) if c.messages]
     groups = [channels, *([c] for c in channels[:PUBLISHERS_MAX] if len(channels) > 1)]
     for group in groups:
-        found = judged_rhythm(run, params, group)
+        found = rhythm_to_judge(run, params, group)
         if found is not None and found.gaps_ns:
             yield _rate_figure(run, params, found, group)
 
@@ -361,10 +361,10 @@ SIDES_MAX = 1000
 
 def end_figures(run: Run, params: EndsAtParams) -> Iterator[PlaceFigure]:
     """The path from when the goal was asked for."""
-    found, asked = track(run, params.topic, params.hold_s, params.fields), asked_stretch(run, params)
+    found, asked = track(run, params.topic, params.hold_s, params.fields), stretch_to_judge(run, params)
     if found is None or asked is None:
         return
-    taken = judged_path(found, asked, params)
+    taken = path_to_judge(found, asked, params)
     if taken:
         missed = not params.is_there(taken[-1])
         figure = _place_figure(run, params, taken, len(taken) - 1 if missed else None)
