@@ -19,7 +19,7 @@ from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.scenario import process_specs
 from grader.arena.session import ArenaSession
 from grader.evidence.writer import EvidenceWriter
-from grader.rubric.model import Start
+from grader.rubric.scenario import Start
 from tests.arena.support import make_place
 
 PUBLISHER = Path(__file__).parent / "publisher.py"

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from grader.model.result import CriterionResult, GradingResult
     from grader.model.verdict import EvidenceCitation, FileCitation, Status
     from grader.rubric.load import LoadedRubric
-    from grader.rubric.model import Criterion, Rubric, Scenario
+    from grader.rubric.model import Criterion, Rubric
+    from grader.rubric.scenario import Scenario
 
 __version__ = "0.1.0"
 

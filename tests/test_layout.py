@@ -13,7 +13,8 @@ import pytest
 GRADER = Path(__file__).resolve().parent.parent / "grader"
 ROS_SIDE = GRADER / "arena" / "ros"
 
-# Who may import whom, beside itself. `rubric.model` holds records only: whoever may see records may see it.
+# Who may import whom, beside itself. `rubric.model` and `rubric.scenario` hold records only: who may see records may
+# see them.
 BASE = {"model", "errors", "portable", "untrusted_text", "wording"}
 ALLOWED = {
     "__init__": {"api", "errors", "model", "rubric"},
@@ -34,7 +35,7 @@ ALLOWED = {
     "verification": BASE | {"evidence", "judging", "report", "results", "rubric", "signing"},
     "faults": BASE | {"files", "intake", "judging", "report", "results", "rubric"},
     "evidence": BASE | {"files", "installable"},
-    "package": BASE | {"files", "host_programs", "limited_child", "rubric.model"},
+    "package": BASE | {"files", "host_programs", "limited_child", "rubric.model", "rubric.scenario"},
     "intake": BASE | {"files", "host_programs", "limited_child"},
     "checks": BASE | {"evidence", "installable"},
     "rubric": BASE | {"checks", "evidence", "files", "installable", "ros_packages"},
@@ -42,7 +43,7 @@ ALLOWED = {
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
     "arena": BASE | {
         "evidence", "files", "host_programs", "package", "ros_env", "ros_packages", "rubric.course_packages",
-        "rubric.model", "rubric.pytest_check"
+        "rubric.model", "rubric.pytest_check", "rubric.scenario"
     },
     "submitted_recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "repaired_copy": {"files", "judging", "model", "package", "rubric"},

@@ -10,7 +10,7 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 
 from grader.model.message_rate import RateBounds
-from grader.rubric.model import Until
+from grader.rubric.scenario import Until
 
 Outcome = tuple[str, str]
 ARRIVALS_MAX = 2000

@@ -24,7 +24,7 @@ from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.message_rate import RateBounds
 from grader.rubric.course_packages import LAUNCH_ENDINGS
-from grader.rubric.model import Param, Scenario, Start
+from grader.rubric.scenario import Param, Scenario, Start
 
 NAPS = re.compile(rb"\bsleep\(\s*[^)\s]")
 """A sleep of so many seconds: `rospy.sleep(0.5)`, and not `rate.sleep()`."""

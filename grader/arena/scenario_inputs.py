@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from grader.files import read_untrusted
-from grader.rubric.model import Param, Probe
+from grader.rubric.scenario import Param, Probe
 
 PROBE_SHAPES = (
     "aaaaaa aaaaaa", "aaaaa aaaaa 5555555.55", "aaaa, aaaaaaa, aaaa and aaa", "aaaaaaa: aaaaa, aaaaaaa: 5555",

@@ -16,7 +16,7 @@ from grader.arena.session import ArenaSession
 from grader.errors import ArenaError
 from grader.evidence.events import GOAL_STATUS, MISFIT, OTHER_TYPE, ActorEvent
 from grader.model.interfaces import other_fields
-from grader.rubric.model import Served
+from grader.rubric.scenario import Served
 
 if TYPE_CHECKING:
     from grader.evidence.message_values import MessageType, ServiceTypes

@@ -26,7 +26,7 @@ from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
 from grader.evidence.events import GOAL_STATUS, MISFIT, UNHEARD, ActorEvent
 from grader.model.interfaces import other_fields
-from grader.rubric.model import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
+from grader.rubric.scenario import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
 
 if TYPE_CHECKING:

@@ -18,7 +18,8 @@ from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.rubric.consistency import TOTAL_POINTS
 from grader.rubric.load import LoadedRubric
-from grader.rubric.model import Criterion, Param, Probe, Rubric, Scenario, Start, Until
+from grader.rubric.model import Criterion, Rubric
+from grader.rubric.scenario import Param, Probe, Scenario, Start, Until
 from grader.untrusted_text import line, visible, without_ci_commands
 
 WEIGHTS = {

@@ -46,7 +46,8 @@ from grader.report.terminal import emit, open_console
 from grader.report.text import line, visible
 from grader.rubric.find import BUILT_IN, EXAMPLE
 from grader.rubric.load import LoadedRubric, load_rubric
-from grader.rubric.model import NAME_PATTERN, Rubric
+from grader.rubric.model import Rubric
+from grader.rubric.scenario import NAME_PATTERN
 from grader.wording import did_you_mean, number
 
 MARKS = {

@@ -30,7 +30,8 @@ from grader.intake.tree import is_file, is_there
 from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
 from grader.rubric.load import LoadedRubric, find_rubric_for_package, load_rubric, packages_of_labs
-from grader.rubric.model import Criterion, Rubric, Scenario, Start, Until
+from grader.rubric.model import Criterion, Rubric
+from grader.rubric.scenario import Scenario, Start, Until
 from grader.wording import closest
 
 ALIKE = 0.75

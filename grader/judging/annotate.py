@@ -29,7 +29,8 @@ from grader.model.package import LaunchFile, PackageFacts
 from grader.model.result import CriterionResult
 from grader.model.verdict import Citation, FileCitation, Status, Verdict
 from grader.rubric.load import names_in
-from grader.rubric.model import Criterion, Rubric, Scenario
+from grader.rubric.model import Criterion, Rubric
+from grader.rubric.scenario import Scenario
 from grader.wording import join_words
 
 POINTS_MAX = 3

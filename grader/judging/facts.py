@@ -20,7 +20,8 @@ from grader.evidence.run import Run
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, unjudged
-from grader.rubric.model import Criterion, Rubric, Scenario, Start
+from grader.rubric.model import Criterion, Rubric
+from grader.rubric.scenario import Scenario, Start
 from grader.wording import join_words
 
 NOT_RUN = "not_run"

@@ -17,7 +17,8 @@ from grader.model.package import PackageFacts
 from grader.model.repair import Repair, advice_of, place_of
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import FileCitation, Status, Verdict, failed
-from grader.rubric.model import Criterion, Rubric, Scenario
+from grader.rubric.model import Criterion, Rubric
+from grader.rubric.scenario import Scenario
 from grader.wording import join_words
 
 PACKAGE_RUN, REPAIRS, BUILD = "package", "repairs", "build"

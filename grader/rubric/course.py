@@ -19,7 +19,8 @@ from grader.model.record import Record
 from grader.model.version import COURSE
 from grader.rubric.faults import model_faults
 from grader.rubric.find import SUFFIXES
-from grader.rubric.model import Deadline, Late, Name
+from grader.rubric.model import Deadline, Late
+from grader.rubric.scenario import Name
 from grader.rubric.source import Fault, Form, Source, as_map, read_source
 from grader.wording import did_you_mean
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from grader.rubric.model import FOLDER_PATTERN, ROSTEST_ENDING
+from grader.rubric.scenario import FOLDER_PATTERN, ROSTEST_ENDING
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import did_you_mean
 

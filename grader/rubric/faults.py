@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from grader.checks.parameter_docs import UNITS
-from grader.rubric.model import NAME_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
+from grader.rubric.scenario import NAME_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
 from grader.rubric.source import Fault, KeyPath
 from grader.wording import did_you_mean, shorten
 

@@ -10,7 +10,7 @@ from grader.errors import EvidenceError
 from grader.installable import noetic_messages
 from grader.ros_packages import ros_packages
 from grader.rubric.faults import model_faults
-from grader.rubric.model import STEP_S_MAX, Step, Transform
+from grader.rubric.scenario import STEP_S_MAX, Step, Transform
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
 from grader.wording import did_you_mean
 

@@ -21,7 +21,7 @@ from grader.evidence.run import Run
 from grader.model.submission import SourcePackage, Submission
 from grader.package import read_package
 from grader.ros_env import RosInstallation, find_ros
-from grader.rubric.model import Scenario, Start, Until
+from grader.rubric.scenario import Scenario, Start, Until
 
 MANIFEST = """<?xml version="1.0"?>
 <package format="2"><name>lab</name><version>0.0.0</version><description>lab</description>

@@ -58,7 +58,7 @@ def test_calls_as_clients_write_them(module, value) -> None:
         (call(f"<value><i8>{'9' * 1000}</i8></value>"), "too large"),
         (
             call("<value><struct><member><value><i4>1</i4></value><value/></member></struct></value>"),
-            "no text",
+            "not a string",
         ),
         (call("<value><nil/></value>"), "no XML-RPC"),
         (call("<value>\0</value>"), "no text"),

@@ -13,7 +13,7 @@ from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter
 from grader.files import READ_MAX
-from grader.rubric.model import Scenario, Start, Until
+from grader.rubric.scenario import Scenario, Start, Until
 from tests.arena.support import CMAKE, SCRIPT, make_place, run
 
 pytestmark = pytest.mark.ros

@@ -10,7 +10,7 @@ from grader.checks.topics import ConnectedParams, connected
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status
-from grader.rubric.model import Scenario, Start, Until
+from grader.rubric.scenario import Scenario, Start, Until
 from tests.arena.support import SCRIPT, make_place, run
 
 pytestmark = pytest.mark.ros

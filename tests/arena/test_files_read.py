@@ -20,7 +20,7 @@ from grader.arena.static_recorder import (
 from grader.evidence.events import ActorEvent
 from grader.files import read_untrusted
 from grader.package import read_package
-from grader.rubric.model import Param
+from grader.rubric.scenario import Param
 from tests.package.trees import CMAKE, MANIFEST, make_package
 
 GOOD = {"package.xml": MANIFEST, "CMakeLists.txt": CMAKE}

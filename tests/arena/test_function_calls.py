@@ -10,8 +10,8 @@ import pytest
 from grader.checks import Evidence
 from grader.evidence.run import Run
 from grader.model.verdict import FileCitation, Status, Verdict, inconclusive
-from grader.rubric.model import Scenario
 from grader.rubric.pytest_check import PytestParams, run_tests
+from grader.rubric.scenario import Scenario
 from tests.arena.support import make_place, run
 
 pytestmark = pytest.mark.ros

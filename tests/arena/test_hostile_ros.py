@@ -9,7 +9,7 @@ import pytest
 
 from grader.arena.limits import RunLimits
 from grader.evidence.run import Channel, Run
-from grader.rubric.model import Probe, Scenario, Start, Until
+from grader.rubric.scenario import Probe, Scenario, Start, Until
 from tests.arena.support import SCRIPT, exit_of, make_place, printed, run
 
 pytestmark = pytest.mark.ros

@@ -8,7 +8,7 @@ import pytest
 
 from grader.arena.limits import RunLimits
 from grader.evidence.run import LeftFile, Run
-from grader.rubric.model import Scenario
+from grader.rubric.scenario import Scenario
 from tests.arena.support import SCRIPT, exit_of, make_place, needs_sandbox, run
 
 pytestmark = [pytest.mark.ros, needs_sandbox]

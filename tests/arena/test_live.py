@@ -8,7 +8,7 @@ import pytest
 
 from grader.arena.run_state import RunState, describe_wait, find_outcome, is_settled, next_look_s
 from grader.model.message_rate import RateBounds
-from grader.rubric.model import Until
+from grader.rubric.scenario import Until
 
 
 def _live(**topics: tuple[int, float, float]) -> RunState:

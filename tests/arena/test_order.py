@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from grader.arena.recorder import order_runs
-from grader.rubric.model import Rubric, Scenario, Start, Until
+from grader.rubric.model import Rubric
+from grader.rubric.scenario import Scenario, Start, Until
 
 
 def scenario(clock: str = "real", **until: object) -> Scenario:

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from mcap_ros1.decoder import DecoderFactory
 
 from grader.evidence.inspect import inspect_file
-from grader.rubric.model import Scenario, Start, Until
+from grader.rubric.scenario import Scenario, Start, Until
 from tests.arena.support import SCRIPT, make_place, printed, run
 
 pytestmark = pytest.mark.ros

@@ -13,7 +13,7 @@ import pytest
 from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.steps import StepRunner
 from grader.evidence.events import MISFIT, ActorEvent
-from grader.rubric.model import Call
+from grader.rubric.scenario import Call
 
 
 @pytest.mark.parametrize(

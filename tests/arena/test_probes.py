@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from grader.arena.scenario_inputs import made_up, make_shots
-from grader.rubric.model import Probe
+from grader.rubric.scenario import Probe
 
 CHATTER = Probe(topic="/chatter", type="std_msgs/String", text=8)
 

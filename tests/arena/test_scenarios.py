@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.evidence.run import Run
-from grader.rubric.model import Call, Param, Probe, Scenario, Start, Until
+from grader.rubric.scenario import Call, Param, Probe, Scenario, Start, Until
 from tests.arena.support import SCRIPT, make_place, printed, run
 
 pytestmark = pytest.mark.ros

@@ -11,7 +11,7 @@ import pytest
 from grader.checks.support.processes import lives, observed_until_ns
 from grader.evidence.message_values import MessageType, action_texts
 from grader.evidence.run import Run
-from grader.rubric.model import Scenario, Start, Until
+from grader.rubric.scenario import Scenario, Start, Until
 from tests.arena.support import SCRIPT, make_place, printed, run
 from tests.evidence.bags import Topic, write_bag
 

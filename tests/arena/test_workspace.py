@@ -9,7 +9,7 @@ import pytest
 
 from grader.arena.workspace import LARGE_BYTES
 from grader.files import read_untrusted
-from grader.rubric.model import Scenario, Start, Until
+from grader.rubric.scenario import Scenario, Start, Until
 from tests.arena.support import SCRIPT, make_place, printed, run
 
 pytestmark = pytest.mark.ros

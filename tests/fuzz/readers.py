@@ -44,7 +44,8 @@ from grader.package.launch import parse_launch, parse_launch_files
 from grader.package.manifest import parse_manifest, read_manifest
 from grader.package.python import cause_of, read_syntax_report
 from grader.rubric.load import load_rubric
-from grader.rubric.model import Param, Rubric
+from grader.rubric.model import Rubric
+from grader.rubric.scenario import Param
 from grader.rubric.source import read_source
 from tests.gradebook.made import BOOK, row
 from tests.support.timeline import build_runs

@@ -11,7 +11,7 @@ from grader.integrations.bundle import Bundle, add_lab
 from grader.rubric.consistency import scenario_faults
 from grader.rubric.faults import model_faults
 from grader.rubric.load import load_rubric
-from grader.rubric.model import Publish, Scenario, Step
+from grader.rubric.scenario import Publish, Scenario, Step
 from grader.rubric.source import RUBRIC, source_of
 from tests.evidence.bags import Topic, write_bag
 from tests.rubric.samples import faults, spoiled

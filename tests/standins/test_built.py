@@ -13,7 +13,7 @@ from grader.arena.process_environment import ProcessEnvironment
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter
-from grader.rubric.model import Scenario, Start, Until
+from grader.rubric.scenario import Scenario, Start, Until
 from tests.arena.support import MANIFEST, SCRIPT, make_place, printed, run
 
 pytestmark = pytest.mark.ros

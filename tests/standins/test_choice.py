@@ -17,7 +17,7 @@ from grader.arena.sandbox_files import (
 )
 from grader.cli.doctor import _standins
 from grader.ros_env import RosInstallation
-from grader.rubric.model import Scenario, Start, Until
+from grader.rubric.scenario import Scenario, Start, Until
 from tests.arena.support import make_place, printed, require_ros, run
 
 ALL = ("robot_world", "rospy_tutorials", "std_srvs", "turtlesim")

@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from grader.evidence.run import Run
-from grader.rubric.model import Scenario, Start, Until
+from grader.rubric.scenario import Scenario, Start, Until
 from tests.arena.support import make_place, printed, run
 
 pytestmark = pytest.mark.ros

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from grader.evidence.run import Run
-from grader.rubric.model import Scenario, Start, Until
+from grader.rubric.scenario import Scenario, Start, Until
 from tests.arena.support import exit_of, make_place, printed, run
 
 pytestmark = pytest.mark.ros

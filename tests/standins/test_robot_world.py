@@ -17,7 +17,7 @@ import yaml
 
 from grader.arena.sandbox_files import STANDIN_SOURCES
 from grader.checks.support.geometry import shown_walls
-from grader.rubric.model import Scenario, Start, Step, Wait
+from grader.rubric.scenario import Scenario, Start, Step, Wait
 from tests.arena.support import make_place, run
 
 ROOM = [[[0, 0], [6, 0], [6, 4], [0, 4], [0, 0]]]
