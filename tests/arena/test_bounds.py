@@ -156,7 +156,7 @@ TYPE = "std_msgs/String"
         ("setParam", ("/grader_recorder_0123abcd_knock", "/p", 1), "the grader's node"),
         ("setParam", ("/grader", "/p", 1), ""),
         ("setParam", ("/grader_helper", "/p", 1), ""),
-        ("setParam", (5, "/p", 1), "no text"),
+        ("setParam", (5, "/p", 1), "not a string"),
         ("setParam", ("/old", "/p", "\0" * 5000), ""),
         ("shutdown", ("/new", "x"), "shut down"),
         ("getPid", (), ""),

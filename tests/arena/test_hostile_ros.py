@@ -244,7 +244,7 @@ def test_registrations_without_end(tmp_path: Path) -> None:
         told(seen, "refused"), ("the address http://192.0.2.1/", "file:///etc/passwd", "127.0.0.1:0/")
     )
     assert_told(
-        told(seen, "refused"), ("127.0.0.1:11311/", "nothing", "99999", "a name that is none", "no text")
+        told(seen, "refused"), ("127.0.0.1:11311/", "nothing", "99999", "a name that is none", "not a string")
     )
     assert_told(told(seen, "limit"), ("more topics and services than a process may",))
     assert "/talker" in seen.student_nodes("talker")
