@@ -25,6 +25,7 @@ from grader.model.result import CriterionResult
 from grader.model.submission import Submission
 from grader.model.verdict import Status
 from grader.package import read_packages
+from grader.ros_env import why_nodes_cannot_run
 from grader.ros_packages import look_for
 from grader.rubric.load import LoadedRubric, needs_ros, rates_of, select_started, watched_of
 from grader.rubric.made_up import KEY
@@ -80,7 +81,6 @@ def make_recorder(
     from grader.arena.static_recorder import (  # noqa: PLC0415 - see LATER
         STATIC_ONLY,
         StaticRecorder,
-        why_nodes_cannot_run,
     )
 
     make_folder(job.evidence)

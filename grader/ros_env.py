@@ -12,11 +12,13 @@ from typing import Literal
 
 from grader.errors import RosMissing
 from grader.model.record import Record
+from grader.portable import system
 
 DEBIAN_PACKAGES = (
     "python3-rospy python3-rosmaster python3-roslaunch rosout rosbash catkin "
     "python3-std-msgs python3-rosgraph-msgs python3-geometry-msgs python3-sensor-msgs"
 )
+NO_ROS = "no ROS 1 on this machine"
 INSTALL_HINT = f"on Debian 12: apt-get install {DEBIAN_PACKAGES} (or: make setup)"
 SYSTEM_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 ROS_VARIABLES = frozenset(
@@ -54,6 +56,13 @@ class RosInstallation(Record):
 def find_ros() -> RosInstallation | None:
     """Return the ROS 1 to use, or None. `$GRADER_ROS_SETUP` names a `setup.bash`, or `none`."""
     return _find(os.environ.get("GRADER_ROS_SETUP", ""), os.environ.get("CONDA_PREFIX", ""))
+
+
+def why_nodes_cannot_run() -> str:
+    """Return why no node can be run here, "" where one can. Raises RosMissing where ROS is not where it should be."""
+    if system():
+        return f"ROS 1's nodes run on Linux, and this is {system()}"
+    return "" if find_ros() is not None else NO_ROS
 
 
 @lru_cache(maxsize=4)

@@ -24,7 +24,7 @@ ALLOWED = {
     "wording": set[str](),
     "installable": set[str](),
     "portable": {"errors"},
-    "ros_env": {"errors", "model"},
+    "ros_env": {"errors", "model", "portable"},
     "ros_packages": {"errors", "host_programs", "installable", "ros_env", "wording"},
     "host_programs": set[str](),
     "limited_child": {"host_programs"},
@@ -48,8 +48,8 @@ ALLOWED = {
     "submitted_recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "repaired_copy": {"files", "judging", "model", "package", "rubric"},
     "recording": BASE | {
-        "arena", "evidence", "files", "installable", "judging", "package", "repaired_copy", "ros_packages", "rubric",
-        "submitted_recordings"
+        "arena", "evidence", "files", "installable", "judging", "package", "repaired_copy", "ros_env", "ros_packages",
+        "rubric", "submitted_recordings"
     },
     "pipeline": BASE | {
         "arena", "evidence", "faults", "files", "intake", "judging", "package", "recording", "report", "results",

@@ -28,7 +28,6 @@ from grader.arena.sandbox_files import prepare
 from grader.arena.sandbox_probe import choose
 from grader.arena.scenario import expected_s, run_scenario
 from grader.arena.static_recorder import (
-    NO_ROS,
     PACKAGE,
     RETRIES,
     Recording,
@@ -49,7 +48,7 @@ from grader.model.sandbox_mode import SandboxMode
 from grader.model.submission import Submission
 from grader.package import SyntaxReport, python_paths, read_syntax_report, with_build_facts
 from grader.package.python import REPORT_BYTES_MAX
-from grader.ros_env import INSTALL_HINT, find_ros
+from grader.ros_env import INSTALL_HINT, NO_ROS, find_ros
 from grader.rubric.model import Rubric
 
 WAITING = "for its turn"

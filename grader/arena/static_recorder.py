@@ -21,8 +21,7 @@ from grader.model.package import PackageFacts, SourceFile
 from grader.model.progress import Progress
 from grader.model.record import Record
 from grader.model.submission import Submission
-from grader.portable import system
-from grader.ros_env import RosInstallation, find_ros
+from grader.ros_env import RosInstallation
 from grader.rubric.model import Rubric
 
 if TYPE_CHECKING:
@@ -37,7 +36,6 @@ ATTACHED_FILES_MAX = 60
 ATTACHED_SUFFIXES = (
     ".py", ".xml", ".txt", ".launch", ".yaml", ".yml", ".cfg", ".sh", ".cpp", ".h", ".msg", ".srv",
 )  # fmt: skip
-NO_ROS = "no ROS 1 on this machine"
 STATIC_ONLY = "nothing was run: only the files were asked for"
 STILL_HOLDS = "unchanged: what was recorded before still holds"
 
@@ -133,13 +131,6 @@ def copy_recorded(recorded: Mapping[str, Path], folder: Path, progress: Progress
     for name, path in recorded.items():
         shutil.copyfile(path, folder / f"{name}.mcap")
         progress.step(name, "skipped", STILL_HOLDS)
-
-
-def why_nodes_cannot_run() -> str:
-    """Return why no node can be run here, "" where one can. Raises RosMissing where ROS is not where it should be."""
-    if system():
-        return f"ROS 1's nodes run on Linux, and this is {system()}"
-    return "" if find_ros() is not None else NO_ROS
 
 
 class StaticRecorder:

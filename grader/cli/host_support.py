@@ -17,7 +17,6 @@ from pydantic import AliasChoices, Field
 from grader.arena.control_groups import describe, find_cgroups, has_memory
 from grader.arena.sandbox import NAMESPACES
 from grader.arena.sandbox_probe import ULIMIT_HINT, choose, refused_limits
-from grader.arena.static_recorder import why_nodes_cannot_run
 from grader.cli.output import say_beside
 from grader.errors import GraderError, HostError, RosMissing
 from grader.host_programs import HOST_ENV, find_host_program
@@ -25,6 +24,7 @@ from grader.model.record import Record
 from grader.model.sandbox_mode import SandboxMode
 from grader.portable import system, user_id
 from grader.report.sentences import without_sandbox
+from grader.ros_env import why_nodes_cannot_run
 from grader.rubric.load import LoadedRubric, needs_ros
 
 PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
