@@ -148,7 +148,7 @@ class Arena:
         return [(process.name, process.tree()) for process in list(self._processes.values())]
 
     def _used_s(self):
-        """CPU seconds of the student's processes so far."""
+        """Return the CPU seconds of the student's processes so far."""
         return sum(process.cpu_used_s() for process in list(self._students))
 
     def _interrupt(self, command):
@@ -286,7 +286,7 @@ class Arena:
 
 
 def run_arena():
-    """One arena's whole life."""
+    """Run one arena, from its start to its end."""
     set_clock()
     libc = ctypes.CDLL(None, use_errno=True)
     libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
@@ -376,7 +376,8 @@ def reset_signals():
 
 
 def stand_by(live, modules):
-    """The template's whole life. `modules` are loaded now; what cannot be loaded is missed by who needs it."""
+    """Run the template, from its start to its end. `modules` are loaded now; one that cannot be loaded is missed by
+    what needs it."""
     reset_signals()
     for name in modules:
         with contextlib.suppress(Exception):

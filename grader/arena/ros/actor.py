@@ -86,7 +86,7 @@ class SlaveApi:
         self._guard = guard
 
     def answer(self, method, args, caller):
-        """A call from outside."""
+        """Answer a call from outside."""
         if method == "shutdown":
             self._guard.refused(caller.name, "told the grader's node to shut down")
         if method in SAME_ANSWERS:

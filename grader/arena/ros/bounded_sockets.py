@@ -70,7 +70,7 @@ class BoundedSocket(socket.socket):
 
 
 def connect(port, seconds, size):
-    """A connection to a port of this machine, bounded; raise OSError."""
+    """Return a bounded connection to a port of this machine; raise OSError."""
     sock = BoundedSocket(socket.AF_INET, socket.SOCK_STREAM)
     sock.allow(seconds, size)
     sock.settimeout(seconds)
@@ -84,7 +84,7 @@ def connect(port, seconds, size):
 
 
 def port_of(uri):
-    """The port of `http://…:port/` or `rosrpc://…:port`; None where there is none.
+    """Return the port of `http://…:port/` or `rosrpc://…:port`; None where there is none.
 
     Nodes are on this machine, by whatever name they call it.
     """
@@ -127,7 +127,7 @@ class _Transport(xmlrpc.client.Transport):
 
 
 def slave_api(uri, seconds):
-    """A proxy of a node's slave API, each of whose calls takes at most so many seconds; raise ValueError."""
+    """Return a proxy of a node's slave API, each of whose calls takes at most so many seconds; raise ValueError."""
     port = port_of(uri)
     if port is None:
         raise ValueError("no address of a node: {}".format(str(uri)[:100]))
@@ -186,7 +186,7 @@ class Caller:
 
 
 def note_arrivals(sock):
-    """From now on the kernel notes for this socket when its bytes arrive; some kernels do not."""
+    """Let the kernel note when this socket's bytes arrive; return whether this kernel does."""
     try:
         sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
     except OSError:
@@ -195,13 +195,13 @@ def note_arrivals(sock):
 
 
 def receive(sock, size):
-    """(bytes, when the last of them arrived, on the arena's clock). Raises what `recv` raises."""
+    """Return (bytes, when the last of them arrived, on the arena's clock). Raises what `recv` raises."""
     data, notes, _, _ = sock.recvmsg(size, SPACE)
     return data, _arrived_ns(notes)
 
 
 def receive_into(sock, view):
-    """(how many bytes, when the last of them arrived)."""
+    """Return (how many bytes, when the last of them arrived)."""
     count, notes, _, _ = sock.recvmsg_into([view], SPACE)
     return count, _arrived_ns(notes)
 

@@ -46,7 +46,7 @@ class Calibration:
         self._rest = b""
 
     def record(self, loop, wire, caller_id):
-        """From now on its messages are evidence."""
+        """Make its messages evidence from now on."""
         self._loop, self._wire = loop, wire
         self._channel = wire.channel(
             topic=TOPIC, callerid=caller_id, type=TYPE, md5sum=MD5SUM, definition=DEFINITION, latching=False
@@ -76,7 +76,7 @@ class Calibration:
 
 
 def _live(sock, parent):
-    """The publisher's whole life, in a session of its own, with nothing of the arena's open."""
+    """Run the publisher from its start to its end, in a session of its own, with nothing of the arena's open."""
     try:
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
         os.setsid()
@@ -101,7 +101,7 @@ def _publish(descriptor):
 
 
 def _connection():
-    """Both ends of a connection over the loopback; no one else's is taken for the other end."""
+    """Return both ends of a connection over the loopback; no one else's is taken for the other end."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         theirs = socket.create_connection(server.getsockname())
         theirs.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -113,14 +113,14 @@ def _connection():
 
 
 def peak_bytes():
-    """Of this process alone: what `getrusage` says holds its parent's, too (man 5 proc)."""
+    """Return the peak of this process alone: what `getrusage` says holds its parent's, too (man 5 proc)."""
     with open("/proc/self/status") as file:
         found = [line.split()[1] for line in file if line.startswith("VmHWM:")]
     return int(found[0]) * 1024 if found else 0
 
 
 def processor_ticks():
-    """(busy, all) of all processors since the machine started (man 5 proc_stat)."""
+    """Return (busy, all) of all processors since the machine started (man 5 proc_stat)."""
     with open("/proc/stat") as file:
         user, nice, system, idle, iowait, *rest = [int(word) for word in file.readline().split()[1:9]]
     busy = user + nice + system + sum(rest)

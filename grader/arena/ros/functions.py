@@ -167,7 +167,7 @@ def encode(value):
 
 
 def decode(value):
-    """The reverse of `encode`."""
+    """Reverse `encode`."""
     if isinstance(value, list):
         return [decode(item) for item in value]
     if not isinstance(value, dict):

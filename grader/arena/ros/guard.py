@@ -78,7 +78,7 @@ class Rules:
         self._names = Names()
 
     def why_not(self, method, args, caller):
-        """What the caller tried that it may not, in words; "" where it may."""
+        """Return what the caller tried that it may not do, in words; "" where it may."""
         node = args[0] if args else ""
         fault = self._no_name(args) or self._foreign_name(node)
         if fault:
@@ -153,7 +153,7 @@ class Rules:
         return ""
 
     def _other_owner(self, address, caller):
-        """The process, other than the caller, that is at this address now; None where there is none."""
+        """Return the process, other than the caller, that is at this address now; None where there is none."""
         if self._owners.of(address) in (None, caller.process):
             return None
         owner = self._owners.look(address)
@@ -169,7 +169,7 @@ class Names:
         self._lock = threading.Lock()
 
     def take(self, process, entry):
-        """False where the process has too many names already, or too long ones."""
+        """Take a name for the process; return False where it has too many already, or too long ones."""
         with self._lock:
             held = self._held[process]
             if entry in held:
@@ -183,7 +183,7 @@ class Names:
 
 
 def shown(text):
-    """In a sentence: short, and nothing that is not to be seen."""
+    """Return the text as it can stand in a sentence: short, and nothing that is not to be seen."""
     text = str(text)
     clean = "".join(c if c.isprintable() else "?" for c in text[: SHOWN_CHARS + 1])
     return cut(clean, SHOWN_CHARS)

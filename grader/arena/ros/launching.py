@@ -86,7 +86,7 @@ def _joined(words):
 
 
 def _scratches(ours, stage, wall):
-    """New memory for each place of the wall that asks for it."""
+    """Make new memory for each place of the wall that asks for it."""
     names = []
     for word in wall:
         if isinstance(word, dict) and "scratch" in word:
@@ -96,7 +96,7 @@ def _scratches(ours, stage, wall):
 
 
 def _arguments(wall, stage, scratches, fds):
-    """bubblewrap's arguments. Words that are no text stand for what only the arena knows."""
+    """Yield bubblewrap's arguments. Words that are no text stand for what only the arena knows."""
     for word in wall:
         if isinstance(word, str):
             yield word
@@ -109,7 +109,7 @@ def _arguments(wall, stage, scratches, fds):
 
 
 def _file(stack, name, data):
-    """A descriptor of a file in memory, at its beginning."""
+    """Return a descriptor of a file in memory, at its beginning."""
     number = os.memfd_create(name)
     stack.callback(os.close, number)
     os.write(number, data)
@@ -118,7 +118,7 @@ def _file(stack, name, data):
 
 
 def _pipe(ours, theirs, fds, name):
-    """Our end of a pipe whose other end is theirs."""
+    """Return our end of a pipe whose other end is theirs."""
     near, far = os.pipe()
     ours.callback(os.close, near)
     theirs.callback(os.close, far)
@@ -127,7 +127,7 @@ def _pipe(ours, theirs, fds, name):
 
 
 def _gate(theirs):
-    """A pipe whose both ends close here: (their end, ours)."""
+    """Return both ends of a pipe, which close here: (their end, ours)."""
     near, far = os.pipe()
     theirs.callback(os.close, near)
     theirs.callback(os.close, far)

@@ -61,7 +61,7 @@ def _shows(below, name):
 
 
 def _read(name, folder, size):
-    """The bytes of a regular file, `size` at most; None for anything else."""
+    """Return the bytes of a regular file, `size` at most; None for anything else."""
     with contextlib.suppress(OSError), open(os.open(name, OPEN, dir_fd=folder), "rb") as file:
         if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             return file.read(size)

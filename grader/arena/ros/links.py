@@ -79,7 +79,7 @@ class Links:
         )
 
     def _ask(self, apis):
-        """What nodes say, by their names in the order of `apis`."""
+        """Return what nodes say, by their names in the order of `apis`."""
         deadline = time.monotonic() + ROUND_S
         found, answered, asked = {}, threading.Semaphore(0), 0
         for node, api in apis.items():

@@ -37,7 +37,7 @@ class Loop:
             self._selector.unregister(fileobj)
 
     def on_child(self, callback):
-        """Called whenever a child may have ended."""
+        """Call the callback whenever a child may have ended."""
         self._child_callbacks.append(callback)
 
     def call_later(self, delay_s, callback):

@@ -66,7 +66,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self.setParam(own, "/rosout_disable_topics_generation", False)
 
     def answer(self, method, args, caller):
-        """A call from outside."""
+        """Answer a call from outside."""
         if method not in METHODS:
             raise ValueError("no method {}".format(cut(method, 100)))
         fault = self._rules.why_not(method, args, caller)
@@ -93,7 +93,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return self._caller.process if self._caller else None
 
     def _registered(self, node):
-        """The address of a node, or None."""
+        """Return the address of a node, or None."""
         with self.ps_lock:
             known = self.reg_manager.get_node(node)
         return known.api if known else None
@@ -194,7 +194,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return answer
 
     def noteOpened(self, caller_id, program, arguments):  # noqa: ARG002 - shaped as the master API is
-        """What a stand-in for a browser was asked to open (see `opener`)."""
+        """Note what a stand-in for a browser was asked to open (see `opener`)."""
         self._opened += 1
         if self._opened <= OPENED_MAX:
             shown = [cut(argument, ARGUMENT_CHARS) for argument in list(arguments)[:ARGUMENTS_MAX]]
@@ -207,12 +207,12 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return 1, "noted", 0
 
     def finish(self):
-        """What was left out so far and matters in the end."""
+        """Tell what was left out so far and matters in the end."""
         self._params.finish()
         self._graph.tell(self.graph(), last=True)
 
     def graph(self, *, connections=False):
-        """The state as a GraphEvent's fields."""
+        """Return the state as a GraphEvent's fields."""
         with self.ps_lock:
             publishers = self.publishers.get_state()
             subscribers = self.subscribers.get_state()
@@ -236,18 +236,18 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return record
 
     def tell_connections(self):
-        """The graph with its connections, as an event; give the connections."""
+        """Tell the graph with its connections, as an event; return the connections."""
         record = self.graph(connections=True)
         self._graph.tell(record)
         return record["connections"]
 
     def service_api(self, service):
-        """Where a service is offered, or None."""
+        """Return where a service is offered, or None."""
         with self.ps_lock:
             return self.services.get_service_api(service)
 
     def _types_of(self, apis):
-        """What the services themselves said they are."""
+        """Return what the services themselves said they are."""
         found = {name: self._service_types.get((name, api)) for name, api in apis.items()}
         return {name: type_ for name, type_ in found.items() if type_}
 

@@ -121,7 +121,8 @@ class Stage:
         mount_tmpfs(folder, SIZE_BYTES, INODES, os.geteuid(), 0o711)
 
     def copy(self, path):
-        """The name, relative to `folder`, of a copy of this file or folder as it was when it was first asked for."""
+        """Return the name, relative to `folder`, of a copy of this file or folder as it was when it was first asked
+        for."""
         if path not in self._copies:
             name = self._new_name()
             copy_tree(path, os.path.join(self.folder, name))
@@ -129,7 +130,7 @@ class Stage:
         return self._copies[path]
 
     def scratch(self, size_bytes, inodes):
-        """The name of new memory for files that students' processes may write."""
+        """Return the name of new memory for files that students' processes may write."""
         name = self._new_name()
         folder = os.path.join(self.folder, name)
         os.mkdir(folder)
@@ -137,7 +138,7 @@ class Stage:
         return name
 
     def used_bytes(self, name):
-        """What is written in a scratch."""
+        """Return how many bytes are written in a scratch."""
         try:
             found = os.statvfs(os.path.join(self.folder, name))
         except OSError:
@@ -145,7 +146,7 @@ class Stage:
         return (found.f_blocks - found.f_bfree) * found.f_frsize
 
     def give_up(self, name):
-        """A scratch whose processes have ended."""
+        """Give up a scratch whose processes have ended."""
         folder = os.path.join(self.folder, name)
         unmount(folder)
         with contextlib.suppress(OSError):  # it goes with the arena

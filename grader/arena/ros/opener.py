@@ -24,7 +24,7 @@ def tell(uri, program, arguments):
 
 
 def clean(argument):
-    """As text that XML can carry."""
+    """Return the argument as text that XML can carry."""
     text = os.fsencode(argument).decode("utf-8", "replace")
     return "".join(c if c.isprintable() or c in "\t\n" else "\ufffd" for c in text)
 

@@ -24,7 +24,7 @@ KILLS = {1: "memory.oom_control", 2: "memory.events"}
 
 
 def descendants(pid):
-    """Ids of all that runs below a process, of as many as a look may cost."""
+    """Return the ids of all that runs below a process, of as many as a look may cost."""
     found = []
     waiting = [pid]
     while waiting and len(found) < PROCESSES_MAX:
@@ -72,7 +72,7 @@ def descriptors(pid):
 
 
 def waits_in(pid, thread):
-    """Where in the kernel a thread waits, or "" where that is not shown."""
+    """Return where in the kernel a thread waits, or "" where that is not shown."""
     try:
         with open("/proc/{}/task/{}/wchan".format(pid, thread)) as file:
             return file.read()
@@ -81,7 +81,7 @@ def waits_in(pid, thread):
 
 
 def _wakes(pid, thread):
-    """How often a thread has waited for something so far."""
+    """Return how often a thread has waited for something so far."""
     try:
         with open("/proc/{}/task/{}/status".format(pid, thread), "rb") as file:
             found = [line.split()[1] for line in file if line.startswith(b"voluntary_ctxt_switches:")]
@@ -91,7 +91,7 @@ def _wakes(pid, thread):
 
 
 def _late_s(pid):
-    """How long the main thread has waited for a processor so far."""
+    """Return how long the main thread has waited for a processor so far."""
     try:
         with open("/proc/{}/schedstat".format(pid)) as file:
             return int(file.read().split()[1]) / 1e9
@@ -190,7 +190,7 @@ class TreeRest:
         self._programs = {}
 
     def look(self, pids, now_s):
-        """(rest, programs): `spins`, `loops` or None, and how many programs have no others below them."""
+        """Return (rest, programs): `spins`, `loops` or None, and how many programs have no others below them."""
         if len(pids) > PROGRAMS_MAX:
             return None, PROGRAMS_MAX
         pids = [pid for pid in pids if not waits_in(pid, pid).startswith("do_wait")]
@@ -243,7 +243,7 @@ class Groups:
         return "memory" in self._made
 
     def take(self, pids):
-        """These processes, and all that they start from now on, belong to the groups."""
+        """Put these processes, and all that they start from now on, into the groups."""
         for folder in {folder for _, folder in self._made.values()}:
             for pid in pids:
                 with contextlib.suppress(OSError):  # it has ended
@@ -272,7 +272,7 @@ class Groups:
         return dict(_rows(folder, "cpu.stat")).get("usage_usec", 0) / 1e6
 
     def remove(self):
-        """Once its processes have ended. Gives back whether nothing is left."""
+        """Remove the groups once their processes have ended. Return whether nothing is left."""
         for folder in {folder for _, folder in self._made.values()}:
             with contextlib.suppress(OSError):  # a process of it is still ending
                 os.rmdir(folder)

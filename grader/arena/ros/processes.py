@@ -189,12 +189,12 @@ class Process:
                 _kill(pid, number)
 
     def _tree(self):
-        """The student's own processes, without bubblewrap's two."""
+        """Return the student's own processes, without bubblewrap's two."""
         tree = descendants(self.pid)
         return [pid for pid in tree if pid != self._inner_pid]
 
     def tree(self):
-        """Ids of all its processes, bubblewrap's own too."""
+        """Return the ids of all its processes, bubblewrap's own too."""
         return [self.pid, *descendants(self.pid)]
 
     def cpu_used_s(self):
@@ -208,7 +208,7 @@ class Process:
         return self._cpu_s + sum(map(cpu_s, tree))
 
     def left_behind(self):
-        """Process ids of the tree that still run."""
+        """Return the process ids of the tree that still run."""
         return self._tree() if self.alive else []
 
     def _watch(self):
@@ -233,7 +233,7 @@ class Process:
         self.loop.call_later(LOOK_S if len(tree) <= PROGRAMS_MAX else LOOK_RARELY_S, self._look)
 
     def _excess(self, tree):
-        """What the tree has too much of, in words, or None."""
+        """Return what the tree has too much of, in words, or None."""
         resident = sum(map(resident_bytes, tree))
         self._peak_bytes = max(self._peak_bytes, resident)
         used_s = self.cpu_used_s()
@@ -273,7 +273,7 @@ class Process:
         self._wire.event("/grader/actor", {"action": "limit", "actor": self.name, "detail": detail})
 
     def line(self, stream, data, cut):
-        """One line of output; past the limits, output is read and thrown away."""
+        """Handle one line of output; past the limits, output is read and thrown away."""
         if not self._entered:
             self._last_line = data[:WORDS_BYTES].decode("utf-8", "replace")
         self._lines += 1

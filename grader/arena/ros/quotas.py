@@ -188,7 +188,7 @@ class Notifications:
 
 
 def weight(value, most):
-    """About how many bytes of memory it takes; counting ends past `most`."""
+    """Return about how many bytes of memory it takes; counting ends past `most`."""
     total, waiting = 0, [iter((value,))]
     while waiting and total <= most:
         for item in waiting.pop():
@@ -218,7 +218,7 @@ def depth(value, most):
 
 
 def plain(value, most):
-    """A copy that JSON can hold, or None if that is more than `most` bytes."""
+    """Return a copy that JSON can hold, or None if that is more than `most` bytes."""
     return _plain(value) if weight(value, most) <= most else None
 
 

@@ -115,7 +115,7 @@ class Recorder:
         self.loop.call_soon(connection.watch)
 
     def _account(self, topic, caller_id, header):
-        """Where the channel's messages are counted, or None where there are too many channels."""
+        """Return where the channel's messages are counted, or None where there are too many channels."""
         process = self._processes.get(caller_id)
         definition = header.get("message_definition", "")
         account = self._budget.open((topic, caller_id, header["type"], header["md5sum"], definition), process)
@@ -165,7 +165,7 @@ class Recorder:
         return sock, header
 
     def _subscribe(self, caller_id, topic, port, seconds):
-        """A connection whose header was answered rightly; raise ProtocolError."""
+        """Return a connection whose header was answered rightly; raise ProtocolError."""
         sock = None
         try:
             sock = connect(port, max(0.05, seconds), LENGTH.size + HEADER_BYTES_MAX)
@@ -179,7 +179,7 @@ class Recorder:
         return sock, header
 
     def pass_on(self, topic, pieces):
-        """Log messages go on to whoever listens to all of them."""
+        """Pass log messages on to whoever listens to all of them."""
         if topic == ROSOUT and self.on_log is not None:
             self.on_log(pieces)
 
@@ -199,7 +199,7 @@ class Recorder:
         self._pool.submit(self._processes.get(connection.caller_id), work)
 
     def reserve(self, size):
-        """Room in memory for a message that is still coming."""
+        """Reserve room in memory for a message that is still coming."""
         with self._lock:
             if size and self._pending_bytes + size > PENDING_BYTES_MAX:
                 return False

@@ -99,7 +99,7 @@ class ParamLog:
         self._lock = threading.Lock()
 
     def why_not(self, key, value, process):
-        """Why a process may not set a value, as words that follow on `tried to`; "" where it may."""
+        """Return why a process may not set a value, as words that follow on `tried to`; "" where it may."""
         levels = key.count("/") + depth(value, LEVELS_MAX)
         if levels > LEVELS_MAX:
             return "set parameters nested more than {} levels deep".format(LEVELS_MAX)
@@ -132,7 +132,7 @@ class ParamLog:
                 self._latest[name] = record
 
     def finish(self):
-        """The last change of each name that was left out."""
+        """Tell the last change of each name that was left out."""
         with self._lock:
             left, self._latest = self._latest, collections.OrderedDict()
         for record in left.values():

@@ -225,7 +225,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             self.server.large.release()
 
     def _result(self, body):
-        """The value of a call, or a Fault."""
+        """Return the value of a call, or a Fault."""
         try:
             args, method = xmlrpc_parser.read(body)
         except (xmlrpc_parser.Malformed, xmlrpc.client.Fault) as error:
@@ -279,7 +279,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
 
 
 def _ends(request):
-    """Both ends of a connection, each (address, port); as good as none where it is closed."""
+    """Return both ends of a connection, each (address, port); as good as none where it is closed."""
     try:
         return request.getpeername(), request.getsockname()
     except OSError:

@@ -39,7 +39,7 @@ class Service:
         self._lock = threading.Lock()
 
     def next_answer(self):
-        """(its number, its bytes as TCPROS has them)."""
+        """Return (its number, its bytes as TCPROS has them)."""
         with self._lock:
             number = min(self._given, len(self._answers) - 1)
             self._given += 1

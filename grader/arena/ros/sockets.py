@@ -76,7 +76,8 @@ def connected(near, far):
 
 
 def streams():
-    """All TCP sockets that listen, are connected, or whose other end has closed; None where there are too many."""
+    """Return all TCP sockets that listen, are connected, or whose other end has closed; None where there are too
+    many."""
     states = (LISTEN, ESTABLISHED, CLOSE_WAIT)
     try:
         rows = _dumped(sum(1 << state for state in states), 0, ROWS_MAX + 1)
@@ -86,7 +87,7 @@ def streams():
 
 
 def datagrams():
-    """All UDP sockets; None where there are too many."""
+    """Return all UDP sockets; None where there are too many."""
     rows = list(itertools.islice(_listed(DATAGRAM_TABLES), ROWS_MAX + 1))
     return rows if len(rows) <= ROWS_MAX else None
 
@@ -99,7 +100,7 @@ def _dumped(states, port, most=SOCKETS_MAX):
 
 
 def buffer_bytes():
-    """What the buffers of all sockets of this network namespace hold: no process's memory counts it."""
+    """Return what the buffers of all sockets of this network namespace hold: no process's memory counts it."""
     unix = _UNIX.pack(socket.AF_UNIX, 0, 0, ALL_STATES, 0, UNIX_SHOW, 0)
     questions = [(unix, UNIX_ANSWER_BYTES, UNIX_MEMORY)]
     for family in (socket.AF_INET, socket.AF_INET6):
@@ -191,17 +192,17 @@ class Owners:
         self._pids = {}
 
     def of(self, api):
-        """The name of the process whose node has this address; None where it cannot be told."""
+        """Return the name of the process whose node has this address; None where it cannot be told."""
         if api not in self._known and self._may_look(api):
             self.look(api)
         return self._known.get(api)
 
     def known(self, api):
-        """The same, without a look."""
+        """Return the same, without a look."""
         return self._known.get(api)
 
     def look(self, api):
-        """The owner, looked up each time: ports are used again."""
+        """Return the owner, looked up each time: ports are used again."""
         port = port_of(api)
         owner = self._holder(listening(port)) if port else None
         if owner is not None:
@@ -209,18 +210,18 @@ class Owners:
         return owner
 
     def caller(self, near, far):
-        """The name of the process whose connection goes from `near` to `far`, both (address, port), or None."""
+        """Return the name of the process whose connection goes from `near` to `far`, both (address, port), or None."""
         return self._holder(connected(near, far))
 
     def callers(self, connections):
-        """The same of many connections, each (near, far)."""
+        """Return the same of many connections, each (near, far)."""
         inodes = [next(iter(connected(*ends)), None) for ends in connections]
         with self._looking:
             self._look_at_all()
             return [self._holders.get("socket:[{}]".format(inode)) for inode in inodes]
 
     def pids(self, inodes):
-        """For each of these sockets the ids of the processes that have it open: one look at all of them."""
+        """Return for each of these sockets the ids of the processes that have it open: one look at all of them."""
         with self._looking:
             self._look_at_all()
             return {inode: self._pids.get("socket:[{}]".format(inode), frozenset()) for inode in inodes}

@@ -118,7 +118,7 @@ def fault(kind, line, column, message, *, text="", opened=None, mixed=False):
 
 
 def undecodable(data):
-    """The fault of a file whose bytes are no text. `compile` forgives them in comments, running does not."""
+    """Return the fault of a file whose bytes are no text. `compile` forgives them in comments, running does not."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return fault("SyntaxError", 1, None, "the file is UTF-16")
     if b"\0" in data:
@@ -159,7 +159,7 @@ def syntax_fault(error, data):
 
 
 def never_closed(data, line):
-    """The line of the outermost bracket that is opened up to `line` and not closed by the end of the file."""
+    """Return the line of the outermost bracket that is opened up to `line` and not closed by the end of the file."""
     stack = []
     try:
         for token in tokenize.tokenize(io.BytesIO(data).readline):
@@ -369,7 +369,7 @@ def callbacks(tree):
 
 
 def takes(function, bound):
-    """With how many values a function can be called at least and at most; of a method without `self`."""
+    """Return with how many values a function can be called at least and at most; of a method without `self`."""
     given = function.args.posonlyargs + function.args.args
     of_class = any(getattr(d, "id", "") == "staticmethod" for d in function.decorator_list)
     own = 1 if bound and not of_class else 0
@@ -378,7 +378,7 @@ def takes(function, bound):
 
 
 def constant(node, given, depth=4):
-    """The positive number that an expression of numbers comes to, None where it is something else."""
+    """Return the positive number that an expression of numbers comes to, None where it is something else."""
     node = given(node)
     if isinstance(node, ast.Constant) and type(node.value) in (int, float) and 0 < node.value < 1e9:
         return float(node.value)
@@ -417,13 +417,13 @@ def resets(tree):
 
 
 def whole(node):
-    """A whole number as it is written, without a sign."""
+    """Return a whole number as it is written, without a sign."""
     number = isinstance(node, ast.Constant) and type(node.value) is int and node.value < 1 << 31
     return node.value if number else None
 
 
 def read_parameter(node):
-    """The name in `get_param('name')`, also within `float(…)`."""
+    """Return the name in `get_param('name')`, also within `float(…)`."""
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
         node = node.args[0] if node.func.id in ("float", "int") else node
     if is_call(node, "get_param") and node.args and isinstance(node.args[0], ast.Constant):
@@ -519,7 +519,7 @@ def asked(node, functions):
 
 
 def dotted(node):
-    """`a.b.c` as it is written; what stands before the dots and is no name becomes an ellipsis."""
+    """Return `a.b.c` as it is written; what stands before the dots and is no name becomes an ellipsis."""
     parts = []
     while isinstance(node, ast.Attribute):
         parts.append(node.attr)

@@ -59,7 +59,7 @@ def write_header(sock, fields):
 
 
 def probe_service(service, uri, caller_id, timeout_s):
-    """The type that the service says it has; raise ProtocolError where it says none."""
+    """Return the type that the service says it has; raise ProtocolError where it says none."""
     with _connected(service, uri, caller_id, timeout_s, probe="1") as sock:
         header = _header(sock)
     if "type" not in header:
@@ -68,7 +68,7 @@ def probe_service(service, uri, caller_id, timeout_s):
 
 
 def call_service(service, uri, caller_id, *, type_, request, timeout_s):
-    """The bytes of the response; raise ProtocolError, with the service's own words, for anything else.
+    """Return the bytes of the response; raise ProtocolError, with the service's own words, for anything else.
 
     A service of another type would wait for bytes that never come, so it is asked first.
     """

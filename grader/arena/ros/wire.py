@@ -33,13 +33,13 @@ _offset_ns = time.time_ns() - time.monotonic_ns()
 
 
 def set_clock():
-    """An arena starts: from here on its time is counted."""
+    """Start counting the arena's time."""
     global _offset_ns  # noqa: PLW0603 - a process has one clock
     _offset_ns = time.time_ns() - time.monotonic_ns()
 
 
 def now_ns():
-    """The wall clock at the arena's start plus monotonic time: never set back while a run lasts."""
+    """Return the wall clock at the arena's start plus monotonic time: never set back while a run lasts."""
     return _offset_ns + time.monotonic_ns()
 
 
@@ -91,7 +91,7 @@ class Wire:
         return fields["id"]
 
     def messages(self, channel_id, pieces, time_ns):
-        """Messages of one channel that came together, as TCPROS has them: each behind its length."""
+        """Send messages of one channel that came together, as TCPROS has them: each behind its length."""
         size = CHANNEL_ID.size + sum(map(len, pieces))
         self._put([MESSAGES.pack(ord("M"), size, time_ns, channel_id), *pieces], urgent=False)
 

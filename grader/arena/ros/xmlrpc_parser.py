@@ -25,7 +25,8 @@ class Malformed(ValueError):
 
 
 def read(data):
-    """(values, method name or None) of a whole call or answer; raise Malformed, or the xmlrpc.client.Fault in it."""
+    """Return (values, method name or None) of a whole call or answer; raise Malformed, or the xmlrpc.client.Fault in
+    it."""
     if b"\0" in data:  # two bytes a character, too: what follows looks for one
         raise Malformed("bytes that are no text")
     if b"<!" in data:
