@@ -58,6 +58,11 @@ STARTS = {
     "intake/git.py:_started": Start(
         "environment", "cwd", "its repository's data; no setting, hook or filter of it"
     ),
+    "intake/credentials.py:helper_password": Start(
+        "{**with_absolute_paths(os.environ), **silent}",
+        "'/'",
+        "nothing: the address of the course's own server",
+    ),
     "limited_child.py:run_limited": Start(
         "loading_environment(os.environ)",
         "'/'",

@@ -15,7 +15,7 @@ from grader.checks.registry import NotRecorded
 from grader.checks.support.exit_causes import SYNTAX, explain_by_exception
 from grader.checks.support.parameters import explain_by_unread_parameter
 from grader.checks.support.text import texts_in
-from grader.checks.support.topics import account_for_losses, heed_unheard
+from grader.checks.support.topics import account_for_losses, explain_by_unheard_topic
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judging.annotate import add_advice, choose_hint_language, name_unchanged_files, show_lines
@@ -132,8 +132,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         )
         if not isinstance(asked, Verdict):
             package, run = facts.package_of(criterion), asked.get("run")
-            for heed in (explain_by_exception, heed_unheard, explain_by_unread_parameter):
-                found = heed(check, package, run, found)
+            for explain in (explain_by_exception, explain_by_unheard_topic, explain_by_unread_parameter):
+                found = explain(check, package, run, found)
         return _named(choose_hint_language(found, criterion, facts), criterion, facts)
     except NotRecorded as missing:
         return missing.verdict

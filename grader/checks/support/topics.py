@@ -159,7 +159,9 @@ def unheard(run: Run) -> Verdict | None:
     return failed(message, hint=f"add {subscriber(topic, '…, callback')}")
 
 
-def heed_unheard(check: Check, _package: PackageFacts | None, run: object, verdict: Verdict) -> Verdict:
+def explain_by_unheard_topic(
+    check: Check, _package: PackageFacts | None, run: object, verdict: Verdict
+) -> Verdict:
     """Return a lost mark with the topic on which the run publishes and that no node heard, whatever it did instead."""
     unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
     if not unexplained or not isinstance(run, Run) or early_end(run) or not (found := unheard(run)):
