@@ -17,7 +17,7 @@ from grader.checks.support.console_output import (
     text_places,
 )
 from grader.checks.support.exit_causes import explain_early_end, explain_error
-from grader.checks.support.processes import GlobalName, lives, not_started
+from grader.checks.support.processes import GlobalName, lives, named_at, not_started
 from grader.checks.support.text import (
     OTHER_WORDS_SHARE,
     SPIN,
@@ -153,7 +153,8 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         near = near_names(topic, subscribed)
         other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""
         hint = f"add {subscriber(topic, '…, callback')}"
-        verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint)
+        cited = named_at(package, run, "subscriber", near[0]) if near else ()
+        verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint, citations=cited)
     return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))
 
 

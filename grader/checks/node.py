@@ -18,12 +18,14 @@ from grader.checks.support.processes import (
     Anonymous,
     Life,
     are_noted,
+    base_name,
     fell_silent,
     is_flood,
     is_named,
     life,
     lives,
     name_hint,
+    named_at,
     nodes_of,
     not_started,
     wanted_names,
@@ -97,7 +99,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
     verdict = (
         _early_end(one, run, package)
         or _registration(one, run, nodes)
-        or _misnamed(nodes, params)
+        or _misnamed(package, run, nodes, params)
         or _short_watch(one, up_ns, params)
         or _bad_end(one, run, package)
         or passed(message)
@@ -132,7 +134,7 @@ def node_name(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
         return _nameless(package, run, params).about(expected=expected)
     cited = (cite(run, "/grader/graph"),)
     measured = join_words(nodes)
-    wrong = _misnamed(nodes, params)
+    wrong = _misnamed(package, run, nodes, params)
     verdict = wrong or passed(f"the node is {_fitting(nodes, params)[0]}")
     return verdict.about(expected=expected, measured=measured, citations=cited)
 
@@ -152,12 +154,15 @@ def _fitting(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) -
     return [n for n in nodes if is_named(n, params.names, params.anonymous)]
 
 
-def _misnamed(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) -> Verdict | None:
+def _misnamed(
+    package: PackageFacts, run: Run, nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams
+) -> Verdict | None:
     """Return None where a name fits, or none is asked for."""
     if not params.names or _fitting(nodes, params):
         return None
     given = params.names, nodes, params.anonymous
-    return failed(wrong_name(*given), hint=name_hint(*given))
+    cited = named_at(package, run, "node-name", base_name(nodes[0])) if nodes else ()
+    return failed(wrong_name(*given), hint=name_hint(*given), citations=cited)
 
 
 def _up_ns(one: Life, run: Run, nodes: tuple[str, ...]) -> int:

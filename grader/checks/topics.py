@@ -6,7 +6,14 @@ from collections.abc import Iterator
 from typing import Annotated
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.processes import GlobalName, PublishedTopic, TypeName, is_called, plain_type
+from grader.checks.support.processes import (
+    GlobalName,
+    PublishedTopic,
+    TypeName,
+    is_called,
+    named_at,
+    plain_type,
+)
 from grader.checks.support.text import INIT, imports, near_names, publisher, subscriber
 from grader.checks.support.topics import (
     End,
@@ -62,7 +69,7 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
     heard = [c for c in channels if c.messages]
     wrong = [c for c in heard or channels if plain_type(c.type) != plain_type(params.type)]
     if wrong:
-        verdict = _wrong_type(wrong[0], params)
+        verdict = _wrong_type(package, run, wrong[0], params)
     elif not heard:
         verdict = no_message(package, run, params.topic, of_node=failed)
     elif other := next(filter(None, (_other_definition(c, params) for c in heard)), None):
@@ -85,12 +92,13 @@ def _listed_topics(run: Run) -> str:
     )
 
 
-def _wrong_type(channel: Channel, params: TopicTypeParams) -> Verdict:
-    package, _, name = params.type.partition("/")
-    call = publisher(params.topic, f"{name}, queue_size=10", type=f"{package}::{name}")
-    hint = f"{imports(package, name, 'msg')}, then {call}"
+def _wrong_type(package: PackageFacts, run: Run, channel: Channel, params: TopicTypeParams) -> Verdict:
+    of_types, _, name = params.type.partition("/")
+    call = publisher(params.topic, f"{name}, queue_size=10", type=f"{of_types}::{name}")
+    hint = f"{imports(of_types, name, 'msg')}, then {call}"
     message = f"{channel.publisher} publishes {plain_type(channel.type)} on {params.topic}, not {params.type}"
-    return failed(message, hint=hint)
+    cited = named_at(package, run, "publisher", params.topic)
+    return failed(message, hint=hint, citations=cited)
 
 
 def _cited(run: Run, channels: tuple[Channel, ...]) -> tuple[Citation, ...]:

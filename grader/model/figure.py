@@ -129,7 +129,7 @@ class ConsoleFigure(Record):
 class CodeFigure(Record):
     """Lines of a file from `first_line` (counted from 1) on, with the `marked` ones.
 
-    `columns` are places in these, counted from 1, by line.
+    `columns` are places in these, counted from 1, by line, and `ends` where what is meant there ends.
     """
 
     kind: Literal["code"] = "code"
@@ -138,6 +138,7 @@ class CodeFigure(Record):
     lines: tuple[str, ...]
     marked: tuple[int, ...]
     columns: dict[int, int] = Field(default={})
+    ends: dict[int, int] = Field(default={})
 
 
 class PathFigure(Record):

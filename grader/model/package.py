@@ -252,6 +252,9 @@ SlipKind = Literal[
     "loop-left",
     "callback-called",
     "callback-values",
+    "node-name",
+    "publisher",
+    "subscriber",
 ]
 
 
@@ -267,7 +270,8 @@ class PythonSlip(Record):
     names; `main-guard`: `__name__` beside another word than `__main__`. `never-reached`: an endless loop before the
     first `publish(…)`; `spin-in-loop`: a loop that publishes and waits in `spin()`; `loop-left`: one that ends in its
     first turn. `callback-called`, `callback-values`: a callback that is called where it is to be named, or that takes
-    another number of values than ROS has for it.
+    another number of values than ROS has for it. `node-name`, `publisher` and `subscriber`: no slips, but where the
+    script names its node, or a topic; `message` is the name as written.
     """
 
     file: str

@@ -220,7 +220,7 @@ class Terminal:
             ("see", c.reproduce),
             ("also costs", ", ".join(f"{a.id} {self._cost(a)}" for a in loss.alike)),
             ("judged with this repaired", ", ".join(name for name in repaired if name not in alike)),
-            ("holds back", ", ".join(f"{b.id} {self._cost(b)}" for b in loss.blocked)),
+            ("blocks", ", ".join(f"{b.id} {self._cost(b)}" for b in loss.blocked)),
         ]
         words = self._words(without_place(c.message, place) or c.title)
         status = "" if c.status is Status.FAIL else c.status.value

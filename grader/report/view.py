@@ -19,7 +19,7 @@ from grader.untrusted_text import CITATIONS_MAX, clip, visible
 from grader.wording import number, plural
 
 ON_COPY = re.compile(r"judged on a copy with .*? repaired: ")
-NAMES_AND_NUMBERS = re.compile(r"/[\w/~]+|\d+(\.\d+)?")
+NAMES, NUMBERS = re.compile(r"/[\w/~]+"), re.compile(r"\d+(\.\d+)?")
 PLACE_CHARS = 300
 SOURCE_CHARS = 60
 POINTS_EQUAL = 1e-6
@@ -104,10 +104,10 @@ def _mistake(loss: Loss, charged: Mapping[Repair, tuple[Repair, ...]]) -> Hashab
     lines = tuple(c for c in criterion.citations if isinstance(c, FileCitation) and c.line is not None)
     if not criterion.hint:
         return criterion.id
-    said = ON_COPY.sub("", criterion.message)
-    if said.startswith("/"):  # how a topic behaves: of two topics of one run, one loop is the reason
-        said = f"{criterion.scenario} {NAMES_AND_NUMBERS.sub('', said)}"
-    return criterion.hint, lines or said
+    said = NUMBERS.sub("", ON_COPY.sub("", criterion.message))
+    if said.startswith("/"):  # how a topic behaves: of two topics, one loop is the reason
+        said = NAMES.sub("", said)
+    return criterion.hint, lines or (criterion.check, said)
 
 
 def _open_alike(loss: Loss) -> Hashable:
@@ -186,10 +186,29 @@ def file_places(criterion: CriterionResult) -> list[str]:
 
 
 def without_place(text: str, place: str) -> str:
-    """Return what is said of a place (`src/talker.py:17`) without naming it again at the beginning."""
+    """Return what is said of a place (`src/talker.py:17`) that stands beside it, without naming its file again."""
     file, _, number = place.rpartition(":")
-    beginnings = [f"{file}{comma} line {number}: " for comma in ("", ",")] if file else []
-    return next((text.removeprefix(one) for one in beginnings if text.startswith(one)), text)
+    if not file:
+        return text
+    beginnings = [f"{file}{comma} line {number}: " for comma in ("", ",", ":")]
+    text = next((text.removeprefix(one) for one in beginnings if text.startswith(one)), text)
+    return text.replace(f" ({file}, line {number})", "").replace(f"{file}, line {number}", f"line {number}")
+
+
+STARTS = re.compile(
+    r"""(a|add|after|all|an|another|at|both|bring|build|call|check|close|correct|create|declare|delete|do|does|drive
+    |each|every|fill|find|first|fix|from|give|hand|have|in|indent|install|it|its|keep|leave|let|line|look|loop|make|more
+    |move|negative|neither|no|nothing|on|once|one|only|open|order|pass|perhaps|print|publish|put|read|record|remove
+    |rename|replace|reset|run|save|send|set|something|start|steer|stop|subscribe|take|tell|the|there|this|too|try|turn
+    |twice|two|use|what|whether|which|while|with|wrap|write|wrong|your)[,:;]?(?=\ )""",
+    re.VERBOSE,
+)
+"""Words that a message or a hint begins with and that are no command, name or code."""
+
+
+def sentence(text: str) -> str:
+    """Return the text with a capital where it begins with a plain word: on a page it stands as a sentence."""
+    return text[:1].upper() + text[1:] if STARTS.match(text) else text
 
 
 TAB = " " * 4

@@ -154,38 +154,59 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         ("class A:\n    def __init__(self):\n        init('a')\n    def go(self):\n        self.p.publish(1)\nA()\n",
          [("never-called", 4, "nothing calls `go()`")]),
         (node("    while True:\n        pass\n    p.publish(1)\n") + CALLED,
-         [("never-reached", 4, "the loop of line 4 goes on")]),
+         [("never-reached", 4, "the loop in line 4 never ends")]),
         (node(LOOP + "        rate.sleep()\n    p.publish(1)\n") + CALLED,
-         [("never-reached", 4, "the publish(…) of line 6")]),
-        (node("    rospy.spin()\n    p.publish(1)\n") + CALLED, [("never-reached", 4, "the spin() of line 4")]),
+         [("never-reached", 4, "the publish(…) in line 6")]),
+        (node("    rospy.spin()\n    p.publish(1)\n") + CALLED, [("never-reached", 4, "the spin() in line 4")]),
         (node("    while True:\n        pass\n    p = rospy.Publisher('a', A)\n    p.publish(1)\n") + CALLED,
-         [("never-reached", 4, "the Publisher(…) of line 6")]),
+         [("never-reached", 4, "the Publisher(…) in line 6")]),
         ("class Node:\n    def __init__(self):\n        rospy.Subscriber('a', A, f)\nrospy.spin()\nNode()\n",
-         [("never-reached", 4, "the spin() of line 4 goes on until the node ends, and the Node(…) of line 5")]),
+         [("never-reached", 4, "the spin() in line 4 never ends, so the Node(…) in line 5")]),
         ("def stop():\n    print(1)\nrospy.spin()\nstop()\n", []),
         (node("    while True:\n        break\n    p.publish(1)\n") + CALLED, []),
         (node("    while not done:\n        pass\n    p.publish(1)\n") + CALLED, []),
         (node(LOOP + "        p.publish(1)\n        rospy.spin()\n") + CALLED,
          [("spin-in-loop", 6, "stops at the spin()")]),
-        (node(LOOP + "        p.publish(1)\n        break\n") + CALLED, [("loop-left", 6, "at the break of line 6")]),
+        (node(LOOP + "        p.publish(1)\n        break\n") + CALLED, [("loop-left", 6, "at the break in line 6")]),
         (node(LOOP + "        p.publish(1)\n        if x:\n            return\n") + CALLED, []),
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, f())\n",
          [("callback-called", 3, "write `f`, without brackets")]),
-        ("def f():\n    pass\nrospy.Subscriber('a', A, callback=f)\n", [("callback-values", 1, "`f` takes 0 values")]),
+        ("def f():\n    pass\nrospy.Subscriber('a', A, callback=f)\n",
+         [("callback-values", 1, "`f` takes 0 arguments")]),
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, f)\n", []),
         ("def f(m, a):\n    pass\nrospy.Subscriber('a', A, f, 3)\n", []),
         ("def f(*a):\n    pass\nrospy.Timer(d, f)\n", []),
         ("def f():\n    return lambda m: 0\nrospy.Subscriber('a', A, f())\n", []),
         ("class A:\n    def f(m):\n        pass\n    def g(self):\n        rospy.Service('a', T, self.f)\n",
-         [("callback-values", 2, "`f` takes 0 values, and ROS calls it with the request")]),
+         [("callback-values", 2, "`f` takes 0 arguments, but ROS passes it the request")]),
     ],
 )  # fmt: skip
 def test_what_never_runs_is_known(tmp_path, text, found):
     (tmp_path / "a.py").write_text(text)
-    others = ("rate-number", "no-clock", "misspelt", "not-called")
+    others = ("rate-number", "no-clock", "misspelt", "not-called", "node-name", "publisher", "subscriber")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind not in others]
     assert [(s.kind, s.line) for s in slips] == [one[:2] for one in found]
     assert all(words in slip.message for slip, (_, _, words) in zip(slips, found, strict=True))
+
+
+def test_where_names_of_the_graph_are_written_is_known(tmp_path):
+    (tmp_path / "a.py").write_text(
+        "rospy.init_node('talker')\nrospy.Publisher(\n    name='/chatter', data_class=String)\n"
+        "from rospy import Subscriber\nSubscriber('~scan', LaserScan)\nrospy.Publisher(TOPIC, String)\n"
+    )
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [(s.kind, s.line, s.message) for s in slips] == [
+        ("node-name", 1, "talker"),
+        ("publisher", 3, "/chatter"),
+        ("subscriber", 5, "~scan"),
+    ]
+
+
+def test_letters_in_another_order_are_a_slip(tmp_path):
+    (tmp_path / "a.py").write_text("def f(msg):\n    print(mgs.data)\n")
+    (slip,) = check_syntax(tmp_path, ["a.py"]).slips
+    assert (slip.kind, slip.line) == ("misspelt", 2)
+    assert "did you mean `msg`?" in slip.message
 
 
 @pytest.mark.parametrize(

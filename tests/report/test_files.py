@@ -120,6 +120,7 @@ def test_what_is_open_for_one_reason_is_one_entry():
         (("the path is mirrored", "the path is mirrored"), 1),
         (("/chatter comes in bursts: 11.5 Hz", "/numeric_chatter comes in bursts: 11.49 Hz"), 1),
         (("no message came on /chatter", "no message came on /numeric_chatter"), 2),
+        (("it ends 0.4 m from (3, 2)", "it ends 0.43 m from (8, 8)"), 1),
     ],
 )
 def test_one_mistake_is_told_once(messages, mistakes):

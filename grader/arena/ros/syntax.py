@@ -197,6 +197,7 @@ def slips(tree):
     found += never_reached(tree)
     found += stopped_loops(tree)
     found += callbacks(tree)
+    found += graph_names(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
     if published is not None and counts(tree) and not knows_time(tree):
         message = "the script counts, and reads no clock"
@@ -234,6 +235,23 @@ def loop_rates(tree):
         elif number:
             hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
             yield {"line": value.lineno, "kind": "rate-number", "message": hz}
+
+
+NAMED = {"init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber"}
+"""Calls whose first argument is a name, and the kind of slip that tells where."""
+
+
+def graph_names(tree):
+    """Where a script names its node, and the topics that it publishes and subscribes to, as written."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        kind = NAMED.get(
+            node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        )
+        names = node.args[:1] or [k.value for k in node.keywords if k.arg == "name"]
+        if kind and names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
+            yield {"line": names[0].lineno, "kind": kind, "message": names[0].value[:TEXT_LIMIT]}
 
 
 def never_run(tree):
@@ -292,8 +310,8 @@ def never_reached(tree):
                 behind = [n for n in behind if word(n) and word(n) not in within]
                 if behind and "publish" not in within:
                     what = "spin()" if spins else "loop"
-                    message = "the %s of line %d goes on until the node ends" % (what, loop.lineno)
-                    message += ", and the %s(…) of line %d comes after it" % (
+                    message = "the %s in line %d never ends" % (what, loop.lineno)
+                    message += ", so the %s(…) in line %d is never reached" % (
                         word(behind[0]),
                         behind[0].lineno,
                     )
@@ -308,12 +326,12 @@ def stopped_loops(tree):
             continue
         spin = next((n for n in inside if is_call(n, "spin")), None)
         if spin is not None:
-            message = "the loop stops at the spin() of line %d, which waits until the node ends" % spin.lineno
+            message = "the loop stops at the spin() in line %d, which waits until the node ends" % spin.lineno
             yield {"line": spin.lineno, "kind": "spin-in-loop", "message": message}
         left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None)
         if left is not None:
             word = "break" if isinstance(left, ast.Break) else "return"
-            message = "the loop ends in its first turn, at the %s of line %d" % (word, left.lineno)
+            message = "the loop ends the first time around, at the %s in line %d" % (word, left.lineno)
             yield {"line": left.lineno, "kind": "loop-left", "message": message}
 
 
@@ -360,7 +378,7 @@ def callbacks(tree):
                 what = (
                     "the request" if name == "Service" else "the event" if name == "Timer" else "the message"
                 )
-                message = "`%s` takes %d values, and ROS calls it with %s" % (
+                message = "`%s` takes %d arguments, but ROS passes it %s" % (
                     own.name[:TEXT_LIMIT],
                     least,
                     what,
@@ -447,6 +465,7 @@ def misspelt(tree):
     for node in names:
         if node.id not in known:
             near = difflib.get_close_matches(node.id[:TEXT_LIMIT], sorted(own), 1, 0.8)
+            near = near or [name for name in sorted(own) if sorted(name) == sorted(node.id)]
             if near:
                 message = "`%s` is not defined anywhere: did you mean `%s`?" % (node.id[:TEXT_LIMIT], near[0])
                 yield {"line": node.lineno, "kind": "misspelt", "message": message}

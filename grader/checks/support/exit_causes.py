@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import re
 import signal
 from collections.abc import Callable, Sequence
@@ -92,6 +93,7 @@ _ADDED = re.compile(
     r"can only concatenate str \(not \"(\w+)\"\) to str|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'"
 )
 _NAME = re.compile(r"name '(\w+)' is not defined")
+_BY_PYTHON = re.compile(r"\. Did you mean: '(\w+)'\?$")
 _MEANT = re.compile(r"did you mean `(\w+)`\?$")
 _FROM_PACKAGE = re.compile(r"cannot import name '(\w+)' from '(\w+)'")
 _NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
@@ -378,13 +380,16 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         place = source.python_fault.place
     if place is not None and found.kind == "NameError":
         cause, hint = _misspelt(found, place, package) or (cause, hint)
+    said = found.text
+    if (guess := _BY_PYTHON.search(said)) and (hasattr(builtins, guess[1]) or "did you mean" in cause):
+        said = said.removesuffix(guess[0])
     if found.kind == "TypeError" and (wrong := _callback(found, place, package)):
         place = place or FileCitation(file=wrong.file, line=wrong.line)
         cause, hint = wrong.message, _callback_hint(wrong)
     elif place is not None and found.kind == "TypeError":
         cause, hint = _operand(found) or (cause, hint)
     where = f" ({place.file}, line {place.line})" if place else ""
-    text = f"{shown(found.text)}{where}" + (f": {cause}" if cause else "")
+    text = f"{shown(said)}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else ())
 
 
@@ -435,7 +440,9 @@ def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> t
     )
     said = next((message for message in slips if wrong and message.startswith(wrong)), "")
     near = _MEANT.search(said)
-    return (f"did you mean {near[1]}?", f"write {near[1]} in line {place.line}") if near else None
+    if near is None or name is None:
+        return None
+    return f"did you mean {near[1]}?", f"in line {place.line}, write {near[1]} instead of {name[1]}"
 
 
 def _callback(found: Traceback, place: FileCitation | None, package: PackageFacts) -> PythonSlip | None:

@@ -17,7 +17,7 @@ from grader.checks.support.text import ANONYMOUS, init
 from grader.evidence.events import ProcessEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts, PythonSlip, SlipKind
-from grader.model.verdict import Verdict, unjudged
+from grader.model.verdict import FileCitation, Verdict, unjudged
 from grader.wording import join_words, seconds, shorten
 
 NO_SCRIPT_HINT = "add the script to the package, and push it"
@@ -129,6 +129,19 @@ def slips_of(package: PackageFacts, run: Run, callerid: str, *kinds: SlipKind) -
     """Return what is remarkable, of these kinds, in the script that the node runs."""
     life = life_of(run, callerid)
     return [s for s in package.slips if life is not None and s.kind in kinds and s.file == life.start.script]
+
+
+def named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tuple[FileCitation, ...]:
+    """Return the line of the run's scripts that names this node or topic; nothing where none does, or several do."""
+    scripts = {one.start.script for one in lives(run)}
+    said = [s for s in package.slips if s.kind == kind and s.file in scripts]
+    last = name.rpartition("/")[2]
+    found = {
+        FileCitation(file=s.file, line=s.line)
+        for s in said
+        if s.message.rpartition("/")[2].lstrip("~") == last
+    }
+    return tuple(found) if len(found) == 1 else ()
 
 
 def early_end(run: Run) -> Life | None:

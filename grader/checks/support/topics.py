@@ -7,7 +7,7 @@ from typing import Literal
 
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end, explain_error
-from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives, plain_type
+from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives, named_at, plain_type
 from grader.checks.support.text import INIT, LOOP, PUBLISHER, near_names, publisher, subscriber, texts_in
 from grader.evidence.events import MISFIT, UNHEARD
 from grader.evidence.run import Channel, Run
@@ -95,7 +95,8 @@ def no_message(
         return unjudged(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
     if near:
         hint = f"name the topic {topic} in {PUBLISHER}"
-        return of_node(f"{what}; the node publishes on {join_words(near)}", measured=measured, hint=hint)
+        verdict = of_node(f"{what}; the node publishes on {join_words(near)}", measured=measured, hint=hint)
+        return verdict.about(citations=named_at(package, run, "publisher", near[0]))
     if absent := no_node(package, run, what) or _refused(run, topic) or misfit(run):
         return absent
     if topic in published:
@@ -109,9 +110,9 @@ def _not_advertised(package: PackageFacts, run: Run, topic: str, of_node: Callab
     if slip := _unreached(package, run):
         verdict = of_node(f"{what}: {slip.message}", measured=measured, hint=_reach_hint(slip))
         return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
-    only = f"it publishes on {join_words(published)}; " if published else ""
-    hint = f"{only}add {publisher(topic)} and publish in the loop"
-    return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
+    hint = f"add {publisher(topic)} and publish in the loop"
+    other = f", or rename {join_words(published, 'or')} if that is meant to be it" if published else ""
+    return of_node(f"{what}: no node publishes on it", measured=measured, hint=f"{hint}{other}")
 
 
 def _advertised(package: PackageFacts, run: Run, what: str, of_node: Callable[..., Verdict]) -> Verdict:

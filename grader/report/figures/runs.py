@@ -138,12 +138,12 @@ def code_figures(build: Run, citations: Sequence[Citation]) -> Iterator[CodeFigu
     for file in dict.fromkeys(c.file for c in cited):
         lines = build.file_lines(file)
         marks = sorted({c.line or 0 for c in cited if c.file == file and 0 < (c.line or 0) <= len(lines)})
-        columns = {c.line: c.column for c in cited if c.file == file and c.line and c.column}
+        places = {c.line: c for c in cited if c.file == file and c.line and c.column}
         for group in _groups(marks):
             if not left:
                 return
             left -= 1
-            yield _figure(file, lines, group, columns)
+            yield _figure(file, lines, group, places)
 
 
 def _groups(marks: Sequence[int]) -> Iterator[list[int]]:
@@ -160,14 +160,20 @@ def _groups(marks: Sequence[int]) -> Iterator[list[int]]:
         yield group
 
 
-def _figure(file: str, lines: Sequence[str], marks: Sequence[int], columns: Mapping[int, int]) -> CodeFigure:
+def _figure(
+    file: str, lines: Sequence[str], marks: Sequence[int], places: Mapping[int, FileCitation]
+) -> CodeFigure:
+    shown = {
+        line: places[line] for line in marks if line in places and (places[line].column or 0) < LINE_LETTERS
+    }
     first = max(1, marks[0] - AROUND)
     return CodeFigure(
         file=named(file),
         first_line=first,
         lines=tuple(short(line) for line in lines[first - 1 : marks[-1] + AROUND]),
         marked=tuple(marks),
-        columns={line: columns[line] for line in marks if columns.get(line, LINE_LETTERS) < LINE_LETTERS},
+        columns={line: one.column for line, one in shown.items() if one.column},
+        ends={line: one.end_column for line, one in shown.items() if one.end_column},
     )
 
 

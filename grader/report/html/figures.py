@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -206,15 +207,25 @@ def _code(figure: CodeFigure, name: str) -> Drawn:
         title=f"{figure.file}, line {marked}" if marked else figure.file,
         points=len(figure.lines),
         rows=[
-            (number, text, number in figure.marked, _before(text, figure.columns.get(number)))
+            (
+                number,
+                number in figure.marked,
+                _parts(text, figure.columns.get(number), figure.ends.get(number)),
+            )
             for number, text in enumerate(figure.lines, start=figure.first_line)
         ],
     )
 
 
-def _before(text: str, column: int | None) -> str | None:
-    """What stands before the caret; None where there is none."""
-    return None if column is None or column < 1 else text[: column - 1]
+def _parts(text: str, column: int | None, end: int | None) -> tuple[str, str, str]:
+    """Return what stands before the place that is meant, that itself, and the rest; all is the rest where no place is
+    known."""
+    if column is None or column < 1:
+        return "", "", text
+    begin = column - 1
+    word = re.compile(r"\w+").match(text, begin)
+    at_end = end - 1 if end and end > column else word.end() if word else column
+    return text[:begin], text[begin:at_end], text[at_end:]
 
 
 def _path(figure: PathFigure, name: str) -> Drawn:

@@ -37,6 +37,7 @@ from grader.report.view import (
     not_graded,
     places,
     points_of,
+    sentence,
     without_place,
 )
 from grader.rubric.model import Rubric
@@ -346,11 +347,11 @@ class Maker:
         place = next(iter(file_places(criterion)), "") if code else ""
         return replace(
             self._short(criterion),
-            message=without_place(criterion.message, place),
+            message=sentence(without_place(criterion.message, place)),
             why=self._prose(docs.get(MATTERS, "")),
             how=self._prose(docs.get(MEASURED, "")),
             fix=self._prose(docs.get(FIX, "")) if criterion.status in MENDED else NOTHING,
-            hint=self._prose(without_place(criterion.hint, place)),
+            hint=self._prose(sentence(without_place(criterion.hint, place))),
             where=self._where(criterion),
             code=code,
             figures=[figure for figure in drawn if figure.kind != "code"],
