@@ -100,7 +100,6 @@ def test_markdown_says_it_below_the_points():
     assert section == (
         "## Decided by a person\n\n"
         "- `style`: 7/10 by A. Miller, 2026-11-02: clear names\n"
-        "  - The check says: manual 0/10: a person awards these points\n"
         "- `rate`: 8/10 by a person\n"
         "  - The check says: pass 10/10: 10 Hz\n"
         f"  - **{AGAIN}**\n\n"
