@@ -52,7 +52,7 @@ SLASH = 'a name of the graph begins with a slash: "/x"'
             (),
             "2, and {number} 1 time in the text",
         ),
-        ("field-equals", {"topic": "/x", "field": "data"}, ("value",), "is missing"),
+        ("field-equals", {"topic": "/x", "field": "data"}, (), "give one of value and values"),
         (
             "reacts",
             {"cause": {"topic": "/x", "min": 1}, "effect": {"topic": "/y"}, "within_s": 1},
