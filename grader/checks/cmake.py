@@ -17,6 +17,7 @@ from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words
 
+NO_FILE = "there is no CMakeLists.txt"
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 
 
@@ -58,7 +59,8 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
             hint, cited = f"git mv {slip} CMakeLists.txt", (FileCitation(file=slip),)
             message = f"the file is called {slip}, and CMake looks for CMakeLists.txt"
             return failed(message, expected=expected, measured=slip, hint=hint, citations=cited)
-        return failed("there is no CMakeLists.txt", expected=expected, measured="no file", hint=hint)
+        absent = failed(NO_FILE, expected=expected, measured="no file", hint=hint)
+        return absent.model_copy(update={"cause": NO_FILE})
     wrong = list(_wrong(facts, names))
     named = [c for c in facts.calls if c.name in {"project", "find_package", "catkin_package"}]
     measured = ", ".join(f"{c.name}({' '.join(c.args[:3])})" for c in named[:6]) or "none of the three calls"
@@ -172,8 +174,9 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
     expected = f"catkin_install_python(PROGRAMS … DESTINATION {BIN}) with {names}"
     facts = package.cmake
     if facts is None:
-        message = "there is no CMakeLists.txt, so nothing is installed"
-        return unjudged(message, expected=expected, measured="no file", hint="first add CMakeLists.txt")
+        message = f"{NO_FILE}, so nothing is installed"
+        absent = unjudged(message, expected=expected, measured="no file", hint="first add CMakeLists.txt")
+        return absent.model_copy(update={"cause": NO_FILE})
     all_named = list(installed(package))
     of_python = [one for one in all_named if one.call.name == PYTHON]
     measured = f"named: {join_words(dict.fromkeys(shown(one.path) for one in of_python)) or 'none'}"

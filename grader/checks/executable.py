@@ -89,7 +89,8 @@ def _judged(package: PackageFacts, build: Run, found: SourceFile, params: Execut
         advice = f" (without it: {obstacles[0].why})" if obstacles else ""
         verdict = passed(f"the build makes an executable wrapper of {found.path}{advice}", hint=hint)
     elif obstacles:
-        message = f"{found.path} {' and '.join(o.why for o in obstacles)}{_rosrun_answer(build, found.path)}"
+        why = "; it also ".join(o.why for o in obstacles)
+        message = f"{found.path} {why}{_rosrun_answer(build, found.path)}"
         verdict = failed(message, hint="; ".join(o.fix for o in obstacles))
     else:
         message = f"whether {found.path} is executable cannot be seen: the submission carries no file modes"

@@ -71,7 +71,7 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
     wanted = [PurePosixPath(s).name for s in params.scripts] + list(params.programs)
     nodes = f"a <node> with pkg, type and name for {join_words(wanted)}"
     expected = f"{params.launch}: <launch> at its root, and {nodes}"
-    file = read_launch(package, params.launch)
+    file = read_launch(package, params.launch, wanted)
     if isinstance(file, Verdict):
         return file.about(expected=expected)
     refused = next(refusals(package, file), None)

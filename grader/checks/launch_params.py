@@ -81,7 +81,7 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
         `ns`. `rosparam list` shows what is on the server.
     """
     expected = f"{params.launch} loads {params.file} and runs {PurePosixPath(params.script).name}"
-    file = read_launch(package, params.launch)
+    file = read_launch(package, params.launch, (params.script,))
     if isinstance(file, Verdict):
         return file.about(expected=expected)
     verdict = (

@@ -238,7 +238,7 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     ]
     over = f", connected over {params.topic}" if params.topic else ""
     expected = f"{params.launch} brings up {join_words(what) or 'its nodes'} under the file's names{over}"
-    file = read_launch(package, params.launch)
+    file = read_launch(package, params.launch, (*params.scripts, *params.programs))
     if isinstance(file, Verdict):
         unjudged_too = {"unjudged": bool(params.scripts)}
         return file.about(expected=expected).model_copy(update=unjudged_too)
@@ -255,7 +255,7 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRun
         return _not_up(package, file, run, lacking)
     names = [name for w in wanted for name in nodes_up(run, w.node)]
     if params.topic and not _connected(run, params.topic, names):
-        return _not_connected(package, run, wanted, params.topic)
+        return _not_connected(package, file, run, wanted, params.topic)
     if dead := _died(package, run, wanted, "came up, but then"):
         return dead
     if params.programs and params.params:
@@ -362,12 +362,34 @@ def _died(package: PackageFacts, run: Run, wanted: list[Wanted], when: str) -> V
     return None
 
 
-def _not_connected(package: PackageFacts, run: Run, wanted: list[Wanted], topic: str) -> Verdict:
+def _in_namespace(
+    file: LaunchFile, verdict: Verdict, nodes: list[LaunchNode], spaces: list[str], topic: str
+) -> Verdict:
+    """Name the namespaces of a launch file, in which a topic has another name, and the nodes in them."""
+    first, name = spaces[0].strip("/"), topic.lstrip("/")
+    which = "namespace" if len(spaces) == 1 else "namespaces"
+    message = (
+        f"{verdict.message}: it puts its nodes in the {which} {join_words(s.strip('/') for s in spaces)}"
+    )
+    move = f'remove ns="{first}"'
+    if len(spaces) > 1:
+        move = f'write one <node> of each outside of <group ns="{first}">'
+    lines = sorted({(n.file or file.path, n.line) for n in nodes if n.namespace != "/"})
+    cited = tuple(FileCitation(file=path, line=line) for path, line in lines)
+    hint = f"{move}: in it, {name} becomes /{first}/{name}"
+    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited[:4]})
+
+
+def _not_connected(
+    package: PackageFacts, file: LaunchFile, run: Run, wanted: list[Wanted], topic: str
+) -> Verdict:
     """A node that died, the launch file's remaps and namespaces, or the scripts' own topics."""
     if dead := _died(package, run, wanted, "came up, but before it was connected"):
         return dead
     other = over_another_topic(run, topic)
     moved = [w.node for w in wanted if w.node.remaps or w.node.namespace != "/"]
+    if spaces := list(dict.fromkeys(node.namespace for node in moved if node.namespace != "/")):
+        return _in_namespace(file, other, moved, spaces, topic)
     if moved or not all(w.own for w in wanted):
         return other
     return other.model_copy(update={"unjudged": True})

@@ -83,7 +83,7 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
     found = without_system_params(params_on_server(run))
     one = life(run, params.process)
     if source is None:
-        verdict = _no_file(package, params.file)
+        verdict = _no_file(package, build, params.file, wanted)
     elif one is None or one.end is None:
         verdict = inconclusive(f"rosparam load {source.path} was not run to its end", hint="grade again")
     else:
@@ -103,11 +103,14 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
     return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, *place, *cited))
 
 
-def _no_file(package: PackageFacts, path: str) -> Verdict:
+def _no_file(package: PackageFacts, build: Run, path: str, wanted: list[str]) -> Verdict:
+    """Return the loss. A file under another name is what was meant if it has one of the names that are `wanted`."""
     name = PurePosixPath(path).name
     names = paths_by_name(package)
     yaml = [p for n, p in names.items() if n.endswith((".yaml", ".yml"))]
+    asked = {part for one in wanted for part in one.split("/") if part}
     near = [names[n] for n in near_names(name, names)]
+    near = [p for p in near if not (keys := _keys_of(build, p)) or asked & _parts(keys)]
     there = near or yaml
     seen = f"; there is {join_words(there)}" if there else ""
     movable = [p for p in near if can_be_moved(p, path)]
@@ -128,6 +131,10 @@ def _error(run: Run, one: Life, path: str) -> Verdict | None:
     said = f": {shown(lines[-1])}" if lines else ""
     hint = f"rosparam load {PurePosixPath(path).name} shows the line"
     return failed(f"{path} does not load{said}", hint=hint)
+
+
+def _parts(keys: tuple[Key, ...]) -> set[str]:
+    return {part for key in keys for part in key.path.split("/")}
 
 
 def _keys_of(build: Run, path: str) -> tuple[Key, ...]:

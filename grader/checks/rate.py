@@ -14,7 +14,7 @@ from grader.checks.support.clocks import NO_EXCUSE, Lateness, excused, lateness
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
-from grader.checks.support.processes import PublishedTopic, observed_until_ns, slips_of
+from grader.checks.support.processes import PublishedTopic, life_of, observed_until_ns, slips_of
 from grader.checks.support.text import LOOP, both, loop_rate
 from grader.checks.support.topics import Sender, cite, nothing_sent, sent_by, whole_until_ns
 from grader.evidence.run import Channel, Run
@@ -126,7 +126,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     if found is None:
         return nothing_sent(package, run, params.topic, params.of).about(expected=expected)
     verdict = (
-        _flood(found, package, params)
+        _flood(found, run, package, params)
         or _short(found, run, package, params)
         or _excused(_uneven(found, run, package, params), found, run, params)
         or passed(f"{params.topic} has {hertz(found.mean_hz)}, evenly")
@@ -158,18 +158,23 @@ def _lateness(found: Rhythm, run: Run) -> str:
     return "" if late is None else f", {late.described}"
 
 
-def _flood(found: Rhythm, package: PackageFacts, params: RateParams) -> Verdict | None:
+def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
     if len(found.times_ns) < 20 or found.mean_hz < FLOOD_FACTOR * params.rate_hz:
         return None
-    slips = [s for s in package.slips if "sleep" in s.kind or "sleep" in s.message]
+    own = (life_of(run, channel.callerid) for channel in run.student_channels(params.topic))
+    scripts = {life.start.script for life in own if life is not None and life.start.script}
+    slips = [s for s in package.slips if "sleep" in s.message and (not scripts or s.file in scripts)]
     if not slips and found.mean_hz < FLOOD_HZ and found.is_even:
         return None
     where = f" ({slips[0].file}, line {slips[0].line}: {slips[0].message})" if slips else ""
     hz = significant(params.rate_hz)
     made = both(f"rate = rospy.Rate({hz})", f"ros::Rate rate({hz})")
+    hint = f"call rate.sleep(), with parentheses, in every iteration; {made}"
+    if slips and slips[0].kind == "sleep-outside":
+        hint = "move it into that loop, as the last line of it"
     return failed(
         f"{params.topic} is flooded with {hertz(found.mean_hz)}: the loop does not sleep{where}",
-        hint=f"call rate.sleep(), with parentheses, in every iteration; {made}",
+        hint=hint,
         citations=tuple(FileCitation(file=s.file, line=s.line) for s in slips[:3]),
     )
 

@@ -283,6 +283,8 @@ def _is_told(repair: Repair, hint: str) -> bool:
     """Return whether the check's own hint says how this is repaired: how git learns of a bit, what has a name."""
     if repair.kind == "executable-bit":
         return repair.file in hint and "chmod" in hint
+    if repair.kind == "parameter-name" and repair.before.strip() == repair.after.strip():
+        return f"line {repair.line}" in hint
     new = _words(repair.after) - _words(repair.before)
     return (
         repair.kind == "package-name" and repair.file in OF_PACKAGES and new <= _words(hint) and new != set()

@@ -250,6 +250,7 @@ SlipKind = Literal[
     "never-reached",
     "spin-in-loop",
     "loop-left",
+    "sleep-outside",
     "callback-called",
     "callback-values",
     "node-name",
@@ -269,8 +270,9 @@ class PythonSlip(Record):
     `message`, or when it reaches it. `never-called`: a function that makes a node, publishes or waits, which nothing
     names; `main-guard`: `__name__` beside another word than `__main__`. `never-reached`: an endless loop before the
     first `publish(…)`; `spin-in-loop`: a loop that publishes and waits in `spin()`; `loop-left`: one that ends in its
-    first turn. `callback-called`, `callback-values`: a callback that is called where it is to be named, or that takes
-    another number of values than ROS has for it. `node-name`, `publisher` and `subscriber`: no slips, but where the
+    first turn; `sleep-outside`: the `sleep()` that one lacks stands after it or around it. `callback-called`,
+    `callback-values`: a callback that is called where it is to be named, or that takes another number of values than
+    ROS has for it. `node-name`, `publisher` and `subscriber`: no slips, but where the
     script names its node, or a topic; `message` is the name as written.
     """
 

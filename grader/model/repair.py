@@ -92,7 +92,9 @@ def added_lines(before: str, after: str) -> str:
 def advice_of(repair: Repair) -> str:
     """Return where and how the repair is done by hand: `package.xml: below line 9 add <depend>rospy</depend>`."""
     new = repair.after.split("\n")
-    if repair.before not in (new[0], new[-1]) or repair.fix != added_lines(repair.before, repair.after):
+    if repair.fix != added_lines(repair.before, repair.after):
         return f"{place_of(repair)}: {repair.fix}"
+    if repair.before not in (new[0], new[-1]):
+        return f"{place_of(repair)}: write {repair.fix}"
     where = "below" if repair.before == new[0] else "above"
     return f"{repair.file}: {where} line {repair.line} add {repair.fix}"

@@ -211,7 +211,7 @@ def test_a_build_that_the_manifest_blocks_is_judged_on_the_copy() -> None:
     copy = built({"manifest": {}}, exit_code=0)["package"]
     about = {**copy.metadata, "repairs": json.dumps([tag.model_dump()])}
     manifest, build = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
-    assert (manifest.points, manifest.hint) == (0, f"package.xml line 5: {tag.fix}")
+    assert (manifest.points, manifest.hint) == (0, f"package.xml line 5: write {tag.fix}")
     assert (build.status.value, build.points, build.hint) == ("partial", 5, "")
 
 

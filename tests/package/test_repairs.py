@@ -539,6 +539,45 @@ def test_a_hostile_source_costs_its_own_repairs(source: str, tmp_path: Path) -> 
     assert (folder / "src" / "talker.py").read_text() == SCRIPT
 
 
+@pytest.mark.parametrize(
+    ("launch", "renamed"),
+    [
+        (LAUNCH, True),
+        (LAUNCH.replace("talker.py", "talker"), True),
+        (LAUNCH.replace("talker.py", "signals.py"), False),
+    ],
+)
+def test_a_launch_file_under_another_name_is_meant_by_what_it_starts(
+    tmp_path: Path, launch: str, renamed: bool
+) -> None:
+    folder = package(tmp_path, {"launch/lab.launch": None, "src/trial.launch": launch})
+    asked = {"launch_files": ("activity1.launch",), "started": (("activity1.launch", "talker.py"),)}
+    found = find_repairs(folder, facts_of(folder), WANTED.model_copy(update=asked))
+    assert [one.after for one in found if one.kind == "file-name"] == ["src/activity1.launch"] * renamed
+
+
+def test_which_of_two_launch_files_is_meant_is_not_known(tmp_path: Path) -> None:
+    folder = package(tmp_path, {"launch/first.launch": LAUNCH})
+    asked = {"launch_files": ("activity1.launch",), "started": (("activity1.launch", "talker.py"),)}
+    assert find_repairs(folder, facts_of(folder), WANTED.model_copy(update=asked)) == ()
+
+
+@pytest.mark.parametrize(
+    ("yaml", "repaired"),
+    [
+        ("a:\n  b:\n    x: 1\n  y: 2\n  c:\n    z: 3\n", "a:\n  b:\n    x: 1\n    y: 2\n  c:\n    z: 3\n"),
+        ("a:\n  b:\n    x: 1\n  c:\n    z: 3\n  y: 2\n", ""),
+        ("a:\n  b:\n    x: 1\n    y: 2\n  c:\n    z: 3\n", ""),
+    ],
+)
+def test_a_key_that_stands_one_level_too_far_left_is_moved(tmp_path: Path, yaml: str, repaired: str) -> None:
+    folder = package(tmp_path, {"config/my.yaml": yaml})
+    asked = {"files": ("config/my.yaml",), "params": ("/a/b/x", "/a/b/y", "/a/c/z")}
+    found = repair_all(folder, WANTED.model_copy(update=asked))
+    assert [one.kind for one in found] == ["parameter-name"] * bool(repaired)
+    assert (folder / "config" / "my.yaml").read_text() == (repaired or yaml)
+
+
 def test_a_renamed_launch_file_is_repaired_further(tmp_path: Path) -> None:
     """By its old path, and a package's wrong name is one repair however often it stands in the file."""
     nodes = LAUNCH.replace("</launch>", LAUNCH.splitlines()[1].replace("talker", "listener") + "\n</launch>")

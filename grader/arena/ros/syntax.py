@@ -196,6 +196,7 @@ def slips(tree):
     found += never_run(tree)
     found += never_reached(tree)
     found += stopped_loops(tree)
+    found += sleepless_loops(tree)
     found += callbacks(tree)
     found += graph_names(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
@@ -333,6 +334,29 @@ def stopped_loops(tree):
             word = "break" if isinstance(left, ast.Break) else "return"
             message = "the loop ends the first time around, at the %s in line %d" % (word, left.lineno)
             yield {"line": left.lineno, "kind": "loop-left", "message": message}
+
+
+WAITS = ("sleep", "spin", "spin_once", "wait_for_message", "wait_for_service", "wait", "join", "input")
+
+
+def sleepless_loops(tree):
+    """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them: after them, or around them."""
+    loops = [n for n in ast.walk(tree) if isinstance(n, (ast.While, ast.For))]
+    sleeps = [n for n in ast.walk(tree) if is_call(n, "sleep") and isinstance(n.func, ast.Attribute)]
+    for loop in loops:
+        inside = list(ast.walk(loop))
+        waits = any(is_call(n, name) for n in inside for name in WAITS)
+        inner = [
+            n
+            for n in inside
+            if n is not loop and n in loops and any(is_call(m, "publish") for m in ast.walk(n))
+        ]
+        outside = [n for n in sleeps if n.lineno > loop.lineno and n.func.attr == "sleep"]
+        if waits or inner or not outside or not any(is_call(n, "publish") for n in inside):
+            continue
+        name = dotted(outside[0].func) or "sleep"
+        message = "`%s()` is outside the loop of line %d" % (name, loop.lineno)
+        yield {"line": outside[0].lineno, "kind": "sleep-outside", "message": message}
 
 
 def is_endless(loop):

@@ -326,6 +326,13 @@ def _unknown_command(found: re.Match[str], *_: object) -> Explained:
     return Explained(f"there is no command {name}(…)", "check the spelling of the command")
 
 
+def _not_catkin(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    kind = package.manifest.build_type if package.manifest is not None else None
+    if not (kind or "").startswith("ament"):
+        return Explained(found.string, FIRST_ERROR_HINT)
+    return Explained(f"{package.manifest.file} is for a ROS 2 package", "make a package for ROS 1")  # type: ignore[union-attr]
+
+
 _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]], ...] = (
     (r'Could not find a package configuration file provided by "([\w-]+)"', _missing_package),
     (r"(add_\w+_files)\(\) directory not found: (\S+)", _missing_folder),
@@ -341,6 +348,7 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"(generate_messages)\(\) must be called before catkin_package\(\)", _before_catkin_package),
     (UNKNOWN_COMMAND + r' "(\w+)"', _unknown_command),
     (r"does not contain a CMakeLists\.txt", _no_cmake_lists),
+    (r"contains non-catkin packages", _not_catkin),
     (r'dependency target "([^"]+)" of target "([^"]+)" does not exist', _missing_dependency),
     (r'dependencies to non-existent target "([^"]+)"', _missing_target),
     (r'link libraries for target "([^"]+)" which is not built', _missing_target),

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from grader.checks.registry import Check
 from grader.checks.support.processes import Life, early_end, lives
-from grader.checks.support.scripts import path_in_package
+from grader.checks.support.scripts import EMPTY, path_in_package
 from grader.checks.support.text import LOOP, SPIN, near_names, shown
 from grader.evidence.run import Run
 from grader.installable import ROS_2, install_hint, known_packages, noetic_messages
@@ -291,6 +291,9 @@ def _explained(life: Life, run: Run, package: PackageFacts) -> Ending:
 
 def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     """Explain a script that comes to its end because nothing calls what it defines, or because its loop is left."""
+    script = next((f for f in package.files if f.path == life.start.script), None)
+    if script is not None and script.shebang_problem == EMPTY:
+        return Ending("its file is empty", f"write the node in {script.path}", by_itself=True)
     kinds = ("main-guard", "never-called", "loop-left")
     slips = [s for s in package.slips if s.file == life.start.script and s.kind in kinds]
     if not slips:

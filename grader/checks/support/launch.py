@@ -95,23 +95,33 @@ def find_launch(package: PackageFacts, name: str) -> LaunchFile | None:
     return min(found, key=lambda f: (PurePosixPath(f.path).parts[0] != "launch", f.path), default=None)
 
 
-def read_launch(package: PackageFacts, name: str) -> LaunchFile | Verdict:
-    """Return the launch file of that name, or the verdict if it is missing, not well-formed, or has another root."""
+def read_launch(package: PackageFacts, name: str, wanted: Iterable[str] = ()) -> LaunchFile | Verdict:
+    """Return the launch file of that name, or the verdict if it is missing, not well-formed, or has another root.
+
+    `wanted` are the programs that it has to start: another file that starts them may be what was meant.
+    """
     file = find_launch(package, name)
-    verdict = _unreadable(package, file, name)
+    verdict = _unreadable(package, file, name, {PurePosixPath(one).name for one in wanted})
     if file is None or verdict is not None:
         return (verdict or failed(f"{name} cannot be read")).about(measured="no launch file that can be read")
     return file
 
 
-def _unreadable(package: PackageFacts, file: LaunchFile | None, launch: str) -> Verdict | None:
+def _unreadable(
+    package: PackageFacts, file: LaunchFile | None, launch: str, wanted: set[str]
+) -> Verdict | None:
     if file is None:
+        started = {f.path: starts(f, wanted) for f in package.launch_files if f.nodes}
+        full = [path for path, found in started.items() if found and found == wanted]
         others = [f.path for f in package.launch_files]
         names = paths_by_name(package)
         near = [names[n] for n in near_names(launch, names)]
         seen = f"; there is {join_words(dict.fromkeys([*near, *others]))}" if near or others else ""
+        seen += f", and {full[0]} starts {join_words(sorted(wanted))}" if len(others) > 1 and full else ""
+        seen += f", which starts {join_words(sorted(wanted))}" if full and full == others else ""
         message = f"{launch} is not in the package{seen}"
-        movable = [p for p in near if can_be_moved(p, launch)]
+        movable = [p for p in near if can_be_moved(p, launch) and (not wanted or started.get(p, wanted))]
+        movable += full[:1] if len(full) == 1 else []
         hint = f"git mv {movable[0]} launch/{launch}" if movable else add_hint(f"launch/{launch}")
         cited = tuple(FileCitation(file=p) for p in (near or others)[:3])
         return failed(message, hint=hint, citations=cited or (FileCitation(file="package.xml"),))
@@ -121,6 +131,12 @@ def _unreadable(package: PackageFacts, file: LaunchFile | None, launch: str) -> 
     message = f"{file.path}{line} is not well-formed: {file.fault.cause or file.fault.message}"
     hint = file.fault.fix or "close every element, and begin with <launch> and end with </launch>"
     return failed(message, hint=hint, citations=(file.fault.place,))
+
+
+def starts(file: LaunchFile, wanted: set[str]) -> set[str]:
+    """Return which of these programs the file starts, by their names; the `.py` may be missing."""
+    types = {node.type for node in file.nodes}
+    return {name for name in wanted if {name, name.removesuffix(".py")} & types}
 
 
 def not_run(run: Run) -> Verdict | None:

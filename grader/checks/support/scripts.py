@@ -11,6 +11,7 @@ from grader.model.package import CMakeCall, Executable, PackageFacts, SourceFile
 
 PYTHON = "catkin_install_python"
 RIGHT_SHEBANG = "#!/usr/bin/env python3"
+EMPTY = "the file is empty"
 NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
 _KINDS = ("PROGRAMS", "FILES", "TARGETS", "DIRECTORY", "SCRIPT", "CODE")
 _OPTIONS = (
@@ -182,6 +183,8 @@ def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
     elif file.shebang is not None and file.shebang.crlf:
         problem = file.shebang_problem or "its #! line ends with Windows' CRLF"
         yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}, then commit and push")
+    elif file.shebang_problem == EMPTY:
+        yield Obstacle("is empty", f"write the node in {file.path}, with {RIGHT_SHEBANG} as its first line")
     elif file.shebang_problem:
         yield Obstacle(f"cannot be run: {file.shebang_problem}", fix)
     elif file.bom:

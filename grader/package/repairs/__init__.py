@@ -27,7 +27,7 @@ from grader.package.repairs.editing import (
 from grader.package.repairs.files import find_renames, is_own, rename_files, repair_files, to_utf8
 from grader.package.repairs.names import repair_launch_names, repair_script_names, repair_yaml_names
 from grader.package.repairs.python import repair_python
-from grader.package.repairs.wanted import Wanted, wanted_of
+from grader.package.repairs.wanted import Wanted, is_near, wanted_of
 
 __all__ = [
     "DEFAULT_SHARES",
@@ -114,6 +114,8 @@ def _scripts(
     named = [PurePosixPath(path).name for path in (*wanted.scripts, *wanted.installed)]
     named += [node.type or "" for launch in package.launch_files for node in launch.nodes]
     named += [f"{name}.py" for name in named]
+    names = dict.fromkeys(PurePosixPath(file.path).name for file in python)
+    named += [right for name in named if name not in names for right in names if is_near(name, right)]
     found: dict[str, SourceFile] = {}
     for name in dict.fromkeys(named):
         for file in python:

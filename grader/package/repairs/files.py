@@ -148,7 +148,22 @@ def find_renames(package: PackageFacts, wanted: Wanted) -> dict[str, str]:
         if name not in names and near:
             old = min(near, key=lambda p: (PurePosixPath(p).parent != PurePosixPath(path).parent, p))
             renames[old] = str(PurePosixPath(old).with_name(name))
+        elif name not in names and (meant := _meant_launch(package, wanted, name, {*right, *renames})):
+            renames[meant] = str(PurePosixPath(meant).with_name(name))
     return renames
+
+
+def _meant_launch(package: PackageFacts, wanted: Wanted, name: str, others: set[str]) -> str:
+    """Return the only launch file that starts what the one of this name has to start; "" if there is none."""
+    scripts = {script for launch, script in wanted.started if PurePosixPath(launch).name == name}
+    found = [
+        file.path
+        for file in package.launch_files
+        if PurePosixPath(file.path).name not in others and file.path not in others
+        for types in [{node.type for node in file.nodes}]
+        if scripts and all({one, one.removesuffix(".py")} & types for one in scripts)
+    ]
+    return found[0] if len(found) == 1 else ""
 
 
 def rename_files(files: Files, renames: dict[str, str]) -> None:

@@ -12,6 +12,7 @@ from grader.package.manifest import parse_manifest
 from grader.package.repairs.editing import MANIFEST, Files
 from grader.package.repairs.python import Name
 from grader.package.repairs.wanted import Wanted, is_near
+from grader.wording import plural
 
 KINDS: dict[str, RepairKind] = {
     "publisher": "topic-name",
@@ -114,6 +115,7 @@ def repair_yaml_names(
         for f in package.files
         if PurePosixPath(f.path).name in names and f.path.endswith((".yaml", ".yml"))
     ):
+        _indent_keys(files, file, branches)
         for old, new in _repair_keys(files, file, branches):
             for script, used in scripts.items():
                 for name in used:
@@ -137,6 +139,29 @@ def _repair_keys(files: Files, file: str, branches: set[tuple[str, ...]]) -> Ite
         files.change("parameter-name", file, "\n".join(lines), message)
         there.add((*path[:-1], right))
         yield path[-1], right
+
+
+def _indent_keys(files: Files, file: str, branches: set[tuple[str, ...]]) -> None:
+    """Move a key that stands one level too far to the left, right behind the block that it belongs to, into it."""
+    text = files.text(file)
+    keys = list(_keys(text)) if text else []
+    there = {path for _, path in keys}
+    for at, (number, path) in enumerate(keys):
+        meant = [b for b in branches - there if len(b) > 2 and (*b[:-2], b[-1]) == path and b[:-1] in there]
+        block = [n for n, other in keys[:at] if other[:-1] == meant[0][:-1]] if len(meant) == 1 else []
+        text = files.text(file)
+        if path in branches or not block or keys[at - 1][1][: len(meant[0]) - 1] != meant[0][:-1] or not text:
+            continue
+        lines = text.split("\n")
+        right = lines[block[0]][: len(lines[block[0]]) - len(lines[block[0]].lstrip())]
+        if not lines[number].rstrip().endswith(":"):
+            lines[number] = right + lines[number].lstrip()
+            message = (
+                f"line {number + 1} of {file}: {path[-1]} stands beside {meant[0][-2]}, and not below it"
+            )
+            fix = f"indent it by {plural(len(right), 'space')}"
+            files.change("parameter-name", file, "\n".join(lines), message, fix)
+            there.add(meant[0])
 
 
 def _keys(text: str) -> Iterator[tuple[int, tuple[str, ...]]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from pathlib import PurePosixPath
 from typing import Any
 
 from grader.model.record import Record
@@ -25,6 +26,8 @@ class Wanted(Record):
     installed: tuple[str, ...] = ()
     dependencies: tuple[str, ...] = ()
     types: tuple[str, ...] = ()
+    started: tuple[tuple[str, str], ...] = ()
+    """Launch files, and the names of the scripts that each has to start."""
 
 
 NAMES_ARE = {
@@ -36,6 +39,7 @@ NAMES_ARE = {
     "launch-loads": "params",
 }
 """What the parameter `names` of a check holds."""
+STARTED_BY = ("launch-xml", "launch-runs", "launch-loads")
 PARAMETER_CHECKS = ("params-set", "param-value")
 TOPIC_KEYS = ("topic", "asked_on")
 TOPICS_OF = {
@@ -53,7 +57,15 @@ def wanted_of(rubric: Rubric, package: str = "") -> Wanted:
     for field, name in (*_of_scenarios(rubric, package), *_of_criteria(criteria)):
         if isinstance(name, str) and name and "*" not in name:
             found.setdefault(field, {})[name] = None
-    return Wanted(package=package, **{field: tuple(names) for field, names in found.items()})
+    started = dict.fromkeys(
+        (c.parameters["launch"], PurePosixPath(script).name)
+        for c in criteria
+        if "launch" in c.parameters and c.check in STARTED_BY
+        for script in (*c.parameters.get("scripts", ()), *filter(None, [c.parameters.get("script")]))
+    )
+    return Wanted(
+        package=package, started=tuple(started), **{field: tuple(names) for field, names in found.items()}
+    )
 
 
 def _of_scenarios(rubric: Rubric, package: str) -> Iterator[tuple[str, Any]]:
