@@ -75,8 +75,16 @@ def test_closing_with_nothing_left_does_nothing() -> None:
 
 def test_closing_says_what_could_not_be_done() -> None:
     work = Work(failing=1000)
-    writer = followed(work, quiet_s=0.01, again_s=3600)
+    writer = followed(work, quiet_s=0.01, again_s=3600, closing_s=0.01)
     writer.changed()
     assert work.failed.wait(WAIT_S)
     assert not writer.close()
     assert writer.trouble == "another batch works here"
+
+
+def test_closing_waits_for_another_that_works_in_the_folder() -> None:
+    work = Work(failing=3)
+    writer = followed(work, quiet_s=3600, latest_s=3600, again_s=0.01)
+    writer.changed()
+    assert writer.close()
+    assert work.done == 1

@@ -60,3 +60,14 @@ def test_save_and_go_on_to_the_end(page, out) -> None:
         "eve": 7,
     }
     assert rows(page.text("/?c=style&show=decided")) == ["ada", "dana", "eve"]
+
+
+def test_many_reports_are_written_by_other_processes(page, review, out, monkeypatch) -> None:
+    monkeypatch.setattr("grader.classes.review.session.FEW", 0)
+    form = page.form("ada", "style", "/s/ada/?c=style")
+    page.client.post("/s/ada/c/style", data={**form, "points": "7", "comment": "All alike", "do": "alike"})
+    assert review.background.wait(60)
+    assert review.left() == 0
+    for name in ("ada", "dana", "eve"):
+        assert "All alike" in (out / name / "report.html").read_text()
+    assert "All alike" in (out / "gradebook.csv").read_text()

@@ -256,6 +256,33 @@ def rewrite(
         results.commit(keep=(EVIDENCE, CONSOLE))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Rewriting:
+    """A result that is to be written into a submission's folder, with its reports."""
+
+    folder: Path
+    result: GradingResult
+
+
+def rewrite_all(jobs: Sequence[Rewriting], rubric: LoadedRubric, count: int) -> Iterator[Written]:
+    """Do as `rewrite` for each, `count` at a time; yield each as it comes. A faulty one stops no other."""
+    return run_each(
+        partial(_try_rewrite, rubric),
+        jobs,
+        min(count, len(jobs)),
+        ended=lambda job, error: _writing_ended(job.folder, error),
+    )
+
+
+def _try_rewrite(rubric: LoadedRubric, job: Rewriting) -> Written:
+    """In a worker."""
+    try:
+        rewrite(job.folder, job.result, rubric.rubric, rubric.docs)
+    except GraderError as error:
+        return Written(folder=job.folder, error=error.message, hint=error.hint)
+    return Written(folder=job.folder, rubric_digest=job.result.rubric.digest)
+
+
 def figures_in(folder: Path, result: GradingResult, rubric: Rubric) -> Figures | None:
     """Return the figures of a submission's evidence; None if there is none, or it cannot be read."""
     with suppress(Exception):  # no mark depends on a picture

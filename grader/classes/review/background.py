@@ -7,17 +7,18 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from grader.errors import GraderError
+from grader.errors import Busy, GraderError
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pace:
-    """Seconds: how long nothing has to change before the work is done, how long it waits at most, and how long until it
-    is tried again where it failed."""
+    """Seconds: how long nothing has to change before the work is done, how long it waits at most, how long until it
+    is tried again where it failed, and how long it waits at the end for another program that works in the folder."""
 
     quiet_s: float = 2.0
     latest_s: float = 8.0
     again_s: float = 3.0
+    closing_s: float = 60.0
 
 
 class BackgroundWriter:
@@ -28,7 +29,7 @@ class BackgroundWriter:
         self._condition = threading.Condition()
         self._first: float | None = None
         self._last = 0.0
-        self._closing = False
+        self._closing, self._closed_at = False, 0.0
         self._working = False
         self.trouble = ""
         self._thread = threading.Thread(target=self._run, name="review-background", daemon=True)
@@ -50,20 +51,21 @@ class BackgroundWriter:
             return self._condition.wait_for(lambda: self._first is None and not self._working, timeout_s)
 
     def close(self) -> bool:
-        """Do what is left at once and end; whether all is done."""
+        """Do what is left at once and end; whether all is done. What is busy in the folder is waited for."""
         with self._condition:
-            self._closing = True
+            self._closing, self._closed_at = True, time.monotonic()
             self._condition.notify_all()
         self._thread.join()
         return self._first is None
 
     def _run(self) -> None:
         while self._begun():
+            is_busy = False
             try:
                 self._work()
                 trouble = ""
             except GraderError as error:
-                trouble = error.message
+                trouble, is_busy = error.message, isinstance(error, Busy)
             except Exception as error:  # noqa: BLE001 - the page shows it, and it is tried again
                 trouble = f"internal error: {type(error).__name__}: {error}"
             with self._condition:
@@ -71,7 +73,11 @@ class BackgroundWriter:
                 self.trouble = trouble
                 if trouble and self._closing:
                     self._first = self._first or time.monotonic()
-                    return
+                    left = self._closed_at + self._pace.closing_s - time.monotonic()
+                    if not is_busy or left <= 0:
+                        return
+                    self._condition.wait(min(left, self._pace.again_s))
+                    continue
                 if trouble:
                     self._first = self._last = time.monotonic() + self._pace.again_s
                 self._condition.notify_all()

@@ -30,8 +30,16 @@ THREADS = 6
 GIT_S = 5
 
 
-def serve(review: ReviewSession, *, port: int, author: str, opened: Callable[[str], None]) -> bool:
-    """Serve `review` until interrupted; `opened` is given the address with its token. Port 0 is any that is free.
+def serve(
+    review: ReviewSession,
+    *,
+    port: int,
+    author: str,
+    opened: Callable[[str], None],
+    ending: Callable[[int], None] = lambda _: None,
+) -> bool:
+    """Serve `review` until interrupted; `opened` is given the address with its token, and `ending` how many reports are
+    still to be written at the end. Port 0 is any that is free.
 
     Gives whether all that follows a decision is written. Raises UsageError where the port cannot be had. What a
     report's figures need is loaded while the first page is read, so that no one waits for it at the first decision.
@@ -57,6 +65,7 @@ def serve(review: ReviewSession, *, port: int, author: str, opened: Callable[[st
             pass
         finally:
             server.close()
+            ending(review.left())
             done = review.close()
     return done
 

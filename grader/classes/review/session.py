@@ -17,7 +17,7 @@ from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 
-from grader.classes.batch.existing_results import Settler, rewrite
+from grader.classes.batch.existing_results import Rewriting, Settler, rewrite, rewrite_all
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
 from grader.classes.batch.run import GRADEBOOK, alone, ids_of, write_books
 from grader.classes.feedback.publish import read_published
@@ -37,15 +37,17 @@ from grader.classes.review.background import BackgroundWriter, Pace
 from grader.classes.review.blind import Mask, aliases, mask_of
 from grader.classes.review.requests import Requests, read_requests, request_files, waiting
 from grader.classes.review.submissions import Item, Submissions, alike, stamp_of
-from grader.errors import Busy, GraderError, RubricError, UsageError
+from grader.errors import Busy, GraderError, OutputError, RubricError, UsageError
 from grader.files import unwritable
 from grader.model.batch import Entry, State
 from grader.model.result import BankComment, GradingResult, Override, WrittenOverride
+from grader.portable import cores
 from grader.report.class_page.submissions import salt_in, words_in
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric, load_rubric, read_beside_rubric
 
 PATIENCE_S = 0.1
+FEW = 8
 OTHER_RUBRIC = "the class has been graded by another rubric since: end this review and start it again"
 
 OLDER_RESULT = (
@@ -96,6 +98,7 @@ class ReviewSession:
         self._pending: set[str] = set()
         self._caught_up = False
         self._books_behind = False
+        self._being_written = 0
 
     @cached_property
     def starter(self) -> dict[str, bytes]:
@@ -329,30 +332,52 @@ class ReviewSession:
         the class's lock."""
         with self._guard:
             self._pending -= keys  # first: who decides from here on puts it back
-        why = ""
+        why, wanted = "", list[Rewriting]()
         try:
             overrides = self.overrides()
             for item in filter(None, map(self.submissions.item, sorted(keys))):
-                why = self._settle_one(item, overrides)
+                now, why = self._settled(item, overrides)
+                wanted += [Rewriting(folder=self.path / item.key, result=now)] if now else []
+            self._rewrite(wanted)
         except BaseException:
             with self._guard:
                 self._pending |= keys
             raise
+        finally:
+            self._being_written = 0
         return why
 
-    def _settle_one(self, item: Item, overrides: Overrides) -> str:
+    def _rewrite(self, wanted: Sequence[Rewriting]) -> None:
+        """Write these results; many by processes beside this one, so that pages do not wait for them."""
+        if len(wanted) <= FEW:
+            for one in wanted:
+                rewrite(one.folder, one.result, self.rubric.rubric, self._docs)
+            return
+        self._being_written = len(wanted)
+        faults = []
+        for written in rewrite_all(wanted, self.rubric, cores()):
+            self._being_written -= 1
+            faults += [written.error] if written.error else []
+        if faults:
+            raise OutputError(faults[0])
+
+    def left(self) -> int:
+        """Return how many submissions have reports that do not say yet what was decided."""
+        with self._guard:
+            return len(self._pending) + self._being_written
+
+    def _settled(self, item: Item, overrides: Overrides) -> tuple[GradingResult | None, str]:
+        """Return the result that is to be written, None where the one that is there is right, and why there is none."""
         batch = self.submissions.batch()
         if batch.run.rubric.digest != self.rubric.digest:
             raise UsageError(OTHER_RUBRIC)
         result = batch.earlier(item.entry) if item.gradable else None
         if result is None:
-            return ""
+            return None, ""
         if result.rubric.digest != self.rubric.digest:
-            return OLDER_RESULT
+            return None, OLDER_RESULT
         now = Settler(self.rubric.rubric, overrides).settle_again(result, item.entry.id, None)
-        if now != result:
-            rewrite(batch.folder_of(item.entry), now, self.rubric.rubric, self._docs)
-        return ""
+        return (now if now != result else None), ""
 
     def _follow(self) -> None:
         """Settle what is not settled yet, and write the class's files."""

@@ -213,6 +213,7 @@ def review(
         from grader.classes.review.markers import share_of
         from grader.classes.review.serve import browser, git_user, serve
         from grader.classes.review.session import open_session
+        from grader.wording import plural
     given = marker if author is None else author
     try:
         name = author_of(git_user() if given is None else given)
@@ -231,7 +232,14 @@ def review(
             say("Only this machine can reach it, and only at this address. Press Ctrl-C to end it.")
             sys.stdout.flush()  # a program that reads it from a pipe needs the address now
 
-        done = serve(review, port=port, author=name, opened=opened)
+        def ending(left: int) -> None:
+            if left:
+                say(
+                    f"Writing {plural(left, 'report')}. Decisions are kept: Ctrl-C again leaves it to the next review."
+                )
+                sys.stdout.flush()
+
+        done = serve(review, port=port, author=name, opened=opened, ending=ending)
     if done:
         say("Ended. Everything is saved and written.")
         return ExitCode.PASSED
