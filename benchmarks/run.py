@@ -28,6 +28,7 @@ NAMES = (
     "load",
     "fair",
     "thousands",
+    "reviewing",
 )
 
 
