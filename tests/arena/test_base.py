@@ -145,7 +145,7 @@ def test_a_build_on_the_base_is_the_one_without_it(
 @pytest.mark.ros
 def test_a_first_build_makes_it_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
-    monkeypatch.setattr(base_workspace, "SCRIPT", "echo learnt >&{collect}")
+    monkeypatch.setattr(base_workspace, "BASE_SCRIPT", "echo learnt >&{collect}")
     with make_place({"src/node.py": SCRIPT}) as place:
         ok, run, _, _ = _build(place, tmp_path)
         assert ok
