@@ -25,6 +25,11 @@ DEPTH_MAX = 5
 LOOK_S = 20
 NEAR_WITHOUT_ROS = 0.85
 """Where there is no ROS, only a name that is one letter off is known to be wrong."""
+COMMON = frozenset({
+    "catkin", "message_generation", "message_runtime", "roscpp", "roslaunch", "roslib", "rospy",
+    "std_msgs", "std_srvs", "geometry_msgs", "sensor_msgs", "nav_msgs",
+})  # fmt: skip
+"""What most students' packages depend on: known without a look at all that there is, which takes a while."""
 IGNORED = frozenset({"CATKIN_IGNORE", "AMENT_IGNORE"})
 TypeKind = Literal["msg", "srv"]
 WORDS: Mapping[TypeKind, str] = {"msg": "message", "srv": "service"}
@@ -70,6 +75,15 @@ class RosPackages:
     def lacks(self, package: str) -> bool:
         """Return whether a package exists that is not installed here."""
         return package not in self.folders and not self._unknown(package, ())
+
+    def misspelt(self, package: str) -> str:
+        """Return what is to be said of a dependency that is all but a ROS package; rosdep has many more names."""
+        if "-" in package or package in COMMON:
+            return ""
+        known = {*known_packages(), *noetic_messages(), *COMMON}
+        near = closest(package, known, cutoff=NEAR_WITHOUT_ROS)
+        is_slip = near and near[0] == package[0] and package not in known and package not in self.folders
+        return f'there is no ROS package "{package}" (did you mean "{near}"?)' if is_slip else ""
 
     def program_fault(self, program: str) -> str:
         """Return why no machine has this program (`turtlesim/turtlesim_node`); empty where one may."""

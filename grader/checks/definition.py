@@ -11,15 +11,12 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.text import shown
-from grader.model.interfaces import PARTS, parse_definition
+from grader.model.interfaces import BUILT_IN, FULL_NAMES, PARTS, parse_definition, refuse_unknown
 from grader.model.package import Interface, InterfaceField, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed
-from grader.wording import closest, did_you_mean, join_words, plural
+from grader.wording import closest, join_words, plural
 
-BUILT_IN = {*(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)), "bool", "float32", "float64",
-            "string", "time", "duration"}  # fmt: skip
-OTHER_NAMES = {"byte": "int8", "char": "uint8", "Header": "std_msgs/Header"}
 FAULTS_SHOWN = 3
 FieldType = Annotated[str, Field(pattern=r"^[A-Za-z]\w*(/[A-Za-z]\w*)?(\[\d*\])?$"), Refers("field")]
 
@@ -63,9 +60,7 @@ class DefinitionParams(Record):
             if part not in PARTS[suffix]:
                 parts = join_words((f"{part}.{bare}" for part in PARTS[suffix]), "or")
                 raise ValueError(f'name it {parts.removeprefix(".")}, not "{name}"')
-            base = type_.partition("[")[0]
-            if base.islower() and "/" not in base and base not in {*BUILT_IN, *OTHER_NAMES}:
-                raise ValueError(f'there is no type "{type_}"{did_you_mean(base, BUILT_IN)}')
+            refuse_unknown(type_)
             found.append(InterfaceField(part=part, type=type_, name=bare, value=value, line=0))
         return found
 
@@ -193,7 +188,7 @@ def _differs(
 
 def _plain(type_: str, package: str) -> str:
     base, bracket, size = type_.partition("[")
-    base = OTHER_NAMES.get(base, base)
+    base = FULL_NAMES.get(base, base)
     return (base if base in BUILT_IN or "/" in base else f"{package}/{base}") + bracket + size
 
 

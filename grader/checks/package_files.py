@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.registry import NoParams, check
+from grader.checks.registry import DependencyName, NoParams, check
 from grader.checks.support.scripts import find_script
 from grader.checks.support.text import near_names, shown
 from grader.model.package import Fault, Manifest, PackageFacts
@@ -156,14 +156,14 @@ class ManifestParams(Record):
 
     name: str
     """The name that the handout gives the package."""
-    dependencies: tuple[str, ...] = ()
+    dependencies: tuple[DependencyName, ...] = ()
     """Packages that it has to declare for run time."""
 
 
 class DependenciesParams(Record):
     """Packages that the nodes need."""
 
-    names: tuple[str, ...]
+    names: tuple[DependencyName, ...]
     """The packages that the nodes need at run time."""
 
 

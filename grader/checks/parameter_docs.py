@@ -33,6 +33,8 @@ REFERRED = {
     "served": "service that the scenario offers",
     "rostest": "`.test` file of the scenario",
     "watched_s": "number",
+    "dependency": "text",
+    "cause": "condition",
 }
 REQUIRED = "required"
 

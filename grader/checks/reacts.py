@@ -8,7 +8,7 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 
-from grader.checks.registry import check
+from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import excused, run_seconds, why_late
 from grader.checks.support.fields import (
     FieldPath,
@@ -92,7 +92,7 @@ class Condition(Record):
 class ReactsParams(Record):
     """Cause and effect."""
 
-    cause: Condition
+    cause: Annotated[Condition, Refers("cause")]
     """Each time that this begins to be true, an effect has to come; without a `field`, after each message one of its
     own."""
     effect: Condition

@@ -39,7 +39,8 @@ class Refers:
     which the scenario's probes send. `published`: a topic on which the student publishes. `set`: a parameter that the
     scenario sets. `action`: an action to which its steps send goals. `kept`: a file that it keeps. `served`: a service
     that the grader offers in it. `rostest`: a start of a `.test` file in it. `watched_s`: so long the scenario has to
-    last.
+    last. `dependency`: a ROS package, or another key of rosdep's. `cause`: a condition on a topic that
+    something has to send on.
     """
 
     to: Literal[
@@ -57,6 +58,8 @@ class Refers:
         "served",
         "rostest",
         "watched_s",
+        "dependency",
+        "cause",
     ]
 
 
@@ -69,6 +72,7 @@ class Reference(NamedTuple):
 
 
 ProcessName = Annotated[str, Refers("process")]
+DependencyName = Annotated[str, Refers("dependency")]
 LaunchName = Annotated[str, Refers("launch")]
 ProgramName = Annotated[str, Refers("program")]
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated
 
+from pydantic import AfterValidator
+
 from grader.checks.registry import Refers, check
 from grader.checks.support.processes import (
     GlobalName,
@@ -25,11 +27,17 @@ from grader.checks.support.topics import (
     topics_with,
 )
 from grader.evidence.run import Channel, Run, is_grader_node
-from grader.model.interfaces import other_fields
+from grader.model.interfaces import other_fields, parse_definition
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, Verdict, failed, inconclusive, passed
 from grader.wording import join_words, plural
+
+
+def _message_text(text: str | None) -> str | None:
+    for _ in parse_definition(text or "", ".msg"):
+        pass
+    return text
 
 
 class TopicTypeParams(Record):
@@ -39,7 +47,7 @@ class TopicTypeParams(Record):
     """The topic, with its slash: `/chatter`."""
     type: Annotated[TypeName, Refers("message")]
     """As `rostopic info` gives it: `std_msgs/Int8`."""
-    definition: str | None = None
+    definition: Annotated[str | None, AfterValidator(_message_text)] = None
     """The handout's text of a `.msg` that students write themselves: fields, their types and their order have to be the
     same; null: the type's name alone is asked for."""
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 
 from grader.model.package import Fault, Interface, InterfaceField
+from grader.wording import did_you_mean
 
 FIELDS_MAX = 500
 PARTS = {".msg": ("",), ".srv": ("request", "response"), ".action": ("goal", "result", "feedback")}
@@ -14,6 +15,8 @@ PARTS = {".msg": ("",), ".srv": ("request", "response"), ".action": ("goal", "re
 DIVIDER = re.compile(r"^---\s*$", re.MULTILINE)
 RULE = "=" * 80
 """Before the types that a full definition brings along, behind its own."""
+BUILT_IN = {*(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)), "bool", "float32", "float64",
+            "string", "time", "duration"}  # fmt: skip
 FULL_NAMES = {"byte": "int8", "char": "uint8", "Header": "std_msgs/Header"}
 _TYPE = r"(?P<type>[A-Za-z]\w*(?:/[A-Za-z]\w*)?(?:\[\d{0,9}\])?)"
 _FIELD = re.compile(rf"{_TYPE}\s+(?P<name>[A-Za-z]\w*)", re.ASCII)
@@ -46,7 +49,16 @@ def parse_definition(text: str, suffix: str) -> Iterator[InterfaceField]:
     found = parse_interface(text.encode(), f"definition{suffix}")
     if found.fault is not None:
         raise ValueError(found.fault.message)
-    yield from found.fields
+    for field in found.fields:
+        refuse_unknown(field.type)
+        yield field
+
+
+def refuse_unknown(type_: str) -> None:
+    """Raise ValueError where a type has the form of a built-in one, and is none."""
+    base = type_.partition("[")[0]
+    if base.islower() and "/" not in base and base not in {*BUILT_IN, *FULL_NAMES}:
+        raise ValueError(f'there is no type "{type_}"{did_you_mean(base, BUILT_IN)}')
 
 
 def _parse_line(text: str, part: str, line: int) -> InterfaceField | None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -42,8 +43,14 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
         if check is not None:
             judged = scenarios.get(str(criterion.get("scenario")))
             yield from _criterion_faults(("criteria", index), criterion, check, judged, rubric)
+            yield from _unknown_fields(("criteria", index, "with"), as_map(criterion.get("with")), rubric)
+            yield from _unknown_expected(("criteria", index), criterion, judged or {})
     yield from _unused(rubric, scenarios, checks)
     yield from _unknown_topics(rubric, scenarios, checks)
+    yield from _unknown_causes(rubric, scenarios, checks)
+    yield from _misspelt_nodes(rubric, scenarios)
+    yield from _own_types(rubric)
+    yield from _misspelt_scripts(rubric, scenarios)
 
 
 def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -74,6 +81,8 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
         fault += "; programs of the students' own go under scripts" if path[-2:-1] == ("programs",) else ""
     elif to == "program" and value.partition("/")[0] not in own:
         fault = ros_packages().program_fault(value)
+    elif to == "dependency":
+        fault = "" if value in own else ros_packages().misspelt(value)
     elif to in TYPES and re.fullmatch(TYPE_PATTERN, value := value.partition("[")[0]):
         fault = ros_packages().type_fault(value, TYPES[to], own)
     if fault:
@@ -205,6 +214,167 @@ def _unknown_topics(
             if topic.startswith("/") and topic not in known and (near or not open_):
                 meant = f' (did you mean "{near}"?)' if near else ""
                 yield ("scenarios", name, "until", *at), f"no criterion and no probe names {topic}{meant}"
+
+
+def _unknown_causes(
+    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
+) -> Iterator[Fault]:
+    """Yield causes on topics that nothing in the scenario sends on, and that no other criterion names."""
+    criteria = list(as_maps(rubric.get("criteria")))
+    for index, criterion in criteria:
+        check, name = checks.get(str(criterion.get("check"))), str(criterion.get("scenario"))
+        scenario = scenarios.get(name, {})
+        others = {t for n, one in criteria if n != index for t in _topics_in(one.get("with"))}
+        sent = {*SYSTEM_TOPICS, *_topics_in(scenario)}
+        open_ = any(start.get("script") is None for start in _starts(scenario)) or "recording" in scenario
+        for one in check.references(as_map(criterion.get("with"))) if check else ():
+            topic = as_map(one.value).get("topic")
+            if one.to != "cause" or not isinstance(topic, str) or topic in sent | others:
+                continue
+            near = _near(topic, sent, cutoff=SURE if open_ else LIKELY)
+            if near or not open_:
+                meant = f' (did you mean "{near}"?)' if near else ""
+                fault = f"nothing in {name} sends on {topic}, and no other criterion names it{meant}"
+                yield ("criteria", index, "with", *one.path, "topic"), fault
+
+
+def _unknown_fields(path: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield fields that the topic's type does not have, where the rubric says the type and it is one of ROS's."""
+    topic, field = given.get("topic"), given.get("field")
+    if isinstance(topic, str) and isinstance(field, str):
+        types = {kind for kind in _types_of(topic, rubric) if isinstance(kind, str)}
+        faults = [_no_such_field(kind, field) for kind in sorted(types)]
+        if faults and all(faults):
+            yield (*path, "field"), faults[0]
+    for key, inner in given.items():
+        if isinstance(inner, dict):
+            yield from _unknown_fields((*path, key), inner, rubric)
+
+
+def _types_of(topic: str, rubric: dict[str, Any]) -> Iterator[object]:
+    """Yield the types that the rubric gives a topic: those that it sends there, or asks for."""
+    for _, criterion in as_maps(rubric.get("criteria")):
+        given = as_map(criterion.get("with"))
+        if criterion.get("check") == "topic-type" and given.get("topic") == topic:
+            yield given.get("type")
+    for scenario in as_map(rubric.get("scenarios")).values():
+        sent = [probe for _, probe in as_maps(as_map(scenario).get("probes"))]
+        sent += [as_map(step.get("publish")) for _, step in as_maps(as_map(scenario).get("steps"))]
+        yield from (one.get("type") for one in sent if one.get("topic") == topic)
+
+
+def _unknown_expected(path: KeyPath, criterion: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield fields of requests and answers that the service's type does not have, where its text is known here."""
+    given, kind = as_map(criterion.get("with")), criterion.get("check")
+    part = {"calls": "request", "service-answers": "response"}.get(str(kind))
+    steps = [as_map(step.get("call")) for _, step in as_maps(scenario.get("steps"))]
+    asked = [one for key in ("serves", "calls") for _, one in as_maps(scenario.get(key))] + steps
+    about = next((one for one in asked if one.get("service") == given.get("service")), None)
+    expected = given.get("expect")
+    if part is None or about is None or not about.get("service"):
+        return
+    text = about.get("definition") or ros_packages().text(str(about.get("type")), "srv")
+    each = [((), expected)] if isinstance(expected, dict) else [((n,), one) for n, one in as_maps(expected)]
+    for at, one in each if isinstance(text, str) else ():
+        fault = _no_such_values(str(about.get("type")), str(text), part, one)
+        if fault:
+            yield (*path, "with", "expect", *at), fault
+
+
+def _no_such_values(type_: str, text: str, part: str, expected: dict[str, Any]) -> str:
+    from grader.evidence.message_values import ServiceTypes  # noqa: PLC0415 - slow to load, and few rubrics need it
+
+    try:
+        kind = getattr(ServiceTypes(type_, text), part)
+        there = kind.decode(kind.encode({}))
+    except ValueError:
+        return ""
+    return _other_shape(there, expected, f"the {part} of {type_}")
+
+
+def _other_shape(there: object, expected: object, what: str) -> str:
+    """Return which name is not in a message, or which text is no number; empty where the value may be there."""
+    if isinstance(there, dict) and isinstance(expected, dict):
+        unknown = next((name for name in expected if name not in there), None)
+        if unknown is not None:
+            return f"{what} has no field {unknown}{_instead(str(unknown), list(there))}"
+        found = (_other_shape(there[name], value, f"{name} of {what}") for name, value in expected.items())
+        return next(filter(None, found), "")
+    kinds = {str: "a text", int: "a number", float: "a number", bool: "true or false"}
+    if (
+        type(there) in kinds
+        and type(expected) in kinds
+        and isinstance(there, str) != isinstance(expected, str)
+    ):
+        return f"{what} is {kinds[type(there)]}, not {expected!r}"
+    return ""
+
+
+def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield types of the student's package that are all but one whose file a criterion asks for."""
+    criteria = list(as_maps(rubric.get("criteria")))
+    files = [str(as_map(c.get("with")).get("file")) for _, c in criteria if c.get("check") == "definition"]
+    names, own = {PurePosixPath(file).stem for file in files}, packages_in(rubric)
+    for index, criterion in criteria:
+        kind = as_map(criterion.get("with")).get("type")
+        package, _, name = kind.partition("/") if isinstance(kind, str) else ("", "", "")
+        near = closest(name, names, cutoff=SURE) if package in own and name not in names else ""
+        if near:
+            yield (
+                ("criteria", index, "with", "type"),
+                f'no criterion asks for {name} (did you mean "{package}/{near}"?)',
+            )
+
+
+def _misspelt_scripts(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield scripts that nothing starts, and that are all but one that is started and that no criterion names."""
+    criteria = list(as_maps(rubric.get("criteria")))
+    paths = {n: as_map(c.get("with")).get("path") for n, c in criteria if c.get("check") == "executable"}
+    named = {n: PurePosixPath(path).name for n, path in paths.items() if isinstance(path, str)}
+    starts = [start for scenario in scenarios.values() for start in _starts(scenario)]
+    started = {PurePosixPath(script).name for script in _named(starts, "script")}
+    for index, name in named.items():
+        near = "" if name in started else _near(name, started - {*named.values()}, cutoff=SURE)
+        if near:
+            yield ("criteria", index, "with", "path"), f'no scenario starts {name} (did you mean "{near}"?)'
+
+
+@lru_cache(maxsize=256)
+def _no_such_field(type_: str, field: str) -> str:
+    """Return why a type has no such field; empty where it has, or where its definition is not known here."""
+    from grader.checks.support.fields import NoField, values_at  # noqa: PLC0415 - as below
+    from grader.evidence.message_values import MessageType  # noqa: PLC0415 - slow to load, and few rubrics need it
+
+    try:
+        kind = MessageType(type_)
+        values_at(kind.decode(kind.encode({})), field.partition("[")[0])
+    except NoField as error:
+        return f"{type_}: {error}"
+    except ValueError:
+        return ""
+    return ""
+
+
+def _misspelt_nodes(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield private parameters of a node whose name is all but one that a criterion asks for."""
+    asked: dict[str, set[str]] = {}
+    for _, criterion in as_maps(rubric.get("criteria")):
+        names = as_texts(as_map(criterion.get("with")).get("names"))
+        asked.setdefault(str(criterion.get("scenario")), set()).update(n.strip("/") for _, n in names)
+    for name, scenario in scenarios.items():
+        given: list[tuple[KeyPath, dict[str, Any]]] = [
+            (("params", n), one) for n, one in as_maps(scenario.get("params"))
+        ]
+        given += [
+            (("steps", n, "set_param"), as_map(s.get("set_param"))) for n, s in as_maps(scenario.get("steps"))
+        ]
+        for at, one in given:
+            node, _, private = str(one.get("name", "")).strip("/").partition("/")
+            nodes = asked.get(name, set())
+            near = _near(node, nodes, cutoff=SURE) if private and node not in nodes else ""
+            if near:
+                fault = f'the node is called {near}, and not {node} (did you mean "/{near}/{private}"?)'
+                yield ("scenarios", name, *at, "name"), fault
 
 
 def _waited_for(until: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:

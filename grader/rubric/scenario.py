@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
+from grader.model.interfaces import parse_definition
 from grader.model.record import Record
 
 Seconds = Annotated[float, Field(ge=0)]
@@ -27,6 +28,8 @@ StepSeconds = Annotated[float, Field(gt=0, le=STEP_S_MAX)]
 def _service_text(text: str | None) -> str | None:
     if text is not None and sum(line.strip() == "---" for line in text.splitlines()) != 1:
         raise ValueError("a service has a request and a response with one line --- between them")
+    for _ in parse_definition(text or "---", ".srv"):
+        pass
     return text
 
 

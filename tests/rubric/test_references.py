@@ -267,6 +267,38 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
             id="rate-with-a-fast-clock",
         ),
         pytest.param(
+            "check: logs, with: {text: a}, scenario: launch",
+            "check: reacts, with: {cause: {topic: /chater}, effect: {topic: /pong}, within_s: 1}, scenario: listener",
+            "39: criteria[9].with.cause.topic: nothing in listener sends on /chater, and no other criterion names it "
+            '(did you mean "/chatter"?)',
+            id="cause-that-never-comes",
+        ),
+        pytest.param(
+            "check: logs, with: {text: a}, scenario: launch",
+            "check: reacts, with: {cause: {topic: /chatter}, effect: {topic: /chatter, field: text, value: a}, "
+            "within_s: 1}, scenario: listener",
+            "39: criteria[9].with.effect.field: std_msgs/String: the message has no field text, but data",
+            id="field-that-the-type-lacks",
+        ),
+        pytest.param(
+            "check: logs, with: {text: a}",
+            "check: field-bounds, with: {topic: /scan, field: 'ranges[3]', min: 0}",
+            "",
+            id="field-of-a-type-that-is-not-known",
+        ),
+        pytest.param(
+            "check: logs, with: {text: a}",
+            "check: manifest, with: {name: lab1, dependencies: [rospy, std_msg, python3-serial]}",
+            '39: criteria[9].with.dependencies[1]: there is no ROS package "std_msg" (did you mean "std_msgs"?)',
+            id="dependency",
+        ),
+        pytest.param(
+            "check: node-lives, with: {process: talker}",
+            "check: executable, with: {path: src/talkr.py}",
+            '30: criteria[0].with.path: no scenario starts talkr.py (did you mean "talker.py"?)',
+            id="script-of-another-name",
+        ),
+        pytest.param(
             "{names: [/side]}",
             "{names: [/sides]}",
             '34: criteria[4].with.names[0]: listener sets no parameter /sides (did you mean "/side"?): '
@@ -282,6 +314,58 @@ def test_a_slip_is_refused(old: str, new: str, fault: str, tmp_path: Path) -> No
         assert len(faults(path)) == (2 if old in FOLLOWED else 1)
     else:
         assert load_rubric(str(path)).rubric.id == "sample"
+
+
+SERVICE = """\
+schema: grader.rubric/1
+id: sample
+title: A sample
+version: "1"
+package: lab1
+scenarios:
+  asks:
+    title: The client asks
+    params: [{name: /ask/times, value: 3}]
+    serves: [{service: /add, type: lab1/Add, answer: {sum: 3}, definition: "int64 a\\n---\\nint64 sum"}]
+    calls: [{service: /on, type: std_srvs/SetBool}]
+    start: [{name: ask, script: scripts/ask.py}]
+    until: {ended: [ask]}
+criteria:
+  - {id: asks, title: It asks, points: 20, check: calls, with: {service: /add, expect: {a: 1}}, scenario: asks}
+  - {id: file, title: A file, points: 20, check: definition, with: {file: msg/Reading.msg, fields: {at: time}}}
+  - {id: node, title: A node, points: 20, check: node-lives, with: {process: ask, names: [ask]}, scenario: asks}
+  - {id: type, title: A type, points: 20, check: topic-type, with: {topic: /r, type: lab1/Reading}, scenario: asks}
+  - {id: answers, title: It answers, points: 20, check: service-answers, scenario: asks,
+     with: {service: /on, expect: [{success: true}]}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("{a: 1}", "{b: 1}", "15: criteria[0].with.expect: the request of lab1/Add has no field b: there is a"),
+        ("{a: 1}", "[{a: 1}, {a: one}]",
+         "15: criteria[0].with.expect[1]: a of the request of lab1/Add is a number, not 'one'"),
+        ("success: true", "sucess: true",
+         ("20: criteria[4].with.expect[0]: the response of std_srvs/SetBool has no field sucess "
+          '(did you mean "success"?)')),
+        ("type: lab1/Reading", "type: lab1/Readings",
+         '18: criteria[3].with.type: no criterion asks for Readings (did you mean "lab1/Reading"?)'),
+        ("/ask/times", "/asks/times",
+         '9: scenarios.asks.params[0].name: the node is called ask, and not asks (did you mean "/ask/times"?)'),
+        ("int64 a", "int46 a",
+         '10: scenarios.asks.serves[0].definition: there is no type "int46" (did you mean "int64"?)'),
+        ("at: time", "at: tme", '16: criteria[1].with: there is no type "tme" (did you mean "time"?)'),
+        ("type: lab1/Reading", "type: lab1/Reading, definition: 'tme at'",
+         '18: criteria[3].with.definition: there is no type "tme" (did you mean "time"?)'),
+    ],
+)  # fmt: skip
+def test_a_slip_in_own_types_is_refused(old: str, new: str, fault: str, tmp_path: Path) -> None:
+    path = tmp_path / "lab.yaml"
+    path.write_text(SERVICE)
+    assert load_rubric(str(path)).rubric.id == "sample"
+    path.write_text(SERVICE.replace(old, new))
+    assert faults(path) == [f"lab.yaml:{fault}"]
 
 
 def test_what_a_map_of_a_checks_parameters_names_is_looked_at(tmp_path: Path) -> None:
