@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from difflib import get_close_matches
 from pathlib import PurePosixPath
 
 from grader.model.package import Fault, Interface, InterfaceField
-from grader.wording import did_you_mean
 
 FIELDS_MAX = 500
 PARTS = {".msg": ("",), ".srv": ("request", "response"), ".action": ("goal", "result", "feedback")}
@@ -58,7 +58,8 @@ def refuse_unknown(type_: str) -> None:
     """Raise ValueError where a type has the form of a built-in one, and is none."""
     base = type_.partition("[")[0]
     if base.islower() and "/" not in base and base not in {*BUILT_IN, *FULL_NAMES}:
-        raise ValueError(f'there is no type "{type_}"{did_you_mean(base, BUILT_IN)}')
+        near = get_close_matches(base, sorted(BUILT_IN), n=1)
+        raise ValueError(f'there is no type "{type_}"' + (f' (did you mean "{near[0]}"?)' if near else ""))
 
 
 def _parse_line(text: str, part: str, line: int) -> InterfaceField | None:
