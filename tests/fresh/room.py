@@ -34,6 +34,31 @@ CAPABILITIES = (
 )  # fmt: skip
 """What root may do in a container, as Docker has it where nobody asked for more."""
 PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
+ALONE = (
+    "unshare",
+    "--mount",
+    "--pid",
+    "--net",
+    "--ipc",
+    "--uts",
+    "--fork",
+    "--kill-child",
+    "--propagation",
+    "private",
+)
+PRIVILEGED = f"""
+set -e
+cd "$1"
+mount --bind . . && cd "$1"
+mount -t proc proc proc
+mount --rbind /dev dev
+mount --rbind /sys sys
+mkdir -p .{HOST} && mount -t tmpfs none .{HOST}
+[ -z "$2" ] || {{ mkdir .{HOST}/locks && mount --bind "$2" .{HOST}/locks; }}
+mkdir -p mnt/outside && pivot_root . mnt/outside && umount -l /mnt/outside
+cd "$3" && shift 3 && exec "$@"
+"""
+"""The root becomes this process's own: one that is only changed into (chroot) may make no user namespaces."""
 NEEDED_KIB = 6_000_000
 """Of memory: a root with ROS takes 2 GB, and each that stands on it what it adds."""
 
@@ -85,10 +110,13 @@ class Root:
         locks: Path | None = None,
         cwd: str = "/",
         user: str | None = None,
+        privileged: bool = False,
         check: bool = True,
         timeout: float = 280,
     ) -> subprocess.CompletedProcess[str]:
         """Run a command in the root as root, or as `user` (a name or a number), with what a container may do.
+
+        `privileged` is as on a machine of its own: with all rights and the kernel's control groups, but no network.
 
         With the folder of their `locks`, graders in the root and those of this machine take turns.
         Raises Failed where `check` is set and it ends with another code than 0.
@@ -100,14 +128,21 @@ class Root:
         variables = {"PATH": PATH, "HOME": "/root", **settings, **self.env, **(env or {})}
         groups = "--clear-groups" if (user or "").isdecimal() else "--init-groups"  # a number may be nobody's
         who = ["setpriv", f"--reuid={user}", f"--regid={user}", groups, "--inh-caps=-all"] if user else []
-        command = [
-            *self.rooms.enter, "bwrap", "--die-with-parent", "--bind", f"{self.rooms.tmpfs}/{self.place}/root", "/",
-            "--proc", "/proc", "--dev", "/dev", "--unshare-pid", "--unshare-ipc", "--unshare-uts",
-            *([] if network else ["--unshare-net"]), "--tmpfs", HOST, *binds, "--clearenv",
-            *(word for capability in CAPABILITIES for word in ("--cap-add", f"CAP_{capability}")),
-            *(word for name, value in variables.items() for word in ("--setenv", name, value)),
-            "--chdir", cwd, "--", *who, *argv,
-        ]  # fmt: skip
+        place = f"{self.rooms.tmpfs}/{self.place}/root"
+        if privileged:
+            assert not network
+            box = [*ALONE, "sh", "-c", PRIVILEGED, "sh", place, str(locks or ""), cwd]
+            box += ["env", "-i", *(f"{name}={value}" for name, value in variables.items())]
+        else:
+            box = [
+                "bwrap", "--die-with-parent", "--bind", place, "/",
+                "--proc", "/proc", "--dev", "/dev", "--unshare-pid", "--unshare-ipc", "--unshare-uts",
+                *([] if network else ["--unshare-net"]), "--tmpfs", HOST, *binds, "--clearenv",
+                *(word for capability in CAPABILITIES for word in ("--cap-add", f"CAP_{capability}")),
+                *(word for name, value in variables.items() for word in ("--setenv", name, value)),
+                "--chdir", cwd, "--",
+            ]  # fmt: skip
+        command = [*self.rooms.enter, *box, *who, *argv]
         done = subprocess.run(
             command,
             stdin=subprocess.DEVNULL,
