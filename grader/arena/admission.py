@@ -112,7 +112,8 @@ def latest_ms(path: Path) -> float:
 
 T = TypeVar("T")
 
-LOOK_S = 0.02
+LOOK_S, LOOK_MOST_S = 0.02, 0.1
+"""The first looks follow each other quickly. Who waits long looks less often: in a class, there are always others."""
 LATE_MS = 10.0
 """For each such step that the machine is late, one start fewer at a time; one is always let in."""
 RUN_BYTES = 400 << 20
@@ -203,9 +204,10 @@ def _has_room(runs: FileLock) -> bool:
 
 async def _until(look: Callable[[], T], patience_s: float) -> T:
     """Return what `look` finds, as soon as it finds something; its last answer once the time is up."""
-    until_s = time.monotonic() + patience_s
-    while not (found := look()) and time.monotonic() < until_s:  # noqa: ASYNC110 - others' locks tell no event loop
-        await asyncio.sleep(LOOK_S)
+    until_s, pause_s = time.monotonic() + patience_s, LOOK_S
+    while not (found := look()) and time.monotonic() < until_s:  # others' locks tell no event loop
+        await asyncio.sleep(pause_s)
+        pause_s = min(1.2 * pause_s, LOOK_MOST_S)
     return found
 
 

@@ -311,6 +311,32 @@ def test_of_thousands_of_sockets_on_one_port_some_are_looked_at(module, monkeypa
     assert set(found) <= inodes
 
 
+@pytest.mark.parametrize(("most", "asked"), [(10, 1), (90, 1), (91, 5)], ids=["little", "the limit", "more"])
+def test_each_socket_is_asked_about_where_all_of_the_machine_hold_enough(
+    module, monkeypatch, most: int, asked: int
+) -> None:
+    """Below the limit, what they hold at most is enough to know."""
+    sockets, questions = module("sockets"), []
+    monkeypatch.setattr(sockets, "_memory_bytes", lambda *about: questions.append(about) or 10)
+    monkeypatch.setattr(sockets, "_internet_bytes_at_most", lambda: most)
+    assert sockets.buffer_bytes(100) == (10 + most if asked == 1 else 50)
+    assert len(questions) == asked
+
+
+def test_what_all_sockets_of_the_machine_hold_is_no_less_than_what_one_holds(module) -> None:
+    server = socket.create_server(("127.0.0.1", 0))
+    near = socket.create_connection(server.getsockname())
+    near.setblocking(False)
+    sent = 0
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            sent += near.send(bytes(MB))
+    assert sent > MB
+    assert module("sockets")._internet_bytes_at_most() > sent
+    near.close()
+    server.close()
+
+
 def test_who_has_very_many_files_open_is_looked_at_so_far_and_named(module, monkeypatch) -> None:
     owners = module("sockets")
     monkeypatch.setattr(owners, "FILES_MAX", 5)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import secrets
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,7 +15,7 @@ import pytest
 from grader.arena.control_groups import find_cgroups
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "grader" / "arena" / "ros"))
-from process_tree import Groups
+from process_tree import Groups, TreeRest, descendants
 
 FOUND = find_cgroups().memory
 MB = 1 << 20
@@ -67,12 +69,29 @@ def test_version_2_has_one_group_for_all(tmp_path: Path) -> None:
     assert ((folder / "memory.max").read_text(), (folder / "pids.max").read_text()) == (str(64 * MB), "7")
     groups.take([4711])
     assert (folder / "cgroup.procs").read_text() == "4711"
+    assert groups.pids() == [4711]
     (folder / "cpu.stat").write_text("usage_usec 2500000\nuser_usec 1\n")
     assert groups.cpu_s() == 2.5
     assert not groups.remove()
     for path in folder.iterdir():
         path.unlink()
     assert groups.remove()
+    assert groups.pids() == []
+
+
+def test_only_programs_that_start_no_other_count_as_last() -> None:
+    """A shell with a program below it is one program, and the shell alone is one, too."""
+    command = (
+        "import subprocess, time; print(subprocess.Popen(['sleep', '60']).pid, flush=True); time.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", command], stdout=subprocess.PIPE) as upper:
+        assert upper.stdout is not None
+        lower = int(upper.stdout.readline())
+        assert TreeRest().look([upper.pid, lower], 1.0)[1] == 1
+        assert TreeRest().look([upper.pid], 1.0)[1] == 1
+        assert descendants(upper.pid) == [lower]
+        os.kill(lower, signal.SIGKILL)
+        upper.kill()
 
 
 NOT_WAITED_FOR = """

@@ -144,6 +144,18 @@ for _ in range(10):
             time.sleep(60)
 time.sleep(60)
 """
+TCP = """
+import socket, time
+kept = [socket.create_server(("127.0.0.1", 0))]
+while True:
+    near = socket.create_connection(kept[0].getsockname())
+    near.setblocking(False)
+    kept += [near, kept[0].accept()[0]]
+    try:
+        while True: near.send(bytes(65536))
+    except BlockingIOError:
+        time.sleep(0.01)
+"""
 DESCRIPTORS = """
 import os, time
 for _ in range(12):
@@ -200,6 +212,7 @@ time.sleep(60)
     "attack",
     [
         (SOCKETS, RunLimits(socket_bytes=64 << 20), "more than 64 MB in sockets"),
+        (TCP, RunLimits(socket_bytes=64 << 20), "more than 64 MB in sockets"),
         (DESCRIPTORS, RunLimits(), "more than 8192 files, pipes and sockets open"),
         (FILES, RunLimits(memory_bytes=100 << 20), "more than 100 MB of memory"),
         (SHARED_AND_LET_GO, RunLimits(memory_bytes=200 << 20), "more than 200 MB of memory"),

@@ -264,8 +264,9 @@ class Arena:
     def _watch_sockets(self):
         """No process is charged for what sockets hold: past the limit, the tree with the most of them is stopped."""
         students = [process for process in self._processes.values() if process.role != "grader"]
-        if self._stage and students and buffer_bytes() > self._limits["socket_bytes"]:
-            excess = "more than {} MB in sockets".format(self._limits["socket_bytes"] >> 20)
+        limit_bytes = self._limits["socket_bytes"]
+        if self._stage and students and buffer_bytes(limit_bytes) > limit_bytes:
+            excess = "more than {} MB in sockets".format(limit_bytes >> 20)
             max(students, key=Process.descriptors).stop_for(excess)
         self.loop.call_later(WATCH_S, self._watch_sockets)
 

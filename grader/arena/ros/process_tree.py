@@ -55,12 +55,17 @@ def _children_of_thread(pid, thread):
 
 def cpu_s(pid):
     """Of a process and of the children that it waited for."""
+    return parent_and_cpu_s(pid)[1]
+
+
+def parent_and_cpu_s(pid):
+    """Return a process's parent, 0 where it has ended, and its CPU seconds with those of waited-for children."""
     try:
         with open("/proc/{}/stat".format(pid), "rb") as file:  # with a name that it gave itself, in any bytes
             fields = file.read().rpartition(b")")[2].split()
-        return sum(int(ticks) for ticks in fields[11:15]) / TICKS_HZ
+        return int(fields[1]), sum(map(int, fields[11:15])) / TICKS_HZ
     except (OSError, IndexError, ValueError):
-        return 0.0
+        return 0, 0.0
 
 
 def descriptors(pid):
@@ -150,20 +155,20 @@ class Rest:
         self._work_s = None
         self._naps = {}
 
-    def look(self, now_s):
-        wakes, work_s = _wakes(self._pid, self._pid), cpu_s(self._pid) + _late_s(self._pid)
+    def look(self, now_s, used_s):
+        """`used_s` are the CPU seconds that the program has used so far."""
+        wakes, work_s = _wakes(self._pid, self._pid), used_s + _late_s(self._pid)
         if wakes != self._wakes:
             self._woke_s = now_s
         napping, asleep = self._others(now_s)
         working = self._work_s is None or work_s - self._work_s > WORKING * (now_s - self._looked_s)
-        waits = waits_in(self._pid, self._pid)
         if working or asleep or now_s - self._woke_s > ASLEEP_S:
             self.since_s = None
         elif self.since_s is None:
             self.since_s, self._wakes_before = now_s, wakes
             self._only_callbacks, self._napping = True, False
         if self.since_s is not None:
-            self._only_callbacks = self._only_callbacks and "futex" in waits
+            self._only_callbacks = self._only_callbacks and "futex" in waits_in(self._pid, self._pid)
             self._napping = self._napping or napping
             rarely = wakes - self._wakes_before <= SPIN_HZ * (now_s - self.since_s) + 1
             self.spins = not self._napping and (rarely or self._only_callbacks)
@@ -194,10 +199,12 @@ class TreeRest:
         if len(pids) > PROGRAMS_MAX:
             return None, PROGRAMS_MAX
         pids = [pid for pid in pids if not waits_in(pid, pid).startswith("do_wait")]
+        seen = {pid: parent_and_cpu_s(pid) for pid in pids}
         self._programs = {pid: self._programs.get(pid) or Rest(pid, now_s) for pid in pids}
-        for program in self._programs.values():
-            program.look(now_s)
-        last = [pid for pid in pids if not _children(pid)]
+        for pid, program in self._programs.items():
+            program.look(now_s, seen[pid][1])
+        parents = {parent for parent, _ in seen.values()}
+        last = [pid for pid in pids if pid not in parents]
         if not last or any(program.since_s is None for program in self._programs.values()):
             return None, len(last)
         return "spins" if all(self._programs[pid].spins for pid in last) else "loops", len(last)
@@ -248,6 +255,14 @@ class Groups:
             for pid in pids:
                 with contextlib.suppress(OSError):  # it has ended
                     _write(folder, "cgroup.procs", pid)
+
+    def pids(self):
+        """Return the ids of all processes of the tree; none where no group knows them."""
+        with contextlib.suppress(OSError, ValueError, StopIteration):  # no group was made, or it is gone
+            _, folder = next(iter(self._made.values()))
+            with open(os.path.join(folder, "cgroup.procs")) as file:
+                return [int(pid) for pid in file]
+        return []
 
     def memory_kills(self):
         """How often the kernel killed a process because the tree had too much memory. What it kills because the whole

@@ -190,12 +190,18 @@ class Process:
 
     def _tree(self):
         """Return the student's own processes, without bubblewrap's two."""
-        tree = descendants(self.pid)
-        return [pid for pid in tree if pid != self._inner_pid]
+        return [pid for pid in self._below() if pid != self._inner_pid]
 
     def tree(self):
         """Return the ids of all its processes, bubblewrap's own too."""
-        return [self.pid, *descendants(self.pid)]
+        return [self.pid, *self._below()]
+
+    def _below(self):
+        """Return the ids of those below the first. In a sandbox, its control group knows them all at once."""
+        in_group = (
+            self._groups.pids() if self._groups is not None and self._inner_pid and self._entered else []
+        )
+        return [pid for pid in in_group if pid != self.pid] if self.pid in in_group else descendants(self.pid)
 
     def cpu_used_s(self):
         """Of all its processes so far, also of what has ended. A control group also counts children never waited for,

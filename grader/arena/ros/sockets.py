@@ -26,6 +26,9 @@ UNIX_SENT_BYTES_MAX = 425984
 """What one socket may send ahead, with its own wish for more (net.core.wmem_max, twice)."""
 INET_SHOW_MEMORY, INET_MEMORY = 1 << 6, 7
 UNIX_ANSWER_BYTES, INET_ANSWER_BYTES = 16, 72
+PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+PAGES_NOT_ADDED = 256
+"""Each processor may keep so many back from the machine's sum (net.core.mem_pcpu_rsv)."""
 REQUEST, DUMP = 0x1, 0x300
 ERROR, DONE = 2, 3
 ESTABLISHED, CLOSE_WAIT, LISTEN, ALL_STATES = 1, 8, 10, 0xFFFFFFFF
@@ -36,7 +39,7 @@ ROWS_MAX = 20000
 _HEADER = struct.Struct("=IHHII")
 _UNIX = struct.Struct("=BBHIIIQ")
 _ATTRIBUTE = struct.Struct("=HH")
-_MEMORY = struct.Struct("=III")
+_MEMORY = struct.Struct("=6I")
 _ID = struct.Struct("!HH16s16s4x8s")
 _ANSWER_PORTS, _ANSWER_INODE = struct.Struct("!4xHH"), struct.Struct("=4x48x16xI")
 _NO_COOKIE = b"\xff" * 8
@@ -99,16 +102,34 @@ def _dumped(states, port, most=SOCKETS_MAX):
     return [row for family in families for row in _asked(family, states, *ends, dump=True, most=most)]
 
 
-def buffer_bytes():
-    """Return what the buffers of all sockets of this network namespace hold: no process's memory counts it."""
+def buffer_bytes(limit_bytes):
+    """Return what the buffers of all sockets of this network namespace hold: no process's memory counts it.
+
+    Up to the limit, they may hold less than this: the kernel is asked about each TCP and UDP socket only where those of
+    the whole machine hold enough to matter.
+    """
     unix = _UNIX.pack(socket.AF_UNIX, 0, 0, ALL_STATES, 0, UNIX_SHOW, 0)
-    questions = [(unix, UNIX_ANSWER_BYTES, UNIX_MEMORY)]
+    held = _memory_bytes(unix, UNIX_ANSWER_BYTES, UNIX_MEMORY)
+    most = held + _internet_bytes_at_most()
+    if most <= limit_bytes:
+        return most
     for family in (socket.AF_INET, socket.AF_INET6):
         for protocol in (socket.IPPROTO_TCP, socket.IPPROTO_UDP):
             head = struct.pack("=BBBBI", family, protocol, INET_SHOW_MEMORY, 0, ALL_STATES)
             question = head + _ID.pack(0, 0, bytes(16), bytes(16), _NO_COOKIE)
-            questions.append((question, INET_ANSWER_BYTES, INET_MEMORY))
-    return sum(_memory_bytes(*question) for question in questions)
+            held += _memory_bytes(question, INET_ANSWER_BYTES, INET_MEMORY)
+    return held
+
+
+def _internet_bytes_at_most():
+    """Return what all TCP and UDP sockets of the machine hold, with what the kernel may not have added up yet."""
+    pages = PAGES_NOT_ADDED * (os.cpu_count() or 1)
+    try:
+        with open("/proc/net/sockstat") as file:
+            rows = [line.split() for line in file if line.startswith(("TCP:", "UDP:"))]
+        return (pages + sum(int(row[row.index("mem") + 1]) for row in rows)) * PAGE_BYTES
+    except (OSError, ValueError, IndexError):
+        return 1 << 62
 
 
 def _memory_bytes(question, answer_bytes, wanted):
@@ -122,8 +143,8 @@ def _memory_bytes(question, answer_bytes, wanted):
                 if kind == UNIX_UNREAD and wanted == UNIX_MEMORY and any(body[at + 4 : at + 8]):
                     held += UNIX_SENT_BYTES_MAX  # charged to the sender, which may be gone
                 elif kind == wanted and length >= _ATTRIBUTE.size + _MEMORY.size:
-                    received, _, sent = _MEMORY.unpack_from(body, at + _ATTRIBUTE.size)
-                    held += received + sent
+                    received, _, sent, _, _, queued = _MEMORY.unpack_from(body, at + _ATTRIBUTE.size)
+                    held += received + max(sent, queued)  # TCP counts as sent what is on its way alone
                 at += max(_ATTRIBUTE.size, (length + 3) & ~3)
     return held
 
