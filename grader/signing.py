@@ -26,6 +26,7 @@ BYTES_MAX, BLOCK_BYTES = 4 << 20, 1 << 20
 TIMEOUT_S = 60.0
 LINE = re.compile(r"(?P<sum>[0-9a-f]{64})  (?P<name>[^\n]+)")
 KEY = re.compile(r"with (?P<key>\S+ key SHA256:\S+)")
+LOCKED_KEY = "a key with a passphrase has to be in ssh-agent; name its .pub file then"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,12 +40,14 @@ class Signature:
 
 def sign(folder: Path, key: Path) -> None:
     """Sign the result in a folder and the evidence beside it. Raises UsageError where the key cannot be used."""
+    if not key.is_file():
+        raise UsageError(f"{key}: there is no such file", hint="ssh-keygen -t ed25519 -f KEY makes a key")
     text = "".join(f"{digest}  {name}\n" for name, digest in sorted(file_sums(folder).items())).encode()
     done = _ssh_keygen(["-Y", "sign", "-f", str(key.absolute()), "-n", NAMESPACE], text)
     if done.returncode or not done.stdout:
         raise UsageError(
             f"{key}: ssh-keygen cannot sign with it: {_said(done)}",
-            hint="a key with a passphrase has to be in ssh-agent; name its .pub file then",
+            hint=f"chmod 600 {key}" if b"UNPROTECTED" in done.stderr else LOCKED_KEY,
         )
     (folder / SIGNATURE).unlink(missing_ok=True)
     atomic_write(folder / SUMS, text)

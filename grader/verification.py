@@ -19,6 +19,7 @@ from grader import __version__
 from grader.errors import EvidenceError
 from grader.evidence.reader import load_evidence
 from grader.evidence.run import Run
+from grader.intake import safe_name
 from grader.judging import judge
 from grader.judging.settle import settle
 from grader.judging.summary import overall_status, total_fields
@@ -75,20 +76,35 @@ def read_whole(folder: Path) -> GradingResult:
     return result
 
 
-def verify(folder: Path, rubric: LoadedRubric, allowed: Path | None) -> list[Finding]:
+def verify(
+    folder: Path, rubric: LoadedRubric, allowed: Path | None, *, of_class: bool = False
+) -> list[Finding]:
     """Judge the evidence in a result's folder again, and return what was found about result, rubric, evidence and
-    signature. Raises EvidenceError where there is nothing to judge."""
+    signature. `of_class`: the folder is one of a class, where it has its submission's name.
+
+    Raises EvidenceError where there is nothing to judge.
+    """
     result = read_whole(folder)
     if result.error is not None:
         raise EvidenceError(
             f"{folder}: it was not graded, so there is nothing to judge: {result.error.message}"
         )
-    found = [*_rubric_findings(result, rubric), *_signature_findings(folder, allowed)]
+    found = [*_owner_findings(folder, result, of_class=of_class), *_rubric_findings(result, rubric)]
+    found += _signature_findings(folder, allowed)
     try:
         runs = load_evidence([folder / EVIDENCE])
     except EvidenceError as error:
         return [*found, Finding(about="evidence", text=error.message)]
     return [*found, *_evidence_findings(result, runs), *_result_findings(result, runs, rubric)]
+
+
+def _owner_findings(folder: Path, result: GradingResult, *, of_class: bool) -> Iterator[Finding]:
+    """The whole of another student's folder, signature and all, fits in itself."""
+    owner, name = result.submission.id, folder.resolve().name
+    if name != safe_name(owner):
+        yield Finding(
+            about="result", text=f"it is the result of {owner}, in the folder {name}", wrong=of_class
+        )
 
 
 def _rubric_findings(result: GradingResult, rubric: LoadedRubric) -> Iterator[Finding]:
@@ -129,8 +145,8 @@ def _signature_words(signature: Signature, *, asked: bool) -> str:
         return "SHA256SUMS is not what was signed"
     if signature.state == "good":
         return f"signed by {signature.by}"
-    who = "none of the allowed signers" if asked else "whose, --allowed-signers says"
-    return f"signed with the {signature.by}, {who}"
+    who = ", none of the allowed signers" if asked else " (--allowed-signers says whose that is)"
+    return f"signed with the {signature.by}{who}"
 
 
 def _evidence_findings(result: GradingResult, runs: Mapping[str, Run]) -> Iterator[Finding]:

@@ -32,7 +32,7 @@ ALLOWED = {
     "files": {"errors", "portable"},
     "results": BASE | {"files"},
     "signing": {"errors", "files", "host_programs", "results"},
-    "verification": BASE | {"evidence", "judging", "report", "results", "rubric", "signing"},
+    "verification": BASE | {"evidence", "intake", "judging", "report", "results", "rubric", "signing"},
     "faults": BASE | {"files", "intake", "judging", "report", "results", "rubric"},
     "evidence": BASE | {"files", "installable"},
     "package": BASE | {"files", "host_programs", "limited_child", "rubric.model", "rubric.scenario"},

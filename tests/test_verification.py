@@ -204,6 +204,30 @@ def test_who_signed_is_said_and_what_changed_since_is_named(tmp_path, told) -> N
     assert "none of the allowed signers" in out
 
 
+def test_somebody_elses_result_is_named(tmp_path, told) -> None:
+    ann = graded(tmp_path / "class" / "ann")
+    key, line = new_key(tmp_path, "staff")
+    (tmp_path / "allowed").write_text(line)
+    assert run(["sign", str(ann), "--key", str(key)]) == 0
+    bob = shutil.copytree(ann, ann.with_name("bob"))
+    words = "result: it is the result of ann, in the folder bob\n"
+    code, out = told(bob, "--allowed-signers", tmp_path / "allowed")
+    assert (code, f"+ {words}" in out) == (0, True)  # a folder of its own can have any name
+    (tmp_path / "class" / "run.json").write_text("{}")
+    code, out = told(tmp_path / "class", "--allowed-signers", tmp_path / "allowed")
+    assert (code, f"x {words}" in out, out.count(": ok\n")) == (1, True, 1)
+
+
+def test_a_key_that_is_not_there_or_open_to_all_says_so(tmp_path, capsys) -> None:
+    folder = graded(tmp_path / "ann")
+    assert run(["sign", str(folder), "--key", str(tmp_path / "nokey")]) == 2
+    assert "nokey: there is no such file" in capsys.readouterr().err
+    key, _ = new_key(tmp_path, "staff")
+    key.chmod(0o644)
+    assert run(["sign", str(folder), "--key", str(key)]) == 2
+    assert f"hint: chmod 600 {key}" in capsys.readouterr().err
+
+
 def test_changed_sums_and_a_broken_signature_are_named(tmp_path, told) -> None:
     folder = graded(tmp_path / "ann")
     staff, _ = new_key(tmp_path, "staff")

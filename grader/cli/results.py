@@ -193,7 +193,9 @@ def verify_results(results: Sequence[Path], rubric: str | None, allowed: Path | 
             name = rubric or read_whole(folder).rubric.id
             if name not in rubrics:
                 rubrics[name] = _rubric_named(name, given=rubric is not None)
-            codes.add(_print_findings(folder, verify(folder, rubrics[name], allowed)))
+            of_class = (folder.resolve().parent / RUN).is_file()
+            found = verify(folder, rubrics[name], allowed, of_class=of_class)
+            codes.add(_print_findings(folder, found))
         except EvidenceError as error:  # noqa: PERF203 - each result has its own
             report(error)
             codes.add(ExitCode.NOT_GRADED)
