@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -122,6 +123,7 @@ def test_the_cited_line_is_marked_among_those_around_it(shown) -> None:
     assert code.locator("mark").all_inner_texts() == ["    rate.sleep"]
     rows = [row.bounding_box() for row in code.locator("pre .row").all()]
     assert [row["y"] for row in rows] == sorted({row["y"] for row in rows}), "each line below the one before"
+    assert {round(after["y"] - before["y"] - before["height"]) for before, after in pairwise(rows)} == {0}
 
 
 def test_a_timeline_is_zoomed_by_keys_buttons_and_wheel_and_scrolled(visit, written) -> None:

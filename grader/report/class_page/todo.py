@@ -89,7 +89,7 @@ KINDS = (
     _Kind(
         anchor="missing",
         title="Not graded yet",
-        advice="The batch goes on where it stopped:",
+        advice="The batch continues where it stopped:",
         holds=lambda found: found.state == "missing",
         text=lambda _: "",
         command=again,
@@ -105,7 +105,7 @@ KINDS = (
     _Kind(
         anchor="error",
         title="Could not be graded",
-        advice="What is wrong with a submission is for its student to fix. Then run only these again:",
+        advice="If a submission is at fault, its student has to fix it. Then run only these again:",
         holds=lambda found: found.problem is not None and not found.problem.roster,
         text=_problem,
         command=lambda run, out: again(run, out, "failed"),
@@ -121,7 +121,7 @@ KINDS = (
     _Kind(
         anchor="look-again",
         title="Decided by a person, and the check says something else now",
-        advice="See whether the points still stand:",
+        advice="Check whether the points are still right:",
         holds=lambda found: found.look_again > 0,
         text=lambda _: "",
         command=lambda _, out: review(out),
