@@ -22,7 +22,7 @@ from typing import NamedTuple
 from grader import __version__
 from grader.classes.batch.existing_results import Settler, rewrite
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch, write_run
-from grader.classes.batch.run import alone, ids_of, write_books
+from grader.classes.batch.run import hold_folder, ids_of, write_books
 from grader.classes.feedback.publish import plan, published_rows, read_published
 from grader.classes.feedback.send import SentLog
 from grader.classes.gradebook import Book, Row
@@ -336,7 +336,7 @@ def combine(out: Path, batches: Sequence[BatchFolder], rubric: LoadedRubric, cou
     Raises UsageError for faulty overrides, Busy if a batch works there, OutputError.
     """
     make_folder(out)
-    with alone(out):
+    with hold_folder(out):
         run = batches[0].run
         overrides = read_overrides(out / OVERRIDES, rubric.rubric, ids_of(run))
         bringing = _Bringing(BatchFolder(out, run), rubric, Settler(rubric.rubric, overrides), counts)
@@ -372,7 +372,7 @@ class _Bringing:
         that attempt's row of the roster."""
         if not attempts:
             return entry
-        one = chosen(attempts, self.counts)
+        one = counting_attempt(attempts, self.counts)
         target = self.folder.folder_of(one.entry)
         earlier = read_result(target)
         automatic = unsettled(counting_result(attempts, self.counts, self.rubric), self.rubric.rubric)
@@ -384,7 +384,7 @@ class _Bringing:
         return one.entry
 
 
-def chosen(attempts: Sequence[Attempt], counts: Counts) -> Attempt:
+def counting_attempt(attempts: Sequence[Attempt], counts: Counts) -> Attempt:
     """Return the attempt that counts; of several with as many points the first, which took the fewest late days. One
     that could not be graded counts only where none could."""
     graded = [one for one in attempts if one.result.status != "error"] or attempts
@@ -396,7 +396,7 @@ def counting_result(attempts: Sequence[Attempt], counts: Counts, rubric: LoadedR
 
     By criterion, each one is taken from the attempt in which it earned most, and says from which.
     """
-    number, _, result, _ = chosen(attempts, counts)
+    number, _, result, _ = counting_attempt(attempts, counts)
     points = tuple(one.result.points if one.result.status != "error" else None for one in attempts)
     lab = rubric.rubric
     if counts == "by-criterion":

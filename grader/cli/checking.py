@@ -21,7 +21,7 @@ from rich.text import Text
 from grader import pipeline
 from grader.cli.display import open_progress
 from grader.cli.host_support import how_to_run_nodes, warn_without_sandbox, why_nothing_runs
-from grader.cli.outcome import REPORT, exit_code, settled, show, staged_code, worst
+from grader.cli.outcome import REPORT, exit_code, judged_criteria, show, staged_code, worst
 from grader.cli.output import say, say_beside
 from grader.cli.select_rubric import Chosen, only
 from grader.errors import ExitCode, HostError, OutputError, UsageError
@@ -166,7 +166,7 @@ def watch_package(
     static, hidden = options.static_only, len(hidden_ids(rubric.rubric))
 
     def code(result: GradingResult) -> ExitCode:
-        return exit_code(settled(result.criteria) if static else result.criteria, rubric.rubric)
+        return exit_code(judged_criteria(result.criteria) if static else result.criteria, rubric.rubric)
 
     def progress(first: bool) -> AbstractContextManager[Progress]:
         return nullcontext(Silence()) if static else open_progress(early=first and not as_json)

@@ -13,7 +13,7 @@ from grader import pipeline
 from grader.cli.display import open_progress
 from grader.cli.errors import report
 from grader.cli.host_support import warn_without_sandbox
-from grader.cli.outcome import exit_code, settled
+from grader.cli.outcome import exit_code, judged_criteria
 from grader.cli.output import say, say_beside
 from grader.cli.select_rubric import Chosen, choose_all, only, package_prefix
 from grader.errors import ExitCode, GraderError, RubricError, UsageError
@@ -72,7 +72,7 @@ def run_job(system: str) -> ExitCode:
 
 def _graded(settings: Settings) -> Graded:
     settings.check_attempt()
-    chosen = _chosen(settings)
+    chosen = _choose(settings)
     source, rubric = chosen.source, with_pass_mark(chosen.rubric, settings.mark)
     if chosen.words:
         say_beside(chosen.words)
@@ -92,7 +92,7 @@ def _graded(settings: Settings) -> Graded:
                 made = pipeline.grade(source, rubric, folder, options, progress)
             result, place = without_hidden(made, rubric.rubric), folder / made.submission.id
         except GraderError as error:
-            result, place = _left(folder, error)
+            result, place = _error_result(folder, error)
         keep(place, settings.out, rubric.rubric)
     prefix = _prefix(result, Path(source))
     add_forms(settings.out, result, rubric.rubric, prefix, rubric.docs)
@@ -101,7 +101,7 @@ def _graded(settings: Settings) -> Graded:
     return _judged(result, rubric, settings, prefix)
 
 
-def _chosen(settings: Settings) -> Chosen:
+def _choose(settings: Settings) -> Chosen:
     try:
         return only(choose_all(settings.path, settings.lab, settings.package))
     except RubricError:
@@ -110,7 +110,7 @@ def _chosen(settings: Settings) -> Chosen:
         raise UsageError(error.message, hint=WHICH) from error
 
 
-def _left(folder: Path, error: GraderError) -> tuple[GradingResult, Path]:
+def _error_result(folder: Path, error: GraderError) -> tuple[GradingResult, Path]:
     """Return the result that says why nothing was graded. Raises the error if there is none."""
     report(error)
     for place in sorted(path.parent for path in folder.glob(f"*/{RESULT}")):
@@ -154,7 +154,7 @@ def _counted(result: GradingResult, rubric: Rubric, *, static: bool) -> GradingR
     """Return, with `static`, the result of the criteria that can be judged from the files alone."""
     if not static or result.error is not None:
         return result
-    criteria = settled(result.criteria)
+    criteria = judged_criteria(result.criteria)
     update = {
         "criteria": criteria,
         **total_fields(rubric, criteria),

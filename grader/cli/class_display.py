@@ -181,7 +181,7 @@ class PlainClass(BatchProgress):
         step = self.total // 100 if self.total > MANY else 1
         if outcome.status != "graded" or self.done % step == 0 or self.done == self.total:
             stamp = datetime.now().astimezone().strftime("%H:%M:%S")
-            print(f"{stamp} {said(outcome)}  [{summary(self)}]", file=self.stream, flush=True)
+            print(f"{stamp} {outcome_line(outcome)}  [{summary(self)}]", file=self.stream, flush=True)
 
 
 class LiveClass(BatchProgress):
@@ -195,7 +195,7 @@ class LiveClass(BatchProgress):
         """Leave a line if a person has to look at it."""
         super().ended(outcome)
         if outcome.status != "graded" or outcome.message:
-            self.console.print(Text(said(outcome), "red" if outcome.status == "error" else "yellow"))
+            self.console.print(Text(outcome_line(outcome), "red" if outcome.status == "error" else "yellow"))
 
     def __rich__(self) -> RenderableType:
         table = Table.grid(padding=(0, 2, 0, 0))
@@ -211,7 +211,7 @@ class LiveClass(BatchProgress):
         return Group(table, *rest, below)
 
 
-def said(outcome: Outcome) -> str:
+def outcome_line(outcome: Outcome) -> str:
     """`ada  85/100  graded  8.1 s`."""
     points = f"{number(outcome.points)}/{number(outcome.max_points)}" if outcome.status != "error" else "-"
     status = f"{outcome.status}, complete already" if outcome.kept else outcome.status

@@ -146,7 +146,10 @@ class LiveSteps(Steps):
             detail = Text(_shown(step.detail), "dim")
             table.add_row(name, Text(step.state, style), Text(_times(step, now_s)), detail)
         table.add_row(
-            Text("total", "bold"), Text(), Text(f"{now_s - self.begun_s:.1f} s"), Text(_left(every, now_s))
+            Text("total", "bold"),
+            Text(),
+            Text(f"{now_s - self.begun_s:.1f} s"),
+            Text(_time_left(every, now_s)),
         )
         return table
 
@@ -192,7 +195,7 @@ def _times(step: Step, now_s: float) -> str:
     return f"{elapsed_s:.1f} s of about {step.expected_s:.0f} s"
 
 
-def _left(steps: tuple[Step, ...], now_s: float) -> str:
+def _time_left(steps: tuple[Step, ...], now_s: float) -> str:
     """Return the time that is left: that of the longest step, since runs go side by side."""
     left_s = [
         (step.expected_s or 0.0) - (step.elapsed_s(now_s) or 0.0) for step in steps if step.state not in ENDED

@@ -76,7 +76,9 @@ def plan_test(
     loaded = load_rubric(rubric)
     reference = reference_at(solution) if solution else find_reference(loaded)
     correct = load_solution(reference, loaded.rubric.package)
-    mutants, unfit = _planned(loaded, correct, own=solution is not None, everything=everything is not None)
+    mutants, unfit = _plan_mutants(
+        loaded, correct, own=solution is not None, everything=everything is not None
+    )
     picked = select_mutants(mutants, only)
     for place in filter(None, (out, everything and everything.absolute().parent)):
         check_writable(place)
@@ -95,7 +97,7 @@ def plan_test(
     )
 
 
-def _planned(
+def _plan_mutants(
     loaded: LoadedRubric, solution: Solution, *, own: bool, everything: bool
 ) -> tuple[list[Planned], list[str]]:
     """Return the mutants, and the declared ones that do not fit a solution of the user's `own`."""
@@ -220,7 +222,7 @@ def print_labs(rubrics: Sequence[tuple[Rubric, str]], stream: IO[str]) -> None:
 def write_example(lab: str, folder: Path, mistake: str | None) -> None:
     """Write a lab's correct package into `folder`, or one with a mistake. Raises UsageError if the folder is in use."""
     loaded, correct = _correct(lab)
-    wanted = None if mistake is None else _chosen(_mistakes(loaded, correct), mistake)
+    wanted = None if mistake is None else _find_mistake(_mistakes(loaded, correct), mistake)
     _write(correct.tree if wanted is None else wanted.tree, folder)
     package = folder / correct.folder
     if wanted is None:
@@ -260,7 +262,7 @@ def _mistakes(loaded: LoadedRubric, correct: Solution) -> list[Planned]:
     return plan_declared(load_mutants(file, loaded.rubric), correct)[0]
 
 
-def _chosen(planned: list[Planned], name: str) -> Planned:
+def _find_mistake(planned: list[Planned], name: str) -> Planned:
     """Return the mistake of that name, or that of an operator which makes only one. Raises UsageError."""
     found = [m for m in planned if m.name == name] or [m for m in planned if m.mutant.operators == (name,)]
     if len(found) == 1:

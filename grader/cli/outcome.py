@@ -44,12 +44,12 @@ def worst(codes: Iterable[ExitCode]) -> ExitCode:
 
 def staged_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
     """Return the code of a pre-commit hook: any criterion that fails, fails it, whatever the pass mark is."""
-    judged = settled(criteria)
+    judged = judged_criteria(criteria)
     counted = [c for c in judged if c.is_required or c.status is Status.ERROR]
     return exit_code(judged, rubric.model_copy(update={"pass_mark": None})) if counted else ExitCode.PASSED
 
 
-def settled(criteria: Iterable[CriterionResult]) -> tuple[CriterionResult, ...]:
+def judged_criteria(criteria: Iterable[CriterionResult]) -> tuple[CriterionResult, ...]:
     """Return the criteria that could be judged."""
     return tuple(c for c in criteria if not c.status.is_open)
 
@@ -102,7 +102,7 @@ def show(
         report(GraderError(result.error.message, hint=result.error.hint))
     if result.status == "error":
         return ExitCode.NOT_GRADED
-    return exit_code(settled(result.criteria) if static else result.criteria, rubric)
+    return exit_code(judged_criteria(result.criteria) if static else result.criteria, rubric)
 
 
 def _paths(folder: Path | None) -> None:

@@ -14,7 +14,7 @@ from grader.classes.feedback import publish as publishing
 from grader.classes.feedback.forges import Comments
 from grader.classes.feedback.forms import FORMS, Form, Settings
 from grader.classes.feedback.publish import Publishing, Step, plan, read_published, refuse_other_rubric
-from grader.classes.feedback.send import Delivery, Failure, Selection, Wanted, deliver, faults, selected
+from grader.classes.feedback.send import Delivery, Failure, Selection, Wanted, deliver, faults, open_selection
 from grader.classes.review.requests import Asked, fetch, rows_of, waiting, write_requests
 from grader.classes.review.serve import git_user
 from grader.classes.review.session import ReviewSession, open_session
@@ -129,7 +129,7 @@ def send(
     batch = open_batch(folder)
     if drafts:
         wanted = replace(wanted, drafts=load_rubric(batch.run.rubric_source))
-    with selected(batch, form, wanted, jobs=cores()) as (selection, log):
+    with open_selection(batch, form, wanted, jobs=cores()) as (selection, log):
         sender = form.open(settings)
         if dry_run:
             return _show(form, selection, list(faults(sender, selection)), settings)

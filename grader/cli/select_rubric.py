@@ -77,7 +77,7 @@ def choose_all(path: Path, rubric: str | None, package: str = "") -> tuple[Chose
         named = tuple(c for c in found.candidates if c.name == package)
         found = replace(found, candidates=named or found.candidates)
     if rubric is not None:
-        return (_named(path, found, load_rubric(rubric)),)
+        return (_choose_named(path, found, load_rubric(rubric)),)
     return tuple(_chosen(path, found, lab) for lab in labs_of(found))
 
 
@@ -111,20 +111,20 @@ def _around_file(path: Path, rubric: str | None) -> Path | None:
     return around
 
 
-def _named(path: Path, found: Found, rubric: LoadedRubric) -> Chosen:
+def _choose_named(path: Path, found: Found, rubric: LoadedRubric) -> Chosen:
     """Choose by the lab that was given. Of several packages the intake takes the lab's."""
     fitting = [c for c in found.packages if c.name.lower() == rubric.rubric.package.lower()]
     package = next(iter([*fitting, *found.packages]), None)
     if package is None:
         return Chosen(rubric=rubric, source=str(path))
-    where = f" in {shown(package.folder)}" if found.moved else ""
+    where = f" in {short_path(package.folder)}" if found.moved else ""
     words = f"Checking {package.name}{where} against {rubric.rubric.id}{f' ({found.moved})' if found.moved else ''}"
     source = _source(path, found, package, rubric.rubric)
     return Chosen(rubric=rubric, source=source, package=package.folder, words=words)
 
 
 def _chosen(path: Path, found: Found, lab: Lab) -> Chosen:
-    folder = shown(lab.package.folder)
+    folder = short_path(lab.package.folder)
     where = f" in {folder}" if folder != "." else ""
     words = f"Checking {lab.package.name}{where} against {lab.rubric}{f', {lab.why}' if lab.why else ''}"
     rubric = load_rubric(lab.rubric)
@@ -231,7 +231,7 @@ def _none(found: Found) -> UsageError:
 
 
 def _no_package(found: Found) -> UsageError:
-    folder = shown(found.root)
+    folder = short_path(found.root)
     if not found.whole:
         return UsageError(
             f"{folder} has too many files to search it all for a package",
@@ -386,7 +386,7 @@ def _as_candidate(folder: Path) -> Candidate:
     return Candidate(path=".", folder=folder, manifest=name, has_cmake=is_file(folder / "CMakeLists.txt"))
 
 
-def shown(folder: Path) -> str:
+def short_path(folder: Path) -> str:
     """Return the shorter of the relative and the absolute path, as printable text."""
     try:
         near = os.path.relpath(folder.resolve(), Path.cwd())

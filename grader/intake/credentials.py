@@ -95,7 +95,7 @@ def accesses(url: str, login: Login | None) -> tuple[Access, ...]:
     if login is None:
         return (*first, Access())
     # A token may stand in the place of the user.
-    return (*first, _named(place, login.user), _with(place, Login(user=login.user, password="")))
+    return (*first, _ask_helpers(place, login.user), _with(place, Login(user=login.user, password="")))
 
 
 def helper_password(server: str) -> str:
@@ -131,7 +131,7 @@ def helper_password(server: str) -> str:
     return ""
 
 
-def refused(stderr: str) -> bool:
+def is_refusal(stderr: str) -> bool:
     """Return whether the server did not let git in. Servers say of what is private that it is not there."""
     return _REFUSED.search(stderr) is not None
 
@@ -154,7 +154,7 @@ def _with(place: str, login: Login) -> Access:
     )
 
 
-def _named(place: str, user: str) -> Access:
+def _ask_helpers(place: str, user: str) -> Access:
     """git's own helpers, asked for this user's password. git knows such settings in its environment since 2.31."""
     count = os.environ.get("GIT_CONFIG_COUNT", "")
     number = int(count) if count.isdecimal() else 0

@@ -23,7 +23,7 @@ from grader.host_programs import (
     loading_environment,
     with_absolute_paths,
 )
-from grader.intake.credentials import Access, refused, scrubbed
+from grader.intake.credentials import Access, is_refusal, scrubbed
 from grader.portable import kill_group
 
 _QUIET = {
@@ -116,7 +116,7 @@ class Git:
         try:
             return self._run(args, cwd, repository, remote=remote, access=first)
         except GitFailed as failure:
-            if not others or not refused(failure.stderr):
+            if not others or not is_refusal(failure.stderr):
                 raise
         return self.run(*args, cwd=cwd, repository=repository, remote=remote, accesses=tuple(others))
 

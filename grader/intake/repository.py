@@ -404,7 +404,7 @@ def explained(failure: GitFailed, source: Source) -> SubmissionError:
         page = re.search(r"/(tree|blob)/|/-/", source.url)
         kind = Unreachable if _NOT_THEIRS.search(cause) else SubmissionError
         return kind(f"{source.given}: {cause}", hint=_PAGE if page else hint)
-    return SubmissionError(f"{source.given}: git says: {said(failure, source)}", hint=_NETWORK)
+    return SubmissionError(f"{source.given}: git says: {error_line(failure, source)}", hint=_NETWORK)
 
 
 def may_pass(failure: GitFailed) -> bool:
@@ -421,7 +421,7 @@ def _cause(failure: GitFailed) -> tuple[str, str] | None:
     return next(fitting, None)
 
 
-def said(failure: GitFailed, source: Source) -> str:
+def error_line(failure: GitFailed, source: Source) -> str:
     """Return the line of git's that names the cause, without a password that the address may hold."""
     lines = [line.strip() for line in failure.stderr.splitlines() if line.strip()]
     fatal = [line for line in lines if line.startswith(("fatal:", "error:", "remote:"))]

@@ -46,7 +46,7 @@ def render_classroom(result: GradingResult, rubric: Rubric, *, passed: bool, pre
 
 
 def _document(result: GradingResult, rubric: Rubric, passed: bool, prefix: str, limit: int) -> dict[str, Any]:
-    tests = [_refused(result, limit)] if not_graded(result) else [*_tests(result, rubric, prefix, limit)]
+    tests = [_refused_test(result, limit)] if not_graded(result) else [*_tests(result, rubric, prefix, limit)]
     scores = _adding_up([test.pop("points") for test in tests], 0.0 if not_graded(result) else result.points)
     tests = [{**test, "score": score} for test, score in zip(tests, scores, strict=True)]
     return {"version": VERSION, "status": _status(result, passed), "max_score": _max(result), "tests": tests}
@@ -66,7 +66,7 @@ def _max(result: GradingResult) -> float:
     return round(sum(c.max_points for c in result.criteria if not c.status.is_open), 3)
 
 
-def _refused(result: GradingResult, limit: int) -> dict[str, Any]:
+def _refused_test(result: GradingResult, limit: int) -> dict[str, Any]:
     said = (result.error.message, result.error.hint) if result.error else ("",)
     message = " ".join(line(text, max(limit, NAME_CHARS)) for text in said if text)
     return _test("it could not be graded", status="error", points=0.0, message=message)
@@ -92,7 +92,7 @@ def _criterion(criterion: CriterionResult, prefix: str, limit: int) -> dict[str,
         status=STATUSES.get(criterion.status, "fail"),
         points=criterion.points,
         message=_message(criterion, limit),
-        test_code="" if waits else "\n".join(_told(criterion, limit)),
+        test_code="" if waits else "\n".join(_test_code(criterion, limit)),
         filename=where,
         line_no=cited.line or 0 if cited and where else 0,
     )
@@ -107,7 +107,7 @@ def _message(criterion: CriterionResult, limit: int) -> str:
     return f"A PERSON MUST LOOK: {line(criterion.id, NAME_CHARS)}: {points}{': ' if words else ''}{words}"
 
 
-def _told(criterion: CriterionResult, limit: int) -> Iterator[str]:
+def _test_code(criterion: CriterionResult, limit: int) -> Iterator[str]:
     """Below a test that has not passed the reporter prints what stands in the place of its code."""
     if criterion.status is Status.PASS or not limit:
         return

@@ -13,7 +13,14 @@ from collections.abc import Iterator
 from grader.errors import GraderError
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
-from grader.report.sentences import decided, decision, look_again, missing_hidden, score_words, visible_words
+from grader.report.sentences import (
+    decided_criteria,
+    decision,
+    look_again,
+    missing_hidden,
+    score_words,
+    visible_words,
+)
 from grader.report.text import json_text, line, text_limit
 from grader.report.view import hidden_ids, is_students_fault, places, points_of
 from grader.rubric.model import Rubric
@@ -42,7 +49,7 @@ class _Writer:
         self._result, self._rubric = result, rubric
         self._hidden = hidden_ids(rubric)
         self._limit = text_limit(len(result.criteria), LIMIT)
-        self._decided = {c.id: override for override, c in decided(result)}
+        self._decided = {c.id: override for override, c in decided_criteria(result)}
 
     def document(self) -> dict[str, object]:
         """Formats are said everywhere: Gradescope's own for the page would read HTML."""

@@ -89,7 +89,9 @@ class _Writer:
         if outcome is not None:
             self._outcome(case, outcome, criterion.status.value, criterion.message, self._details(criterion))
         about = {"title": criterion.title, "status": criterion.status.value, "points": points_of(criterion)}
-        etree.SubElement(case, "system-out").text = self._lines({**about, **_decided(criterion, override)})
+        etree.SubElement(case, "system-out").text = self._lines(
+            {**about, **_decision_words(criterion, override)}
+        )
         return case
 
     def _file(self, cited: FileCitation) -> str:
@@ -134,7 +136,7 @@ class _Writer:
         return line(text, self._limit)
 
 
-def _decided(criterion: CriterionResult, override: AppliedOverride | None) -> dict[str, str]:
+def _decision_words(criterion: CriterionResult, override: AppliedOverride | None) -> dict[str, str]:
     if override is None:
         return {}
     again = look_again(override, criterion)

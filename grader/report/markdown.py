@@ -15,7 +15,7 @@ from grader.report.sentences import (
     DECIDED_TITLE,
     NOT_SETTLED,
     automatic_words,
-    decided,
+    decided_criteria,
     decision,
     look_again,
     score_words,
@@ -158,7 +158,7 @@ class _Writer:
             yield from (*self._more(changes), "")
 
     def _decided(self, result: GradingResult) -> Iterator[str]:
-        found = decided(result)
+        found = decided_criteria(result)
         if not found:
             return
         yield from (f"## {DECIDED_TITLE}", "")

@@ -182,8 +182,8 @@ def _said(automatic: Automatic, criterion: CriterionResult) -> str:
     return f"{automatic.status.value} {points}"
 
 
-def decided(result: GradingResult) -> list[tuple[AppliedOverride, CriterionResult]]:
-    """What was decided about which criterion, in the rubric's order."""
+def decided_criteria(result: GradingResult) -> list[tuple[AppliedOverride, CriterionResult]]:
+    """Return what was decided about which criterion, in the rubric's order."""
     by_id = {criterion.id: criterion for criterion in result.criteria}
     return [
         (override, by_id[override.criterion]) for override in result.overrides if override.criterion in by_id

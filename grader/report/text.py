@@ -92,7 +92,7 @@ def markdown(text: str, *, cell: bool = False) -> str:
     """
     words = _TOKEN.findall(" ".join(visible(text).split()))
     shown = " ".join(_with_code(word, cell=cell) for word in words)
-    return shown if cell else _begun(shown)
+    return shown if cell else _escape_line_start(shown)
 
 
 def markdown_code(text: str, *, cell: bool = False) -> str:
@@ -152,7 +152,7 @@ def _escaped(text: str) -> str:
     return _MARKUP.sub(lambda match: "\\" + match.group(), text)
 
 
-def _begun(shown: str) -> str:
+def _escape_line_start(shown: str) -> str:
     """What would make a heading, a list or a quotation of the line is no more than a sign."""
     if _FIRST.match(shown):
         return f"\\{shown}"

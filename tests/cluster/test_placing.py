@@ -12,7 +12,7 @@ from grader.arena.limits import RunLimits
 from grader.classes.batch.job import Job, Outcome
 from grader.classes.cluster import executor
 from grader.classes.cluster.exchange import Exchange, Parcel, Report, pack
-from grader.classes.cluster.executor import ParcelLost, place
+from grader.classes.cluster.executor import ParcelLost, store_results
 from grader.errors import Busy
 from grader.results import Results
 from tests.cluster.jobs import jobs_for
@@ -57,7 +57,7 @@ def test_of_two_attempts_the_one_that_was_reported_counts(
 ) -> None:
     believed_lost = _sent(exchange, tmp_path, words="first", evidence="first")
     reported = _sent(exchange, tmp_path, words="second", evidence="second")
-    assert place(job, Report(outcome=_outcome(), parcel=reported), exchange).status == "graded"
+    assert store_results(job, Report(outcome=_outcome(), parcel=reported), exchange).status == "graded"
     assert _words(job) == "second"
     assert (job.out / "s000" / "evidence" / "package.mcap").read_text() == "second"
     assert sorted(path.name for path in (job.out / "s000").iterdir()) == ["evidence", "result.json"]
@@ -71,9 +71,9 @@ def test_only_an_error_of_the_submission_takes_the_place_of_a_complete_result(
     kind: str, stays: bool, exchange: Exchange, job: Job, tmp_path: Path
 ) -> None:
     earlier = _sent(exchange, tmp_path / "a", words="earlier", evidence="earlier")
-    place(job, Report(outcome=_outcome(), parcel=earlier), exchange)
+    store_results(job, Report(outcome=_outcome(), parcel=earlier), exchange)
     wrong = _sent(exchange, tmp_path / "b", status="error", words="wrong")
-    outcome = place(job, Report(outcome=_outcome("error", kind), parcel=wrong), exchange)
+    outcome = store_results(job, Report(outcome=_outcome("error", kind), parcel=wrong), exchange)
     assert outcome.status == "error"
     assert _words(job) == ("earlier" if stays else "wrong")
     assert (job.out / "s000" / "evidence").exists() is stays
@@ -83,7 +83,7 @@ def test_only_an_error_of_the_submission_takes_the_place_of_a_complete_result(
 
 def test_a_result_that_was_kept_needs_no_parcel(exchange: Exchange, job: Job) -> None:
     kept = _outcome().model_copy(update={"kept": True})
-    assert place(job, Report(outcome=kept), exchange) == kept
+    assert store_results(job, Report(outcome=kept), exchange) == kept
     assert not job.out.exists()
 
 
@@ -91,14 +91,14 @@ def test_a_parcel_that_is_not_there_or_not_whole_changes_nothing(
     exchange: Exchange, job: Job, tmp_path: Path
 ) -> None:
     earlier = _sent(exchange, tmp_path, words="earlier", evidence="earlier")
-    place(job, Report(outcome=_outcome(), parcel=earlier), exchange)
+    store_results(job, Report(outcome=_outcome(), parcel=earlier), exchange)
     with pytest.raises(ParcelLost):
-        place(job, Report(outcome=_outcome(), parcel=earlier), exchange)
+        store_results(job, Report(outcome=_outcome(), parcel=earlier), exchange)
     broken = _sent(exchange, tmp_path, words="broken")
     whole = Path(exchange.url, broken.name).read_bytes()
     Path(exchange.url, broken.name).write_bytes(whole[:-9])
     with pytest.raises(ParcelLost):
-        place(job, Report(outcome=_outcome(), parcel=broken), exchange)
+        store_results(job, Report(outcome=_outcome(), parcel=broken), exchange)
     assert _words(job) == "earlier"
     assert sorted(path.name for path in (job.out / "s000").iterdir()) == ["evidence", "result.json"]
 
@@ -108,7 +108,7 @@ def test_a_submission_that_another_grader_works_on_is_left_to_it(
 ) -> None:
     parcel = _sent(exchange, tmp_path)
     with Results(job.out / "s000"), pytest.raises(Busy):
-        place(job, Report(outcome=_outcome(), parcel=parcel), exchange)
+        store_results(job, Report(outcome=_outcome(), parcel=parcel), exchange)
 
 
 def test_the_page_on_clusters_has_the_limits_of_memory_as_they_are() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.batch.folder import open_batch
-from grader.classes.batch.run import alone
+from grader.classes.batch.run import hold_folder
 from grader.classes.feedback.publish import changes_between, read_published
 from grader.cli.main import run
 from grader.model.result import AppliedOverride, Automatic, GradingResult, Lateness
@@ -212,7 +212,7 @@ def test_published_results_are_for_their_owner_alone(out: Path) -> None:
 
 
 def test_nothing_is_published_while_a_batch_works(out: Path, capsys) -> None:
-    with alone(out):
+    with hold_folder(out):
         assert publish(out) == 3
     assert "another batch works" in capsys.readouterr().err
     assert not (out / "published.jsonl").exists()

@@ -7,7 +7,7 @@ from datetime import datetime, timedelta, timezone
 import pytest
 
 from grader.classes.fetching import NothingInTime, Rule
-from grader.classes.fetching.history import later, read_commit, shown
+from grader.classes.fetching.history import later, local_time, read_commit
 from grader.errors import SubmissionError
 from tests.fetching.samples import DEADLINE, HOST, commit_at
 from tests.intake.samples import commit, git, repository, write
@@ -247,7 +247,7 @@ def test_absurd_dates_become_some_time(record, year):
     commit = read_commit(f"{'a' * 40} {record}")
     assert abs(commit.at.year - year) <= 1
     assert commit.hash == "a" * 40
-    assert shown(commit.at)[:4].isdigit()
+    assert local_time(commit.at)[:4].isdigit()
     assert later(commit.at, 3660)
     assert isinstance(commit.at < DEADLINE, bool)
 

@@ -8,7 +8,7 @@ from datetime import datetime
 
 import pytest
 
-from grader.classes.batch.run import alone
+from grader.classes.batch.run import hold_folder
 from grader.classes.review.background import Pace
 from grader.classes.review.session import open_session
 from grader.model.result import Override
@@ -206,7 +206,7 @@ def test_what_is_not_graded_yet_keeps_its_points_for_later(page, out) -> None:
 def test_while_a_batch_works_decisions_are_kept_and_applied_when_it_has_ended(page, out, review) -> None:
     assert review.background.wait(WAIT_S)
     form = page.form("ada", "style")
-    with alone(out):
+    with hold_folder(out):
         answer = page.send("ada", "style", form, script=True, points="6")
         assert "a batch is running in this folder" in answer.json["said"]
         assert overrides_of(out)["ada"]["style"]["points"] == 6
@@ -254,7 +254,7 @@ def test_a_review_beside_a_batch_that_is_ended_without_a_decision_leaves_nothing
     (out / "run.json").write_text(json.dumps(run | {"state": "running"}))
     (out / "gradebook.csv").unlink()
     review = open_session(out, QUICK)
-    with alone(out):
+    with hold_folder(out):
         assert review.batch_runs()
         review.start()
         assert review.close()

@@ -105,7 +105,7 @@ class LocalExecutor:
         )
 
 
-def failed(job: Job, *, kind: str, message: str, hint: str) -> Outcome:
+def failed_outcome(job: Job, *, kind: str, message: str, hint: str) -> Outcome:
     """Return the outcome of a job that could not be done."""
     most = job.rubric.rubric.max_points
     return Outcome(id=job.entry.id, status="error", max_points=most, kind=kind, message=message, hint=hint)
@@ -114,9 +114,9 @@ def failed(job: Job, *, kind: str, message: str, hint: str) -> Outcome:
 def outcome_of_ended(job: Job, error: WorkerEnded) -> Outcome:
     """Return the outcome of a job whose process ended, with kind `killed` or `interrupted`."""
     if error.interrupted:
-        return failed(job, kind="interrupted", message="interrupted", hint="")
+        return failed_outcome(job, kind="interrupted", message="interrupted", hint="")
     message = f"the process that graded it {error.reason}"
-    return failed(job, kind="killed", message=message, hint=KILLED_HINT)
+    return failed_outcome(job, kind="killed", message=message, hint=KILLED_HINT)
 
 
 def grade_job(job: Job) -> Outcome:
@@ -130,7 +130,7 @@ def grade_job(job: Job) -> Outcome:
             outcome = _grade(job, folder)
     except Exception as error:  # noqa: BLE001 - whatever it is, the others are graded
         fault = fault_of(error)
-        outcome = failed(job, kind=fault.kind, message=fault.message, hint=fault.note or fault.hint)
+        outcome = failed_outcome(job, kind=fault.kind, message=fault.message, hint=fault.note or fault.hint)
     return outcome.model_copy(update={"wall_s": round(time.monotonic() - begun, 3)})
 
 

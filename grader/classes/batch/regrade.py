@@ -16,8 +16,8 @@ from grader.classes.batch.job import Executor
 from grader.classes.batch.run import (
     BatchOptions,
     Watcher,
-    alone,
     describe_rubric,
+    hold_folder,
     ids_of,
     run_batch,
     write_books,
@@ -98,7 +98,7 @@ def regrade(
     Raises UsageError for faulty overrides, EvidenceError if a newer grader has written there, Busy if a batch works in
     the folder, OutputError.
     """
-    with alone(folder.path):
+    with hold_folder(folder.path):
         folder.refuse_newer()
         entries = folder.run.entries
         overrides = read_overrides(folder.path / OVERRIDES, rubric.rubric, ids_of(folder.run))

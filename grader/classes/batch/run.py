@@ -123,7 +123,7 @@ def run_batch(
     _check_only(roster.entries, options.only)
     check_writable(options.out)
     is_new = make_folder(options.out)
-    with alone(options.out):
+    with hold_folder(options.out):
         batch = _begin(roster, rubric_source, rubric, options, is_new=is_new)
         state: State = "interrupted"
         kept = 0
@@ -304,7 +304,7 @@ def _counts(folder: BatchFolder, rubric: Rubric, kept: int) -> Counts:
 
 
 @contextmanager
-def alone(out: Path, who: str = "another batch works") -> Iterator[None]:
+def hold_folder(out: Path, who: str = "another batch works") -> Iterator[None]:
     """Hold a batch's folder. Raises Busy, which says `who` does, if another program holds it."""
     descriptor = os.open(out, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:

@@ -21,7 +21,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from grader.classes.batch.job import Job, Outcome, failed
+from grader.classes.batch.job import Job, Outcome, failed_outcome
 from grader.classes.cluster import worker
 from grader.classes.cluster.connect import LOCAL, Needs, Recruits, check_address, connect, is_encrypted
 from grader.classes.cluster.exchange import (
@@ -211,7 +211,7 @@ class _Tasks:
 
         try:
             report = Report.model_validate_json(task.future.result(timeout=RESULT_S))
-            return place(task.job, report, self._exchange)
+            return store_results(task.job, report, self._exchange)
         except (TimeoutError, asyncio.TimeoutError):  # lost with its worker: Dask has it done again
             self._running.append(task)
             return None
@@ -221,11 +221,11 @@ class _Tasks:
             task.losses += LOSSES if isinstance(error, KilledWorker) else 0
             return self._repeat(task, error.message if isinstance(error, ParcelLost) else LOST)
         except GraderError as error:
-            return failed(task.job, kind=error.kind, message=error.message, hint=error.hint)
+            return failed_outcome(task.job, kind=error.kind, message=error.message, hint=error.hint)
         except Exception as error:  # noqa: BLE001 - whatever a worker's environment lacks, the others are graded
             hint = "look into the workers' logs, and install the same grader everywhere"
             message = f"a worker failed: {type(error).__name__}: {error}"
-            return failed(task.job, kind="internal", message=message, hint=hint)
+            return failed_outcome(task.job, kind="internal", message=message, hint=hint)
 
     def _repeat(self, task: _Task, why: str) -> Outcome | None:
         """Queue the job once more, or give it up."""
@@ -236,7 +236,9 @@ class _Tasks:
             self._back.append(task)
             return None
         hint = "look into the workers' logs (out of memory?), then grade it again with `--only failed`"
-        return failed(task.job, kind="worker-lost", message=f"{why}, at least {LOSSES} times", hint=hint)
+        return failed_outcome(
+            task.job, kind="worker-lost", message=f"{why}, at least {LOSSES} times", hint=hint
+        )
 
     def _look(self) -> Iterator[Outcome]:
         """Once a second, look which workers there are. Repeat what was given only to workers that are gone."""
@@ -296,7 +298,7 @@ def put_lab(rubric: LoadedRubric, exchange: Exchange) -> Parcel | None:
         return exchange.put(packed, "lab")
 
 
-def place(job: Job, report: Report, exchange: Exchange) -> Outcome:
+def store_results(job: Job, report: Report, exchange: Exchange) -> Outcome:
     """Unpack a report's results into `job.out`, and return the outcome.
 
     A complete result is replaced by no error but the submission's own. Raises ParcelLost, and what `Results` raises.

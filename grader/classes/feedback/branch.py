@@ -70,7 +70,7 @@ class Branch(Sender):
             try:
                 commit = _Push(source, self.branch, room).push(feedback)
             except GitFailed as failure:
-                raise _refused(failure, source, self.branch) from failure
+                raise _refusal(failure, source, self.branch) from failure
         return f"{source.given}, branch {self.branch}, commit {commit[:12]}"
 
 
@@ -160,7 +160,7 @@ class _Push:
         return self._git.run(*args, cwd=self._top, repository=self._own).decode("utf-8", "replace").strip()
 
 
-def _refused(failure: GitFailed, source: Source, branch: str) -> NotSent:
+def _refusal(failure: GitFailed, source: Source, branch: str) -> NotSent:
     if re.search(r"\[(?:remote )?rejected\]|protected branch|denied|GH00[0-9]", failure.stderr):
         said = next((row for row in failure.stderr.splitlines() if "rejected" in row or "remote:" in row), "")
         return NotSent(

@@ -181,7 +181,7 @@ class Server:
         except (OSError, smtplib.SMTPException) as error:
             self.close()
             hint = f"check --smtp, {USER} and {PASSWORD}"
-            raise HostError(f"{self.host}:{self.port}: {_said(error)}", hint=hint) from error
+            raise HostError(f"{self.host}:{self.port}: {_reply_text(error)}", hint=hint) from error
 
     def _start_tls(self, smtp: smtplib.SMTP, context: ssl.SSLContext) -> None:
         smtp.ehlo_or_helo_if_needed()
@@ -207,11 +207,11 @@ class Server:
             except smtplib.SMTPResponseException as error:
                 self._reset()
                 if error.smtp_code not in REFUSED_LATER or not left:
-                    raise NotSent(f"{self.host} says: {_said(error)}") from error
+                    raise NotSent(f"{self.host} says: {_reply_text(error)}") from error
             except (OSError, smtplib.SMTPException) as error:
                 self.close()
                 if not left:
-                    raise NotSent(f"{self.host}: {_said(error)}") from error
+                    raise NotSent(f"{self.host}: {_reply_text(error)}") from error
             self._sleep(WAIT_S)
         raise AssertionError
 
@@ -251,7 +251,7 @@ class Server:
             self.close()
 
 
-def _said(error: Exception) -> str:
+def _reply_text(error: Exception) -> str:
     if isinstance(error, smtplib.SMTPResponseException):
         said = error.smtp_error
         text = said.decode("utf-8", "replace") if isinstance(said, bytes) else said

@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from grader.classes.batch.existing_results import figures_in
 from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.regrade import Change, pairs
-from grader.classes.batch.run import alone
+from grader.classes.batch.run import hold_folder
 from grader.classes.gradebook import Row
 from grader.errors import EvidenceError, GraderError, UsageError
 from grader.files import atomic_write, make_folder
@@ -181,7 +181,7 @@ def publish(folder: BatchFolder, rubric: LoadedRubric, how: Publishing) -> tuple
     """
     refuse_other_rubric(folder, rubric)
     make_folder(folder.path / FOLDER)
-    with alone(folder.path), alone(folder.path / FOLDER, "feedback is being sent"):
+    with hold_folder(folder.path), hold_folder(folder.path / FOLDER, "feedback is being sent"):
         published = read_published(folder.path)
         steps = list(plan(folder, published, how.only))
         jobs = {}
@@ -191,7 +191,7 @@ def publish(folder: BatchFolder, rubric: LoadedRubric, how: Publishing) -> tuple
         done: list[Publication] = []
         try:
             write = partial(_try_freeze, rubric)
-            for frozen in run_each(write, jobs.items(), min(how.jobs, len(jobs)), ended=_ended):
+            for frozen in run_each(write, jobs.items(), min(how.jobs, len(jobs)), ended=_worker_ended):
                 if frozen.error:
                     steps[frozen.place] = replace(steps[frozen.place], why=frozen.error, failed=True)
                 else:
@@ -264,7 +264,7 @@ def history_words(history: Sequence[Publication]) -> tuple[str, ...]:
     return tuple(f"{one.at:%Y-%m-%d}: {change}" for one in history for change in one.changes)
 
 
-def _ended(job: tuple[int, Freezing], error: WorkerEnded) -> _Frozen:
+def _worker_ended(job: tuple[int, Freezing], error: WorkerEnded) -> _Frozen:
     return _Frozen(place=job[0], error=f"the process that wrote its reports {error.reason}")
 
 

@@ -115,8 +115,8 @@ class Api:
             wait_s = _wait_s(answer, limited)
             if wait_s is None or limited >= TRIES:
                 if answer.status >= 500:
-                    raise Broken(f"{answer.status} {_said(answer)}")
-                raise Refused(answer.status, _said(answer))
+                    raise Broken(f"{answer.status} {_error_text(answer)}")
+                raise Refused(answer.status, _error_text(answer))
             if wait_s > WAIT_MAX_S:
                 raise HostError(
                     f"{self.base}: too many requests, for {wait_s / 60:.0f} minutes",
@@ -158,7 +158,7 @@ def _json(data: bytes) -> Any:  # noqa: ANN401 - JSON
         raise Broken("the answer is no JSON") from error
 
 
-def _said(answer: _Answer) -> str:
+def _error_text(answer: _Answer) -> str:
     try:
         found = json.loads(answer.data)
         said = found.get("message") or found.get("error") if isinstance(found, dict) else ""
@@ -171,7 +171,7 @@ def _wait_s(answer: _Answer, times: int) -> float | None:
     """Return how long a server that has too much to do wants to be left alone; None if that is not what it says."""
     headers = answer.headers
     exhausted = "0" in (headers.get("x-ratelimit-remaining"), headers.get("ratelimit-remaining"))
-    limited = "rate limit" in _said(answer).lower() or "retry-after" in headers or exhausted
+    limited = "rate limit" in _error_text(answer).lower() or "retry-after" in headers or exhausted
     if answer.status != 429 and not (answer.status in (403, 503) and limited):
         return None
     if (after := headers.get("retry-after", "")).isdecimal():

@@ -19,7 +19,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from grader.classes.batch.folder import BatchFolder
-from grader.classes.batch.run import alone
+from grader.classes.batch.run import hold_folder
 from grader.classes.feedback.forms import Feedback, Form, Sender, Unsure
 from grader.classes.feedback.publish import (
     FOLDER,
@@ -173,7 +173,7 @@ class _Class:
 
 
 @contextmanager
-def selected(
+def open_selection(
     folder: BatchFolder, form: Form, wanted: Wanted, *, jobs: int
 ) -> Iterator[tuple[Selection, SentLog]]:
     """Hold the class's feedback and give what is to be sent, and the log of what was.
@@ -188,7 +188,10 @@ def selected(
         )
     check_only(folder, wanted.only)
     place = folder.path / FOLDER if published.history else folder.path
-    with alone(place, "other feedback is being sent, or a class published,"), temporary_folder("run") as room:
+    with (
+        hold_folder(place, "other feedback is being sent, or a class published,"),
+        temporary_folder("run") as room,
+    ):
         log = SentLog(folder.path, form.name)
         about = _Class(
             folder=folder, published=read_published(folder.path), log=log, wanted=wanted, jobs=jobs

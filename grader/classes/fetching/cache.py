@@ -124,7 +124,7 @@ def name_of(address: str) -> str:
 @contextmanager
 def locked(folder: Path) -> Iterator[MirrorFolder]:
     """The place of a mirror, when no one else uses it. Raises OSError where it cannot be had or locked."""
-    descriptor = _held(folder, wait=True)
+    descriptor = _take_lock(folder, wait=True)
     assert descriptor is not None  # noqa: S101 - waited for
     try:
         yield MirrorFolder(folder)
@@ -141,7 +141,7 @@ def tidy(folder: Path, bytes_max: int = BYTES_MAX) -> None:
     left = sum(size for _, size, _ in known)
     for used_at, size, path in sorted(known):
         unfinished = size == 0 and used_at < time.time() - UNFINISHED_S
-        if (left > bytes_max or unfinished) and _removed(path):
+        if (left > bytes_max or unfinished) and _remove_unused(path):
             left -= size
 
 
@@ -166,10 +166,10 @@ def _used_and_size(folder: Path) -> tuple[float, int]:
         return folder.stat().st_mtime, 0
 
 
-def _removed(folder: Path) -> bool:
+def _remove_unused(folder: Path) -> bool:
     """Return whether it is gone. What is in use stays."""
     with suppress(OSError):
-        descriptor = _held(folder, wait=False)
+        descriptor = _take_lock(folder, wait=False)
         if descriptor is None:
             return False
         try:
@@ -181,7 +181,7 @@ def _removed(folder: Path) -> bool:
     return False
 
 
-def _held(folder: Path, *, wait: bool) -> int | None:
+def _take_lock(folder: Path, *, wait: bool) -> int | None:
     """The descriptor of the lock, which may be taken away together with its folder before it is locked."""
     while True:
         with suppress(FileNotFoundError):

@@ -34,7 +34,7 @@ class Commit(NamedTuple):
     at: datetime
 
     def __str__(self) -> str:
-        return f"commit {self.hash[:7]} of {shown(self.at)}"
+        return f"commit {self.hash[:7]} of {local_time(self.at)}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ class Limit(NamedTuple):
     more: str
 
     def __str__(self) -> str:
-        return f"{self.name} {shown(self.at)}{self.more}"
+        return f"{self.name} {local_time(self.at)}{self.more}"
 
 
 class Found(NamedTuple):
@@ -161,7 +161,7 @@ def choose(
     if found is None:
         raise NothingInTime(
             f"{given}: no commit on {printable(branch)} is from before {limit}",
-            hint=f"The first one is of {shown(first.at)} ({BY_COMMIT}).",
+            hint=f"The first one is of {local_time(first.at)} ({BY_COMMIT}).",
         )
     handed_in = as_it_is.model_copy(
         update={
@@ -189,7 +189,7 @@ def _by_commit(found: Found, branch: str, limit: Limit, submitted: datetime | No
     at = _beside(found.commit.at, limit.at)
     text = f"commit {found.commit.hash[:7]} of {at} is the last one on {printable(branch)} before {limit}"
     if submitted is not None:
-        text += f"; the roster says that it was submitted later, {shown(submitted)}"
+        text += f"; the roster says that it was submitted later, {local_time(submitted)}"
     return f"{text}{_later_ones(found.later)}; {BY_COMMIT}"
 
 
@@ -199,13 +199,14 @@ def _by_roster(
     before = f", before {limit}" if limit else ""
     if found is None:
         return (
-            f"{tip} is the last one on {printable(branch)}; the roster says that it was submitted {shown(submitted)}"
-            f"{before}, and all commits are dated later than that: its author's clock may be wrong"
+            f"{tip} is the last one on {printable(branch)}; the roster says that it was submitted "
+            f"{local_time(submitted)}{before}, and all commits are dated later than that: "
+            "its author's clock may be wrong"
         )
     at = _beside(found.commit.at, submitted)
     return (
         f"commit {found.commit.hash[:7]} of {at} is the last one on {printable(branch)} when it was submitted, "
-        f"{shown(submitted)} as the roster says{before}{_later_ones(found.later)}"
+        f"{local_time(submitted)} as the roster says{before}{_later_ones(found.later)}"
     )
 
 
@@ -220,11 +221,11 @@ def _beside(time: datetime, other: datetime) -> str:
     try:
         time = time.astimezone(other.tzinfo)
     except OverflowError:
-        return shown(time)
-    return shown(time, seconds=abs(time - other) < _NEAR)
+        return local_time(time)
+    return local_time(time, seconds=abs(time - other) < _NEAR)
 
 
-def shown(time: datetime, *, seconds: bool = False) -> str:
+def local_time(time: datetime, *, seconds: bool = False) -> str:
     """`2026-10-30 21:14 +01:00`."""
     zone = time.strftime("%z")
     zone = f"{zone[:3]}:{zone[3:5]}" if zone else ""

@@ -154,7 +154,7 @@ def _from_repository(task: Task, room: Path) -> Obtained:
     except GitTooMuch as failure:
         if task.rule.is_any:
             raise error_of(failure, task.source) from None
-        return _alone(task, room)
+        return _without_history(task, room)
     except (GitFailed, GivenUp) as problem:
         raise error_of(problem, task.source) from None
 
@@ -171,7 +171,7 @@ def _served(task: Task, room: Path) -> Source:
 def _through_mirror(task: Task, room: Path) -> Obtained:
     """A mirror that seems to be damaged is made again."""
     with ExitStack() as stack:
-        place = _place(task.source, room, stack)
+        place = _mirror_folder(task.source, room, stack)
         kept = place.state() is not None
         try:
             return _commit_of(place, task, room)
@@ -183,7 +183,7 @@ def _through_mirror(task: Task, room: Path) -> Obtained:
         return _commit_of(place, task, room)
 
 
-def _place(source: Source, room: Path, stack: ExitStack) -> MirrorFolder:
+def _mirror_folder(source: Source, room: Path, stack: ExitStack) -> MirrorFolder:
     """In the cache for what is far away; in the room for what is here, and where there is no cache."""
     folder = cache_folder() if source.remote else None
     if folder is not None:
@@ -203,12 +203,12 @@ def _commit_of(place: MirrorFolder, task: Task, room: Path) -> Obtained:
     tip = patiently(lambda: mirror.commit(listing, wanted), task.patience)
     if tip is None:
         raise no_such_ref(listing.refs, task.source.ref or "HEAD", given=task.source.given)
-    commit, handed_in = _chosen(mirror, listing, wanted, tip, task)
+    commit, handed_in = _choose_commit(mirror, listing, wanted, tip, task)
     mirror.copy(commit.hash, room / "commit.git")
     return _obtained(task, commit, handed_in, wanted, room)
 
 
-def _chosen(
+def _choose_commit(
     mirror: Mirror, listing: Listing, wanted: Wanted, tip: str, task: Task
 ) -> tuple[Commit, HandedIn]:
     branch = branch_of(listing, task.source.ref, wanted)
@@ -245,7 +245,7 @@ def branch_of(listing: Listing, ref: str | None, wanted: Wanted) -> str | None:
     return name.removeprefix("refs/heads/").removeprefix("refs/remotes/")
 
 
-def _alone(task: Task, room: Path) -> Obtained:
+def _without_history(task: Task, room: Path) -> Obtained:
     """What is too much with its history, without it."""
     local = task.source.top is not None
     source = replace(task.source, url=(room / "view").as_uri()) if local else task.source

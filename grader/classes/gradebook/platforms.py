@@ -52,10 +52,12 @@ def kinds(columns: Iterable[str], platform: Platform) -> dict[str, Kind]:
     """What each column says of a student, for those that say anything."""
     known: dict[str, Kind] = {name: kind for kind, names in _KINDS.items() for name in names.split()}
     known |= dict.fromkeys(_OWN_ID[platform].split(), "platform")
-    return {column: known[plain(column)] for column in columns if plain(column) in known}
+    return {
+        column: known[letters_and_digits(column)] for column in columns if letters_and_digits(column) in known
+    }
 
 
-def plain(text: str) -> str:
+def letters_and_digits(text: str) -> str:
     """Letters and digits only, small."""
     folded = unicodedata.normalize("NFKC", text).casefold()
     return "".join(sign for sign in folded if sign.isalnum())
@@ -85,7 +87,7 @@ def row_identity(fields: Mapping[str, str], known: Mapping[str, Kind]) -> Identi
         if not text or kind == "section":
             continue
         if kind == "name":
-            identity.name = _turned(text)
+            identity.name = _first_name_first(text)
         elif kind == "first":
             first = text
         elif kind == "last":
@@ -100,7 +102,7 @@ def entry_identity(entry: Entry, platform: Platform) -> Identity:
     """Of a submission. Its id may be any of the platform's."""
     identity = row_identity(entry.extra, kinds(entry.extra, platform))
     identity.sure |= {(kind, key(entry.id)) for kind in ("platform", "number", "login")}
-    identity.name = _turned(key(entry.name)) or identity.name
+    identity.name = _first_name_first(key(entry.name)) or identity.name
     if any(kind == "platform" and text in identity.name.split() for kind, text in identity.sure):
         identity.name = ""  # `Participant 123` is no one's name
     return identity
@@ -114,7 +116,7 @@ def _sure(kind: Kind, text: str) -> tuple[str, str]:
     return ("login" if kind == "email" else kind), text
 
 
-def _turned(name: str) -> str:
+def _first_name_first(name: str) -> str:
     """`lovelace, ada` is `ada lovelace`."""
     last, comma, first = name.partition(",")
     return " ".join(f"{first} {last}".split()) if comma else name
@@ -156,8 +158,8 @@ def _contradict(ours: Identity, theirs: Identity) -> bool:
     """Whether only the platform's number says so, and the names have nothing in common: Moodle numbers teams too."""
     if not (ours.name and theirs.name) or any(kind != "platform" for kind, _ in ours.sure & theirs.sure):
         return False
-    name = plain(ours.name)
-    return not any(plain(word) in name for word in theirs.name.split() if len(word) > 1)
+    name = letters_and_digits(ours.name)
+    return not any(letters_and_digits(word) in name for word in theirs.name.split() if len(word) > 1)
 
 
 def _doubt(rows: set[int], wanted: dict[int, list[int]]) -> str:
@@ -175,7 +177,7 @@ NONE = "-"
 MOODLE_MAX = 100.0
 
 
-def fresh(
+def new_import_file(
     platform: Platform, marks: Sequence[Mark], wanted: Sequence[Wanted], columns: Sequence[str]
 ) -> Made:
     """Return the lines of the file, and remarks. `columns` are the roster's further ones."""

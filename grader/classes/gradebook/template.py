@@ -15,8 +15,8 @@ from grader.classes.gradebook.platforms import (
     Wanted,
     entry_identity,
     kinds,
+    letters_and_digits,
     match,
-    plain,
     row_identity,
 )
 from grader.classes.gradebook.table import harmless, number_text
@@ -68,7 +68,7 @@ def fill_template(
         else:
             who = f"{mark.entry.id} ({mark.entry.name})" if mark.entry.name else mark.entry.id
             work.remarks.append(f"{who}: not in {template.name}: {found.doubtful[place]}")
-    work.remarks += _left(work, students, theirs, set(found.rows.values()))
+    work.remarks += _unmatched(work, students, theirs, set(found.rows.values()))
     return sheet.to_bytes(), work.remarks
 
 
@@ -157,7 +157,7 @@ def _fill(work: _Work, record: Record, mark: Mark) -> None:
             record.cells[place] = work.sheet.written(number_text(points), record.cells[place])
 
 
-def _left(
+def _unmatched(
     work: _Work, students: Sequence[Record], theirs: Sequence[Identity], taken: set[int]
 ) -> Iterator[str]:
     """Yield a remark for each student who is in the export only."""
@@ -188,7 +188,7 @@ def find_column(
     Raises UsageError where several columns could be it, or none is what was named.
     """
     exact = [place for place, name in enumerate(header) if name.strip() in wanted.names]
-    meant = {plain(name) for name in wanted.names}
+    meant = {letters_and_digits(name) for name in wanted.names}
     near = [
         place
         for place, name in enumerate(header)
@@ -208,7 +208,7 @@ def find_column(
 
 def worksheet_columns(header: Sequence[str], known: dict[str, Kind]) -> tuple[int, int | None] | None:
     """The places of the grade and of its maximum in Moodle's offline grading worksheet; None where it is none."""
-    plains = [plain(name) for name in header]
+    plains = [letters_and_digits(name) for name in header]
     grade = next((place for place, name in enumerate(plains) if name in _GRADE), None)
     if grade is None or "platform" not in known.values():
         return None
@@ -229,11 +229,11 @@ def new_header(wanted: Wanted, platform: Platform, points: str) -> str:
 def _titles(name: str, platform: Platform) -> set[str]:
     """What the column may be called without what the platform adds."""
     if platform == "canvas":
-        return {plain(re.sub(r"\s*\(\d+\)\s*$", "", name))}
+        return {letters_and_digits(re.sub(r"\s*\(\d+\)\s*$", "", name))}
     if platform == "blackboard":
-        return {plain(re.sub(r"\s*\[Total Pts:.*$|\s*\|\s*\d+\s*$", "", name))}
+        return {letters_and_digits(re.sub(r"\s*\[Total Pts:.*$|\s*\|\s*\d+\s*$", "", name))}
     bare = re.sub(r"\s*\([^()]*\)\s*$", "", name)
-    return {plain(bare), plain(bare.partition(":")[2]) or plain(bare)}
+    return {letters_and_digits(bare), letters_and_digits(bare.partition(":")[2]) or letters_and_digits(bare)}
 
 
 def _others(header: Sequence[str], known: dict[str, Kind]) -> str:

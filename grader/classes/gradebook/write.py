@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from grader.classes.gradebook.platforms import Platform, fresh, marks_of, remarks_of, wanted_columns
+from grader.classes.gradebook.platforms import Platform, marks_of, new_import_file, remarks_of, wanted_columns
 from grader.classes.gradebook.table import Book, Cell, Form, Row, cells, csv_line, header, visible_text
 from grader.classes.gradebook.template import fill_template
 from grader.errors import OutputError, UsageError
@@ -49,7 +49,7 @@ def write_gradebook(
                 f"--form {form} has every criterion and needs no template",
                 hint="--template, --per-criterion and --column are for canvas, moodle and blackboard",
             )
-        _plain(book, rows, target, form)
+        _write_plain(book, rows, target, form)
         return ()
     marks = marks_of(book, rows, per_criterion=per_criterion)
     wanted = wanted_columns(book, column, per_criterion=per_criterion)
@@ -62,13 +62,13 @@ def write_gradebook(
         data, more = fill_template(template, platform, marks, wanted, named=bool(column))
         atomic_write(target, data)
     else:
-        lines, more = fresh(platform, marks, wanted, book.columns)
+        lines, more = new_import_file(platform, marks, wanted, book.columns)
         with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
             file.writelines(lines)
     return (*remarks, *more)
 
 
-def _plain(book: Book, rows: Iterable[Row], target: Path, form: Form) -> None:
+def _write_plain(book: Book, rows: Iterable[Row], target: Path, form: Form) -> None:
     if form == "csv":
         write_csv(book, rows, target)
     elif form == "jsonl":

@@ -139,13 +139,13 @@ class _Reading:
             faults = self._faults(key, criterion, given)
             self.faults += faults
             if not faults and name is not None:
-                override = WrittenOverride.model_validate_json(json.dumps(_given(given)), strict=True)
+                override = WrittenOverride.model_validate_json(json.dumps(_without_empty(given)), strict=True)
                 self.found.setdefault(name, {})[criterion] = override
 
     def _faults(self, key: str, criterion: str, given: object) -> list[Fault]:
         path = (key, criterion)
         comments = as_map(given).get("comments")
-        found = model_faults(WrittenOverride if comments else Override, _given(given), path)
+        found = model_faults(WrittenOverride if comments else Override, _without_empty(given), path)
         if criterion not in self._points:
             near = did_you_mean(criterion, self._points)
             return [(path, f'there is no criterion "{criterion}"{near}'), *found]
@@ -165,7 +165,7 @@ class _Reading:
         return found
 
 
-def _given(value: object) -> object:
+def _without_empty(value: object) -> object:
     """Without what was left empty, as in a form that someone has begun to fill in."""
     if not isinstance(value, dict):
         return value

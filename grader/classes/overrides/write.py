@@ -47,11 +47,11 @@ def write_overrides(path: Path, changes: Iterable[Change]) -> None:
     changed here, OutputError where it cannot be written, Busy where another writer does not come to its end.
     """
     path = path.resolve()
-    with _alone(path):
+    with _hold_lock(path):
         raw = _read(path)
         mode = path.stat().st_mode & 0o777 if path.exists() else None
         wanted = {(name, criterion): given for name, criterion, given in changes}  # of two for one, the last
-        data = _changed(path, raw, [(*of, _fields(given)) for of, given in wanted.items()]).encode()
+        data = _changed_text(path, raw, [(*of, _fields(given)) for of, given in wanted.items()]).encode()
         if data != raw:
             atomic_write(path, data)
             if mode is not None:
@@ -59,7 +59,7 @@ def write_overrides(path: Path, changes: Iterable[Change]) -> None:
 
 
 @contextmanager
-def _alone(path: Path) -> Iterator[None]:
+def _hold_lock(path: Path) -> Iterator[None]:
     """Hold the file beside it that all writers lock; it stays, because another one may be waiting for it."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -101,7 +101,7 @@ def _fields(entry: Entry | None) -> Fields | None:
     return {name: value for name, value in given.items() if value is not None and value not in ("", [])}
 
 
-def _changed(path: Path, raw: bytes, changes: Sequence[tuple[str, str, Fields | None]]) -> str:
+def _changed_text(path: Path, raw: bytes, changes: Sequence[tuple[str, str, Fields | None]]) -> str:
     """The file's new text, which is read back and compared before it counts."""
     before = _data(path, raw)
     if any(submission == SCHEMA_KEY for submission, _, _ in changes):
@@ -115,7 +115,7 @@ def _changed(path: Path, raw: bytes, changes: Sequence[tuple[str, str, Fields | 
     ]
     new = edited(raw.decode("utf-8-sig"), before, edits)
     try:
-        sound = _plain(_data(path, new.encode())) == _plain(_expected(before, edits))
+        sound = _without_empty(_data(path, new.encode())) == _without_empty(_expected(before, edits))
     except RubricError:
         sound = False
     if not sound:
@@ -150,9 +150,9 @@ def _expected(before: dict[str, Any], edits: Iterable[Edit]) -> dict[str, Any]:
     return after
 
 
-def _plain(data: dict[str, Any]) -> dict[str, Any]:
+def _without_empty(data: dict[str, Any]) -> dict[str, Any]:
     """Without what is empty, which means nothing; the schema's line may be there or not."""
-    plain = {key: _plain(value) if isinstance(value, dict) else value for key, value in data.items()}
+    plain = {key: _without_empty(value) if isinstance(value, dict) else value for key, value in data.items()}
     return {key: value for key, value in plain.items() if value not in (None, {}) and key != SCHEMA_KEY}
 
 

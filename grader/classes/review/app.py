@@ -54,7 +54,7 @@ from grader.classes.review.guard import (
     open_report,
     reports_of,
 )
-from grader.classes.review.session import Conflict, ReviewSession, plain
+from grader.classes.review.session import Conflict, ReviewSession, override_as_written
 from grader.classes.review.submissions import Item, across, alike, place_of
 from grader.errors import GraderError, RubricError
 from grader.model.result import AppliedOverride, WrittenOverride
@@ -100,8 +100,8 @@ def create_app(review: ReviewSession, *, port: int, token: str, author: str) -> 
     app.add_url_rule("/s/<key>/c/<criterion>", view_func=view.decide, methods=["POST"])
     app.add_url_rule("/s/<key>/report/<name>", view_func=view.report)
     app.add_url_rule("/s/<key>/evidence/<name>", view_func=view.evidence)
-    app.register_error_handler(HTTPException, failed)
-    app.register_error_handler(GraderError, graders)
+    app.register_error_handler(HTTPException, show_http_error)
+    app.register_error_handler(GraderError, show_grader_error)
     return app
 
 
@@ -230,7 +230,7 @@ class _Views:
         item = self._item(key)
         if item.alias:
             return self._report_without_names(item, name)
-        response = sent(open_report(self._session.path / item.key, name), REPORTS.get(name, ""))
+        response = send_opened(open_report(self._session.path / item.key, name), REPORTS.get(name, ""))
         response.headers["Content-Security-Policy"] = FRAMED
         return response
 
@@ -240,7 +240,7 @@ class _Views:
         if item.alias:
             raise NotFound(HIDDEN)
         file = open_evidence(self._session.path / item.key, name)
-        return sent(file, "application/octet-stream", download=f"{item.key}-{name}")
+        return send_opened(file, "application/octet-stream", download=f"{item.key}-{name}")
 
     def _report_without_names(self, item: Item, name: str) -> Response:
         row, _, _ = self._row(item, {})
@@ -416,7 +416,7 @@ def as_written(applied: AppliedOverride) -> Decided:
     written = WrittenOverride(
         points=applied.points, comment=applied.comment, author=applied.author, date=applied.date
     )
-    return Decided(written=written, override=plain(applied))
+    return Decided(written=written, override=override_as_written(applied))
 
 
 def _author(default: str) -> str:
@@ -441,7 +441,7 @@ SCRIPT = "X-Asked-By"
 """The header with which our script asks: it is answered with what changed, as JSON."""
 
 
-def sent(file: BinaryIO | None, mimetype: str, *, download: str = "") -> Response:
+def send_opened(file: BinaryIO | None, mimetype: str, *, download: str = "") -> Response:
     """A file that is open; under the name `download` it is kept and not shown. Raises NotFound where there is none."""
     if file is None:
         raise NotFound("There is no such file.")
@@ -456,25 +456,27 @@ def with_code(response: Response, code: int) -> Response:
     return response
 
 
-def graders(error: GraderError) -> AnyResponse:
+def show_grader_error(error: GraderError) -> AnyResponse:
     """What the grader says is wrong."""
     blind = current_app.extensions["review"].blind
     text = (
         "The grader says why to those who see names." if blind else f"{error.message}. {error.hint}".strip()
     )
-    return _told(500, "This did not work", text, again=False)
+    return _message_page(500, "This did not work", text, again=False)
 
 
-def failed(error: HTTPException) -> AnyResponse:
+def show_http_error(error: HTTPException) -> AnyResponse:
     """Any other answer than a page. After a link of another site, browsers hold back the cookie that they have just
     been given; the page itself asks once more, and that is no other site's request."""
     code = error.code or 500
     title = {403: "Not allowed", 404: "Not found", 413: "Too much text"}.get(code, "This did not work")
     cross = request.headers.get("Sec-Fetch-Site") == "cross-site"
-    return _told(code, title, error.description or "", again=code == 403 and request.path == "/" and cross)
+    return _message_page(
+        code, title, error.description or "", again=code == 403 and request.path == "/" and cross
+    )
 
 
-def _told(code: int, title: str, text: str, *, again: bool) -> AnyResponse:
+def _message_page(code: int, title: str, text: str, *, again: bool) -> AnyResponse:
     if SCRIPT in request.headers:
         return with_code(jsonify(error=text), code)
     return Response(render_template("told.html", title=title, text=text, again=again), code)

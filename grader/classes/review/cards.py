@@ -94,7 +94,7 @@ class Card:
         points = self.decided.written.points if self.decided else None
         if self.requests and not self.decided and not self.criterion.status.is_open:
             points = self.criterion.points
-        return "" if points is None else plain(points)
+        return "" if points is None else form_number(points)
 
     @property
     def comment(self) -> str:
@@ -197,7 +197,7 @@ def verdict(status: Status, points: float, most: float) -> str:
     return f"{status.value}, {number(points)} of {number(most)}"
 
 
-def plain(value: float) -> str:
+def form_number(value: float) -> str:
     """As a field of a form has it: no digit is lost."""
     return f"{value:.10f}".rstrip("0").rstrip(".")
 
@@ -282,7 +282,7 @@ def points_words(comment: BankComment) -> str:
     """Return `7`, `-2` or nothing."""
     if comment.change is not None:
         return f"{comment.change:+g}"
-    return "" if comment.points is None else plain(comment.points)
+    return "" if comment.points is None else form_number(comment.points)
 
 
 def author_of(text: str) -> str:

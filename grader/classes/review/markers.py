@@ -13,7 +13,7 @@ from grader.classes.batch.run import ids_of
 from grader.classes.overrides import COMMENTS_FILE as BANK
 from grader.classes.overrides import FILE, read_bank, read_written
 from grader.classes.overrides.write import Change, write_overrides
-from grader.classes.review.session import reviewing
+from grader.classes.review.session import hold_review
 from grader.errors import UsageError
 from grader.files import atomic_write
 from grader.model.batch import Entry
@@ -52,7 +52,7 @@ def share_of(folder: Path, marker: str | None, of: str | None, group: str | None
             raise UsageError("--of needs --marker", hint="--marker ann --of 4")
         return Share(group=group)
     if of.isdigit() and 0 < int(of) < 1000:
-        with reviewing(folder):
+        with hold_review(folder):
             names, count = _claimed(folder, marker, int(of)), int(of)
     else:
         names = [name.strip() for name in of.split(",")]
@@ -98,7 +98,7 @@ def merge(batch: BatchFolder, rubric: Rubric, other: Path) -> Merged:
             f"{other / FILE}: there is no such file", hint="give the other marker's folder of results"
         )
     ids = ids_of(batch.run)
-    with reviewing(batch.path):
+    with hold_review(batch.path):
         bank, their_bank = read_bank(batch.path / BANK, rubric), read_bank(other / BANK, rubric)
         mine = read_written(batch.path / FILE, rubric, ids, bank)
         theirs = read_written(other / FILE, rubric, ids, their_bank)

@@ -107,7 +107,9 @@ def rows_of(path: Path, students: Collection[str]) -> list[Asked]:
         Asked(
             student=str(row["student"]),
             criterion=str(row.get("criterion") or ""),
-            request=Request(**{name: _plain(str(row.get(name) or "")) for name in COLUMNS[2:]}),
+            request=Request(
+                **{name: _without_formula_sign(str(row.get(name) or "")) for name in COLUMNS[2:]}
+            ),
         )
         for row in csv.DictReader(io.StringIO(_text(path), newline=""))
         if row.get("student") in students
@@ -159,7 +161,9 @@ def read_requests(paths: Sequence[Path], entries: Sequence[Entry], criteria: Seq
                 faults.append(f"{where}: {what if asks else f'no criterion is named: {line(text, 80)}'}")
                 continue
             asked = Request(
-                text=_plain(text)[:TEXT_CHARS], when=when[:WHEN_CHARS], source=source[:SOURCE_CHARS]
+                text=_without_formula_sign(text)[:TEXT_CHARS],
+                when=when[:WHEN_CHARS],
+                source=source[:SOURCE_CHARS],
             )
             of = found.setdefault(submission, {})
             for criterion in about:
@@ -209,7 +213,7 @@ def _columns(headings: Sequence[str | None]) -> dict[str, tuple[str, ...]]:
     return found
 
 
-def _plain(cell: str) -> str:
+def _without_formula_sign(cell: str) -> str:
     """Return a cell without the sign that keeps it from being a formula."""
     return cell[1:] if cell[:1] == "'" and _FORMULA.match(cell[1:]) else cell
 

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from grader.classes.batch.existing_results import Rewriting, Settler, rewrite, rewrite_all
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
-from grader.classes.batch.run import GRADEBOOK, alone, ids_of, write_books
+from grader.classes.batch.run import GRADEBOOK, hold_folder, ids_of, write_books
 from grader.classes.feedback.publish import read_published
 from grader.classes.overrides import COMMENTS_FILE as BANK
 from grader.classes.overrides import (
@@ -222,7 +222,7 @@ class ReviewSession:
         """
         name = item.entry.id
         asked = next(c for c in self.rubric.rubric.criteria if c.id == criterion)
-        with self._saving, reviewing(self.path):
+        with self._saving, hold_review(self.path):
             found = self.decisions()
             now = found.come_to.get(name, {}).get(criterion)
             if not same(now, resolve(wanted, asked, found.bank) if wanted else None):
@@ -242,14 +242,14 @@ class ReviewSession:
         All are written at once, with a word by which they can be taken back at once.
         """
         wanted = wanted.model_copy(update={"together": secrets.token_hex(6)})
-        with self._saving, reviewing(self.path):
+        with self._saving, hold_review(self.path):
             those = alike(self.items(), criterion, diagnosis)
             self._write_together(those, criterion, wanted)
         return len(those)
 
     def undo_together(self, criterion: str, word: str) -> int:
         """Take out what was decided in one go and not changed since; return how many these are."""
-        with self._saving, reviewing(self.path):
+        with self._saving, hold_review(self.path):
             written = self.decisions().written
             those = [
                 item
@@ -267,7 +267,7 @@ class ReviewSession:
 
     def save_comment(self, criterion: str, name: str, comment: BankComment) -> int:
         """Put a comment into `comments.yaml`, or change it there for all that have it; return how many have it."""
-        with self._saving, reviewing(self.path):
+        with self._saving, hold_review(self.path):
             written = self.decisions().written
             write_override(self.path / BANK, criterion, name, comment)
             having = {
@@ -306,7 +306,7 @@ class ReviewSession:
         if self.submissions.batch().run.state != "running" or self._writing.locked():
             return False
         try:
-            with alone(self.path):
+            with hold_folder(self.path):
                 return False
         except Busy:
             return True
@@ -318,7 +318,7 @@ class ReviewSession:
         if not self._writing.acquire(timeout=PATIENCE_S):
             return "the report follows in a moment"
         try:
-            with alone(self.path):
+            with hold_folder(self.path):
                 return self._settle({item.key})
         except Busy:
             return "a batch is running in this folder: the report follows when it has ended"
@@ -385,7 +385,7 @@ class ReviewSession:
             self._catch_up()
         if not self._books_behind:
             return
-        with self._writing, alone(self.path):
+        with self._writing, hold_folder(self.path):
             with self._guard:
                 keys = set(self._pending)
                 self._books_behind = False
@@ -429,7 +429,7 @@ class ReviewSession:
         """Return whether a result says something else than `overrides.yaml`."""
         known = {criterion.id for criterion in result.criteria}
         given = {k: v for k, v in overrides.get(item.entry.id, {}).items() if k in known}
-        return given != {o.criterion: plain(o) for o in result.overrides}
+        return given != {o.criterion: override_as_written(o) for o in result.overrides}
 
 
 LOCK = ".review.lock"
@@ -448,7 +448,7 @@ def mark(override: Override | None) -> str:
     return sha256(override.model_dump_json().encode()).hexdigest()[:24] if override else ""
 
 
-def plain(override: Override) -> Override:
+def override_as_written(override: Override) -> Override:
     """What a person wrote of an override that was applied."""
     return Override(**{name: getattr(override, name) for name in Override.model_fields})
 
@@ -461,7 +461,7 @@ def same(one: Override | None, other: Override | None) -> bool:
 
 
 @contextmanager
-def reviewing(path: Path) -> Iterator[None]:
+def hold_review(path: Path) -> Iterator[None]:
     """Hold what all reviews of a class hold while they compare and write: another process may review it, too."""
     try:
         descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)

@@ -85,29 +85,29 @@ def source_fault(source: str, base: Path, local: Local = OWN_FOLDER) -> str:
     try:
         there = _is_there(source, base)
     except (OSError, ValueError, RuntimeError):
-        return f"{_shown(source)} is no path that can be followed"
+        return f"{_without_password(source)} is no path that can be followed"
     refused = local_fault(whole_source(source, base), base, local)
     if not there and (_ADDRESS.match(source) or _WINDOWS.match(source)):
         fault = _address_fault(source)
         if fault or not refused:
             return fault
     if refused:
-        return f"{_shown(source)} {refused}"
+        return f"{_without_password(source)} {refused}"
     if there or Path(source).is_absolute() or source.startswith("~"):
         return ""
     web = "; a web address begins with https://" if _WEB.match(source) else ""
-    return f"{_shown(source)} does not exist{web}"
+    return f"{_without_password(source)} does not exist{web}"
 
 
 def _address_fault(source: str) -> str:
     if _SLASHES.match(source):
-        return f"{_shown(source)}: an address has two slashes behind its colon, as in https://"
+        return f"{_without_password(source)}: an address has two slashes behind its colon, as in https://"
     if not _ADDRESS.match(source):
-        return f"{_shown(source)} is a path of Windows: write it with / as it is on this machine"
+        return f"{_without_password(source)} is a path of Windows: write it with / as it is on this machine"
     try:
         parse_source(source)
     except UsageError:  # as what git takes for the name of a program (`ext::`) or for an option of ssh
-        return f"{_shown(source)} is no address of a repository"
+        return f"{_without_password(source)} is no address of a repository"
     except (
         SubmissionError,
         OSError,
@@ -128,7 +128,7 @@ def ref_fault(ref: str) -> str:
     return f"{brief(ref)} cannot be the name of a branch, tag or commit" if _NO_REF.search(ref) else ""
 
 
-def _shown(source: str) -> str:
+def _without_password(source: str) -> str:
     """Without what may be a password: all that stands before an `@`."""
     return brief(source.rpartition("@")[2] if re.search(r":.*@", source, re.DOTALL) else source)
 

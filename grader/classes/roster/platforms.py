@@ -379,7 +379,7 @@ def _projects(path: Path) -> list[object]:
     try:
         while at < len(text):
             page, at = decoder.raw_decode(text, at)
-            projects += page if isinstance(page, list) else [_alone(page, path)]
+            projects += page if isinstance(page, list) else [_as_list(page, path)]
             at = _BLANKS.match(text, at).end()  # type: ignore[union-attr]
     except (ValueError, RecursionError) as error:
         raise UsageError(f"{path}: no JSON: {printable(str(error))[:200]}", hint=_HINT) from error
@@ -388,7 +388,7 @@ def _projects(path: Path) -> list[object]:
     return projects
 
 
-def _alone(page: object, path: Path) -> object:
+def _as_list(page: object, path: Path) -> object:
     """A project without a list around it, as `--output ndjson` writes one a line."""
     if isinstance(page, dict) and any(key in page for key in ADDRESSES):
         return page

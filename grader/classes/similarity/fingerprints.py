@@ -164,16 +164,16 @@ def _interrupt(_number: int, _frame: FrameType | None) -> None:
 
 def read_text(path: str, code: str, language: Language) -> Text:
     """Return all fingerprints of a file's code: labs are short, and no window has to be thinned out."""
-    plain = _plain(code, language)
+    plain = _without_comments(code, language)
     signs, offsets = filter_code(plain, path, language)
     prints = hashed_kgrams(signs, GRAM).astype(np.int64)
     skipped = len(plain) - len(plain.lstrip("\n"))  # pygments begins behind them
-    places = np.arange(len(signs)) + _removed(offsets, len(signs)) + skipped
+    places = np.arange(len(signs)) + _count_removed(offsets, len(signs)) + skipped
     ends = np.flatnonzero(np.frombuffer(plain.encode("utf-32-le"), dtype=np.uint32) == ord("\n"))
     return Text(path=path, prints=prints, lines=np.searchsorted(ends, places).astype(np.int64) + 1)
 
 
-def covered(text: Text, chosen: Marks) -> Marks:
+def mark_covered(text: Text, chosen: Marks) -> Marks:
     """Mark the signs that lie in one of the chosen fingerprints."""
     marks = np.zeros(len(text.lines), dtype=np.bool_)
     for begin, end in get_copied_slices(np.flatnonzero(chosen), GRAM).T.astype(int):
@@ -181,7 +181,7 @@ def covered(text: Text, chosen: Marks) -> Marks:
     return marks
 
 
-def _plain(code: str, language: Language) -> str:
+def _without_comments(code: str, language: Language) -> str:
     """Return the same lines without comments, docstrings and imports, which are alike by nature.
 
     Classes get names of one letter: `filter_code` counts their length wrongly."""
@@ -210,7 +210,7 @@ def _lexer(language: Language) -> Lexer:
     return get_lexer_by_name(language, stripnl=False)
 
 
-def _removed(offsets: Numbers, size: int) -> Numbers:
+def _count_removed(offsets: Numbers, size: int) -> Numbers:
     """Return how many characters are left out before each sign: `filter_code` notes it where it leaves some out."""
     rows = offsets[1:][offsets[1:, 0] >= 0]
     if not len(rows):

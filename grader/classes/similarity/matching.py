@@ -18,8 +18,8 @@ from grader.classes.similarity.fingerprints import (
     Marks,
     Numbers,
     Text,
-    covered,
     leave_out,
+    mark_covered,
     read_place,
     reading_ended,
 )
@@ -257,7 +257,7 @@ def distinct(prints: Iterable[Numbers]) -> Numbers:
 
 def _own(text: Text, taken_out: Numbers) -> Own:
     others = np.isin(text.prints, taken_out)
-    signs = ~covered(text, others)
+    signs = ~mark_covered(text, others)
     return Own(text=text, prints=~others, signs=signs)
 
 
@@ -282,7 +282,7 @@ def _shared_counts(works: Sequence[Work]) -> np.ndarray:
 def _hits(work: Work, others: Numbers) -> list[Marks]:
     """For each file, which of its own signs are in the other submission too."""
     return [
-        file.signs & covered(file.text, file.prints & np.isin(file.text.prints, others))
+        file.signs & mark_covered(file.text, file.prints & np.isin(file.text.prints, others))
         for file in work.files
     ]
 
@@ -315,7 +315,7 @@ def _common(one: Own, other: Own) -> int:
 
 def _stretches(one: Own, other: Own) -> Lines:
     """The lines of the one file that are in the other, neighbours joined."""
-    hits = covered(one.text, one.prints & np.isin(one.text.prints, other.text.prints[other.prints]))
+    hits = mark_covered(one.text, one.prints & np.isin(one.text.prints, other.text.prints[other.prints]))
     lines = np.unique(one.text.lines[one.signs & hits])
     if not len(lines):
         return ()

@@ -26,7 +26,7 @@ from grader.report.class_page.statistics import (
     histogram,
     most_first,
     span,
-    spread,
+    spread_of,
     timing,
 )
 from grader.report.class_page.submissions import (
@@ -91,7 +91,7 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
     lines = found.lines
     judged = [one for one in lines if one.judged]
     heat = heat_map(lines, run.criteria)
-    points = spread([one.points for one in judged], run.max_points)
+    points = spread_of([one.points for one in judged], run.max_points)
     cost = costs(lines, run.criteria)
     shared, alone = _listed(run, found.diagnoses)
     parts: dict[str, Any] = {

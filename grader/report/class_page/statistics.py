@@ -95,7 +95,7 @@ class Spread:
     bins: tuple[Bin, ...]
 
 
-def spread(points: Sequence[float], most: float) -> Spread | None:
+def spread_of(points: Sequence[float], most: float) -> Spread | None:
     """None where nothing was judged."""
     if not points:
         return None

@@ -111,7 +111,7 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
         look_again=sum(override.changed for override in result.overrides),
         wall_s=result.timing.wall_s,
         unwalled=line(without_sandbox(result.environment.sandbox), MESSAGE_CHARS),
-        why=_why(result.criteria),
+        why=_open_words(result.criteria),
         problem=_problem(result),
     )
 
@@ -146,7 +146,7 @@ def _still_open(criteria: Iterable[CriterionResult]) -> list[CriterionResult]:
     return [c for c in criteria if c.status.is_retryable and c.counts]
 
 
-def _why(criteria: Iterable[CriterionResult]) -> str:
+def _open_words(criteria: Iterable[CriterionResult]) -> str:
     """What is open, in a line."""
     found = _still_open(criteria)
     if not found:
@@ -165,7 +165,7 @@ def _problem(result: GradingResult) -> Problem | None:
     if result.status != "error" or (error is not None and error.kind == MISSING):
         return None
     if error is None:
-        return Problem(message=_why(result.criteria), hint="", roster=False)
+        return Problem(message=_open_words(result.criteria), hint="", roster=False)
     return Problem(
         message=line(error.message, MESSAGE_CHARS),
         hint=line(error.hint, MESSAGE_CHARS),

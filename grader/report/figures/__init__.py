@@ -57,7 +57,7 @@ def figures_of(rubric: Rubric, runs: Mapping[str, Run], criteria: Sequence[Crite
     scenario without nodes and one in which nothing was printed are not in it.
     """
     rubric = with_recorded_values(rubric, runs)
-    facts, on_copy = (_made(try_facts, rubric, found) for found in _first_and_copy(runs))
+    facts, on_copy = (_try_make(try_facts, rubric, found) for found in _first_and_copy(runs))
     known = facts.runs if facts else runs
     shown = {
         name: run for name, run in islice(known.items(), RUNS_MAX) if name in {*rubric.scenarios, PACKAGE_RUN}
@@ -91,7 +91,7 @@ def _by_criterion(
 
 def _drawn(facts: Facts, criterion: Criterion) -> tuple[Figure, ...]:
     """What shows the check's measurement; nothing where the check itself was given no run to judge."""
-    return _made(_from_facts, facts, criterion) or ()
+    return _try_make(_from_facts, facts, criterion) or ()
 
 
 def _from_facts(facts: Facts, criterion: Criterion) -> tuple[Figure, ...]:
@@ -107,16 +107,16 @@ def _from_facts(facts: Facts, criterion: Criterion) -> tuple[Figure, ...]:
 
 def _cited(facts: Facts, result: CriterionResult) -> tuple[Figure, ...]:
     build = facts.runs.get(PACKAGE_RUN)
-    found = _made(lambda: tuple(code_figures(build, result.citations))) if build else None
+    found = _try_make(lambda: tuple(code_figures(build, result.citations))) if build else None
     return found or ()
 
 
 def _each(make: Callable[[Run], Made | None], runs: Mapping[str, Run]) -> dict[str, Made]:
-    found = ((name, _made(make, run)) for name, run in runs.items())
+    found = ((name, _try_make(make, run)) for name, run in runs.items())
     return {name: figure for name, figure in found if figure is not None}
 
 
-def _made(make: Callable[Asked, Made], *args: Asked.args, **kwargs: Asked.kwargs) -> Made | None:
+def _try_make(make: Callable[Asked, Made], *args: Asked.args, **kwargs: Asked.kwargs) -> Made | None:
     """None for what cannot be made: a report without a picture is better than none."""
     try:
         return make(*args, **kwargs)

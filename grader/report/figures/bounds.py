@@ -21,7 +21,7 @@ def short(text: object, letters: int = LINE_LETTERS) -> str:
     return cut if cut.isascii() else cut.encode(errors="replace").decode()
 
 
-def named(text: object) -> str:
+def short_name(text: object) -> str:
     """Return the name of a topic, a node or a file."""
     return short(text, NAME_LETTERS)
 
@@ -41,7 +41,7 @@ def second(run: Run, time_ns: int) -> float:
     return round((time_ns - run.start_ns) / 1e9, 6)
 
 
-def spread(indices: Sequence[int], count: int) -> Iterable[int]:
+def thin_out(indices: Sequence[int], count: int) -> Iterable[int]:
     """About `count` of them, one from each of as many parts, at another place in each: so that no rhythm of theirs
     meets one of the parts'."""
     if len(indices) <= count:

@@ -62,7 +62,7 @@ from grader.model.figure import (
 from grader.model.message_rate import Rhythm
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status
-from grader.report.figures.bounds import finite, named, second, short, spread
+from grader.report.figures.bounds import finite, second, short, short_name, thin_out
 from grader.wording import join_words, significant
 
 FIRST_VALUES = 40
@@ -143,9 +143,9 @@ def _counter_figure(
     ]
     places = {number: place for place, number in enumerate(numbers)}
     return CounterFigure(
-        topic=named(topic),
-        publisher=named(count.callerid or "an unnamed node"),
-        scenario=named(run.scenario),
+        topic=short_name(topic),
+        publisher=short_name(count.callerid or "an unnamed node"),
+        scenario=short_name(run.scenario),
         times_s=tuple(second(run, count.times_ns[i]) for i in numbers),
         values=tuple(_whole(finite(count.values[i])) for i in numbers),
         numbers=tuple(numbers),
@@ -192,12 +192,12 @@ def _shown_values(count: Count, marks: Sequence[int], turns: Sequence[Step]) -> 
     if len(every) <= POINTS_MAX:
         return every
     begin = every[: turns[TURNS_MAX].number] if len(turns) > TURNS_MAX else every
-    breaks = _around([s.number for s in turns[:TURNS_MAX]], 1, begin)
-    kept = {begin[0], begin[-1], *_around(marks, AROUND, every), *breaks}
-    return sorted({*kept, *spread(begin, POINTS_MAX - len(kept))})
+    breaks = _neighbours([s.number for s in turns[:TURNS_MAX]], 1, begin)
+    kept = {begin[0], begin[-1], *_neighbours(marks, AROUND, every), *breaks}
+    return sorted({*kept, *thin_out(begin, POINTS_MAX - len(kept))})
 
 
-def _around(numbers: Sequence[int], count: int, every: range) -> Iterator[int]:
+def _neighbours(numbers: Sequence[int], count: int, every: range) -> Iterator[int]:
     """These values and so many before and behind each; of a step, that is from `count` before to `count` - 1 behind."""
     return chain.from_iterable(every[max(0, n - count) : n + count] for n in numbers)
 
@@ -226,9 +226,9 @@ def _rate_figure(run: Run, params: RateParams, found: Rhythm, channels: Sequence
     kept = _shown_gaps(found.gaps_ns)
     low_ns, high_ns = params.bounds_ns
     return RateFigure(
-        topic=named(params.topic),
-        publisher=named(join_words(c.publisher for c in channels)),
-        scenario=named(run.scenario),
+        topic=short_name(params.topic),
+        publisher=short_name(join_words(c.publisher for c in channels)),
+        scenario=short_name(run.scenario),
         times_s=tuple(second(run, arrivals[i]) for i in kept),
         gaps_s=tuple(round(found.gaps_ns[i] / 1e9, 6) for i in kept),
         mean_hz=round(found.mean_hz, 4) or None,
@@ -253,7 +253,7 @@ def _shown_gaps(gaps_ns: Sequence[int]) -> list[int]:
         *heapq.nsmallest(EXTREMES, every, key=gaps_ns.__getitem__),
         every[-1],
     }
-    return sorted({*extremes, *spread(every, POINTS_MAX - len(extremes))})
+    return sorted({*extremes, *thin_out(every, POINTS_MAX - len(extremes))})
 
 
 def _late(run: Run, params: RateParams, found: Rhythm) -> list[tuple[int, int]]:
@@ -292,7 +292,7 @@ def heard_figures(run: Run, params: HearsParams) -> Iterator[HeardFigure]:
     ]
     kept = _shown_probes(found)
     yield HeardFigure(
-        scenario=named(run.scenario),
+        scenario=short_name(run.scenario),
         rows=tuple(_row(run, params.topic, probes[i], found[i]) for i in kept),
         left_out=len(probes) - len(kept),
         out_of_order=all(places) and None in in_turn,
@@ -307,15 +307,15 @@ def _both(
 
 def _row(run: Run, topic: str, probe: Probe, line: Line | None) -> Heard:
     return Heard(
-        topic=named(topic),
+        topic=short_name(topic),
         sent=short(probe.value, TEXT_LETTERS),
         at_s=second(run, probe.at_ns),
-        heard=None if line is None else _said(line),
+        heard=None if line is None else _message_words(line),
         after_s=None if line is None else max(0.0, round((line.at_ns - probe.at_ns) / 1e9, 6)),
     )
 
 
-def _said(line: Line) -> str:
+def _message_words(line: Line) -> str:
     """Without what stands between the node's name, which is cut off already, and its words."""
     return short(" ".join(line.text.split()).removeprefix(": "), TEXT_LETTERS)
 
@@ -344,8 +344,8 @@ def path_figures(run: Run, params: PathParams) -> Iterator[PathFigure]:
     course = followed(taken, way.points, params.tolerance_m)
     kept = _shown_poses(taken, course.strayed)
     yield PathFigure(
-        topic=named(params.topic),
-        scenario=named(run.scenario),
+        topic=short_name(params.topic),
+        scenario=short_name(run.scenario),
         points=tuple(_spot(taken[i].point) for i in kept),
         corners=tuple(map(_spot, way.points[:CORNERS_MAX])),
         tolerance_m=finite(params.tolerance_m),
@@ -395,8 +395,8 @@ def _place_figure(
     kept = _shown_poses(taken, wrong)
     shown = walls or (() if params.relative else shown_walls(run))
     return PlaceFigure(
-        topic=named(params.topic),
-        scenario=named(run.scenario),
+        topic=short_name(params.topic),
+        scenario=short_name(run.scenario),
         points=tuple(_spot(taken[i].point) for i in kept),
         walls=tuple(tuple(map(_spot, wall[:CORNERS_MAX])) for wall in shown[:SIDES_MAX]),
         wrong=None if wrong is None else kept.index(wrong),
@@ -416,4 +416,4 @@ def _shown_poses(path: Sequence[Pose], strayed: int | None) -> list[int]:
     moves = [i for i in every[1:] if spots[i] != spots[i - 1]]
     near = every[max(0, strayed - NEAR) : strayed + NEAR] if strayed is not None else ()
     own = {every[0], every[-1], *near}
-    return sorted({*own, *spread(moves, POINTS_MAX - len(own))})
+    return sorted({*own, *thin_out(moves, POINTS_MAX - len(own))})

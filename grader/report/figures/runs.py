@@ -25,7 +25,7 @@ from grader.model.figure import (
     TimelineFigure,
 )
 from grader.model.verdict import Citation, FileCitation
-from grader.report.figures.bounds import LINE_LETTERS, is_drawn, named, second, short, spread
+from grader.report.figures.bounds import LINE_LETTERS, is_drawn, second, short, short_name, thin_out
 
 NODES_MAX = 40
 TOPICS_MAX = 40
@@ -53,11 +53,13 @@ def graph_of(run: Run) -> GraphFigure | None:
     types = _types(run, states)
     kept = [e for e in edges if e.node in shown and e.topic in drawn][:EDGES_MAX]
     return GraphFigure(
-        scenario=named(run.scenario),
-        nodes=tuple(map(named, nodes[:NODES_MAX])),
-        topics=tuple(map(named, topics[:TOPICS_MAX])),
-        types={named(t): named(types[t]) for t in topics[:TOPICS_MAX] if t in types},
-        edges=tuple(Edge(node=named(e.node), topic=named(e.topic), publishes=e.publishes) for e in kept),
+        scenario=short_name(run.scenario),
+        nodes=tuple(map(short_name, nodes[:NODES_MAX])),
+        topics=tuple(map(short_name, topics[:TOPICS_MAX])),
+        types={short_name(t): short_name(types[t]) for t in topics[:TOPICS_MAX] if t in types},
+        edges=tuple(
+            Edge(node=short_name(e.node), topic=short_name(e.topic), publishes=e.publishes) for e in kept
+        ),
         left_out=len(nodes) - len(shown) + len(topics) - len(drawn),
     )
 
@@ -67,7 +69,7 @@ def _states(run: Run) -> list[GraphEvent]:
     events = [event for _, event in run.graph]
     if len(events) <= STATES_MAX:
         return events
-    return [*(events[i] for i in spread(range(len(events)), STATES_MAX - 1)), events[-1]]
+    return [*(events[i] for i in thin_out(range(len(events)), STATES_MAX - 1)), events[-1]]
 
 
 def _edges(run: Run, states: Sequence[GraphEvent]) -> Iterator[_Edge]:
@@ -115,13 +117,13 @@ def console_of(run: Run) -> ConsoleFigure | None:
     lines = tuple(
         ConsoleLine(
             at_s=second(run, time_ns),
-            process=named(line.process),
+            process=short_name(line.process),
             stream=line.stream,
             text=short(text, letters),
         )
         for (time_ns, line), text in zip(kept, texts, strict=True)
     )
-    return ConsoleFigure(scenario=named(run.scenario), lines=lines, left_out=len(printed) - len(kept))
+    return ConsoleFigure(scenario=short_name(run.scenario), lines=lines, left_out=len(printed) - len(kept))
 
 
 AROUND = 3
@@ -168,7 +170,7 @@ def _figure(
     }
     first = max(1, marks[0] - AROUND)
     return CodeFigure(
-        file=named(file),
+        file=short_name(file),
         first_line=first,
         lines=tuple(short(line) for line in lines[first - 1 : marks[-1] + AROUND]),
         marked=tuple(marks),
@@ -197,7 +199,7 @@ def timeline_of(run: Run) -> TimelineFigure | None:
     if not any(lane.kind in {"process", "node"} for lane in lanes):
         return None
     return TimelineFigure(
-        scenario=named(run.scenario),
+        scenario=short_name(run.scenario),
         length_s=second(run, run.end_ns),
         lanes=tuple(lanes[:LANES_MAX]),
         left_out=len(lanes[LANES_MAX:]),
@@ -207,7 +209,9 @@ def timeline_of(run: Run) -> TimelineFigure | None:
 def _lane(kind: str, name: str, stretches: Iterable[Stretch]) -> Iterator[Lane]:
     found = tuple(stretches)
     if found:
-        yield Lane.model_validate({"kind": kind, "name": named(name), "stretches": found[:STRETCHES_MAX]})
+        yield Lane.model_validate(
+            {"kind": kind, "name": short_name(name), "stretches": found[:STRETCHES_MAX]}
+        )
 
 
 def _processes(run: Run) -> Iterator[Lane]:
@@ -224,13 +228,13 @@ def _lives(run: Run, name: str) -> Iterator[Stretch]:
         if event.event == "start":
             begin = time_ns
         elif begin is not None:
-            yield _stretch(run, begin, time_ns, _ended(event), wrong=_failed(event))
+            yield _stretch(run, begin, time_ns, _how_it_ended(event), wrong=_failed(event))
             begin = None
     if begin is not None:
         yield _stretch(run, begin, run.end_ns, "ran to the end")
 
 
-def _ended(event: ProcessEvent) -> str:
+def _how_it_ended(event: ProcessEvent) -> str:
     stopped = {"INT": "Ctrl-C, then "}.get(event.stopped_by or "", f"{event.stopped_by}, then ")
     return (stopped if event.stopped_by else "ended by itself: ") + how_it_ended(event)
 
@@ -243,10 +247,10 @@ def _failed(event: ProcessEvent) -> bool:
 def _node_lanes(run: Run) -> Iterator[Lane]:
     """From the first of the master's states that has a node up to the first that has it no longer."""
     for node in filter(is_drawn, (*run.student_nodes(), *sorted(run.grader_nodes - {"/rosout"}))):
-        yield from _lane("node", node, _there(run, node))
+        yield from _lane("node", node, _node_stretches(run, node))
 
 
-def _there(run: Run, node: str) -> Iterator[Stretch]:
+def _node_stretches(run: Run, node: str) -> Iterator[Stretch]:
     begin: int | None = None
     for time_ns, state in run.graph:
         if node in state.nodes and begin is None:
@@ -268,13 +272,13 @@ def _topics(run: Run) -> Iterator[Lane]:
 
 def _message_stretches(run: Run, times: Sequence[int], size_ns: int) -> Iterator[Stretch]:
     """Of very many, the stretches are longer."""
-    while len(found := list(_joined(times, size_ns))) > STRETCHES_MAX:
+    while len(found := list(_join_close(times, size_ns))) > STRETCHES_MAX:
         size_ns *= 2
     for begin, end, count in found:
         yield _stretch(run, begin, end, f"{count} messages" if count > 1 else "")
 
 
-def _joined(times: Sequence[int], size_ns: int) -> Iterator[tuple[int, int, int]]:
+def _join_close(times: Sequence[int], size_ns: int) -> Iterator[tuple[int, int, int]]:
     """Yield the first time, the last time and the number of those that follow each other so closely."""
     begin, count = 0, 0
     for i, time_ns in enumerate(times):

@@ -111,7 +111,7 @@ def _rendered(result: GradingResult, rubric: Rubric, head: Head, page: Page, lim
             head=head,
             page=page,
             sections=list(_sections(result, page)),
-            decided=sentences.decided(result),
+            decided=sentences.decided_criteria(result),
             sentences=sentences,
             limit=limit,
             policy=Markup(policy(ours)),  # noqa: S704 - no text of anybody's
@@ -182,7 +182,7 @@ def _sections(result: GradingResult, page: Page) -> Iterator[tuple[str, str]]:
         yield "advice", "Advice"
     if result.notes:
         yield "noticed", "Noticed"
-    if sentences.decided(result):
+    if sentences.decided_criteria(result):
         yield "decided", "Decided by a person"
     yield "all", "All criteria"
     if page.ran:

@@ -94,7 +94,7 @@ def _plot(figure: CounterFigure, name: str, shown: range, size: tuple[float, flo
     if size == WHOLE:
         low, high = min(low, 0.0), max(high, 1.0)
     pad = (high - low) * 0.14 or 1.0
-    died = _around(figure.died, times[0], times[-1])
+    died = _visible_ends(figure.died, times[0], times[-1])
     frame = Frame(
         width=size[0],
         height=size[1],
@@ -129,7 +129,7 @@ def _dwarfed(values: Sequence[float]) -> bool:
     return sizes[-1] > DWARFS * max(sizes[int(0.9 * (len(sizes) - 1))], 1.0)
 
 
-def _around(died: Sequence[tuple[float, str]], from_s: float, to_s: float) -> list[tuple[float, str]]:
+def _visible_ends(died: Sequence[tuple[float, str]], from_s: float, to_s: float) -> list[tuple[float, str]]:
     """Those ends that lie in a plot, or not far behind what it shows."""
     beyond = to_s + max(0.5 * (to_s - from_s), 1.0)
     return [(at, words) for at, words in died if from_s <= at <= beyond][:1]
@@ -335,7 +335,7 @@ def _over_time(figure: RateFigure, name: str) -> Markup:
     rates = [1 / gap if gap > FASTEST_S else 1 / FASTEST_S for gap in figure.gaps_s]
     begin = max(0.0, figure.times_s[0] - figure.gaps_s[0])
     last = max(*figure.times_s, begin + TINY_S)
-    died = _around(figure.died, begin, last)
+    died = _visible_ends(figure.died, begin, last)
     highest = max(figure.high_hz, figure.mean_hz or 0.0)
     log = max(rates) > TOO_FAR * highest
     frame = Frame(

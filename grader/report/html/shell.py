@@ -27,7 +27,7 @@ def environment() -> Environment:
     """The templates. A text that a template puts out is one visible line of at most `limit` characters, escaped."""
     made = Environment(
         autoescape=True,
-        finalize=_shown,
+        finalize=_make_visible,
         loader=DictLoader(_templates()),
         lstrip_blocks=True,
         trim_blocks=True,
@@ -94,7 +94,7 @@ def _code(context: Context, text: str) -> Markup:
 
 
 @pass_context
-def _shown(context: Context, value: Any) -> Any:  # noqa: ANN401 - whatever a template puts out
+def _make_visible(context: Context, value: Any) -> Any:  # noqa: ANN401 - whatever a template puts out
     """Foreign text made visible. Markup that was drawn here and what is not text stay as they are."""
     if isinstance(value, str) and not isinstance(value, Markup):
         return line(value, context.get("limit", LIMIT))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.report.class_page.statistics import costs, most_first, span, spread, timing
+from grader.report.class_page.statistics import costs, most_first, span, spread_of, timing
 from grader.report.class_page.submissions import Line, line_of
 from grader.report.class_page.todo import todos
 from tests.report.class_page.made_up import made_up_rows, made_up_run
@@ -30,14 +30,14 @@ def lines(count: int, **more: int) -> list[Line]:
     ],
 )
 def test_everybody_is_in_one_bin(points, most, expected) -> None:
-    found = spread(points, most)
+    found = spread_of(points, most)
     counts = {round(one.low, 6): one.count for one in found.bins if one.count}
     assert len(found.bins) <= 20
     assert counts == expected
 
 
 def test_nobody_has_no_spread() -> None:
-    assert spread([], 100) is None
+    assert spread_of([], 100) is None
 
 
 def test_a_mistake_costs_what_was_lost_by_it_and_by_what_followed() -> None:
