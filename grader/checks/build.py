@@ -110,6 +110,17 @@ def judge_build(package: PackageFacts, build: Run) -> Verdict:
     return _broken_build(package, build, end.exit_code)
 
 
+def explain_by_build(package: PackageFacts | None, build: Run | None, verdict: Verdict) -> Verdict:
+    """Return a loss of what the build alone makes as `inconclusive` where the machine is why it was not built."""
+    if not (verdict.unbuilt and verdict.status.is_lost) or package is None or build is None:
+        return verdict
+    built = judge_build(package, build)
+    if not built.status.is_open:
+        return verdict
+    said = inconclusive(f"{verdict.message}; {built.message}", hint=built.hint, citations=built.citations)
+    return said.about(expected=verdict.expected, measured=verdict.measured)
+
+
 def _stopped_build(build: Run, took: str) -> Verdict:
     """By a limit that it broke, which is named, or because its time was up."""
     limits = (e.detail for _, e in build.actors if e.action == "limit" and e.actor == CATKIN_MAKE)

@@ -259,9 +259,7 @@ def _unnamed(
         why, fix, line = _respell(slip, PYTHON)
         return Lack(f"{why}, so nothing installs {{}}", fix, FileCitation(file=slip.file, line=line))
     if not of_python:
-        why = "no catkin_install_python(…) is called, so nothing installs {}"
-        fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN}), without # before it"
-        return Lack(why, fix, None, path)
+        return _without_call(all_named, path)
     names = {PurePosixPath(one.path).name: one for one in of_python}
     wanted = PurePosixPath(path).name
     near = [wanted] if wanted in names else list(near_names(wanted, names))
@@ -269,7 +267,27 @@ def _unnamed(
         one = names[near[0]]
         why = f"line {one.call.line}: {shown(one.path)} is named, but does not exist; the script is {path}"
         return Lack(why, f"write {path} in place of {shown(one.path)}", _line(one))
-    return Lack("catkin_install_python(…) does not name {}", "write {} into it, after PROGRAMS", None, path)
+    why = "catkin_install_python(…) does not name {}"
+    if any(one.kind == "PROGRAMS" and is_bin(one.destination or "", package) for one in of_python):
+        return Lack(why, "write {} into it, after PROGRAMS", None, path)
+    return Lack(why, f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN})", None, path)
+
+
+def _without_call(all_named: Sequence[Installed], path: str) -> Lack:
+    fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN})"
+    if folder := _folder_above(all_named, path):
+        other = "install(DIRECTORY …)"
+        why = f"line {folder.call.line}: {other} names {{}}, where catkin_install_python(PROGRAMS …) should"
+        return Lack(why, f"{fix} below it", _line(folder), path)
+    why = "no catkin_install_python(…) is called, so nothing installs {}"
+    return Lack(why, f"{fix}, without # before it", None, path)
+
+
+def _folder_above(all_named: Sequence[Installed], path: str) -> Installed | None:
+    """Return the call that copies the folder in which the script lies."""
+    above = PurePosixPath(path).parent.as_posix()
+    folders = (one for one in all_named if one.kind == "DIRECTORY")
+    return next((one for one in folders if names_script(one, above)), None)
 
 
 def _called(package: PackageFacts, name: str) -> bool:

@@ -75,16 +75,32 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
     if isinstance(file, Verdict):
         return file.about(expected=expected)
     refused = next(refusals(package, file), None)
-    verdict = (
-        (refused.verdict() if refused else None)
-        or next(filter(None, (missing_node(package, file, script) for script in params.scripts)), None)
-        or next(filter(None, (_program(file, program) for program in params.programs)), None)
-        or passed(f"{file.path} has a <node> for {join_words(wanted)}", hint=_advice(package, file))
+    verdict = _all_lacking(package, file, params, refused) or passed(
+        f"{file.path} has a <node> for {join_words(wanted)}", hint=_advice(package, file)
     )
     seen = f"{plural(len(file.brings), 'node')}: {join_words(map(_shown, file.brings))}"
     citations = verdict.citations or (FileCitation(file=file.path, line=1),)
     measured = seen if file.brings else "no <node>"
     return verdict.about(expected=expected, measured=measured, citations=citations)
+
+
+def _all_lacking(
+    package: PackageFacts, file: LaunchFile, params: LaunchXmlParams, refused: Slip | None
+) -> Verdict | None:
+    """Return why roslaunch starts nothing, and why nodes are not there, each reason once; None where all are."""
+    verdicts = [refused.verdict() if refused else None]
+    verdicts += [missing_node(package, file, script) for script in params.scripts]
+    verdicts += [_program(file, program) for program in params.programs]
+    lacking = list({one.message: one for one in verdicts if one}.values())
+    if len(lacking) < 2:
+        return lacking[0] if lacking else None
+    first = next((one for one in lacking if not one.unjudged), lacking[0])
+    update = {
+        "message": "; ".join(one.message for one in lacking),
+        "hint": "; ".join(dict.fromkeys(one.hint for one in lacking)),
+        "citations": tuple(dict.fromkeys(place for one in lacking for place in one.citations)),
+    }
+    return first.model_copy(update=update)
 
 
 def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdict | None:

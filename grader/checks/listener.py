@@ -120,7 +120,7 @@ def _other_words(
     glued = params.template.replace(f" {VALUE}", VALUE)
     hint = f"print '{wanted}', in the handout's own words"
     if any(f'data: "{missing[0].value}"' in line for line in said):
-        hint = "print the message's .data, which is the text, not the whole message around it"
+        hint = f"print '{wanted}': of the message only its .data, which is the text"
     elif blank and said and all(text_places(missing, lines, glued)):
         hint = f"put a space between the words and the message: '{wanted}'"
     return partial(1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes), message, hint=hint)
@@ -140,12 +140,14 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     """The grader sends when the node has subscribed; it never did, or it was not there."""
     if not lives(run):
         return not_started("the listener").about(measured="not started")
-    if end := explain_early_end(package, run):
-        message = f"the node ended before it subscribed to {topic}: {end.cause}"
-        return end.verdict(unjudged, message, measured="ended")
     subscribed = topics_with(run, "subscribers")
     measured = f"subscribed to {join_words(subscribed)}" if subscribed else "no subscription"
-    verdict = refused_type(run, topic) or misfit(run, topic)
+    differing = refused_type(run, topic)
+    end = explain_early_end(package, run)
+    if end is not None and differing is None:
+        message = f"the node ended before it subscribed to {topic}: {end.cause}"
+        return end.verdict(unjudged, message, measured="ended")
+    verdict = differing or misfit(run, topic)
     if verdict is None and topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
         verdict = inconclusive(message, hint="grade again")
@@ -153,6 +155,8 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         near = near_names(topic, subscribed)
         other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""
         hint = f"add {subscriber(topic, '…, callback')}"
+        if len(subscribed) == 1 and not near:
+            hint = f"{hint}, or rename {subscribed[0]} if that is meant to be it"
         cited = named_at(package, run, "subscriber", near[0]) if near else ()
         verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint, citations=cited)
     return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))

@@ -14,6 +14,7 @@ from pathlib import PurePosixPath
 from grader.checks.support.exit_causes import SYNTAX, syntax_hint
 from grader.checks.support.launch import node_slip, not_executable, own_script
 from grader.checks.support.scripts import (
+    BACKUPS,
     PYTHON,
     chmod_hint,
     find_script,
@@ -54,7 +55,7 @@ def add_advice(
 
 def _points(package: PackageFacts) -> Iterator[tuple[FileCitation, str]]:
     for file in package.files:
-        fault = file.python_fault
+        fault = None if file.path.endswith(BACKUPS) else file.python_fault
         if fault is not None and fault.kind in SYNTAX and not is_product(file.path):
             why = fault.cause or fault.message
             text = f"{file.path} does not parse: {why}; {syntax_hint(fault)}"

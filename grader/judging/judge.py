@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from grader.checks import CHECKS, Check
+from grader.checks.build import explain_by_build
 from grader.checks.registry import NotRecorded
 from grader.checks.support.exit_causes import SYNTAX, explain_by_exception
 from grader.checks.support.parameters import explain_by_unread_parameter
@@ -134,6 +135,7 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
             package, run = facts.package_of(criterion), asked.get("run")
             for explain in (explain_by_exception, explain_by_unheard_topic, explain_by_unread_parameter):
                 found = explain(check, package, run, found)
+            found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found)
         return _named(choose_hint_language(found, criterion, facts), criterion, facts)
     except NotRecorded as missing:
         return missing.verdict
@@ -229,6 +231,8 @@ class Requirements:
             and (found.unbuilt or self._is_compiled(criterion))
         ):
             repaired = False
+        if _lines(verdict) & _lines(found):
+            repaired = False  # the arena repairs bits and first lines, and this is another line
         beside = (
             found.cause not in {"", verdict.cause} and self._criteria[required].scenario == criterion.scenario
         )

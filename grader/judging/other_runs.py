@@ -221,6 +221,7 @@ def _charges(
     for repair in sorted(needed, key=lambda one: one.kind not in NAMES):
         asking = [c for c in rubric.criteria if c.scenario is None and _asks_for(first[c.id], repair)]
         asking = [c for c in asking if _names(c, repair)] or asking
+        asking = [c for c in asking if repair.message.partition(": ")[2] in first[c.id].message] or asking
         if asking:
             charges[repair] = {asking[0].id}
             continue

@@ -22,6 +22,7 @@ INCLUDES_MAX = 50
 DEPTH_MAX = 10
 WORK_MAX = 10_000
 _TOO_MUCH = "launch files that hold more than a robot can start"
+_FOUND = re.compile(r"\$\(find\s+([^()\s]+)\s*\)/+(.+)")
 _SUBSTITUTION = re.compile(r"\$\(([^()]*)\)")
 _SLASHES = re.compile(r"//+")
 # Of one value: arguments that name each other can double at every step.
@@ -177,6 +178,9 @@ class _Loader:
     def _include(self, element: etree._Element, scope: Scope, depth: int) -> None:
         path = scope.own_path(scope.get(element, "file") or "")
         if path is None:
+            if slip := scope.misspelt_package(scope.get(element, "file") or ""):
+                message = f"it includes a file of the package {slip}, which is called {scope.own[0]}"
+                self.loaded.faults.append(_fault(element, scope, message))
             return
         self.loaded.included += 1
         if depth >= DEPTH_MAX or self.loaded.included > INCLUDES_MAX:
@@ -284,8 +288,15 @@ class Scope(Record):
 
     def own_path(self, path: str) -> str | None:
         """Return the package's own path behind `$(find <package>)/…`, None for any other."""
-        found = re.fullmatch(r"\$\(find\s+([^()\s]+)\s*\)/+(.+)", path.strip())
+        found = _FOUND.fullmatch(path.strip())
         return _plain(found[2]) if found and found[1] in self.own else None
+
+    def misspelt_package(self, path: str) -> str:
+        """Return the package's name in `$(find …)/…` where it differs in capitals or dashes alone, else ""."""
+        found = _FOUND.fullmatch(path.strip())
+        name = found[1] if found else ""
+        plain = {one.casefold().replace("-", "_") for one in self.own}
+        return name if name not in self.own and name.casefold().replace("-", "_") in plain else ""
 
     def _value(self, whole: str, words: list[str]) -> str:
         match words:

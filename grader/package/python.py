@@ -81,6 +81,7 @@ _MESSAGES = (
     (r"Non-UTF-8 code|codec can't decode byte|invalid or missing encoding",
      "the file is not saved as UTF-8 (accents of an old encoding): save it as UTF-8"),
     (r"unicodeescape", r"a backslash in a string is read as `\U...`: write the string as r\"...\""),
+    (r"name '(\w+)' is .* global declaration", "`global {0}` stands below a line that uses {0}"),
     (r"encoding", "line 1 or 2 names an encoding that Python does not know: write `# -*- coding: utf-8 -*-`"),
     (r"null bytes", "the file holds null bytes: it is not text, or was saved as UTF-16; save it as UTF-8"),
     (r"after line continuation", r"nothing may follow a backslash `\` at the end of a line"),

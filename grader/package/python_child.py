@@ -33,6 +33,19 @@ MESSAGES = {
     "sensor_msgs": "CompressedImage Image Imu JointState Joy LaserScan NavSatFix PointCloud2 Range",
 }
 MODULES = frozenset({"math", "os", "random", "rospy", "sys", "time"})
+NAMES_OF_ROSPY = (
+    "AnyMsg DEBUG Duration ERROR FATAL Header INFO MasterProxy Message Publisher ROSException ROSInitException "
+    "ROSInternalException ROSInterruptException ROSSerializationException ROSTimeMovedBackwardsException Rate Service "
+    "ServiceException ServiceProxy SubscribeListener Subscriber Time Timer TransportException TransportInitError "
+    "TransportTerminated WARN client core delete_param exceptions get_caller_id get_master get_name get_namespace "
+    "get_node_uri get_param get_param_cached get_param_names get_published_topics get_ros_root get_rostime get_time "
+    "get_topic_class has_param impl init_node is_shutdown logdebug logdebug_once logdebug_throttle logerr logerr_once "
+    "logerr_throttle logfatal logfatal_once logfatal_throttle loginfo loginfo_once loginfo_throttle logout logwarn "
+    "logwarn_once logwarn_throttle msg msproxy myargv names numpy_msg on_shutdown parse_rosrpc_uri remap_name "
+    "resolve_name rostime search_param service set_param signal_shutdown sleep spin timer topics wait_for_message "
+    "wait_for_service"
+)
+ROSPY = frozenset(NAMES_OF_ROSPY.split())
 LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
 CALLED = frozenset({"is_shutdown", "sleep", "spin"})
 ROLES = {
@@ -76,6 +89,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             _without_old_print,
             lambda t: _with_modules(t, types),
             lambda t: _with_imports(t, types),
+            _with_attributes,
             _with_calls,
             _with_callbacks,
             _with_main,
@@ -123,7 +137,9 @@ def _one_step(text: str, error: Error) -> Step | None:
         left = _error(candidate)
         further = left is not None and (left["line"] > error["line"] or _is_next(error, left))
         if left is None or further:
-            return {"cause": cause, "line": error["line"], "error": error, "text": candidate}
+            word = re.match(r"name '(\w+)'", error["message"])
+            found = {"cause": cause, "line": error["line"], "error": error, "text": candidate}
+            return {**found, "word": word[1] if word else ""}
     return None
 
 
@@ -158,11 +174,38 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     at = error["line"] - 1
     if not 0 <= at < len(lines):
         return
+    if "global declaration" in error["message"]:
+        yield from _with_global_first(text, error["line"])
     yield from (("python2", candidate) for candidate in _as_python3(lines, at))
     yield "characters", _with_line(lines, at, lines[at].translate(PLAIN))
     for line in dict.fromkeys((at, max(at - 1, 0))):
         for changed in _with_token(lines[line], error if line == at else None):
             yield "token", _with_line(lines, line, changed)
+
+
+def _with_global_first(text: str, number: int) -> Iterator[tuple[str, str]]:
+    """Yield the text with that line's `global` as the first line of its function; without it outside of a function."""
+    nodes, lines = list(ast.walk(ast.parse(text))), text.split("\n")
+    found = next((n for n in nodes if isinstance(n, ast.Global) and n.lineno == number), None)
+    line = lines[number - 1]
+    if found is None or line.strip() != ast.unparse(found):
+        return
+    blocks = (getattr(node, part, None) for node in nodes for part in ("body", "orelse", "finalbody"))
+    alone = any(block == [found] for block in blocks)
+    lines[number - 1 : number] = [line.replace(line.strip(), "pass")] if alone else []
+    around = [n for n in nodes if isinstance(n, ast.FunctionDef) and found in ast.walk(n)]
+    if not around:
+        yield "outside", "\n".join(lines)
+        return
+    function = max(around, key=lambda n: n.lineno)
+    first = next((s for s in function.body if not _is_docstring(s)), function.body[-1])
+    at, names = first.lineno - 1, found.names
+    indentation = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
+    if isinstance(first, ast.Global) and first is not found:
+        names = list(dict.fromkeys([*first.names, *names]))
+        del lines[at]
+    lines.insert(at, f"{indentation}global {', '.join(names)}")
+    yield "global", "\n".join(lines)
 
 
 def _expanded(line: str, width: int) -> str:
@@ -324,13 +367,15 @@ def _with_modules(text: str, types: list[str]) -> Iterator[Step]:
     for package, _, name in (kind.partition("/") for kind in types):
         known.setdefault(package, set()).add(name)
     for node in ast.walk(ast.parse(text)):
-        module = node.module if isinstance(node, ast.ImportFrom) and not node.level else None
-        package, _, inner = (module or "").partition(".")
-        names = {alias.name for alias in getattr(node, "names", ())}
-        if not module or inner not in ("", "msg", "msgs") or (package in known and inner == "msg"):
+        if not isinstance(node, ast.ImportFrom) or node.level or not node.module:
+            continue
+        module = node.module
+        package, _, inner = module.partition(".")
+        names = {alias.name for alias in node.names}
+        if inner not in ("", "msg", "msgs") or (package in known and inner == "msg"):
             continue
         near = package if package in known else next(iter(get_close_matches(package, known, 1, 0.85)), "")
-        lines, at = text.split("\n"), node.lineno - 1  # type: ignore[attr-defined] # an import
+        lines, at = text.split("\n"), node.lineno - 1
         after = re.sub(rf"from\s+{re.escape(module)}\b", f"from {near}.msg", lines[at], count=1)
         if near and names <= known[near] and after != lines[at]:
             for step in _step("module", at + 1, text, _with_line(lines, at, after), module):
@@ -384,6 +429,23 @@ def _is_docstring(statement: ast.stmt) -> bool:
 
 def _last(node: ast.AST | None) -> str:
     return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+
+
+def _with_attributes(text: str) -> Iterator[Step]:
+    """`rospy.subscriber(…)`, for `rospy.Subscriber(…)`: what rospy lacks, and has nearly under that name."""
+    lines = text.split("\n")
+    for node in ast.walk(ast.parse(text)):
+        if not isinstance(node, ast.Attribute) or _last(node.value) != "rospy" or node.attr in ROSPY:
+            continue
+        plain = {name.lower(): name for name in ROSPY}
+        meant = plain.get(node.attr.lower()) or next(iter(get_close_matches(node.attr, ROSPY, 1, 0.85)), "")
+        span = _span(lines, node)
+        if meant and span is not None and not node.attr.startswith("_"):
+            line, _, end = span
+            after = _edited(text, [(line, end - len(node.attr), end, meant)])
+            for step in _step("attribute", line + 1, text, after, f"rospy.{node.attr}"):
+                text, lines = step["text"], step["text"].split("\n")
+                yield step
 
 
 def _with_calls(text: str) -> Iterator[Step]:

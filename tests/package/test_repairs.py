@@ -14,7 +14,7 @@ import pytest
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.package_tree import Tree, read_tree, write_tree
 from grader.authoring.mutation.solution import Solution
-from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS
+from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, advice_of
 from grader.package.repairs import NotRepairable, Repair, Wanted, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.wanted import is_near, is_one_edit
 from grader.rubric.find import rubric_ids
@@ -138,6 +138,16 @@ CASES = {
                "not imported from std_msgs"),
     "import": (swapped(TALKER, ("import Int8", "import String")), ["missing-import"], "talker.py uses Int8"),
     "no-rospy": (swapped(TALKER, ("import rospy\n", "")), ["missing-import"], "uses rospy"),
+    "attribute": (swapped(TALKER, ("rospy.Publisher", "rospy.publisher")), ["missing-call"],
+                  "there is no rospy.publisher"),
+    "global": (swapped(TALKER, ("        rate.sleep()", "        print(count)\n        global count"),
+                       ("def main", "count = 0\ndef main")), ["python-syntax"], "`global count` stands below a line"),
+    "global-outside": (swapped(TALKER, ("\nmain()", "\ncount = 0\nglobal count\nmain()")), ["python-syntax"],
+                       "`global count` stands below a line that uses count"),
+    "beside-a-global": (swapped(TALKER, ("def main():", "count = 0\ndef main():\n    global count"),
+                                ("rate.sleep()", "rate.sleep")), ["missing-call"], "rate.sleep is named but not"),
+    "include": (swapped("CMakeLists.txt", ("catkin_package()", "catkin_package(\n  INCLUDE_DIRS include\n)")),
+                ["build-line"], "line 4 of CMakeLists.txt: catkin_package(…) names the folder include/"),
     "topic": (swapped(TALKER, ("numeric_chatter", "numeric_chater")), ["topic-name"], "should be /numeric_chatter"),
     "node": (swapped(TALKER, ("'talker'", "'Talker'")), ["node-name"], "the node Talker should be talker"),
     "param": (swapped(TALKER, ("'~rate'", "'~rat'")), ["parameter-name"], "the parameter ~rat should be /talker/rate"),
@@ -177,6 +187,45 @@ def test_a_mistake_is_found_and_repaired(name: str, tmp_path: Path) -> None:
     assert find_repairs(folder, facts_of(folder), WANTED) == ()
     assert all(ast.parse(path.read_bytes()) for path in folder.rglob("*.py"))
     assert (folder / "src" / "talker.py").stat().st_mode & 0o777 == 0o755
+
+
+INSTALL = """
+catkin_install_python(
+  PROGRAMS
+    scripts/other.py
+  DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+"""
+INSTALLS = Wanted(package="lab", installed=("src/talker.py", "src/listener.py"))
+INSTALLED = {
+    "below-programs": (INSTALL, "CMakeLists.txt line 7: write src/listener.py src/talker.py after PROGRAMS"),
+    "another-place": (
+        INSTALL.replace("_BIN_", "_SHARE_"),
+        "write catkin_install_python(PROGRAMS src/listener.py src/talker.py DESTINATION ${CATKIN_PACKAGE_BIN_DEST",
+    ),
+    "no-dollar": (
+        INSTALL.replace("$", "").replace("scripts/other.py", "src/talker.py src/listener.py"),
+        "CMakeLists.txt line 9: write DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION}",
+    ),
+    "misspelt": (
+        INSTALL.replace("scripts/other.py", "src/talker src/listener"),
+        "write src/listener.py for src/listener; CMakeLists.txt line 8: write src/talker.py for src/talker",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", INSTALLED)
+def test_scripts_go_into_the_call_that_installs_programs(name: str, tmp_path: Path) -> None:
+    """However many lines the call has, what is to be written is said whole, and other calls stay as they are."""
+    call, words = INSTALLED[name]
+    folder = package(
+        tmp_path, {"CMakeLists.txt": CMAKE + call, "src/listener.py": SCRIPT, "scripts/other.py": SCRIPT}
+    )
+    found = repair_all(folder, INSTALLS)
+    assert words in "; ".join(advice_of(one) for one in found)
+    assert find_repairs(folder, facts_of(folder), INSTALLS) == ()
+    text = (folder / "CMakeLists.txt").read_text()
+    assert ("scripts/other.py" in call) == ("scripts/other.py" in text)
+    assert ("_SHARE_" in call) == ("_SHARE_" in text)
 
 
 def test_an_executable_bit_is_set_for_those_who_may_read(tmp_path: Path) -> None:

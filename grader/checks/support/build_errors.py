@@ -8,14 +8,17 @@ from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from typing import NamedTuple
 
-from grader.checks.support.scripts import path_in_package
+from grader.checks.support.scripts import cmake_calls, installed, path_in_package
 from grader.checks.support.text import near_names, shown
-from grader.installable import ROS_2, install_hint, known_packages
+from grader.installable import ON_THE_MACHINE, ROS_2, install_hint, known_packages
 from grader.model.package import PackageFacts, meant_command
 from grader.model.verdict import FileCitation
+from grader.wording import join_words
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
 ONE_EDIT = 0.88
+SLIP = 0.8
+"""How alike a name is that is written for one that every machine has: `pospy` for `rospy`."""
 UNKNOWN_COMMAND = "Unknown CMake command"
 FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error that it prints"
 _CMAKE_ERROR = re.compile(
@@ -34,6 +37,30 @@ _QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
 OF_GENERATION = ("add_message_files", "add_service_files", "add_action_files", "generate_messages")
 OF_CATKIN = ("catkin_package", "catkin_install_python", "catkin_python_setup")
 """Commands that `find_package(catkin …)` defines."""
+LIBRARIES = {
+    "PCL": "libpcl-dev",
+    "OpenCV": "libopencv-dev",
+    "Eigen3": "libeigen3-dev",
+    "Eigen": "libeigen3-dev",
+    "Boost": "libboost-all-dev",
+    "Qt5": "qtbase5-dev",
+    "yaml-cpp": "libyaml-cpp-dev",
+    "VTK": "libvtk9-dev",
+    "OpenGL": "libgl-dev",
+    "GLUT": "freeglut3-dev",
+    "SDL": "libsdl1.2-dev",
+    "SDL2": "libsdl2-dev",
+    "CURL": "libcurl4-openssl-dev",
+    "Ceres": "libceres-dev",
+    "Protobuf": "libprotobuf-dev",
+    "GTest": "libgtest-dev",
+    "Bullet": "libbullet-dev",
+    "octomap": "liboctomap-dev",
+    "TBB": "libtbb-dev",
+    "PythonLibs": "python3-dev",
+    "Curses": "libncurses-dev",
+}
+"""Libraries beside ROS that `find_package` finds, with Debian's packages."""
 STANDARD = {
     **dict.fromkeys(("cout", "cin", "cerr", "endl"), "iostream"),
     **dict.fromkeys(("string", "to_string", "stoi"), "string"),
@@ -134,10 +161,33 @@ def _goes_on(words: Sequence[str]) -> bool:
     return words[-1].endswith(":") or (words[:3] == ["The", "source", "directory"] and words[-1][-1] != ".")
 
 
+def _misspelt_components(package: PackageFacts) -> dict[str, str]:
+    """Return the names behind COMPONENTS that are a slip of a package that every machine has, or a half of its name
+    (`std msgs`), with what is meant."""
+    calls = [call.args for call in cmake_calls(package, "find_package") if call.args[:1] == ("catkin",)]
+    named = [name for args in calls for name in args[1:] if name not in ("REQUIRED", "COMPONENTS")]
+    found: dict[str, str] = {}
+    for name in dict.fromkeys(named):
+        halves = (
+            whole for whole in ALWAYS_THERE if name in whole.split("_") and {*whole.split("_")} <= {*named}
+        )
+        near = get_close_matches(name, ALWAYS_THERE, 1, SLIP) if name not in known_packages() else []
+        meant = next(halves, near[0] if near else "")
+        if meant and name not in ALWAYS_THERE:
+            found[name] = meant
+    return found
+
+
 def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
     name = found[1]
     near = get_close_matches(name, (*ALWAYS_THERE, *known_packages()), 1, ONE_EDIT)
     declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
+    if slips := _misspelt_components(package):
+        wrong, right = join_words(slips), "; ".join(f"write {new} for {old}" for old, new in slips.items())
+        what = (
+            "there is no package of that name" if len(slips) == 1 else "there are no packages of these names"
+        )
+        return Explained(f"find_package(…) names {wrong}, and {what}", f"{right}; in package.xml too")
     if any(one.name == name and not one.files for one in package.also):
         return Explained(f"it needs the package {name}, which is not here", f"hand in {name} too")
     if name in ROS_2:
@@ -153,6 +203,16 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
         f"{meant} in find_package(…) and in package.xml; a package of your own must be pushed with this one"
     )
     return Explained(f"find_package(…) names {name}, but there is no package of that name", hint)
+
+
+def _missing_library(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
+    """A library beside ROS, or a package that is not among catkin's components."""
+    name = found[1]
+    if name not in LIBRARIES:
+        return _missing_package(found, package, lines)
+    why = f"it needs the library {name}, which this grading machine lacks"
+    hint = f"{ON_THE_MACHINE}apt-get install {LIBRARIES[name]}, then grade again"
+    return Explained(why, hint, of_machine=True)
 
 
 def _missing_folder(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -201,7 +261,17 @@ def _missing_message(found: re.Match[str], package: PackageFacts, _lines: Sequen
 
 
 def _missing_script(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    path = _below(found[1], package)
+    path, there = _below(found[1], package), {f.path for f in package.files}
+    named = [one for one in installed(package) if one.call.name == "catkin_install_python" and one.known]
+    others = [_below(one.path, package) for one in named if not one.path.startswith("$")]
+    absent = [
+        one
+        for one in dict.fromkeys((path, *others))
+        if one not in there and one.removeprefix("./") not in there
+    ]
+    if len(absent) > 1:
+        words = f"catkin_install_python(…) names {join_words(absent)}, which are not in the package"
+        return Explained(words, "add them and push them, or take them out of that call")
     return _missing_file(path, package, f"catkin_install_python(…) names {path}")
 
 
@@ -335,6 +405,8 @@ def _not_catkin(found: re.Match[str], package: PackageFacts, _lines: Sequence[st
 
 _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]], ...] = (
     (r'Could not find a package configuration file provided by "([\w-]+)"', _missing_package),
+    (r'By not providing "Find([\w-]+)\.cmake"', _missing_library),
+    (r"Could NOT find ([\w-]+) \(missing:", _missing_library),
     (r"(add_\w+_files)\(\) directory not found: (\S+)", _missing_folder),
     (
         r"Assertion failed: file '([^']+)' does not exist\. Message: (message|service|action)",

@@ -11,8 +11,9 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from grader.checks.registry import Check
+from grader.checks.support.exceptions import explain_exception
 from grader.checks.support.processes import Life, early_end, lives
-from grader.checks.support.scripts import EMPTY, path_in_package
+from grader.checks.support.scripts import EMPTY, cmake_calls, path_in_package
 from grader.checks.support.text import LOOP, SPIN, near_names, shown
 from grader.evidence.run import Run
 from grader.installable import ROS_2, install_hint, known_packages, noetic_messages
@@ -250,13 +251,15 @@ class Ending(NamedTuple):
     """Whether it came to its end as a script that has nothing more to do."""
     of_machine: bool = False
     """The grading machine lacks what it needs."""
+    unbuilt: bool = False
+    """What it needs is made by the build alone."""
 
     def verdict(self, kind: Callable[..., Verdict], message: str, measured: str = "") -> Verdict:
         """Return a verdict of this kind (`failed`, `unjudged`) with the ending's hint and citations, or
         `inconclusive` where the machine is at fault."""
         kind = inconclusive if self.of_machine else kind
         verdict = kind(message, measured=measured, hint=self.hint, citations=self.citations)
-        return verdict.model_copy(update={"cause": self.cause})
+        return verdict.model_copy(update={"cause": self.cause, "unbuilt": self.unbuilt})
 
 
 def explain_early_end(package: PackageFacts, run: Run) -> Ending | None:
@@ -364,14 +367,15 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     """Explain one traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
     slip = _slip(found, package)
-    cause, hint = slip or CAUSES.get(found.kind, ("", "fix the line that is named"))
+    cause, hint = slip or CAUSES.get(
+        found.kind, ("", "look at that line: the last words say what Python cannot do there")
+    )
     maker = next((one for one in (package, *package.also) if _makes(one, found.message)), None)
     if maker is not None:
         whose = "the package's own messages" if maker is package else f"the messages of {maker.name}"
-        hint = (
-            f"the build makes {whose}: list them in add_message_files(…) or "
-            "add_service_files(…), call generate_messages(…), and build again"
-        )
+        cause, hint = f"the build makes {whose}", "first get the build to pass: catkin_make"
+        if not cmake_calls(maker, "generate_messages"):
+            hint = "list them in add_message_files(…) or add_service_files(…), and call generate_messages(…)"
     if lacking := _lacking(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""
         cause = f"{shown(found.text)}{where}: this grading machine lacks {lacking}"
@@ -393,7 +397,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         cause, hint = _operand(found) or (cause, hint)
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(said)}{where}" + (f": {cause}" if cause else "")
-    return Ending(text, hint, (place,) if place else ())
+    return Ending(text, hint, (place,) if place else (), unbuilt=maker is not None)
 
 
 def _makes(package: PackageFacts, message: str) -> bool:
@@ -408,7 +412,9 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     if found.kind == "IndexError" and "argv" in source:
         return "it reads a command-line argument, but is started without any", ARGUMENT_HINT
     known = next((known for said, known in SLIPS.items() if said in found.message), None)
-    return known or _other_name(found, package)
+    meant = known or _other_name(found, package)
+    frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
+    return meant or explain_exception(found.kind, found.message, frame.source, frame.marked)
 
 
 def _other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:

@@ -198,7 +198,10 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
     """Yield what makes roslaunch start nothing at all."""
     for fault in file.include_faults:
         yield Slip(
-            fault.file or file.path, fault.line or 1, fault.message, "write $(find <package>)/launch/<file>"
+            fault.file or file.path,
+            fault.line or 1,
+            fault.message,
+            f"write $(find {package.name})/launch/<file>",
         )
     seen: dict[str, LaunchNode] = {}
     for node in file.brings:

@@ -27,7 +27,7 @@ _HERE = tuple(
         "CMAKE_CURRENT_LIST_DIR",
     )
 )
-BACKUPS = ("~", ".bak", ".orig", ".swp")
+BACKUPS = ("~", ".bak", ".orig", ".save", ".swp")
 _BIN = ("${CATKIN_PACKAGE_BIN_DESTINATION}", "lib/${PROJECT_NAME}")
 
 
@@ -87,7 +87,7 @@ def paths_by_name(package: PackageFacts) -> dict[str, str]:
 def can_be_moved(path: str, wanted: str) -> bool:
     """Return whether one file can be what another was meant to be: of the same kind, or without a suffix."""
     one, other = PurePosixPath(path).suffix, PurePosixPath(wanted).suffix
-    return one == other or not one or not other
+    return one == other or not one or not other or (other == ".launch" and one.startswith(other))
 
 
 def add_hint(path: str) -> str:

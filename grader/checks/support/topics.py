@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Literal
 
 from grader.checks.registry import Check
@@ -98,7 +98,7 @@ def no_message(
         verdict = of_node(f"{what}; the node publishes on {join_words(near)}", measured=measured, hint=hint)
         return verdict.about(citations=named_at(package, run, "publisher", near[0]))
     if absent := no_node(package, run, what) or _refused(run, topic) or misfit(run):
-        return absent
+        return absent if topic in published else _with_others(absent, published)
     if topic in published:
         return _advertised(package, run, what, of_node)
     return _not_advertised(package, run, topic, of_node)
@@ -113,6 +113,12 @@ def _not_advertised(package: PackageFacts, run: Run, topic: str, of_node: Callab
     hint = f"add {publisher(topic)} and publish in the loop"
     other = f", or rename {join_words(published, 'or')} if that is meant to be it" if published else ""
     return of_node(f"{what}: no node publishes on it", measured=measured, hint=f"{hint}{other}")
+
+
+def _with_others(absent: Verdict, published: Collection[str]) -> Verdict:
+    """Return the verdict with the topics that were there in place of the one that is asked for."""
+    others = f"; it published on {join_words(published)}" if published else ""
+    return absent.model_copy(update={"message": f"{absent.message}{others}"})
 
 
 def _advertised(package: PackageFacts, run: Run, what: str, of_node: Callable[..., Verdict]) -> Verdict:

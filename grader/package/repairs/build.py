@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from itertools import takewhile
 from pathlib import PurePosixPath
 
 from cmake_parser.ast import Command, Token
@@ -147,6 +148,7 @@ def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted)
         below = ("find_package", "project")
         _add_call(files, "catkin_package()", r"catkin_package\s*\(", "catkin_package()", below)
     _install(files, package, wanted)
+    _correct_include(files)
     _name_project(files, package, name, wanted.package)
 
 
@@ -207,6 +209,29 @@ def _spell_commands(files: Files) -> None:
             files.change("build-line", CMAKE, text[:start] + right + text[start + len(name) :], message)
 
 
+def _correct_include(files: Files) -> None:
+    """`INCLUDE_DIRS include`, which `catkin_create_pkg` writes in a comment, in a package without such a folder."""
+    for call in _commands(files, "catkin_package"):
+        words = _words(call)
+        at = next((i for i, t in enumerate(words) if t.value == "INCLUDE_DIRS"), len(words))
+        given = list(takewhile(lambda token: not token.value.isupper(), words[at + 1 :]))
+        absent = [t for t in given if "$" not in t.value and not (files.folder / t.value.strip('"')).is_dir()]
+        if not absent:
+            continue
+        text = _cmake(files)
+        taken = [words[at], *absent] if absent == given else absent
+        for token in reversed(taken):
+            text = _replaced(text, token, "")
+        listed = " ".join(t.value for t in absent)
+        folders = join_words(f"the folder {t.value.strip('/')}/" for t in absent)
+        message = (
+            f"line {call.line} of {CMAKE}: catkin_package(…) names {folders}, which is not in the package"
+        )
+        fix = f"take INCLUDE_DIRS {listed} out" if absent == given else f"take {listed} out of INCLUDE_DIRS"
+        files.change("build-line", CMAKE, text, message, fix)
+        return
+
+
 def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -> None:
     """Name the project. A manifest in whose name the lab's is meant gets that name later."""
     right = wanted if _is_meant(files, package, name, wanted) else name
@@ -261,9 +286,8 @@ def _install(files: Files, package: PackageFacts, wanted: Wanted) -> None:
         fix = f"write {' '.join(line.split())}"
         files.change("build-line", CMAKE, changed, f"{CMAKE} does not install {join_words(missing)}", fix)
         return
-    for path in missing:
-        _name_script(files, own, path)
-    _correct_destination(files)
+    _name_scripts(files, own, missing)
+    _correct_destination(files, there)
 
 
 def _place(own: Sequence[str], files: Files, script: str) -> str:
@@ -280,33 +304,56 @@ def _plain(word: str) -> str:
     return re.sub(r"^\$\{(PROJECT_SOURCE_DIR|CMAKE_CURRENT_SOURCE_DIR)\}/|^\./", "", word.strip('"'))
 
 
-def _name_script(files: Files, own: Sequence[str], path: str) -> None:
-    """Name the script in place of a file that does not exist and has nearly its name, or beside the others."""
-    text, name = _cmake(files), PurePosixPath(path).name
-    call = next((c for c in _commands(files, INSTALL) if any(t.value == "PROGRAMS" for t in _words(c))), None)
+def _name_scripts(files: Files, own: Sequence[str], paths: Sequence[str]) -> None:
+    """In place of files that do not exist and have nearly their names, or beside the others."""
+    unnamed = [path for path in paths if not _replace_stray(files, own, path)]
+    call = next((c for c in _commands(files, INSTALL) if _installs_programs(c)), None)
+    if not unnamed:
+        return
+    text, listed = _cmake(files), " ".join(unnamed)
     if call is None:
+        line = f"{INSTALL}(PROGRAMS {listed} DESTINATION {BIN})"
+        message = f"{CMAKE} does not install {join_words(unnamed)} where rosrun looks"
+        files.change("build-line", CMAKE, f"{text.rstrip()}\n\n{line}\n", message, f"write {line}")
         return
     programs = next(t for t in _words(call) if t.value == "PROGRAMS")
-    stray = [
-        t for t in _words(call) if _plain(t.value) not in own and _is_about(PurePosixPath(t.value).name, name)
-    ]
-    if stray:
-        message = f"line {call.line} of {CMAKE}: {stray[0].value} does not exist; the script is {path}"
-        files.change("build-line", CMAKE, _replaced(text, stray[0], path), message)
-    else:
-        message = f"line {call.line} of {CMAKE}: {INSTALL}(…) does not name {path}"
-        files.change("build-line", CMAKE, _replaced(text, programs, f"PROGRAMS {path}"), message)
+    message = f"line {call.line} of {CMAKE}: {INSTALL}(…) does not name {join_words(unnamed)}"
+    fix = f"write {listed} after PROGRAMS"
+    files.change("build-line", CMAKE, _replaced(text, programs, f"PROGRAMS {listed}"), message, fix)
+
+
+def _replace_stray(files: Files, own: Sequence[str], path: str) -> bool:
+    name = PurePosixPath(path).name
+    for call in _commands(files, INSTALL):
+        for token in _words(call):
+            if _plain(token.value) not in own and _is_about(PurePosixPath(token.value).name, name):
+                message = f"line {call.line} of {CMAKE}: {token.value} does not exist; the script is {path}"
+                fix = f"write {path} for {token.value}"
+                files.change("build-line", CMAKE, _replaced(_cmake(files), token, path), message, fix)
+                return True
+    return False
+
+
+def _installs_programs(call: Command) -> bool:
+    """Return whether the call installs programs where rosrun looks, or gives no place."""
+    words = [token.value for token in _words(call)]
+    given = words[words.index("DESTINATION") + 1 :][:1] if "DESTINATION" in words else []
+    return "PROGRAMS" in words and given in ([], [BIN])
 
 
 def _is_about(given: str, name: str) -> bool:
     return given == name or is_near(given, name) or f"{given}.py" == name
 
 
-def _correct_destination(files: Files) -> None:
+def _correct_destination(files: Files, scripts: Collection[str]) -> None:
+    """Of a call that names one of the scripts: another of catkin's places, or a slip in this one's name."""
     for call in _commands(files, INSTALL):
         words = _words(call)
         at = next((i for i, t in enumerate(words) if t.value == "DESTINATION"), len(words))
-        if at + 1 < len(words) and words[at + 1].value.startswith("${CATKIN_") and words[at + 1].value != BIN:
-            message = f"line {call.line} of {CMAKE}: {words[at + 1].value} is not where rosrun looks"
-            files.change("build-line", CMAKE, _replaced(_cmake(files), words[at + 1], BIN), message)
+        given = words[at + 1] if at + 1 < len(words) else None
+        names_one = any(_plain(t.value) in scripts for t in words)
+        if given and names_one and given.value != BIN and given.value.strip("${}").startswith("CATKIN_"):
+            message = f"line {call.line} of {CMAKE}: {given.value} is not where rosrun looks"
+            fix = f"write DESTINATION {BIN}"
+            files.change("build-line", CMAKE, _replaced(_cmake(files), given, BIN), message, fix)
             return

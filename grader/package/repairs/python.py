@@ -31,16 +31,19 @@ Cause = Literal[
     "python2",
     "characters",
     "token",
+    "global",
+    "outside",
     "old-name",
     "module",
     "import",
+    "attribute",
     "call",
     "callback",
     "guard",
     "main",
     "spin",
 ]
-CALLS = ("call", "callback", "guard", "main", "spin")
+CALLS = ("attribute", "call", "callback", "guard", "main", "spin")
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "import"), "missing-import"),
     **dict.fromkeys(CALLS, "missing-call"),
@@ -124,7 +127,11 @@ def _joined(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
     """Steps of one cause that follow each other are one mistake, but each missing token and import is its own."""
     groups: list[tuple[Cause, list[_Step]]] = []
     for step in steps:
-        if groups and groups[-1][0] == step.cause and step.cause not in ("token", "module", "import"):
+        if (
+            groups
+            and groups[-1][0] == step.cause
+            and step.cause not in ("token", "module", "import", "attribute")
+        ):
             groups[-1][1].append(step)
         else:
             groups.append((step.cause, [step]))
@@ -161,15 +168,25 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     """Return what is wrong, and how it is repaired; "" where the changed line says it."""
     first = steps[0]
     place, word = f"line {first.line} of {file}", first.word
+    names = ", ".join(dict.fromkeys(step.word for step in steps))
     calls = ", ".join(f"{one}()" for one in word.split(", "))
     said: dict[Cause, tuple[str, str]] = {
         "tabs": (
             f"{place}: tabs and spaces are mixed in the indentation",
             _indented(before, steps[-1].text),
         ),
+        "global": (
+            f"{place}: `global {word}` stands below a line that uses {word}",
+            f"write `global {names}` as the first line of the function, and nowhere else in it",
+        ),
+        "outside": (
+            f"{place}: `global {word}` stands below a line that uses {word}",
+            f"take line {first.line} out: outside of a function `global` does nothing",
+        ),
         "old-name": (f"{place}: {word} is Python 2", ""),
         "import": (f"{place} uses {word}, which is not imported", ""),
         "module": (f"{place}: messages are not imported from {word}", ""),
+        "attribute": (f"{place}: there is no {word}", ""),
         "call": (f"{place}: {word} is named but not called", f"write {calls}"),
         "callback": (f"{place}: {calls} is called where the function itself is meant", ""),
         "guard": (f"{place}: `__name__` is never {word!r}", ""),

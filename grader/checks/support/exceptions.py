@@ -1,0 +1,160 @@
+"""What the exceptions of a first script mean, and what to do: by their messages and the lines that raised them."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable
+from contextlib import suppress
+
+from grader.checks.support.text import shown
+from grader.wording import plural
+
+Meaning = tuple[str, str]
+"""The cause, and what to do."""
+NUMBER_OF_PARTS = "not every message has so many parts"
+_NO_FILE = re.compile(r"No such file or directory: '([^']+)'")
+_UNPACKED = re.compile(r"(not enough|too many) values to unpack \(expected (\d+)(?:, got (\d+))?")
+_NO_NUMBER = re.compile(
+    r"(?:invalid literal for int\(\) with base \d+|could not convert string to float): (.+)"
+)
+_LOCAL = re.compile(r"local variable '(\w+)'")
+_OPERANDS = re.compile(r"unsupported operand type\(s\) for \S+ '(\w+)' and '(\w+)'")
+_CALLED = re.compile(r"'(\w+)' object is not callable")
+_WANTS_NUMBER = re.compile(r"(?:real number|a number) is required, not (\w+)|must be real number, not (\w+)")
+
+
+def explain_exception(kind: str, message: str, source: str, marked: tuple[int, int] | None) -> Meaning | None:
+    """Return the meaning of an exception that the line `source` raised; `marked` is what Python pointed at in it."""
+    explain = _EXPLAINED.get(kind)
+    return explain(message, source, marked) if explain else None
+
+
+def _index(_message: str, source: str, marked: tuple[int, int] | None) -> Meaning:
+    found = _subscript(source, marked)
+    if found is None:
+        return (
+            "the index is beyond the end",
+            f"look at the length before you take an element: {NUMBER_OF_PARTS}",
+        )
+    name, index = (shown(ast.unparse(part)) for part in (found.value, found.slice))
+    if index.isdecimal():
+        parts = plural(int(index) + 1, "element")
+        return f"`{name}` has fewer than {parts}", f"check `len({name}) > {index}` first: {NUMBER_OF_PARTS}"
+    return f"`{name}` has no element {index}", f"check `len({name})` first: {NUMBER_OF_PARTS}"
+
+
+def _subscript(source: str, marked: tuple[int, int] | None) -> ast.Subscript | None:
+    """Return the only `x[i]` of the line, or the one that is marked."""
+    begun = re.sub(r"^el(?=if\b)", "", source)
+    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        tree = ast.parse(f"{begun} pass" if begun.rstrip().endswith(":") else begun)
+        found = [
+            n for n in ast.walk(tree) if isinstance(n, ast.Subscript) and not isinstance(n.slice, ast.Slice)
+        ]
+        pointed = [n for n in found if marked and (n.col_offset, n.end_col_offset) == marked]
+        return (pointed or found)[0] if pointed or len(found) == 1 else None
+    return None
+
+
+def _key(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning:
+    if "get_param" in source:
+        return f"the parameter {message} is not set", f"give it a default: `rospy.get_param({message}, …)`"
+    return (
+        f"there is no key {message}",
+        f"look at which keys there are, or take `.get({message}, …)` with a default",
+    )
+
+
+def _value(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    if found := _UNPACKED.search(message):
+        came = f"; {found[3]} came" if found[3] else ""
+        hint = f"look at how many there are before you take them apart: {NUMBER_OF_PARTS}"
+        return f"{plural(int(found[2]), 'value')} are expected on the right of `=`{came}", hint
+    if found := _NO_NUMBER.search(message):
+        hint = "turn into a number only what is one; print a text as it is"
+        return f"{shown(found[1])} is a text, and no number", hint
+    return None
+
+
+def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    if message == "'module' object is not callable":
+        return (
+            "a module is called",
+            "call what is in the module (`time.time()`), or import it: `from … import …`",
+        )
+    if called := _CALLED.search(message):
+        return (
+            f"what is called is a value ({called[1]}), no function",
+            "give the variable another name than the function",
+        )
+    if "'NoneType' object" in message:
+        return _none()
+    if wanted := _WANTS_NUMBER.search(message):
+        kind = wanted[1] or wanted[2]
+        hint = "write %s for %d or %f" if "%" in source else "turn the text into a number: `float(…)`"
+        return f"a number is wanted here, and it is of the type {kind}", hint
+    if given := _OPERANDS.search(message):
+        return _operands(given[1], given[2])
+    return None
+
+
+def _operands(left: str, right: str) -> Meaning | None:
+    """Of a calculation: a whole message, or a text."""
+    message = next((kind for kind in (left, right) if kind[:1].isupper() and kind != "NoneType"), "")
+    if "NoneType" in (left, right):
+        return _none()
+    if message:
+        return f"one side is the whole message ({message})", "take its field: `msg.data`"
+    if "str" in (left, right):
+        return "one side is a text", "turn the text into a number first: `float(…)`"
+    return None
+
+
+def _none() -> Meaning:
+    cause = "it is None here: nothing has given it a value yet, or a function without `return` did"
+    return cause, "check `is not None` before that line"
+
+
+def _local(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    name = _LOCAL.search(message)
+    if name is None:
+        return None
+    cause = (
+        f"the function assigns to {name[1]} further down, so it is a variable of its own and has no value yet"
+    )
+    return cause, f"write `global {name[1]}` as the first line of the function"
+
+
+def _attribute(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    return _none() if "'NoneType' object" in message else None
+
+
+def _file(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    found = _NO_FILE.search(message)
+    if found is None or found[1].startswith("/dev/"):
+        return None
+    path = found[1]
+    here = f"os.path.join(os.path.dirname(os.path.abspath(__file__)), '{shown(path.rpartition('/')[2])}')"
+    if path.startswith(("/", "~")):
+        return "no other machine has this path", f"keep the file beside the script, and open `{here}`"
+    return "a path is looked for where the node is started, not beside the script", f"open `{here}`"
+
+
+_EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | None]] = {
+    "IndexError": _index,
+    "KeyError": _key,
+    "ValueError": _value,
+    "TypeError": _type,
+    "UnboundLocalError": _local,
+    "AttributeError": _attribute,
+    "FileNotFoundError": _file,
+    "ZeroDivisionError": lambda *_: (
+        "it divides by zero",
+        "check that the divisor is not 0 before you divide",
+    ),
+    "RecursionError": lambda *_: (
+        "a function calls itself without an end",
+        "call another function there, or loop",
+    ),
+}
