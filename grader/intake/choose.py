@@ -10,11 +10,13 @@ from itertools import islice
 from pathlib import Path
 
 from grader.errors import PackageNotFound
+from grader.files import read_untrusted
 from grader.intake.find import BUILD_SPACES, MANIFEST, WORKSPACE_MARKS, Candidate, manifest_name, named_at
 from grader.intake.names import brief, encodable, is_archive_name, listing, printable
 from grader.intake.tree import NO_CONTENT, is_there, walk
 
 COPIES_LOOKED_AT, FOLDERS_OF_A_COPY = 50, 300
+FIRST_LINE_BYTES = 200
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,7 +197,7 @@ def _rename(root: Path, packages: list[Candidate], wanted: Wanted) -> str:
     if not seen:
         told = f"It is the folder whose {MANIFEST} says <name>{name}</name>"
         loose = _loose_files(root, wanted.files)
-        made = f"catkin_create_pkg {name} std_msgs rospy makes it, for {loose} to go into"
+        made = f"catkin_create_pkg {name} std_msgs rospy makes it, to hold {loose}"
         return f"{told}: {made}." if loose else f"{told}: was it handed in (and pushed)?"
     counts = {c: _count_files(c.folder, wanted.files) for c in seen.values()}
     only = max(counts, key=lambda c: counts[c])
@@ -223,7 +225,22 @@ def _loose_files(root: Path, names: frozenset[str]) -> str:
     path = max(found, key=lambda path: len(found[path]), default="")
     if not path or not found[path]:
         return ""
-    return listing(found[path]) + ("" if path == "." else f" in {printable(path)}/")
+    folder = root if path == "." else root / path
+    return (
+        listing(found[path])
+        + ("" if path == "." else f" in {printable(path)}/")
+        + _windows(folder, found[path])
+    )
+
+
+def _windows(folder: Path, names: list[str]) -> str:
+    """Return what to do with those of the files whose lines end as on Windows; "" for none."""
+    first = {name: (read_untrusted(folder / name, FIRST_LINE_BYTES) or b"").split(b"\n")[0] for name in names}
+    crlf = [name for name, line in first.items() if line.startswith(b"#!") and line.endswith(b"\r")]
+    if not crlf:
+        return ""
+    them = "it" if len(crlf) == 1 else "them"
+    return f"; {listing(crlf)} cannot be started, because of Windows' line ends (CRLF): dos2unix {them} first"
 
 
 def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:

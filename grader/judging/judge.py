@@ -196,6 +196,7 @@ class Requirements:
             return verdict
         lost = [r for r in criterion.requires if self._explains(r, criterion, verdict)]
         same = [r for r in lost if _cause(self.verdicts[r]) == _cause(verdict)]
+        same = same or [r for r in lost if _cause(self.verdicts[r]) in verdict.message]
         if lost:
             # what is not there at all explains most
             blocking = min(same or lost, key=lambda r: not self.verdicts[r].unjudged)

@@ -134,7 +134,12 @@ def test_what_is_there_instead_is_named(files, message, hint, tmp_path):
             "packages here: first, second",
             "--package NAME.",
         ),
-        ({"week1/talker.py": "x"}, "no package.xml", "for talker.py in week1/ to go into"),
+        ({"week1/talker.py": "x"}, "no package.xml", "makes it, to hold talker.py in week1/."),
+        (
+            {"week1/talker.py": "#!/usr/bin/env python\r\n", "week1/listener.py": "#!/usr/bin/env python\n"},
+            "no package.xml",
+            "week1/; talker.py cannot be started, because of Windows' line ends (CRLF): dos2unix it first.",
+        ),
     ],
 )
 def test_what_has_the_labs_files_is_named(files, message, hint, tmp_path):

@@ -239,3 +239,20 @@ def test_what_else_is_wrong_with_a_node_is_no_reason_for_its_end() -> None:
     assert "EOFError" in found["chatter"].message
     assert found["rate"].blocked_by == "chatter"
     assert found["rate"].message.count("EOFError") == 1
+
+
+def test_what_is_named_as_absent_explains_more_than_another_loss() -> None:
+    asked = rubric(
+        EXECUTABLE,
+        {"id": "cmake", "check": "cmake", "with": {"name": "lab1"}},
+        {
+            "id": "install",
+            "check": "cmake-install",
+            "with": {"scripts": ["src/numeric_talker.py", "src/numeric_listener.py"]},
+            "requires": ["executable", "cmake"],
+        },
+    )
+    package = {"files": [{"path": "src/numeric_listener.py"}], "manifest": {}}
+    found = {c.id: c for c in judge(asked, build_runs({"runs": {}, "package": package}))}
+    assert found["executable"].status.is_lost
+    assert found["install"].blocked_by == "cmake"
