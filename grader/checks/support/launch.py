@@ -253,7 +253,8 @@ def _no_program(package: PackageFacts, node: LaunchNode, of_lab: Sequence[Packag
     near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
     if near:
         return _slip(node, f"{why}; there is {join_words(near)}", f'write type="{near[0]}"')
-    return _slip(node, why, "type is the script's whole file name, with its ending")
+    fix = "type is the script's whole file name, with its ending"
+    return _slip(node, why, f"write {plain}, or the name of a script that is there" if suffix else fix)
 
 
 def _named_otherwise(package: PackageFacts, node: LaunchNode, made: Executable, why: str) -> Slip:
