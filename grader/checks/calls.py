@@ -171,7 +171,7 @@ def _fault(
     if left:
         nearest = min(left, key=lambda one: len(list(_differences(one, wanted, params))))
         found = join_words(map(str, _differences(nearest, wanted, params)))
-        message = f"{params.service} is called with {_text(nearest)}: {found}"
+        message = f"{params.service} is called with {found}"
         return failed(
             message, hint="pass the request's fields by name, with the values that the handout asks for"
         )

@@ -25,7 +25,6 @@ from grader.report.sentences import (
 )
 from grader.report.text import line, without_ci_commands
 from grader.report.view import (
-    SOURCE_CHARS,
     Loss,
     ReportView,
     arrange,
@@ -211,7 +210,7 @@ class Terminal:
         """What was lost, as a compiler says it: the criterion and its place, the cause, the line of code, the fix."""
         c = loss.criterion
         place, *others = file_places(c) or [""]
-        code = [self._code(row) for pair in pointed_at(c, self._source_chars) for row in pair]
+        code = [row for pair in pointed_at(c, self._source_chars) for row in self._code(*pair)]
         alike = {a.id for a in loss.alike}
         rows = [
             ("expected", "" if code else c.expected),
@@ -285,10 +284,15 @@ class Terminal:
     @property
     def _source_chars(self) -> int:
         """How much of a line of code has room beside its number."""
-        return min(SOURCE_CHARS, max(SOURCE_CHARS_MIN, self.console.width - INDENT - 10))
+        return max(SOURCE_CHARS_MIN, self.console.width - INDENT - 12)
 
-    def _code(self, row: str) -> RenderableType:
-        return Text(" " * (INDENT + 2) + self._encoded(row), no_wrap=True, overflow="ignore")
+    def _code(self, text: str, carets: str) -> list[RenderableType]:
+        """Return a line of code and the carets below it, which three dots in place of an ellipsis move."""
+        if self._encoded("…") != "…":
+            carets = carets.replace(" | ", " |   ", 1) if " | …" in text else carets
+            text = text.replace("…", "...")
+        rows = (" " * (INDENT + 2) + self._encoded(row) for row in (text, carets))
+        return [Text(row, no_wrap=True, overflow="ignore") for row in rows]
 
     def _rows(self, rows: Iterable[tuple[str, str]]) -> list[RenderableType]:
         """Return `fix: …` for each row that says something: read aloud, a name belongs to its value."""

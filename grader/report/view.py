@@ -19,7 +19,7 @@ from grader.untrusted_text import CITATIONS_MAX, clip, visible
 from grader.wording import number, plural
 
 ON_COPY = re.compile(r"judged on a copy with .*? repaired: ")
-NAMES, NUMBERS = re.compile(r"/[\w/~]+"), re.compile(r"\d+(\.\d+)?")
+NAMES, NUMBERS = re.compile(r"/[\w/~]+"), re.compile(r"-?\d+(\.\d+)?")
 PLACE_CHARS = 300
 SOURCE_CHARS = 60
 POINTS_EQUAL = 1e-6

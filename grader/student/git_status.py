@@ -103,7 +103,7 @@ def advise(package: Path, base: Path, environment: Environment, *, seconds: floa
         package = package.resolve()
         top = repository_around(package)
         if top is None:
-            text = "This package isn't in a git repository: what you submit has to be these files."
+            text = "This package isn't in a git repository: make sure that you submit exactly these files."
             remark = Point(kind="no-repository", text=text, remark=True)
             return GitStatus(points=() if environment.ci else (remark,))
         view = open_view(top, base / "view", Git(base / "home", timeout_s=seconds))

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import json
 import os
 from pathlib import Path
@@ -14,6 +15,7 @@ from grader.model.result import ErrorInfo, Repaired
 from grader.model.verdict import Status
 from grader.report.files import result_bytes, write_reports
 from grader.report.sentences import repair_words
+from grader.report.terminal import Terminal, open_console
 from grader.report.view import arrange, without_hidden
 from tests.report.hostile import result, rubric
 from tests.support.a_class import criterion
@@ -223,3 +225,12 @@ def test_the_look_leaves_nothing_behind(tmp_path):
     check_writable(tmp_path / "new" / "folder")
     check_writable(tmp_path)
     assert list(Path(tmp_path).iterdir()) == []
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+@pytest.mark.parametrize("number", ["7", "13"])
+def test_carets_stand_below_what_is_meant_whatever_the_encoding(encoding, number):
+    console = open_console(io.TextIOWrapper(io.BytesIO(), encoding))
+    text, carets = Terminal(console)._code(f"{number} | …r, mgs.data)", f"{' ' * len(number)} |     ^^^")
+    assert text.plain.index("mgs") == carets.plain.index("^")
+    assert "\\u" not in text.plain
