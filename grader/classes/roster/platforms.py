@@ -77,7 +77,14 @@ def _inside(folder: Path) -> list[Path]:
 def _allowed(found: Found, folder: Path, local: Local) -> Found:
     """A link may lead out of the folder."""
     fault = local_fault(found.entry.source, folder, local) if found.entry else ""
-    return Found(where=found.where, id=found.id, faults=(fault,)) if fault else found
+    return _faulty(found.entry, fault) if fault and found.entry else found
+
+
+def _faulty(entry: Entry, fault: str) -> Found:
+    """What is wrong with a submission, with what is known of its student."""
+    return Found(
+        where=entry.where, id=entry.id, faults=(fault,), name=entry.name, group=entry.group, extra=entry.extra
+    )
 
 
 def _student(files: list[tuple[Path, Named | None]]) -> Found:
@@ -97,16 +104,15 @@ def _named(files: list[tuple[Path, Named]]) -> Found:
     """What a platform has from one student: the one folder, or the one archive among the files."""
     taken = [one for one in files if _can_be_graded(one[0]) and not one[1].is_text]
     path, named = (taken or files)[0]
-    where, name = printable(path.name), f"{named.name}-{named.id}"
+    name = f"{named.name}-{named.id}"
+    entry = _entry(path, named, name, [one.name for one, _ in files if one != path])
     if not taken:
         fault = "only text or a link was submitted" if named.is_text else "neither a folder nor an archive"
-        return Found(where=where, id=name, faults=(fault,))
+        return _faulty(entry, fault)
     if len(taken) > 1:
         more = listing([other.name for other, _ in taken[1:]])
-        fault = f"not the only one of this student, there is {more}: leave one there"
-        return Found(where=where, id=name, faults=(fault,))
-    others = [one.name for one, _ in files if one != path]
-    return Found(where=where, id=name, entry=_entry(path, named, name, others))
+        return _faulty(entry, f"not the only one of this student, there is {more}: leave one there")
+    return Found(where=entry.where, id=name, entry=entry)
 
 
 def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
