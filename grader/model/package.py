@@ -264,7 +264,7 @@ class PythonSlip(Record):
 
     `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and nodes
     get none. `misspelt`: a name that the file does not define, beside one that it does. `no-clock`: it publishes
-    and counts, and nothing in it can tell the time; that is a slip only where its messages are to tell it.
+    and counts, and nothing in what it sends can tell the time; that is a slip only where its messages are to tell it.
     `rate-parameter` and `rate-number`: no slip, but a loop or a timer whose rate is a parameter, `message` its name as
     written, or a number, `message` in Hz. `reset-value` and `reset-limit`: where a counter goes back, to the number
     `message`, or when it reaches it. `never-called`: a function that makes a node, publishes or waits, which nothing

@@ -302,6 +302,30 @@ def test_a_script_that_counts_and_reads_no_clock(tmp_path, value, imported, told
 
 
 @pytest.mark.parametrize(
+    ("before", "value", "told"),
+    [
+        ("c = itertools.count()\n", "next(c)", True),
+        (
+            "def gen():\n    n = 0\n    while True:\n        yield n\n        n += 1\nc = gen()\n",
+            "str(next(c))",
+            True,
+        ),
+        ("c = itertools.count()\nmessage = String()\nmessage.data = str(next(c))\n", "message.data", True),
+        ("self.began = rospy.get_time()\nself.c = itertools.count()\n", "next(self.c)", True),
+        ("c = itertools.count(int(rospy.get_time()))\n", "next(c)", False),
+        ("c = itertools.count()\nt = int(rospy.get_time())\n", "t if next(c) else t", False),
+        ("def now():\n    return rospy.get_time()\nc = itertools.count()\nnext(c)\n", "now()", False),
+        ("from clocks import tick\nc = itertools.count()\nnext(c)\n", "tick()", False),
+    ],
+)
+def test_a_script_that_reads_a_clock_and_sends_what_it_counts(tmp_path, before, value, told):
+    text = f"import itertools, rospy\n{before}print(rospy.get_time())\npub.publish('%s' % ({value}))\n"
+    (tmp_path / "a.py").write_text(text)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "no-clock"]
+    assert len(slips) == told
+
+
+@pytest.mark.parametrize(
     ("text", "told"),
     [
         ("counter = 0\nprint(conter)\n", ["`conter` is not defined anywhere: did you mean `counter`?"]),

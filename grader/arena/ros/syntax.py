@@ -200,7 +200,7 @@ def slips(tree):
     found += callbacks(tree)
     found += graph_names(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
-    if published is not None and counts(tree) and not knows_time(tree):
+    if published is not None and counts(tree) and (not knows_time(tree) or sends_no_time(tree)):
         message = "the script counts, and reads no clock"
         found.append({"line": published.lineno, "kind": "no-clock", "message": message})
     return sorted(found, key=lambda slip: slip["line"])[:SLIPS_LIMIT]
@@ -524,6 +524,56 @@ def knows_time(tree):
         ):
             return True
     return False
+
+
+PLAIN_CALLS = {
+    "str",
+    "int",
+    "float",
+    "repr",
+    "round",
+    "format",
+    "next",
+    "count",
+    "iter",
+    "len",
+    "String",
+    "join",
+}
+
+
+def sends_no_time(tree):
+    """Whether what is published comes from counting alone, though the script may read a clock for something else."""
+    bound = {}
+    for node in ast.walk(tree):
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        value = getattr(node, "iter", None) or getattr(node, "value", None)
+        for target in targets if value is not None else ():
+            part = target
+            while part is not None and dotted(part) != "self":
+                bound.setdefault(dotted(part), []).append(value)
+                part = getattr(part, "value", None)  # `msg.data = …` is a part of `msg`
+    functions = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+    left = [arg for n in ast.walk(tree) if is_call(n, "publish") for arg in n.args]
+    seen, counted = set(), False
+    while left:
+        for node in ast.walk(left.pop()):
+            name = dotted(node.func if isinstance(node, ast.Call) else node)
+            if name.rpartition(".")[2] in CLOCKS and name != "time":
+                return False
+            last = node.func.attr if is_any_method(node) else name
+            if isinstance(node, ast.Call) and last not in PLAIN_CALLS and name not in functions:
+                return False
+            counted = counted or (isinstance(node, ast.Call) and last in ("next", "count"))
+            if name and name not in seen:
+                seen.add(name)
+                left += bound.get(name, [])
+                left += [functions[name]] if name in functions else []
+    return counted
+
+
+def is_any_method(node):
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
 
 
 def is_plain(module):
