@@ -35,7 +35,10 @@ ATTACHED_BYTES_MAX = 256 << 10
 ATTACHED_FILES_MAX = 60
 ATTACHED_SUFFIXES = (
     ".py", ".xml", ".txt", ".launch", ".yaml", ".yml", ".cfg", ".sh", ".cpp", ".h", ".msg", ".srv",
+    ".action", ".c", ".cc", ".hpp", ".md", ".rst",
 )  # fmt: skip
+LAST_SUFFIXES = (".md", ".rst")
+"""Where there are too many files, no code is left out for these."""
 STATIC_ONLY = "nothing was run: only the files were asked for"
 STILL_HOLDS = "unchanged: what was recorded before still holds"
 
@@ -123,7 +126,8 @@ def left_out_events(facts: PackageFacts) -> Iterable[ActorEvent]:
 
 
 def _texts(facts: PackageFacts) -> list[SourceFile]:
-    return [f for f in facts.files if not f.binary and f.link is None and f.path.endswith(ATTACHED_SUFFIXES)]
+    found = (f for f in facts.files if not f.binary and f.link is None and f.path.endswith(ATTACHED_SUFFIXES))
+    return sorted(found, key=lambda file: file.path.endswith(LAST_SUFFIXES))
 
 
 def copy_recorded(recorded: Mapping[str, Path], folder: Path, progress: Progress) -> None:

@@ -40,6 +40,14 @@ def test_files_that_the_evidence_does_not_hold_are_named(tmp_path: Path) -> None
     assert list(left_out_events(read_package(make_package(tmp_path / "lab2", GOOD)))) == []
 
 
+def test_a_readme_is_held_and_takes_no_codes_place(tmp_path: Path) -> None:
+    few = make_package(tmp_path / "lab1", {**GOOD, "README.md": "# Lab 1"})
+    assert dict(attachments(few.folder, read_package(few)))["README.md"] == b"# Lab 1"
+    files = {f"src/{number:03}.py": "x = 1\n" for number in range(ATTACHED_FILES_MAX)}
+    many = make_package(tmp_path / "lab2", {**files, "package.xml": MANIFEST, "README.md": "# Lab 1"})
+    assert "README.md" not in dict(attachments(many.folder, read_package(many)))
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [

@@ -43,6 +43,12 @@ def test_a_criterion_for_people_shows_its_files_or_all_programs(out) -> None:
     assert all(path.endswith(".py") for path in every)
     assert [file.path for file in shown(out, "ada", "style", files=["package.xml"])] == ["package.xml"]
     assert [file.path for file in shown(out, "ada", "style", files=["*/*.py"])] == every
+    two = shown(out, "ada", "style", files=["package.xml", "README*"])
+    assert [(file.path, file.told) for file in two] == [
+        ("package.xml", ""),
+        ("README*", "no such file is in the evidence"),
+    ]
+    assert [file.path for file in shown(out, "ada", "style", files=["README*"])] == ["README*"]
 
 
 def test_what_differs_from_the_starter(out) -> None:

@@ -64,7 +64,8 @@ def code_of(
 ) -> list[CodeFile]:
     """Return the files that the criterion is about, those that it cites first; none without evidence.
 
-    They are what it cites and what its parameters name, or else all programs. `starter` has the course's files by path;
+    They are what it cites and what its parameters name, or else all programs; a pattern of its `files` that fits none
+    is one without lines. `starter` has the course's files by path;
     `hide` takes out of each line what is not to be read.
     """
     run = _package_run(folder, stamp_of(folder.joinpath(*PLACE)))
@@ -76,17 +77,25 @@ def code_of(
             marks.setdefault(citation.file, set()).add(citation.line or 0)
     paths = [path for path in marks if path in run.attachments]
     paths += [path for path in sorted(run.attachments) if path not in marks and _is_about(criterion, path)]
-    if not paths:
+    missing = [
+        CodeFile(path=pattern, rows=(), cited=False, told="no such file is in the evidence")
+        for pattern in map(str, criterion.parameters.get("files", ()))
+        if criterion.check == "manual" and not any(_fits(path, pattern) for path in run.attachments)
+    ]
+    if not paths and not missing:
         paths = [path for path in sorted(run.attachments) if PurePosixPath(path).suffix in SUFFIXES]
-    return [_file(run, path, marks.get(path, set()), starter, hide) for path in paths[:FILES_MAX]]
+    found = [_file(run, path, marks.get(path, set()), starter, hide) for path in paths[:FILES_MAX]]
+    return [*found, *missing]
 
 
 def _is_about(criterion: Criterion, path: str) -> bool:
     """Return whether its parameters name the file, by its path, its name or a pattern."""
     patterns = [str(one) for one in criterion.parameters.get("files", ())]
-    names = names_in(criterion)
-    name = PurePosixPath(path).name
-    return name in names or any(fnmatch(path, one) or fnmatch(name, one) for one in patterns)
+    return PurePosixPath(path).name in names_in(criterion) or any(_fits(path, one) for one in patterns)
+
+
+def _fits(path: str, pattern: str) -> bool:
+    return fnmatch(path, pattern) or fnmatch(PurePosixPath(path).name, pattern)
 
 
 @lru_cache(maxsize=RUNS_KEPT)
