@@ -89,6 +89,13 @@ class Slip(NamedTuple):
         return (unjudged if self.of_manifest else failed)(message, hint=self.fix, citations=cited)
 
 
+PROGRAMS_OF = {
+    "rospy_tutorials": ("listener.py", "talker.py", "listener", "talker"),
+    "turtlesim": ("turtlesim_node", "turtle_teleop_key", "draw_square", "mimic"),
+}
+"""What tutorials start of ROS's own packages."""
+
+
 def find_launch(package: PackageFacts, name: str) -> LaunchFile | None:
     """Return the launch file of that name in any folder, one in `launch/` first."""
     found = [f for f in package.launch_files if PurePosixPath(f.path).name == name]
@@ -461,6 +468,8 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
             f"there is no package {node.pkg}", "check the spelling of pkg, and that it is installed"
         )
     why = f"roslaunch finds no program {node.type} in the package {node.pkg}"
+    if near := near_names(str(node.type), PROGRAMS_OF.get(str(node.pkg), ())):
+        return Absence(f"{why}; it has {near[0]}", f'write type="{near[0]}"')
     return Absence(why, "type is the file's name, with .py for a script, and the file needs chmod +x")
 
 
