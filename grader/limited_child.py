@@ -2,7 +2,7 @@
 
 The arguments, and each value that the function yields, travel as JSON. The child is this Python without site-packages,
 and inherits none of the user's variables but those that a program needs to be loaded. A process for many jobs is not
-its business (`classes/batch/child.py`), and neither are students' programs (`arena/`).
+its business (`workers.py`), and neither are students' programs (`arena/`).
 """
 
 from __future__ import annotations

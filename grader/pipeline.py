@@ -10,8 +10,8 @@
 A submission that is a recording, or holds recordings only, is evidence already: it skips the package and the arena.
 
 `grade` does all of it, `record` stops before judging, and `grader judge` (`judging/`) begins with the evidence. Many
-submissions at once are `classes/batch/`, the repeated gradings of `grader check --watch` are `student/watching/`: both
-call `grade`.
+submissions at once are `classes/batch/`, the repeated gradings of `grader check --watch` are `student/watching.py`:
+both call `grade`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Finds ROS 1 on this machine, in the order that docs/design.md gives."""
+"""Finds ROS 1 on this machine, in the order that docs/how-to/install.md gives."""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
@@ -12,6 +13,16 @@ import pytest
 
 GRADER = Path(__file__).resolve().parent.parent / "grader"
 ROS_SIDE = GRADER / "arena" / "ros"
+ROOT = GRADER.parent
+NAMED = re.compile(r"(?<!`)`([\w./-]+)`(?!`)")
+"""A path or a name in the text of a page or a docstring."""
+EXAMPLES = {
+    *(".py", "a.py", "scripts/numeric_talker.py", "scripts/talker.py", "src/a.py", "src/nodes/a.py"),
+    *("../b/scripts/talker.py", "evidence/repaired-1/", "evidence/repeated-1/"),
+}
+"""What a submission, or a folder of results, may have in it."""
+NO_MODULES = {"copydetect", "params", "run", "sarif"}
+"""Names in the docstrings of rooms that are a library, a check's parameters and a form."""
 
 # Who may import whom, beside itself. `rubric.model` and `rubric.scenario` hold records only: who may see records may
 # see them.
@@ -144,6 +155,56 @@ def test_the_ros_side_needs_ros_and_the_standard_library_only() -> None:
 def test_the_ros_side_is_python_3_8(path) -> None:
     tree = ast.parse(path.read_text(encoding="utf-8"), feature_version=(3, 8))
     assert tree.body
+
+
+def test_files_that_the_design_and_docstrings_name_are_there() -> None:
+    paths = {f"/{path.relative_to(ROOT)}" for path in _repository()}
+    rooms = {path.name for path in GRADER.iterdir() if path.is_dir()} | {"grader"}
+    wrong = [
+        f"{place}: {name}"
+        for place, text in _texts()
+        for name in NAMED.findall(text)
+        if (name.endswith(".py") or (name.endswith("/") and name.split("/")[0] in rooms))
+        and name not in EXAMPLES
+        and not any(path.endswith(f"/{name}") or f"/{name}" in path for path in paths)
+    ]
+    assert wrong == []
+
+
+def test_modules_that_the_docstring_of_a_room_names_are_there() -> None:
+    modules = {part for path in _sources(GRADER) for part in path.relative_to(ROOT).with_suffix("").parts}
+    wrong = [
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in GRADER.rglob("__init__.py")
+        for name in NAMED.findall(ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "")
+        if re.fullmatch("[a-z_.]+", name)
+        and not name.endswith((".jsonl", ".yaml", ".html", ".py"))
+        and not set(name.split(".")) & (modules | NO_MODULES)
+        and not _defines(path.parent, name)
+    ]
+    assert wrong == []
+
+
+def _defines(folder: Path, name: str) -> bool:
+    return any(f"def {name}(" in path.read_text(encoding="utf-8") for path in folder.glob("*.py"))
+
+
+def _repository() -> Iterator[Path]:
+    return (path for top in ("grader", "scripts", "tests") for path in (ROOT / top).rglob("*.py"))
+
+
+def _texts() -> Iterator[tuple[str, str]]:
+    """Yield the pages about the code and every docstring of the grader, each with its place."""
+    for page in ("docs/design.md", "CONTRIBUTING.md"):
+        yield page, (ROOT / page).read_text(encoding="utf-8")
+    for path in _sources(GRADER):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if (
+                isinstance(node, ast.Expr)
+                and isinstance(node.value, ast.Constant)
+                and isinstance(node.value.value, str)
+            ):
+                yield f"{path.relative_to(ROOT)}:{node.lineno}", node.value.value
 
 
 def _sources(folder: Path) -> Iterator[Path]:

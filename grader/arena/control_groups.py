@@ -193,7 +193,7 @@ CONTROLLERS = ("memory", "pids")
 MARKS = ("user.delegate", "trusted.delegate")
 """How systemd marks what it leaves alone. The second can be read by root only, and older versions have no other."""
 SCOPES = re.compile(r"(grader|run)-[\w-]+\.scope")
-"""Those that the grader asks for (`cli/scope.py`), and those of `systemd-run --scope`."""
+"""Those that the grader asks for (`cli/systemd_scope.py`), and those of `systemd-run --scope`."""
 USERS_OWN = "/user@"
 """Below it all groups are the user's, also those that the user's systemd manages."""
 SYSTEMD = Path("/run/systemd/system")

@@ -55,10 +55,9 @@ class RunState:
     are registered now, `published` their topics, `talking` when each first sent a message, `owners` the processes of
     all nodes so far. `lost_s` is what others took of the run's time while they filled the machine: so much longer a
     node is waited for. Of that, `lost_before_s` was gone at `started_s`, `lost_before_last_s` at `last_start_s`.
-    `only_answers`: nodes that wait for callbacks send nothing more, since nothing is sent to them any more.
-    `unheeded`: no node subscribed to what the steps send; for that they had waited `waited_s`. `least_s` is how long
-    nodes are watched, even where nothing more is to come. `naps`: the package's programs sleep for times of their
-    own, which may look like `spin()` from outside."""
+    `waited_s`: so long steps had waited in vain by `started_s`. `least_s` is how long nodes are watched, even where
+    nothing more is to come. `naps`: the package's programs sleep for times of their own, which may look like
+    `spin()` from outside."""
 
     least_s: float = 0.0
     naps: bool = False
@@ -95,8 +94,6 @@ class RunState:
     lost_s: float = 0.0
     lost_before_s: float = 0.0
     lost_before_last_s: float = 0.0
-    only_answers: bool = False
-    unheeded: bool = False
     waited_s: float = 0.0
     rates: dict[str, list[RateBounds]] = field(default_factory=lambda: defaultdict(list))
     arrivals_ns: dict[str, list[int]] = field(default_factory=dict)
@@ -198,7 +195,7 @@ class RunState:
     def begin_wait(self, now_s: float, *, heeded: bool = True) -> None:
         """Start the time in which what is waited for has to come: the steps are over. Where no node subscribed to what
         they send, the time that this took was the first message's too."""
-        self.unheeded, self.waited_s = not heeded, 0.0 if heeded else now_s - self.started_s
+        self.waited_s = 0.0 if heeded else now_s - self.started_s
         self.started_s = self.news_s = now_s
         self.lost_before_s = self.lost_s
 
@@ -433,15 +430,11 @@ def _silent(live: RunState, until: Until, now_s: float) -> str:
 
 
 def _never(live: RunState, until: Until, now_s: float) -> str:
-    """Return what is waited for and cannot come, since no node is there for it, or none heard the steps, and all the
-    rest has been seen; else ""."""
+    """Return what is waited for and cannot come, since no node is there for it and all the rest has been seen;
+    else ""."""
     if not is_settled(live, now_s):
         return ""
-    absent = {t for t in (*until.topics, *until.messages) if not live.topics[t].count}
-    if live.only_answers and not live.helpers and all(live.at_rest[p].spins for p in live.running):
-        absent |= {topic for topic, count in until.messages.items() if live.topics[topic].count < count}
-    elif not live.unheeded:
-        absent -= live.published
+    absent = {t for t in (*until.topics, *until.messages) if not live.topics[t].count} - live.published
     absent |= {topic for topic in until.connected if topic not in live.connected_s}
     topics = tuple(topic for topic in until.topics if topic not in absent)
     possible = {

@@ -26,8 +26,6 @@ from grader.model.message_rate import RateBounds
 from grader.rubric.course_packages import LAUNCH_ENDINGS
 from grader.rubric.scenario import Param, Scenario, Start
 
-BY_ITSELF = re.compile(rb"(?i)timer|thread|asyncio|sched|alarm")
-"""What a node may use to do something while its main thread waits for callbacks."""
 NAPS = re.compile(rb"\bsleep\(\s*[^)\s]")
 """A sleep of so many seconds: `rospy.sleep(0.5)`, and not `rate.sleep()`."""
 CLOCK_STEP_S = 0.05
@@ -99,11 +97,6 @@ async def run_scenario(
         try:
             session.live.watch_rates(rates)
             session.live.naps = place.has_line(NAPS)
-            by_itself = session.live.naps or scenario.clock == "warped" or place.has_line(BY_ITSELF)
-            sent = (one for step in scenario.steps for one in (step.published, step.play) if one is not None)
-            fed = bool(scenario.serves) or any(one.background for one in sent)
-            alone = bool(scenario.steps) and all(start.script is not None for start in scenario.start)
-            session.live.only_answers = alone and not by_itself and not fed
             session.live.least_s = max(watched_s + WATCHED_MORE_S, expected_s(scenario) - STARTING_S)
             async with admission.start() as leave, session as arena:
                 arena.course(ScenarioEvent(event="begin"))

@@ -160,8 +160,8 @@ class StepRunner:
 
     @property
     def unheeded(self) -> bool:
-        """Whether no node subscribed to any topic on which the steps were to send."""
-        return bool(self._deaf) and not self._live.subscribed & self._types.keys()
+        """Whether no node subscribed to a topic on which steps were to send."""
+        return bool(self._deaf)
 
     # --- Messages ----------------------------------------------------------------------------------------------------
 

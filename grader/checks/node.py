@@ -94,15 +94,14 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
     if one is None:
         return not_started(params.process).about(expected=expected)
     nodes = nodes_of(run, one.name)
-    own = [each for each in lives(run) if each.name == one.name]
-    up_ns = max(_up_ns(each, run, nodes) for each in own)
+    up_ns = _up_ns(one, run, nodes)
     message = f"{_script(one)} is the node {join_words(nodes)}, stayed alive and ended on Ctrl-C"
     verdict = (
-        next((early for each in own if (early := _early_end(each, run, package))), None)
+        _early_end(one, run, package)
         or _registration(one, run, nodes)
         or _misnamed(package, run, nodes, params)
         or _short_watch(one, up_ns, params)
-        or next((bad for each in own if each.step != "kill" and (bad := _bad_end(each, run, package))), None)
+        or _bad_end(one, run, package)
         or passed(message)
     )
     measured = f"{plural(len(nodes), 'node')} ({join_words(nodes) or 'none'}), alive for {seconds(up_ns)}"
@@ -169,8 +168,7 @@ def _misnamed(
 def _up_ns(one: Life, run: Run, nodes: tuple[str, ...]) -> int:
     """Return how long it lived freely after its first message, or after its start where it published none."""
     channels = (c for c in run.student_channels() if c.topic != "/rosout" and c.callerid in nodes)
-    times_ns = (next((t for t in c.times_ns if t >= one.start_ns), None) for c in channels)
-    first = min((t for t in times_ns if t is not None), default=one.start_ns)
+    first = min((c.times_ns[0] for c in channels if c.messages), default=one.start_ns)
     return max(0, one.until_ns(run) - first)
 
 

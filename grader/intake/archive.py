@@ -1,7 +1,7 @@
 """An archive becomes a folder. What kind it is, its content says, not its name.
 
-A child process with limits unpacks it (`limited.py`): `unpack` starts it, and `unpack_here` is what runs there. What is
-written where, and how much of it, is decided in `unpack.py` and `limits.py`.
+A child process with limits unpacks it (`limited_child.py`): `unpack` starts it, and `unpack_here` is what runs there.
+What is written where, and how much of it, is decided in `unpack.py` and `limits.py`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Versions of formats: `grader.result/1` is version 1 of `grader.result`. `report/formats/` says what each is."""
+"""Versions of formats (`report/file_formats.py`): `grader.result/1` is version 1 of `grader.result`."""
 
 from __future__ import annotations
 

@@ -86,31 +86,6 @@ def test_what_no_node_subscribed_to_is_waited_for_once() -> None:
     assert find_outcome(live, until, 26.0) == ("silent", "no message within 20 s")
 
 
-def test_nodes_that_only_wait_for_callbacks_send_nothing_more_once_nothing_is_sent_to_them() -> None:
-    until = Until(messages={"/mean": 3})
-    for rest, helper, outcome in (
-        ("spins", False, ("silent", "the graph has settled, without /mean")),
-        ("loops", False, None),
-        ("spins", True, None),
-    ):
-        live = _resting(node=(rest, 1))
-        live.published, live.only_answers = {"/mean"}, True
-        live.note_messages("/mean", 2, 2.0)
-        live.begin_wait(4.0)
-        if helper:
-            live.helpers.add("node")
-        assert find_outcome(live, until, 7.5) == outcome
-
-
-def test_nodes_that_hear_nothing_of_the_steps_send_nothing_once_they_have_settled() -> None:
-    until = Until(messages={"/mean": 3})
-    for heeded, outcome in ((True, None), (False, ("silent", "the graph has settled, without /mean"))):
-        live = _resting(node=("spins", 1))
-        live.published = {"/mean"}
-        live.begin_wait(5.0, heeded=heeded)
-        assert find_outcome(live, until, 8.0) == outcome
-
-
 def test_what_others_took_before_a_process_started_lengthens_nothing_behind_it() -> None:
     live, until = _live(), Until(nodes=2)
     live.lost_s, live.nodes, live.news_s = 30.0, {"/node"}, 30.0

@@ -33,8 +33,8 @@ LINE_CHARS = 200
 
 
 class Life(NamedTuple):
-    """One process from start to end. `end` is None while it ran on to the end of the recording. `step` is `stop` or
-    `kill` where a step of the scenario ended it, and empty where that was the end of the run, or its own."""
+    """One process from start to end. `end` is None while it ran on to the end of the recording. `by_step`: it was not
+    the run's end that stopped it, but a step of the scenario."""
 
     name: str
     start_ns: int
@@ -42,11 +42,7 @@ class Life(NamedTuple):
     end_ns: int | None
     end: ProcessEvent | None
     interrupt_ns: int | None
-    step: str = ""
-
-    @property
-    def by_step(self) -> bool:
-        return bool(self.step)
+    by_step: bool = False
 
     @property
     def ended_early(self) -> bool:
@@ -103,7 +99,7 @@ def _life(run: Run, start_ns: int, start: ProcessEvent) -> Life:
     interrupt_ns, action = min(_interrupts(run, start.name, start_ns), default=(None, ""))
     if interrupt_ns is not None and end_ns is not None and end_ns < interrupt_ns:
         interrupt_ns, action = None, ""
-    return Life(start.name, start_ns, start, end_ns, end, interrupt_ns, action if action in STEPS else "")
+    return Life(start.name, start_ns, start, end_ns, end, interrupt_ns, action in STEPS)
 
 
 def _interrupts(run: Run, process: str, after_ns: int) -> Iterator[tuple[int, str]]:
