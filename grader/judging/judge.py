@@ -204,7 +204,10 @@ class Requirements:
             message = f"blocked by {root}: {self.verdicts[root].message}"
             if verdict.message not in message:
                 message = f"{message}; here: {_without_cause(verdict)}"
+            # what is sure and explains it would come again with the run
+            sure = self.verdicts[root].unjudged or self._criteria[root].scenario == criterion.scenario
             update = {
+                "timing": verdict.timing and (self.verdicts[root].timing or not sure),
                 "status": Status.BLOCKED,
                 "message": message,
                 "hint": f"fix {root} first",

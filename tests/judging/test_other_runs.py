@@ -138,6 +138,29 @@ def test_what_was_seen_once_costs_nothing() -> None:
     assert (node.status.value, node.points) == ("fail", 0)
 
 
+def test_what_a_sure_loss_explains_is_not_run_again() -> None:
+    asks = {"id": "asks", "check": "calls", "with": {"service": "/add"}, "scenario": "talker"}
+    sums = {
+        "id": "sum",
+        "check": "prints",
+        "with": {"process": "talker", "text": "sum"},
+        "scenario": "talker",
+    }
+    lookup = {
+        "action": "lookup",
+        "actor": "/talker",
+        "topic": "/sum",
+        "at_s": 1,
+        "detail": "it was not there",
+    }
+    quiet = {**GOOD_RUN, "topics": [], "console": [], "actors": [*GOOD_RUN.get("actors", []), lookup]}
+    runs = build_runs({"runs": {"talker": quiet}, "package": PACKAGE})
+    assert judge_all_runs(rubric(sums), runs).doubtful == {"talker"}
+    found = judge_all_runs(rubric(asks, {**sums, "requires": ["asks"]}), runs)
+    assert [c.status.value for c in found.criteria] == ["fail", "blocked"]
+    assert found.doubtful == frozenset()
+
+
 def test_a_missing_call_is_charged_where_no_name_is_wrong() -> None:
     flooded = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 500, "rate_hz": 500}]}
     call = TABS.model_copy(update={"kind": "missing-call", "message": "rate.sleep is named but not called"})

@@ -154,6 +154,10 @@ def test_every_kind_of_edit():
             {"replace": {"file": "src/x.py", "old": "rospy", "new": ""}},
             "replace: there is no file 'src/x.py'",
         ),
+        (
+            {"replace": {"file": "lab/src/a.py", "old": "rospy", "new": ""}},
+            "replace: there is no file 'lab/src/a.py' (did you mean \"src/a.py\"?)",
+        ),
         ({"move": {"old": "lab/", "new": ""}}, "move: there is no file 'lab/'"),
         ({"delete": {"file": "lab"}}, "delete: there is no file 'lab'"),
     ],

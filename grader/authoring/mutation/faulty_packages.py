@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import yaml
@@ -267,7 +267,10 @@ def build_tree(solution: Solution, mutant: Mutant) -> Tree:
         try:
             EDITS[kind](tree, getattr(edit, kind))
         except KeyError as error:
-            raise DoesNotFitError(f"{kind}: there is no file {error}") from error
+            name = str(error.args[0])
+            there = [path for path in solution.tree if PurePosixPath(path).name == PurePosixPath(name).name]
+            meant = f' (did you mean "{there[0]}"?)' if len(there) == 1 else ""
+            raise DoesNotFitError(f"{kind}: there is no file {name!r}{meant}") from error
         solution = solution.then(tree)
     return solution.tree
 
