@@ -11,7 +11,7 @@ from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives, na
 from grader.checks.support.text import INIT, LOOP, PUBLISHER, near_names, publisher, subscriber, texts_in
 from grader.evidence.events import MISFIT, UNHEARD
 from grader.evidence.run import Channel, Run
-from grader.model.package import PackageFacts, PythonSlip
+from grader.model.package import LaunchNode, PackageFacts, PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import (
     EvidenceCitation,
@@ -93,15 +93,40 @@ def no_message(
             f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all topics"
         )
         return unjudged(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
-    if near:
-        hint = f"name the topic {topic} in {PUBLISHER}"
-        verdict = of_node(f"{what}; the node publishes on {join_words(near)}", measured=measured, hint=hint)
-        return verdict.about(citations=named_at(package, run, "publisher", near[0]))
+    if misnamed := _misnamed(package, run, topic, of_node):
+        return misnamed
     if absent := no_node(package, run, what) or _refused(run, topic) or misfit(run):
         return absent if topic in published else _with_others(absent, published)
     if topic in published:
         return _advertised(package, run, what, of_node)
     return _not_advertised(package, run, topic, of_node)
+
+
+def _misnamed(package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict]) -> Verdict | None:
+    """Return the verdict where a node publishes under a name that is nearly the topic's, or that a launch file made."""
+    published, what = published_topics(run), f"no message came on {topic}"
+    if topic in published or not published:
+        return None
+    near, measured = near_names(topic, published), join_words(published)
+    if node := _remapped(package, run, topic):
+        here = [name for name in published if name.startswith(node.namespace)] or near or published
+        hint = "look at its <remap>: `from` is the name in the script, `to` the new one"
+        verdict = of_node(f"{what}; the node publishes on {join_words(here)}", measured=measured, hint=hint)
+        return verdict.about(citations=(FileCitation(file=node.file, line=node.line),))
+    if not near:
+        return None
+    hint = f"name the topic {topic} in {PUBLISHER}"
+    verdict = of_node(f"{what}; the node publishes on {join_words(near)}", measured=measured, hint=hint)
+    return verdict.about(citations=named_at(package, run, "publisher", near[0]))
+
+
+def _remapped(package: PackageFacts, run: Run, topic: str) -> LaunchNode | None:
+    """Return the launch file's node in whose namespace the topic is, where the run is a launch file's and the node's
+    names are remapped."""
+    if not lives(run) or any(one.start.script for one in lives(run)):
+        return None
+    nodes = [n for f in package.launch_files for n in f.brings if n.remaps and topic.startswith(n.namespace)]
+    return max(nodes, key=lambda n: len(n.namespace), default=None)
 
 
 def _not_advertised(package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict]) -> Verdict:
