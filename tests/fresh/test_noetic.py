@@ -47,11 +47,13 @@ def ros(rooms: Rooms, tmp_path_factory) -> Root:
     return root
 
 
-def _grade(root: Root, source: Path, lab: str, locks: Path, **env: str) -> GradingResult:
+def _grade(
+    root: Root, source: Path, lab: str, locks: Path | None, *, user: str | None = None, **env: str
+) -> GradingResult:
     root.copy_in(source, f"/srv/in/{lab}")
-    command = [GRADER, "grade", f"/srv/in/{lab}", "--rubric", lab, "--out", "/srv/out"]
-    done = root.run(command, privileged=True, locks=locks, env=env, check=False)
-    result = root.path / "srv" / "out" / lab / "result.json"
+    command = [GRADER, "grade", f"/srv/in/{lab}", "--rubric", lab, "--out", "/tmp/out"]
+    done = root.run(command, privileged=True, locks=locks, env=env, user=user, check=False)
+    result = root.path / "tmp" / "out" / lab / "result.json"
     assert result.is_file(), done.stdout + done.stderr
     return GradingResult.model_validate_json(result.read_bytes())
 
@@ -95,3 +97,12 @@ def test_a_courses_workspace_over_it(rooms: Rooms, ros: Root, locks: Path) -> No
     result = _grade(root, REPO / "reference_solutions" / lab, lab, locks, GRADER_ROS_SETUP=setup)
     assert setup in result.environment.ros
     assert surprises(result, read_fixture(lab, "reference"), rubric_of(lab)) == []
+
+
+def test_an_ordinary_user_grades_in_a_sandbox_too(rooms: Rooms, ros: Root) -> None:
+    lab, root = "leeds-comp3631-lab1", rooms.fresh_root(on=ros)
+    root.run(["useradd", "--uid", "1000", "--create-home", "someone"])
+    source = REPO / "reference_solutions" / lab
+    result = _grade(root, source, lab, None, user="someone", HOME="/home/someone")
+    assert surprises(result, read_fixture(lab, "reference"), rubric_of(lab)) == []
+    assert "bubblewrap" in result.environment.sandbox
