@@ -49,6 +49,9 @@ class Meter:
         return time.process_time() - self._own_s
 
     def children_cpu_s(self) -> float:
+        with suppress(ChildProcessError):  # there is none
+            while os.waitpid(-1, os.WNOHANG)[0]:
+                pass  # it outlived its parent, and has ended
         return children_cpu_s() - self._children_s
 
     def all_cpu_s(self) -> float:

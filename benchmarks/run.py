@@ -19,6 +19,7 @@ from grader.errors import GraderError
 
 NAMES = (
     "one",
+    "peers",
     "faulty",
     "against",
     "hundred",
