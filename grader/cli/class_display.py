@@ -42,7 +42,7 @@ CRITERIA_SHOWN = 4
 NEXT_STEPS = {
     "error": "{count} could not be graded; once that is fixed: --only failed",
     "inconclusive": "{count} inconclusive; to grade them again: --only inconclusive",
-    "manual": "{count} with criteria that a person decides: their points go into {overrides}",
+    "manual": "{count} with criteria that a person decides: grader review {folder}, or points in {overrides}",
     "missing": "{count} not graded yet: the same command goes on with them",
 }
 
@@ -128,7 +128,7 @@ def list_attention(folder: BatchFolder) -> Iterator[str]:
                 yield f"{row.entry.id}: {override.criterion}: a person decided, and the check says something else now"
     for state, words in NEXT_STEPS.items():
         if found[state]:
-            yield words.format(count=found[state], overrides=folder.path / OVERRIDES)
+            yield words.format(count=found[state], folder=folder.path, overrides=folder.path / OVERRIDES)
 
 
 def _name(row: Row) -> str:
