@@ -61,7 +61,8 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
             return failed(message, expected=expected, measured=slip, hint=hint, citations=cited)
         absent = failed(NO_FILE, expected=expected, measured="no file", hint=hint)
         return absent.model_copy(update={"cause": NO_FILE})
-    wrong = list(_wrong(facts, names))
+    # what is missing may stand behind the line that cannot be read
+    wrong = [one for one in _wrong(facts, names) if facts.fault is None or one[2] is not None]
     named = [c for c in facts.calls if c.name in {"project", "find_package", "catkin_package"}]
     measured = ", ".join(f"{c.name}({' '.join(c.args[:3])})" for c in named[:6]) or "none of the three calls"
     fault = facts.fault
@@ -76,7 +77,7 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         f"{facts.file}: {'; '.join([*_fault(fault), *(message for message, _, _ in wrong)])}",
         expected=expected,
         measured=measured,
-        hint="; ".join(hint for _, hint, _ in wrong) or "fix that line, then run catkin_make",
+        hint="; ".join([*_repair_of(fault), *(hint for _, hint, _ in wrong)]),
         citations=tuple(dict.fromkeys(lines)),
     )
 
@@ -85,6 +86,16 @@ def _fault(fault: Fault | None) -> Iterator[str]:
     if fault is not None:
         line = f"line {fault.line}: " if fault.line else ""
         yield f"{line}CMake cannot read it: {fault.cause or fault.message}"
+
+
+def _repair_of(fault: Fault | None) -> Iterator[str]:
+    if fault is not None:
+        unclosed = "never closed by `)`" in fault.cause
+        yield (
+            "write `)` at the end of that call"
+            if unclosed
+            else fault.fix or "fix that line, then run catkin_make"
+        )
 
 
 def _misspelt(facts: CMakeFacts, name: str) -> CMakeCall | None:

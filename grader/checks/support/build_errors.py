@@ -17,6 +17,7 @@ from grader.wording import join_words
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
 ONE_EDIT = 0.88
+SLIPS_OF_COMPONENTS = ("COMPONENT", "COMPONENETS", "COMPONETS", "COMPONENTES", "Components", "components")
 SLIP = 0.8
 """How alike a name is that is written for one that every machine has: `pospy` for `rospy`."""
 UNKNOWN_COMMAND = "Unknown CMake command"
@@ -182,6 +183,9 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
     name = found[1]
     near = get_close_matches(name, (*ALWAYS_THERE, *known_packages()), 1, ONE_EDIT)
     declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
+    if name in SLIPS_OF_COMPONENTS:
+        why = f"find_package(…) takes {name} for the name of a package: the word is COMPONENTS"
+        return Explained(why, f"write COMPONENTS for {name}")
     if slips := _misspelt_components(package):
         wrong, right = join_words(slips), "; ".join(f"write {new} for {old}" for old, new in slips.items())
         what = (
@@ -322,6 +326,27 @@ def _depends(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]
     return Explained(why, f"take {found[1]} out of DEPENDS; ROS packages go after CATKIN_DEPENDS")
 
 
+def _run_dependency(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    name = found[1]
+    tag = "run_depend" if package.manifest and package.manifest.format == 1 else "exec_depend"
+    why = f"catkin_package(…) depends on {name}, and package.xml does not declare it for run time"
+    return Explained(
+        why, f"add <{tag}>{name}</{tag}> to package.xml, or take {name} out of catkin_package(…)"
+    )
+
+
+def _build_dependency(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    why = f"find_package(…) names {found[1]}, and package.xml does not declare it for building"
+    return Explained(why, f"add <build_depend>{found[1]}</build_depend> to package.xml")
+
+
+def _unused_argument(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    why = f"catkin_package(…) does not know what to do with {shown(found[1].replace(';', ' '))}"
+    return Explained(
+        why, "write it after INCLUDE_DIRS, LIBRARIES, CATKIN_DEPENDS or DEPENDS, spelt like this"
+    )
+
+
 def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
     text = f"{found[1]}/{found[2]}.h does not exist when the program is compiled"
     made = {f"{folder}/{found[2]}.{folder}" for folder in ("msg", "srv")}
@@ -424,6 +449,12 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r'dependency target "([^"]+)" of target "([^"]+)" does not exist', _missing_dependency),
     (r'dependencies to non-existent target "([^"]+)"', _missing_target),
     (r'link libraries for target "([^"]+)" which is not built', _missing_target),
+    (
+        r"catkin package '([^']+)' has been find_package\(\)-ed but is not listed as a build",
+        _build_dependency,
+    ),
+    (r"catkin_package\(\) called with unused arguments: (\S+)", _unused_argument),
+    (r"catkin_package\(\) DEPENDS on the catkin package '([^']+)' which must", _run_dependency),
     (r"catkin_package\(\) DEPENDS on (?:the catkin package )?'([^']+)'", _depends),
     (r"(\w+)/(\w+)\.h: No such file or directory", _header_race),
     (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),

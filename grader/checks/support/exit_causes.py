@@ -176,6 +176,13 @@ def syntax_hint(fault: Fault) -> str:
     if bracket := re.match(r"the bracket `(.)`|(a bracket)", fault.cause):
         closing = {"(": "`)`", "[": "`]`", "{": "`}`"}.get(bracket[1], "the bracket that closes it")
         return f"{where}write {closing} at the end of what is opened there"
+    if below := re.match(r"(`global \w+`) stands below", fault.cause):
+        inside = fault.source[:1].isspace()
+        return (
+            f"{where}write {below[1]} as the first line of the function"
+            if inside
+            else f"{where}delete this line"
+        )
     if right := _rewritten(fault):
         return f"{where}write `{shown(right)}`"
     return fault.fix or CAUSES.get(fault.kind, ("", "save the file as plain UTF-8 text"))[1]
