@@ -253,13 +253,13 @@ class _Writer:
 
     def _foot(self, result: GradingResult) -> Iterator[str]:
         used = result.environment
-        kind = "package" if result.submission.package else "recording"
+        kind, digest = "package" if result.submission.package else "recording", result.submission.digest[:12]
         yield (
             f"Graded by grader {self._text(used.grader)} with ROS {self._text(used.ros or 'not used')}, "
             f"Python {self._text(used.python)}, sandbox {self._text(used.sandbox)}, "
             f"in {result.timing.wall_s:.1f} s. Rubric digest {self._code(result.rubric.digest[:12])}"
-            f"{f' ({origin})' if (origin := sentences.RUBRIC_FROM[result.rubric_origin]) else ''}, "
-            f"{kind} digest {self._code(result.submission.digest[:12])}."
+            f"{f' ({origin})' if (origin := sentences.RUBRIC_FROM[result.rubric_origin]) else ''}"
+            f"{f', {kind} digest {self._code(digest)}' if digest else ''}."
         )
 
     def _folded(self, title: str, rows: Iterable[str]) -> Iterator[str]:

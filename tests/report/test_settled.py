@@ -158,3 +158,12 @@ def test_what_a_person_graded_in_the_graders_place_is_graded():
     assert "It could not be graded automatically:\n\nno package in it\n\nhand in a package\n" in text
     assert "## What was lost" in text
     assert render_markdown(settled(error=error, status="error"), rubric()).startswith("# Not graded\n")
+
+
+def test_of_what_could_not_be_opened_there_is_no_digest() -> None:
+    one = settled(
+        error=ErrorInfo(kind="submission", message="the archive is damaged", hint=""), status="error"
+    )
+    assert "package digest" in render_markdown(one, rubric())
+    gone = one.submission.model_copy(update={"digest": "", "package": ""})
+    assert "recording digest" not in render_markdown(one.model_copy(update={"submission": gone}), rubric())
