@@ -14,7 +14,6 @@ from grader.checks.support.scripts import (
     Obstacle,
     add_hint,
     can_be_moved,
-    chmod_hint,
     find_script,
     installed,
     is_found,
@@ -26,6 +25,7 @@ from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import Fault, PackageFacts, SourceFile
 from grader.model.record import Record
+from grader.model.submission import chmod_hint
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words
 
@@ -64,10 +64,10 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
         file without running it, and says which line it does not understand.
 
     How to fix
-        `chmod +x <file>`, then `git add --chmod=+x <file>`, commit and push; write `#!/usr/bin/env
-        python3` as the very first line; `dos2unix <file>` for a file from Windows. `ls -lF` shows
-        executable files with a `*`. `python3 -m py_compile <file>` shows a syntax error: fix that line, or
-        the one above it.
+        `chmod +x <file>`, then with git `git add --chmod=+x <file>`, commit and push; an archive is packed
+        again with tar or zip. Write `#!/usr/bin/env python3` as the very first line; `dos2unix <file>` for a
+        file from Windows. `ls -lF` shows executable files with a `*`. `python3 -m py_compile <file>` shows
+        a syntax error: fix that line, or the one above it.
     """
     found = find_script(package, params.path)
     verdict = _missing(package, params.path) if found is None else _judged(package, build, found, params)
@@ -160,7 +160,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
 
 def _mode_obstacles(file: SourceFile, remarks: tuple[str, ...]) -> Iterator[Obstacle]:
     if file.executable is False:
-        yield Obstacle("has no executable bit", "; ".join(remarks) or chmod_hint(file.path))
+        yield Obstacle("has no executable bit", "; ".join(remarks) or chmod_hint(file.mode_source, file.path))
 
 
 def _rosrun_answer(build: Run, path: str) -> str:

@@ -144,11 +144,11 @@ def _comes_up(nodes: Sequence[str]) -> str:
 def _absent(package: PackageFacts, run: Run, nodes: Sequence[str], absent: Sequence[LaunchNode]) -> Verdict:
     """Return why nodes of the launch file did not come up: all that lack the executable bit, or the first."""
     scripts = [script for node in absent if (script := own_script(package, node))]
-    plain = [script.path for script in scripts if script.executable is False]
+    plain = [script for script in scripts if script.executable is False]
     unstarted = {script.path: script for script in scripts if any(shebang_obstacles(script))}
     several = bool(plain) or len(unstarted) > 1
     if plain:
-        why = not_executable(*dict.fromkeys(plain))
+        why = not_executable(*plain)
     elif several:
         why = not_started(*unstarted.values())
     else:

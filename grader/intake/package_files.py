@@ -22,7 +22,7 @@ from grader.intake.limits import NO_CODE, IntakeLimits, too_much
 from grader.intake.names import brief, encodable, listing, printable
 from grader.intake.source import GivenModes
 from grader.intake.tree import Entry, list_entries, read_file
-from grader.model.submission import ModeSource
+from grader.model.submission import ModeSource, chmod_hint
 from grader.portable import MODES_ON_DISK, system
 
 # What a build or an editor leaves in a package; it is copied nowhere, so it counts for nothing.
@@ -251,10 +251,8 @@ def _differences(folder: Path, on_disk: Mapping[str, bool | None], tracked: Mapp
         if tracked[path]:
             hints.append(f"{shown} is executable in git but not on this disk: chmod +x {shlex.quote(shown)}")
         else:
-            hints.append(
-                f"{shown} is executable on this disk but not in git: "
-                f"git update-index --chmod=+x {shlex.quote(shown)}; git commit -m 'Executable'; git push"
-            )
+            how = chmod_hint("git", shown, only_git_lacks_it=True)
+            hints.append(f"{shown} is executable on this disk but not in git: {how}")
     return hints
 
 

@@ -16,7 +16,6 @@ from grader.checks.support.launch import node_slip, not_executable, own_script
 from grader.checks.support.scripts import (
     BACKUPS,
     PYTHON,
-    chmod_hint,
     find_script,
     installed,
     is_product,
@@ -77,7 +76,8 @@ def _nodes(package: PackageFacts, launch: LaunchFile) -> Iterator[tuple[FileCita
             text = f"roslaunch leaves a <node> out: {slip.file}, line {slip.line}: {slip.why}; {slip.fix}"
             yield FileCitation(file=slip.file, line=slip.line), text
         elif script and script.executable is False and not _is_installed(package, script.path):
-            text = f"{not_executable(script.path).why} ({node.file}, line {node.line}); {chmod_hint(script.path)}"
+            why = not_executable(script)
+            text = f"{why.why} ({node.file}, line {node.line}); {why.hint}"
             yield FileCitation(file=script.path), text
 
 

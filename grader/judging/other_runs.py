@@ -236,7 +236,7 @@ def _charges(
 
 
 def _cites(found: Verdict | CriterionResult, repair: Repair) -> bool:
-    if repair.kind == "executable-bit" and repair.fix not in found.hint:
+    if repair.kind == "executable-bit" and not _is_told(repair, found.hint):
         return False  # the build installs what runs the script, bit or not
     return any(getattr(citation, "file", None) == repair.file for citation in found.citations)
 

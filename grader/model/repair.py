@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Literal, get_args
 
 from grader.model.record import Record
+from grader.model.submission import chmod_hint
 
 RepairKind = Literal[
     "executable-bit",
@@ -34,7 +35,7 @@ HALF: frozenset[RepairKind] = frozenset(
 DEFAULT_SHARES: dict[RepairKind, float] = {kind: 0.5 if kind in HALF else 1.0 for kind in KINDS}
 """How much of its points a criterion is worth that was judged on a copy with a repair of this kind."""
 BY_HAND: dict[RepairKind, str] = {
-    "executable-bit": "not executable: chmod +x FILE, then git add FILE",
+    "executable-bit": f"not executable: {chmod_hint(None, 'FILE')}",
     "encoding": "not saved as UTF-8: in the editor, save it with the encoding UTF-8",
     "byte-order-mark": "an invisible mark before the first line: save it as UTF-8 without BOM",
     "line-ends": "Windows' line ends: dos2unix FILE, or switch CRLF to LF in the editor",

@@ -2,12 +2,30 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Literal
 
 from grader.model.record import Record
 
 ModeSource = Literal["git", "archive", "disk", "none"]
+"""Whose word counts for executable bits. "none": the source carries no modes."""
+
+
+def chmod_hint(source: ModeSource | None, *paths: str, only_git_lacks_it: bool = False) -> str:
+    """Return how these files become executable in what is handed in, by where their modes come from.
+
+    `source` is None where nobody knows how the package is handed in. With git, the words are right for files that are
+    tracked and for new ones; with `only_git_lacks_it`, the disk has the bit and the files are tracked.
+    """
+    files = shlex.join(paths)
+    if source == "git" and only_git_lacks_it:
+        return f"git update-index --chmod=+x {files}, then commit and push"
+    if source == "git":
+        return f"chmod +x {files}, then git add --chmod=+x {files}, commit and push"
+    if source == "archive":
+        return f"chmod +x {files}, then pack it again with tar or zip, which keep the bit"
+    return f"chmod +x {files}, and hand it in with git, tar or zip, which keep the bit"
 
 
 class SourcePackage(Record):

@@ -13,6 +13,9 @@ import pytest
 from grader.errors import OutputError, UsageError
 from grader.intake import archive
 from grader.limited_child import Answer
+from grader.model.submission import chmod_hint
+from grader.package import read_package
+from grader.package.repairs import Wanted, find_repairs
 from tests.intake.samples import NODE, commit, git, lab, lab_tar, lab_zip, manifest, opened, repository, write
 
 
@@ -246,3 +249,43 @@ def test_the_package_is_at_hand_after_opening(tmp_path):
     for source in (lab_zip(tmp_path / "a.zip"), repository(tmp_path / "r", lab()).as_uri()):
         folder = opened(source, tmp_path).package.folder
         assert (folder / "package.xml").read_text() == manifest("lab1")
+
+
+@pytest.mark.parametrize(
+    ("handed_in", "by_hand"),
+    [
+        ("tracked", "chmod +x src/node.py, then git add --chmod=+x src/node.py, commit and push"),
+        ("only git lacks it", "git update-index --chmod=+x src/node.py, then commit and push"),
+        ("new", "chmod +x src/node.py, then git add --chmod=+x src/node.py, commit and push"),
+        ("archive", "chmod +x src/node.py, then pack it again with tar or zip, which keep the bit"),
+        ("folder", "chmod +x src/node.py, and hand it in with git, tar or zip, which keep the bit"),
+    ],
+)
+def test_how_a_script_becomes_executable_is_true_for_how_it_was_handed_in(handed_in, by_hand, tmp_path):
+    if handed_in in {"tracked", "only git lacks it"}:
+        source = repository(tmp_path / "r", lab())
+        (source / "lab1/src/node.py").chmod(0o644 if handed_in == "tracked" else 0o755)
+    elif handed_in == "new":
+        source = repository(tmp_path / "r", {k: v for k, v in lab().items() if k != "lab1/src/node.py"})
+        write(source, lab())
+    else:
+        source = write(tmp_path / "lab", lab())
+        (source / "lab1/src/node.py").chmod(0o644)
+    if handed_in == "archive":
+        source = Path(shutil.make_archive(str(tmp_path / "lab"), "gztar", source))
+    handed = opened(source, tmp_path / "out").package
+    repairs = find_repairs(
+        handed.folder, read_package(handed), Wanted(package="lab1", scripts=("src/node.py",))
+    )
+    assert [one.fix for one in repairs if one.kind == "executable-bit"] == [by_hand]
+
+
+@pytest.mark.parametrize("new", [False, True])
+def test_what_the_hint_tells_git_is_enough(new, tmp_path):
+    repo = repository(tmp_path / "r", {k: v for k, v in lab().items() if not (new and k.endswith("node.py"))})
+    write(repo, lab())
+    chmod, add = chmod_hint("git", "lab1/src/node.py").removesuffix(", commit and push").split(", then ")
+    assert chmod == "chmod +x lab1/src/node.py"
+    assert opened(repo, tmp_path).package.executable["src/node.py"] is False
+    git(repo, *add.split()[1:])
+    assert opened(repo, tmp_path).package.executable["src/node.py"] is True

@@ -15,6 +15,7 @@ from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.package_tree import Tree, read_tree, write_tree
 from grader.authoring.mutation.solution import Solution
 from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, advice_of
+from grader.model.submission import chmod_hint
 from grader.package.repairs import NotRepairable, Repair, Wanted, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.wanted import is_near, is_one_edit
 from grader.rubric.find import rubric_ids
@@ -233,7 +234,7 @@ def test_an_executable_bit_is_set_for_those_who_may_read(tmp_path: Path) -> None
     (folder / "src" / "talker.py").chmod(0o640)
     (found,) = repair_all(folder)
     assert (found.kind, found.message) == ("executable-bit", "src/talker.py is not executable")
-    assert found.fix == "chmod +x src/talker.py"
+    assert found.fix == chmod_hint("disk", "src/talker.py")
     assert stat.S_IMODE((folder / "src" / "talker.py").stat().st_mode) == 0o750
 
 

@@ -13,7 +13,6 @@ from grader.checks.support.processes import lives, observed_until_ns
 from grader.checks.support.scripts import (
     add_hint,
     can_be_moved,
-    chmod_hint,
     cmake_calls,
     find_script,
     is_elsewhere,
@@ -24,6 +23,7 @@ from grader.checks.support.scripts import (
 from grader.checks.support.text import INIT, bare, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFacts, SourceFile
+from grader.model.submission import chmod_hint
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, unjudged
 from grader.wording import join_words
 
@@ -395,11 +395,13 @@ def _owner(package: PackageFacts, node: LaunchNode) -> PackageFacts | None:
     return next((one for one in (package, *package.also) if one.name == node.pkg), None)
 
 
-def not_executable(*paths: str) -> Absence:
+def not_executable(*scripts: SourceFile) -> Absence:
     """Return the absence of nodes whose scripts lack the executable bit."""
+    paths = tuple(dict.fromkeys(script.path for script in scripts))
     has, them = ("has", "it") if len(paths) == 1 else ("have", "them")
     why = f"{join_words(paths)} {has} no executable bit, so that roslaunch does not find {them}"
-    return Absence(why, chmod_hint(*paths), True, tuple(FileCitation(file=path) for path in paths))
+    hint = chmod_hint(scripts[0].mode_source, *paths)
+    return Absence(why, hint, True, tuple(FileCitation(file=path) for path in paths))
 
 
 def not_started(*scripts: SourceFile) -> Absence:
@@ -458,7 +460,7 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
     if line is None:
         return None
     if (script := own_script(package, node)) and script.executable is False:
-        return not_executable(script.path)
+        return not_executable(script)
     owner = _owner(package, node)
     if owner is not None and any(one.is_called(str(node.type)) for one in programs(owner)):
         why = f"CMakeLists.txt makes the program {node.type}, but the build did not make it"

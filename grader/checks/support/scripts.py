@@ -94,11 +94,6 @@ def add_hint(path: str) -> str:
     return f"write {path}, then git add, commit and push it"
 
 
-def chmod_hint(*paths: str) -> str:
-    files = " ".join(paths)
-    return f"chmod +x {files}, then git add --chmod=+x {files}, commit and push"
-
-
 def cmake_calls(package: PackageFacts, *names: str) -> tuple[CMakeCall, ...]:
     """Return the calls of these commands, in order."""
     return tuple(c for c in package.cmake.calls if c.name in names) if package.cmake else ()

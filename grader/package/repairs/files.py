@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 
 from grader.model.package import PackageFacts, SourceFile
 from grader.model.repair import Repair, RepairKind
+from grader.model.submission import chmod_hint
 from grader.package.reading import LEFT_OUT
 from grader.package.repairs.editing import (
     BOM,
@@ -36,10 +37,10 @@ def repair_files(files: Files, scripts: Iterable[SourceFile]) -> None:
     for script in scripts:
         if script.executable is False:
             on_disk = not MODES_ON_DISK or is_executable(files.folder, script.path)
-            in_git = script.mode_source == "git" and on_disk
-            command = f"{'git add --chmod=+x' if in_git else 'chmod +x'} {script.path}"
+            only_git_lacks_it = script.mode_source == "git" and on_disk
+            how = chmod_hint(script.mode_source, script.path, only_git_lacks_it=only_git_lacks_it)
             message = f"{script.path} is not executable"
-            files.add(Repair(kind="executable-bit", file=script.path, message=message, fix=command))
+            files.add(Repair(kind="executable-bit", file=script.path, message=message, fix=how))
         if script.link is None and not script.binary:
             _repair_bytes(files, script)
 
