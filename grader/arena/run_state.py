@@ -258,6 +258,7 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     elif now_s - live.started_s > until.limit_s:
         return "complete", f"watched for {until.limit_s:g} s"
     silent = "" if starting else _silent(live, until, now_s) or _never(live, until, now_s)
+    silent = silent or _in_namespaces(live, until, now_s)
     if silent:
         return "silent", silent
     if now_s - live.started_s > until.limit_s:
@@ -447,6 +448,23 @@ def _never(live: RunState, until: Until, now_s: float) -> str:
     if all(_enough(live, until.model_copy(update=possible), now_s)):
         missing = min(absent, default="")
         return f"the graph has settled, without {missing}" if missing else "the graph has settled"
+    return ""
+
+
+def _in_namespaces(live: RunState, until: Until, now_s: float) -> str:
+    """Return that all nodes are up and connected over topics of these names in namespaces, as long as it would take
+    outside of them; else ""."""
+    rests = [(process, live.at_rest.get(process)) for process in live.running]
+    owners = [live.owners.get(node) for node in live.here]
+    if not rests or any(rest is None or owners.count(process) < rest.programs for process, rest in rests):
+        return ""
+    for topic in until.connected:
+        since = [at_s for name, at_s in live.connected_s.items() if name != topic and name.endswith(topic)]
+        if topic in live.connected_s or not since or now_s < max(since) + CONNECTED_S:
+            return ""
+    others = until.model_copy(update={"connected": ()})
+    if until.connected and all(_enough(live, others, now_s)):
+        return f"the nodes are connected over {until.connected[0]} of a namespace"
     return ""
 
 

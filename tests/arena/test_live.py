@@ -331,6 +331,28 @@ def test_what_never_comes_ends_the_wait_once_the_graph_has_settled(
     assert find_outcome(live, until, 5.0) == (outcome and ("silent", outcome))
 
 
+@pytest.mark.parametrize(
+    ("connected", "programs", "ends"),
+    [
+        ({"/robot/a"}, 1, True),
+        ({"/robot/a", "/other/a"}, 1, True),
+        ({"/robot/a"}, 2, False),  # one of its programs is no node yet
+        ({"/robot/b"}, 1, False),
+        ({"/a", "/robot/a"}, 1, False),
+    ],
+)
+def test_nodes_that_are_connected_in_a_namespace_are_not_waited_for_longer(
+    connected: set[str], programs: int, ends: bool
+) -> None:
+    live, until = _resting(node=("loops", programs)), Until(connected=("/a",))
+    live.lost_s = 60.0  # others fill the machine
+    live.note_connections(connected, 2.0)
+    assert find_outcome(live, until, 2.9) is None
+    found = find_outcome(live, until, 3.1)
+    silent = ("silent", "the nodes are connected over /a of a namespace")
+    assert found == (silent if ends else ("complete", "") if "/a" in connected else None)
+
+
 def test_a_window_that_another_topic_needs_is_watched_to_its_end() -> None:
     live = _resting(node=("loops", 1))
     seen = live.topics["/a"]
