@@ -38,6 +38,8 @@ class Entry(Record):
     """How many late days of the course the student can use here. Only there if there are any."""
     where: str = ""
     """The file and line: `roster.csv:7`."""
+    modes_lost: bool = Field(default=False, exclude_if=lambda value: not value)
+    """Whether files lost their executable bits on the way, as single files do on a platform. Only there if they did."""
     extra: Mapping[str, str] = Field(default_factory=dict)
     """The further columns, as they were."""
 

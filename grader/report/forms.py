@@ -1,7 +1,10 @@
 """The registry of forms: every form in which one result is shown.
 
-A new form is one file beside this one with a function that renders it, one entry in `FORMS`, and one golden file in
-`tests/report/golden`. `grader report --form`, the files of a submission, the documentation and the tests read `FORMS`.
+A new form takes
+1. a file beside this one with a function that renders it, as text or bytes;
+2. an entry in `_FORMS`, from which `grader report --form`, its help and the files of a submission have it;
+3. its row in the table of `docs/how-to/reports.md`, in the order of `_FORMS` and in the words of its `purpose`;
+4. a golden file in `tests/report/golden/`: `GRADER_REGENERATE=1 pytest tests/report/test_golden.py` writes it.
 """
 
 from __future__ import annotations

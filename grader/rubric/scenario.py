@@ -1,4 +1,15 @@
-"""A scenario's records: what is started, sent, called and served in a run, and when it has seen enough."""
+"""A scenario's records: what is started, sent, called and served in a run, and when it has seen enough.
+
+A new kind of step takes
+1. its record and its key in `Step`, here; `Step.lasts_s` where it takes time, `Step.published` where it publishes;
+2. `arena/steps.py`: what it advertises before anything starts, and how it is done;
+3. `evidence/events.py`: the `action` of the `ActorEvent` that says so, where none of those that are there fits;
+4. `rubric/steps.py`: what its record's types cannot say, and its entry in `NAMED` if it names something of ROS's;
+5. `rubric/made_up.py`: its entry in `GIVEN`, if a program meets its values;
+6. `rubric/references.py`: `_topics_in`, `_sent` and the like, if criteria refer to what it sends or calls;
+7. `package/repairs/wanted.py`: `wanted_of`, if it has a name that a student's package may misspell;
+8. a section in `docs/how-to/steps.md`, and the pages that `make reference` writes.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The registry of forms in which feedback is returned.
 
-A new form is a module beside this one with a `Sender`, and an entry in `FORMS`: the command line, the documentation and
-the tests read it from there.
+A new form is a module beside this one with a `Sender`, an entry in `_FORMS`, from which the command line and the tests
+have it, and its row in `docs/how-to/feedback.md`.
 """
 
 from __future__ import annotations

@@ -28,7 +28,6 @@ from grader.classes.fetching.mirror import (
     patiently,
     place_name,
 )
-from grader.classes.roster.platforms import PLATFORMS
 from grader.errors import GraderError, OutputError, SubmissionError
 from grader.files import temporary_folder
 from grader.intake import unreadable
@@ -117,13 +116,12 @@ class _Unreadable(Exception):
 
 
 def source_of(entry: Entry) -> Source:
-    """What the entry names; single files that a platform packed have lost their modes. Raises UsageError,
-    SubmissionError."""
+    """Return what the entry names, with what its roster says of modes. Raises UsageError, SubmissionError."""
     try:
         source = with_ref(parse_source(entry.source), entry.ref)
     except OSError as error:
         raise unreadable(printable(entry.source), error) from error
-    return replace(source, modes="lost") if entry.extra.get("platform") in PLATFORMS else source
+    return replace(source, modes="lost") if entry.modes_lost else source
 
 
 @contextmanager

@@ -27,8 +27,17 @@ SOURCES: tuple[tuple[Callable[[Path], bool], Callable[[Path, Local], Roster]], .
     (Path.is_dir, from_folder),
     (lambda path: path.suffix.lower() in {".json", ".ndjson", ".jsonl"}, from_gitlab),
 )
-"""The kinds of rosters: whether a path is one, and what reads it. A new kind is one file here and one line. Any other
-path is a table; `platforms.py` recognises those of GitHub Classroom."""
+"""The kinds of rosters: whether a path is one, and what reads it; any other path is a table (`_from_table`), and
+`with_roster_columns` renames the columns of GitHub Classroom's.
+
+A new kind takes
+1. a function in a file of this folder, from the path and `Local` to a `Roster`. It makes an `Entry` of each submission
+   (`entries.py` has `gather`, `entries_of` and the checks of paths), with `modes_lost=True` where files lost their
+   executable bits on the way;
+2. a line here, before the kinds that would take its paths too;
+3. where it comes packed as one file: `is_download` and `unpack_download` (`platforms.py`);
+4. an example in `tests/roster/`, and its section in `docs/how-to/rosters.md`.
+"""
 
 
 def read_roster(path: Path, local: Local = OWN_FOLDER) -> Roster:

@@ -35,7 +35,6 @@ from grader.intake.names import archive_stem, encodable, is_archive_name, listin
 from grader.model.batch import Entry, Roster
 from grader.untrusted_text import line
 
-PLATFORMS = ("Moodle", "Canvas")
 IGNORED = {"__MACOSX", "Thumbs.db", "desktop.ini"}
 RECORDINGS = (".bag", ".mcap", ".db3")
 
@@ -130,6 +129,7 @@ def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
         source=str(source.absolute()),
         name=f"{named.name} {named.id}" if named.is_blind else named.name,
         where=printable(path.name),
+        modes_lost=True,
         extra={key: text for key, text in extra.items() if text},
     )
 
