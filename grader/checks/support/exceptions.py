@@ -137,8 +137,14 @@ def _file(message: str, _source: str, _marked: tuple[int, int] | None) -> Meanin
     path = found[1]
     here = f"os.path.join(os.path.dirname(os.path.abspath(__file__)), '{shown(path.rpartition('/')[2])}')"
     if path.startswith(("/", "~")):
-        return "no other machine has this path", f"keep the file beside the script, and open `{here}`"
-    return "a path is looked for where the node is started, not beside the script", f"open `{here}`"
+        return (
+            "no other machine has this path",
+            f"keep the file beside the script, `import os`, and open `{here}`",
+        )
+    return (
+        "a path is looked for where the node is started, not beside the script",
+        f"`import os`, and open `{here}`",
+    )
 
 
 _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | None]] = {
