@@ -92,7 +92,9 @@ def _packages(chosen: Chosen, work: Path) -> tuple[SourcePackage, ...]:
         wanted = wanted_package(chosen.rubric.rubric, "")
         submission = open_submission(chosen.source, package=wanted, workdir=work)
     if submission is None or submission.package.folder.resolve().is_relative_to(work.resolve()):
-        raise UsageError(f"{chosen.source} is no folder of yours", hint="give your package's folder to --fix")
+        raise UsageError(
+            f"{chosen.source} is not a folder on your disk", hint="give your package's folder to --fix"
+        )
     return (submission.package, *submission.also)
 
 

@@ -280,7 +280,7 @@ def _unpack_zip(path: Path, unpacker: Unpacker, name: str, limits: IntakeLimits)
         # one packed content that many entries share would be unpacked over and over
         for one, two in pairwise(sorted(archive.infolist(), key=lambda info: info.header_offset)):
             if one.header_offset + LOCAL_HEADER_BYTES + one.compress_size > two.header_offset:
-                unpacker.refuse(f"the entry '{brief(two.filename)}' lies in another one")
+                unpacker.refuse(f"the entry '{brief(two.filename)}' is inside another one")
         for info in archive.infolist():
             _unpack_entry(archive, info, unpacker, by_git=by_git)
 

@@ -264,7 +264,7 @@ def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
                 return f"{printable(folder.inside(wanted))} is a link: hand in the folder itself."
         packed = [entry.name for entry in folder.others if is_archive_name(entry.name)]
         if packed and folder.path == ".":
-            return f"{printable(packed[0])} lies here: unpack it, or give that file."
+            return f"{printable(packed[0])} is here: unpack it, or give that file."
     return ""
 
 
@@ -275,7 +275,7 @@ def _hidden_place(path: str) -> str:
         return (
             f"{printable(path)} is only a copy in {printable(made)}/: hand in the package itself, from src/."
         )
-    return f"{printable(path)} lies below another {MANIFEST}, where catkin never looks: move it out."
+    return f"{printable(path)} is below another {MANIFEST}, where catkin never looks: move it out."
 
 
 def _has_files(root: Path) -> bool:

@@ -130,7 +130,7 @@ def test_an_archive_is_no_folder_of_the_student(folder, tmp_path, capsys):
     archive = shutil.make_archive(str(tmp_path / "handed-in"), "zip", folder.parent, folder.name)
     arguments = ["check", archive, "--fix", "--yes", "--rubric", "mcr2-basic-comms"]
     assert run(arguments) == 2
-    assert "is no folder of yours" in capsys.readouterr().err
+    assert "is not a folder on your disk" in capsys.readouterr().err
 
 
 def test_a_bit_that_git_lacks_is_told_below_the_report(folder, monkeypatch, capsys):

@@ -107,7 +107,7 @@ def test_the_package_is_found(files, path, hints, tmp_path):
         (tree("build/lab1"), "no package.xml", "only a copy in build/"),
         (tree("devel/share/lab1"), "no package.xml", "only a copy in devel/"),
         (tree("ws", "ws/lab1"), "packages here: ws", "below another package.xml"),
-        ({"lab1.zip": "", "x": ""}, "no package.xml", "lab1.zip lies here"),
+        ({"lab1.zip": "", "x": ""}, "no package.xml", "lab1.zip is here"),
         # A workspace that is called like the lab is not the lab's package.
         (tree("lab1/src/other"), "packages here: other", "Rename to lab1"),
     ],

@@ -41,7 +41,7 @@ def test_every_fault_by_its_line(tmp_path: Path) -> None:
         "roster.csv:2: no id",
         "roster.csv:3: no source",
         f"roster.csv:4: source: ../../secret {OUT}",
-        "roster.csv:5: submitted_at: yesterday is no time such as 2026-11-20 23:59 or 2026-11-20T23:59:00+01:00",
+        "roster.csv:5: submitted_at: yesterday is not a time such as 2026-11-20 23:59 or 2026-11-20T23:59:00+01:00",
         "roster.csv:5: extension_days: many is not a number of days",
         (
             "roster.csv:6: submitted_at: 20/11/2026 23:59 can be read with the day or the month first: "
@@ -168,7 +168,7 @@ def test_an_address_with_one_slash(tmp_path: Path) -> None:
     roster = read(tmp_path, "id,source\nada,https:/github.com/c/ada\n")
     (fault,) = said(roster)
     assert fault.endswith(
-        "https:/github.com/c/ada: an address has two slashes behind its colon, as in https://"
+        "https:/github.com/c/ada: an address has two slashes after its colon, as in https://"
     )
 
 

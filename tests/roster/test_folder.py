@@ -72,7 +72,7 @@ def test_folders_archives_and_recordings(tmp_path: Path) -> None:
     assert said(roster) == [
         "notes.pdf: neither a folder nor an archive",
         "zoe.zip: id: zoe is there already, in zoe",
-        "zo\\xeb: its name is no UTF-8 text: rename it",
+        "zo\\xeb: its name is not UTF-8: rename it",
     ]
 
 

@@ -202,4 +202,4 @@ def test_what_cannot_be_followed_is_a_fault(forms: Path, monkeypatch: pytest.Mon
 
     assert said(read(forms, "id,source\neve,round/x\n")) != []
     monkeypatch.setattr(entries, "parse_source", forbidden)
-    assert entries.source_fault("ada", forms) == "ada is no path that can be followed"
+    assert entries.source_fault("ada", forms) == "ada is not a path that can be followed"

@@ -76,7 +76,7 @@ def test_what_could_be_two_days(text: str) -> None:
 )
 def test_what_is_no_time(text: str) -> None:
     assert parse_time(text) is None
-    assert "is no time such as" in time_fault(text)
+    assert "is not a time such as" in time_fault(text)
 
 
 @pytest.mark.parametrize(

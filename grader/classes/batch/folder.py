@@ -30,7 +30,7 @@ from grader.untrusted_text import json_text
 RUN = "run.json"
 BYTES_MAX = 64 << 20
 HINTS = {
-    MISSING: "run `grader batch` again: it goes on where it stopped",
+    MISSING: "run `grader batch` again: it continues where it stopped",
     ROSTER: "correct the roster",
     UNPUBLISHED: "publish it with `grader publish`",
 }

@@ -54,7 +54,7 @@ def check_address(text: str, *, insecure: bool = False) -> str:
         raise UsageError(
             f"--cluster {text}: this scheduler asks for no certificate: "
             "all who reach its port can run programs as its user",
-            hint="use tls:// (docs/how-to/cluster.md says how); if no one else is in that network, "
+            hint="use tls:// (docs/how-to/cluster.md says how); if you are alone on that network, "
             "add --cluster-insecure",
         )
     try:
@@ -99,7 +99,7 @@ def _check_address_answers(address: str) -> None:
             raise HostError(
                 f"{address} needs certificates, and none are configured here", hint=hint
             ) from error
-        message = f"what answers at {address} is no Dask scheduler ({type(error).__name__})"
+        message = f"what answers at {address} is not a Dask scheduler ({type(error).__name__})"
         raise HostError(
             message, hint="give the address that `dask scheduler` prints, of a like version"
         ) from error

@@ -51,7 +51,7 @@ RESULT_S = 10.0
 READS, PAUSE_S = 5, 1.0
 LEAVE_S = 45.0
 LOST = "the workers that graded it were lost"
-GOES_ON = "then run the same command again: it goes on where it stopped"
+GOES_ON = "then run the same command again: it continues where it stopped"
 
 
 class ParcelLost(HostError):

@@ -87,7 +87,7 @@ class Sender:
     """Sends by one form, inside of a `with` block. Files appear when the block ends without an exception.
 
     `together`: what is sent is one file, so that all of it is sent or nothing. `unsure` says what becomes of
-    feedback of which nobody knows whether it was sent: it is sent `again`, since that does no harm; the sender can
+    feedback of which it is not known whether it was sent: it is sent `again`, since that does no harm; the sender can
     `look`; or a person has to (`ask`).
     """
 

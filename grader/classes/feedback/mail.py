@@ -56,7 +56,7 @@ class Mail(Sender):
             raise UsageError("no address to send mails from", hint=f"give it with --from, or in {FROM}")
         if self.sender and not _ADDRESS.fullmatch(self.sender):
             raise UsageError(
-                f"{line(self.sender, 80)} is no mail address", hint="write it like name@example.org"
+                f"{line(self.sender, 80)} is not a mail address", hint="write it like name@example.org"
             )
         if settings.smtp and settings.out:
             raise UsageError(
@@ -105,7 +105,7 @@ class Mail(Sender):
         try:
             message["To"] = [Address(addr_spec=to) for to in addresses(feedback.entry)]
         except (ValueError, IndexError) as error:
-            raise NotSent(f"{line(self.place(feedback), 80)} is no mail address") from error
+            raise NotSent(f"{line(self.place(feedback), 80)} is not a mail address") from error
         message["Subject"] = feedback.subject
         message["Date"] = format_datetime(datetime.now(timezone.utc))
         domain = self.sender.rpartition("@")[2] or "localhost"
@@ -160,7 +160,7 @@ class Server:
             or parts.username
         ):
             hint = f"write it like smtp://mail.example.org:587 or smtps://mail.example.org; {USER} logs in"
-            raise UsageError("--smtp: this is no address of a mail server", hint=hint)
+            raise UsageError("--smtp: this is not the address of a mail server", hint=hint)
         self.host, self.port = parts.hostname, port or PORTS[parts.scheme]
         self.tls = parts.scheme == "smtps"
         self.sender, self._sleep = sender, sleep
@@ -237,7 +237,7 @@ class Server:
         except (OSError, smtplib.SMTPException) as error:
             self.close()
             raise Unsure(
-                f"the connection to {self.host} broke while the mail was sent, so nobody knows whether it was",
+                f"the connection to {self.host} broke while the mail was sent, so it is not known whether it was",
                 hint="ask the student; --only ID --again sends it once more",
             ) from error
         if code != 250:

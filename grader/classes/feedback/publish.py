@@ -98,7 +98,7 @@ def read_published(path: Path) -> Published:
         except ValidationError as error:
             if newer := FORMAT.newer_in(row):
                 raise UsageError(f"{file}:{place}: {newer}", hint=UPDATE) from error
-            hint = "restore it: without it, nobody knows what was published"
+            hint = "restore it: without it, there is no record of what was published"
             raise UsageError(f"{file}:{place}: not what this grader writes", hint=hint) from error
         history.setdefault(safe_name(publication.id), []).append(publication)
     return Published(path, history)

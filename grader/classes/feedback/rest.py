@@ -155,7 +155,7 @@ def _json(data: bytes) -> Any:  # noqa: ANN401 - JSON
     try:
         return json.loads(data or b"null")
     except ValueError as error:
-        raise Broken("the answer is no JSON") from error
+        raise Broken("the answer is not JSON") from error
 
 
 def _error_text(answer: _Answer) -> str:

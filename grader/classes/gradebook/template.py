@@ -298,7 +298,7 @@ def read_sheet(path: Path) -> Sheet:
             f"{path}: cannot be read: {error.strerror}", hint="give the platform's export"
         ) from error
     if not data or data.startswith(b"PK\x03\x04"):
-        raise UsageError(f"{path}: this is no export as CSV", hint=_EXPORT)
+        raise UsageError(f"{path}: this is not a CSV export", hint=_EXPORT)
     mark, encoding = encoding_of(data)
     try:
         text = data[len(mark) :].decode(encoding)

@@ -47,7 +47,7 @@ def local_fault(source: str, base: Path, local: Local) -> str:
         roots = [folder.resolve() for folder in (base, *local.folders)]
         return "" if all(_is_below(place.resolve(), roots) for place in places) else OUT
     except (OSError, ValueError, RuntimeError):
-        return "is no path that can be followed"
+        return "is not a path that can be followed"
 
 
 def _places(source: str) -> list[Path]:
@@ -85,7 +85,7 @@ def source_fault(source: str, base: Path, local: Local = OWN_FOLDER) -> str:
     try:
         there = _is_there(source, base)
     except (OSError, ValueError, RuntimeError):
-        return f"{_without_password(source)} is no path that can be followed"
+        return f"{_without_password(source)} is not a path that can be followed"
     refused = local_fault(whole_source(source, base), base, local)
     if not there and (_ADDRESS.match(source) or _WINDOWS.match(source)):
         fault = _address_fault(source)
@@ -101,13 +101,13 @@ def source_fault(source: str, base: Path, local: Local = OWN_FOLDER) -> str:
 
 def _address_fault(source: str) -> str:
     if _SLASHES.match(source):
-        return f"{_without_password(source)}: an address has two slashes behind its colon, as in https://"
+        return f"{_without_password(source)}: an address has two slashes after its colon, as in https://"
     if not _ADDRESS.match(source):
         return f"{_without_password(source)} is a path of Windows: write it with / as it is on this machine"
     try:
         parse_source(source)
     except UsageError:  # as what git takes for the name of a program (`ext::`) or for an option of ssh
-        return f"{_without_password(source)} is no address of a repository"
+        return f"{_without_password(source)} is not the address of a repository"
     except (
         SubmissionError,
         OSError,
@@ -340,7 +340,7 @@ def time_fault(text: str) -> str:
         return ""
     if _DAY_AND_MONTH.fullmatch(text.strip()):
         return f"can be read with the day or the month first: write it as {EXAMPLE}"
-    return f"is no time such as {EXAMPLE} or 2026-11-20T23:59:00+01:00"
+    return f"is not a time such as {EXAMPLE} or 2026-11-20T23:59:00+01:00"
 
 
 def parse_days(text: str) -> float | None:

@@ -92,7 +92,7 @@ def _student(files: list[tuple[Path, Named | None]]) -> Found:
         return _named([(path, named) for path, named in files if named])
     where = printable(path.name)
     if not encodable(path.name):
-        return Found(where=where, faults=("its name is no UTF-8 text: rename it",))
+        return Found(where=where, faults=("its name is not UTF-8: rename it",))
     if not _can_be_graded(path):
         return Found(where=where, faults=("neither a folder nor an archive",))
     name = path.name if path.is_dir() else archive_stem(path.name)

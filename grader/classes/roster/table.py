@@ -131,9 +131,9 @@ def _text(path: Path) -> str:
             f"{path}: cannot be read: {error.strerror}", hint="give a CSV file, a folder, or an export"
         ) from error
     if is_archive_name(path.name):
-        raise UsageError(f"{path}: an archive is no roster", hint="unpack it first, and give the folder")
+        raise UsageError(f"{path}: an archive is not a roster", hint="unpack it first, and give the folder")
     if data is None:
-        raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is no roster")
+        raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is not a roster")
     return text_of(data, path)
 
 

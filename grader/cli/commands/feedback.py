@@ -38,7 +38,7 @@ def publish(
     folder: Annotated[Path, CLASS],
     only: Annotated[
         Sequence[str],
-        Option("--only", "ID", "publish these alone, also where they are not settled"),
+        Option("--only", "ID", "publish only these, even if they are not settled"),
     ] = (),
     dry_run: Annotated[
         bool, Flag("--dry-run", "only show what would be published, and what changes")
@@ -68,7 +68,7 @@ def feedback(
     dry_run: Annotated[
         bool, Flag("--dry-run", "show one of them, and who could get nothing; send nothing")
     ] = False,
-    only: Annotated[Sequence[str], Option("--only", "ID", "send to these alone")] = (),
+    only: Annotated[Sequence[str], Option("--only", "ID", "send to these only")] = (),
     changed_since: Annotated[
         str | None, Option("--changed-since", "TIME", "send only what was published after TIME")
     ] = None,
