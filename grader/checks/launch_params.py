@@ -241,8 +241,9 @@ def _of_node(run: Run, file: LaunchFile, node: str, wanted: Wanted) -> Verdict |
         )
         verdict = failed(message, hint="set them with <param> inside the <node>: roslaunch does that first")
     else:
-        verdict = _wrong_value(before, places, wanted) or _elsewhere(before, node, wanted)
-    return verdict.about(citations=(*_lines(file, wanted), cite(run, "/grader/param")))
+        verdict = _wrong_value(file, before, places, wanted) or _elsewhere(before, node, wanted)
+    lines = verdict.citations or _lines(file, wanted)
+    return verdict.about(citations=(*lines, cite(run, "/grader/param")))
 
 
 def _is_there(found: Mapping[str, Any], places: Iterable[str], wanted: Wanted) -> bool:
@@ -250,7 +251,9 @@ def _is_there(found: Mapping[str, Any], places: Iterable[str], wanted: Wanted) -
     return any(all(_fits(found.get(p + name), value) for name, value in wanted.items()) for p in places)
 
 
-def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wanted) -> Verdict | None:
+def _wrong_value(
+    file: LaunchFile, before: Mapping[str, Any], places: tuple[str, str], wanted: Wanted
+) -> Verdict | None:
     """There where the node looks, with another value."""
     place = next((p for p in places if any(p + name in before for name in wanted)), None)
     if place is None:
@@ -261,7 +264,13 @@ def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wan
         verb = "is" if len(missing) == 1 else "are"
         message = f"{join_words(place + name for name in missing)} {verb} not set, only {join_words(known)}"
         hint = "write one <param> for each inside the <node>, with exactly these names"
-        return failed(message, hint=hint)
+        names = [param.name for param in file.params]
+        again = [p for p in file.params if names.count(p.name) > 1 and p.name.rpartition("/")[2] in wanted]
+        if len(again) > 1:
+            lines = join_words(str(p.line) for p in again)
+            hint = f"lines {lines} give the same name: write {join_words(missing)} for the others"
+        cited = tuple(FileCitation(file=p.file, line=p.line) for p in again)
+        return failed(message, hint=hint, citations=cited)
     name = next(name for name, value in wanted.items() if not _fits(before[place + name], value))
     found, value = before[place + name], wanted[name]
     if isinstance(found, str) and found.strip() == str(value):
