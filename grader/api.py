@@ -40,7 +40,7 @@ from grader.rubric.load import LoadedRubric
 from grader.rubric.load import load_rubric as load_file
 
 if TYPE_CHECKING:
-    from grader.arena.asynchronous import Stop
+    from grader.arena.interruption import Stop
 
 StrPath: TypeAlias = "str | os.PathLike[str]"
 SANDBOXES = get_args(SandboxMode)
@@ -163,7 +163,7 @@ def load_result(path: StrPath) -> GradingResult:
 
 def _run_stoppable(work: Callable[[Stop, Progress], T], on_step: OnStep | None) -> T:
     """Return what `work` returns. Whatever `on_step` raises stops it, and is raised when it has ended in order."""
-    from grader.arena.asynchronous import Stop, Stopped  # noqa: PLC0415 - loading a rubric needs nothing of it
+    from grader.arena.interruption import Stop, Stopped  # noqa: PLC0415 - loading a rubric needs nothing of it
 
     stop = Stop()
     listener = _StepListener(on_step, stop.ask)

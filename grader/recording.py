@@ -18,7 +18,7 @@ from grader.evidence.run import Run
 from grader.files import make_folder
 from grader.installable import ON_THE_MACHINE
 from grader.judging.judge import judge, judge_all_runs
-from grader.judging.other_runs import REPAIRS, was_built
+from grader.judging.repeats_and_repairs import REPAIRS, was_built
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
 from grader.model.result import CriterionResult
@@ -33,7 +33,7 @@ from grader.rubric.model import Rubric
 from grader.wording import join_words
 
 if TYPE_CHECKING:
-    from grader.arena.asynchronous import Stop
+    from grader.arena.interruption import Stop
     from grader.arena.recorder import Recorder
     from grader.arena.static_recorder import Recording, StaticRecorder
     from grader.model.sandbox_mode import SandboxMode
@@ -52,7 +52,7 @@ class RecordingOptions:
     """How a submission is recorded.
 
     `static_only` runs nothing. `reused` is evidence by scenario that still holds: these scenarios are not run again.
-    `stop` ends the runs in order, from another thread; then `arena.asynchronous.Stopped` is raised.
+    `stop` ends the runs in order, from another thread; then `arena.interruption.Stopped` is raised.
     """
 
     sandbox: SandboxMode = "auto"

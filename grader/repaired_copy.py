@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 
 from grader.files import temporary_folder
-from grader.judging.other_runs import BUILD, DONE_BEFORE_RUNS, concerns, is_used_by, needs_build
+from grader.judging.repeats_and_repairs import BUILD, DONE_BEFORE_RUNS, concerns, is_used_by, needs_build
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.repair import Repair

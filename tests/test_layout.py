@@ -67,7 +67,7 @@ ALLOWED = {
         "rubric", "submitted_recordings"
     },
     "api": {
-        *BASE, "arena.asynchronous", "evidence", "files", "judging", "pipeline", "results", "rubric"
+        *BASE, "arena.interruption", "evidence", "files", "judging", "pipeline", "results", "rubric"
     },
     "authoring": {
         *BASE, "checks", "classes.batch", "evidence", "files", "intake", "package", "pipeline", "rubric"
@@ -77,7 +77,7 @@ ALLOWED = {
         "pipeline", "report", "results", "rubric", "workers"
     },
     "student": {
-        *BASE, "arena.asynchronous", "arena.workspace", "faults", "files", "intake", "package", "pipeline", "report",
+        *BASE, "arena.interruption", "arena.workspace", "faults", "files", "intake", "package", "pipeline", "report",
         "results", "rubric"
     },
     "integrations": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from grader import __version__
-from grader.arena.asynchronous import run_until_signal
+from grader.arena.interruption import run_until_signal
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import BASE, ProcessEnvironment
 from grader.arena.sandbox import Word, copy_of, scratch, temporary_base
@@ -134,7 +134,7 @@ def catkin_make(place: ProcessEnvironment) -> list[str]:
 
 
 def _hand_answers(place: ProcessEnvironment) -> None:
-    """Give the answers to the programs that stand before the real ones (`ros/known.sh`)."""
+    """Give the answers to the programs that stand before the real ones (`ros/cached_answers.sh`)."""
     for question in QUESTIONS:
         answer = read_member(place.base, f"{ANSWERS}/{question}", ANSWER_BYTES)
         if answer is not None:

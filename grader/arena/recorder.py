@@ -18,9 +18,9 @@ from typing import Any
 from typing_extensions import Self
 
 from grader.arena.admission import Admission, shared_folder
-from grader.arena.asynchronous import Stop, run_together, run_until_signal
 from grader.arena.base_workspace import copy_course, provide_course
 from grader.arena.build import BUILD_EXPECTED_S, CMakeTrace, build
+from grader.arena.interruption import Stop, run_together, run_until_signal
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.sandbox import temporary_base

@@ -80,7 +80,7 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     shutil.copyfile(ROS_SIDE / "rostests.py", shims / ROSTESTS)
     _program(shims, "terminal.sh", "grader-terminal", TERMINALS)
     _program(shims, "open.sh", "grader-open", BROWSERS)
-    _program(shims, "answers.sh", "grader-reachable", ASKING)
+    _program(shims, "network_and_screen.sh", "grader-reachable", ASKING)
     _program(shims, "rosbag_record.sh", RECORD_SHIM, ())
     shutil.copyfile(ROS_SIDE / "opener.py", shims / "grader-open.py")
     _quicker(shims, ros)
@@ -91,7 +91,7 @@ def _quicker(shims: Path, ros: RosInstallation) -> None:
     """Put shell programs that answer known questions before programs that start Python, where those are there."""
     (shims / ANSWERS).mkdir()
     asked = sorted({question.split()[0] for question in QUESTIONS})
-    _program(shims, "known.sh", "grader-answers", [name for name in asked if ros.program(name)])
+    _program(shims, "cached_answers.sh", "grader-answers", [name for name in asked if ros.program(name)])
     if ros.program("catkin_find_pkg"):
         _program(shims, "find_pkg.sh", "catkin_find_pkg", ())
     empy, modules = ros.program("empy"), [Path(prefix) / EM for prefix in (*ros.prefixes, "/usr")]

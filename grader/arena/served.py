@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from grader.arena.session import ArenaSession
 from grader.errors import ArenaError
 from grader.evidence.events import GOAL_STATUS, MISFIT, OTHER_TYPE, ActorEvent
-from grader.model.interfaces import other_fields
+from grader.model.message_definitions import other_fields
 from grader.rubric.scenario import Served
 
 if TYPE_CHECKING:

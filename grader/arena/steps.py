@@ -25,7 +25,7 @@ from grader.arena.served import ServedAction, ServedServices
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
 from grader.evidence.events import GOAL_STATUS, MISFIT, UNHEARD, ActorEvent
-from grader.model.interfaces import other_fields
+from grader.model.message_definitions import other_fields
 from grader.rubric.scenario import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
 

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.text import shown
-from grader.model.interfaces import BUILT_IN, FULL_NAMES, PARTS, parse_definition, refuse_unknown
+from grader.model.message_definitions import BUILT_IN, FULL_NAMES, PARTS, parse_definition, refuse_unknown
 from grader.model.package import Interface, InterfaceField, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed

@@ -27,7 +27,7 @@ from grader.checks.support.topics import (
     topics_with,
 )
 from grader.evidence.run import Channel, Run, is_grader_node
-from grader.model.interfaces import other_fields, parse_definition
+from grader.model.message_definitions import other_fields, parse_definition
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, Verdict, failed, inconclusive, passed

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from grader import __version__
-from grader.classes.batch.existing_results import Settler, rewrite
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch, write_run
+from grader.classes.batch.renew_results import Settler, rewrite
 from grader.classes.batch.run import hold_folder, ids_of, write_books
 from grader.classes.feedback.publish import plan, published_rows, read_published
 from grader.classes.feedback.send import SentLog

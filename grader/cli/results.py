@@ -14,7 +14,8 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from grader.classes.batch.existing_results import (
+from grader.classes.batch.folder import RUN, BatchFolder, open_batch
+from grader.classes.batch.renew_results import (
     Judged,
     Written,
     figures_in,
@@ -24,7 +25,6 @@ from grader.classes.batch.existing_results import (
     write_all,
     write_one,
 )
-from grader.classes.batch.folder import RUN, BatchFolder, open_batch
 from grader.classes.batch.run import INDEX
 from grader.cli.errors import report
 from grader.cli.outcome import exit_code

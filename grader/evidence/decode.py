@@ -30,7 +30,7 @@ from grader.evidence.definitions import (
     parse,
 )
 from grader.evidence.memory_budget import DECODED_BYTES_MAX
-from grader.model.interfaces import RULE
+from grader.model.message_definitions import RULE
 
 Value: TypeAlias = Any
 """What a message holds: numbers, text, bytes, lists and dicts of these."""

@@ -20,7 +20,7 @@ from grader.evidence.decode import (
 )
 from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, parse, sections_of
 from grader.installable import noetic_messages
-from grader.model.interfaces import DIVIDER
+from grader.model.message_definitions import DIVIDER
 from grader.wording import did_you_mean, join_words
 
 ITEMS_MAX = 1_000_000

@@ -21,7 +21,7 @@ from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judging.annotate import add_advice, choose_hint_language, name_unchanged_files, show_lines
 from grader.judging.facts import PACKAGE_RUN, Facts, try_facts
-from grader.judging.other_runs import (
+from grader.judging.repeats_and_repairs import (
     apply_repaired_copy,
     drop_unrepeated_losses,
     needs_build,

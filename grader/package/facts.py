@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path, PurePosixPath
 
-from grader.model.interfaces import PARTS, parse_interface
+from grader.model.message_definitions import PARTS, parse_interface
 from grader.model.package import Fault, Interface, PackageFacts, PythonSlip, SourceFile
 from grader.model.submission import SourcePackage, Submission
 from grader.package.files import Entry, Interpreters, read_files

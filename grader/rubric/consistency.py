@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from grader.checks.registry import Check
-from grader.rubric.faults import model_faults
+from grader.rubric.fault_words import model_faults
 from grader.rubric.model import ManualParams
 from grader.rubric.references import reference_faults
 from grader.rubric.scenario import ROSTEST_ENDING
-from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
-from grader.rubric.steps import given_steps, served_faults, slash, step_faults
+from grader.rubric.step_faults import given_steps, served_faults, slash, step_faults
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import did_you_mean, join_words
 
 TOTAL_POINTS = 100

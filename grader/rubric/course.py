@@ -17,11 +17,11 @@ from pydantic import Field
 from grader.errors import RubricError, UsageError
 from grader.model.record import Record
 from grader.model.version import COURSE
-from grader.rubric.faults import model_faults
+from grader.rubric.fault_words import model_faults
 from grader.rubric.find import SUFFIXES
 from grader.rubric.model import Deadline, Late
 from grader.rubric.scenario import Name
-from grader.rubric.source import Fault, Form, Source, as_map, read_source
+from grader.rubric.yaml_lines import Fault, Form, Source, as_map, read_source
 from grader.wording import did_you_mean
 
 FORM = Form(what="a course file", usual="a course file is a few kilobytes", times=frozenset({"deadline"}))

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.rubric.scenario import FOLDER_PATTERN, ROSTEST_ENDING
-from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import did_you_mean
 
 MANIFEST = "package.xml"

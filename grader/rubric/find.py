@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from grader.errors import RubricError, UsageError
 from grader.files import atomic_write
-from grader.rubric.source import texts_at
+from grader.rubric.yaml_lines import texts_at
 from grader.wording import did_you_mean
 
 PACKAGE = Path(__file__).resolve().parent.parent

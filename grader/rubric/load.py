@@ -17,12 +17,12 @@ from grader.model.result import RubricOrigin
 from grader.model.version import RUBRIC, UPDATE, Versioned
 from grader.rubric.consistency import cross_faults
 from grader.rubric.course import load_course, split_name
-from grader.rubric.faults import model_faults
+from grader.rubric.fault_words import model_faults
 from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics_folder
-from grader.rubric.instructor import Beside, known_checks, read_instructor, run_checks_file
 from grader.rubric.made_up import draw_values, faults_of_sample, made_up_faults, sample_data, with_values
 from grader.rubric.model import Criterion, Rubric
-from grader.rubric.source import Source, Value, as_map, read_source
+from grader.rubric.own_checks import Beside, known_checks, read_instructor, run_checks_file
+from grader.rubric.yaml_lines import Source, Value, as_map, read_source
 
 PIN = "#sha256:"
 """Between a rubric's name and the digest that it must have."""

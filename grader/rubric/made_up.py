@@ -20,7 +20,7 @@ from pydantic import Field, ValidationError
 
 from grader.errors import EvidenceError
 from grader.model.record import Record
-from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts, dotted
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, dotted
 from grader.wording import did_you_mean, join_words
 
 if TYPE_CHECKING:

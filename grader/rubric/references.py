@@ -15,7 +15,7 @@ from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.ros_packages import TypeKind, ros_packages
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
-from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import closest, did_you_mean, join_words
 
 PUBLISHED_BY = {

@@ -4,7 +4,7 @@ A new kind of step takes
 1. its record and its key in `Step`, here; `Step.lasts_s` where it takes time, `Step.published` where it publishes;
 2. `arena/steps.py`: what it advertises before anything starts, and how it is done;
 3. `evidence/events.py`: the `action` of the `ActorEvent` that says so, where none of those that are there fits;
-4. `rubric/steps.py`: what its record's types cannot say, and its entry in `NAMED` if it names something of ROS's;
+4. `rubric/step_faults.py`: what its record's types cannot say, and its entry in `NAMED` if it names something of ROS's;
 5. `rubric/made_up.py`: its entry in `GIVEN`, if a program meets its values;
 6. `rubric/references.py`: `_topics_in`, `_sent` and the like, if criteria refer to what it sends or calls;
 7. `package/repairs/wanted.py`: `wanted_of`, if it has a name that a student's package may misspell;
@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
-from grader.model.interfaces import parse_definition
+from grader.model.message_definitions import parse_definition
 from grader.model.record import Record
 
 Seconds = Annotated[float, Field(ge=0)]

@@ -11,11 +11,11 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, create_model
 
 from grader.checks import HEADINGS, Check
-from grader.checks.parameter_docs import inner_records
 from grader.model.record import Record, field_docstrings
+from grader.rubric.check_parameters import inner_records
 from grader.rubric.consistency import MANUAL
-from grader.rubric.instructor import known_checks
 from grader.rubric.model import Criterion, ManualParams, Rubric
+from grader.rubric.own_checks import known_checks
 
 WITHOUT_PLACES = ("Criterion", "Gate", "Group", "Late", "MadeUp", "Needs")
 """Records in which no made-up value stands."""

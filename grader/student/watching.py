@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 from grader import pipeline
-from grader.arena.asynchronous import Stop, Stopped
+from grader.arena.interruption import Stop, Stopped
 from grader.arena.workspace import needed_packages
 from grader.errors import ExitCode, GraderError, SubmissionError, UsageError
 from grader.faults import error_result

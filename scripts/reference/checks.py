@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from grader.checks import CHECKS, HEADINGS, Check
-from grader.checks.parameter_docs import about, inner_records, parameters
 from grader.model.record import Record
+from grader.rubric.check_parameters import about, inner_records, parameters
 from scripts.reference.table import table
 
 INTRODUCTION = """# Checks

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.batch.existing_results import judge_all, submissions_in
+from grader.classes.batch.renew_results import judge_all, submissions_in
 from grader.cli.main import run
 from grader.errors import EvidenceError
 from grader.evidence.reader import load_evidence

@@ -18,7 +18,7 @@ from grader.checks.support.parameters import explain_by_unread_parameter
 from grader.checks.support.text import in_language
 from grader.checks.support.topics import account_for_losses, explain_by_unheard_topic
 from grader.evidence.run import Run
-from grader.model.interfaces import parse_interface
+from grader.model.message_definitions import parse_interface
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status, Verdict
 from grader.package.launch import parse_launch_files

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from grader.checks import CHECKS
-from grader.rubric.faults import model_faults
+from grader.rubric.fault_words import model_faults
 
 SQUARE = [[0, 0], [2, 0], [2, 2]]
 SLASH = 'a name of the graph begins with a slash: "/x"'

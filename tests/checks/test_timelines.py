@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 from grader.checks import CHECKS, HEADINGS, Check
-from grader.checks.parameter_docs import inner_records, parameters
 from grader.checks.support.text import in_language
 from grader.model.verdict import Status
+from grader.rubric.check_parameters import inner_records, parameters
 from scripts.reference.checks import checks_page
 from tests.checks.examples import LOADER, Example, differences, examples
 

@@ -95,7 +95,7 @@ def award(
 
 def settle(out: Path) -> None:
     """Apply the overrides, as a batch does."""
-    from grader.classes.batch.existing_results import Settler  # noqa: PLC0415 - of this alone
+    from grader.classes.batch.renew_results import Settler  # noqa: PLC0415 - of this alone
     from grader.classes.batch.run import ids_of  # noqa: PLC0415
     from grader.classes.overrides import read_overrides  # noqa: PLC0415
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader import judge, load_result, load_rubric
-from grader.classes.batch.existing_results import write_one
+from grader.classes.batch.renew_results import write_one
 from grader.evidence.reader import load_evidence, package_facts
 from grader.report.files import result_text
 from tests.formats.kept import CLASS, FOLDER, ROOT, Kept, submissions

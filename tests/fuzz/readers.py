@@ -35,7 +35,7 @@ from grader.intake import IntakeLimits, open_submission, safe_name
 from grader.intake.find import manifest_name
 from grader.intake.repository import choose_ref, parse_refs
 from grader.intake.source import parse_source
-from grader.model.interfaces import parse_interface
+from grader.model.message_definitions import parse_interface
 from grader.model.package import CMakeFacts
 from grader.model.record import Record
 from grader.package.cmake import read_cmake, refine_cmake
@@ -46,7 +46,7 @@ from grader.package.python import cause_of, read_syntax_report
 from grader.rubric.load import load_rubric
 from grader.rubric.model import Rubric
 from grader.rubric.scenario import Param
-from grader.rubric.source import read_source
+from grader.rubric.yaml_lines import read_source
 from tests.gradebook.made import BOOK, row
 from tests.support.timeline import build_runs
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.rubric.instructor import VisibleText, printing_to_stderr
+from grader.rubric.own_checks import VisibleText, printing_to_stderr
 from tests.report.nasty import STEERING, TEXTS
 from tests.report.test_shown import TO_A_CI
 

@@ -14,7 +14,7 @@ from grader.authoring.mutation.package_tree import Entry, unified_diff
 from grader.authoring.mutation.solution import Solution
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import Mutant
-from grader.rubric.source import Source
+from grader.rubric.yaml_lines import Source
 from tests.mutation.samples import other_solution, tree_of
 
 NODE = "#!/usr/bin/env python\nimport rospy\nrospy.init_node('a')\nrospy.spin()\n"

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from grader.errors import RubricError
-from grader.rubric.source import read_source
+from grader.rubric.yaml_lines import read_source
 
 
 def doubling(line: str, rounds: int = 40) -> str:

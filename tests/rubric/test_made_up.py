@@ -11,7 +11,7 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
-from grader.classes.batch.existing_results import fitting_runs
+from grader.classes.batch.renew_results import fitting_runs
 from grader.errors import EvidenceError
 from grader.judging import judge
 from grader.model.verdict import Status

@@ -9,10 +9,10 @@ import pytest
 
 from grader.integrations.bundle import Bundle, add_lab
 from grader.rubric.consistency import scenario_faults
-from grader.rubric.faults import model_faults
+from grader.rubric.fault_words import model_faults
 from grader.rubric.load import load_rubric
 from grader.rubric.scenario import Publish, Scenario, Step
-from grader.rubric.source import RUBRIC, source_of
+from grader.rubric.yaml_lines import RUBRIC, source_of
 from tests.evidence.bags import Topic, write_bag
 from tests.rubric.samples import faults, spoiled
 

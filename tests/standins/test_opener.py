@@ -45,7 +45,7 @@ def shims(tmp_path: Path) -> Path:
     (folder / "grader-open").chmod(0o755)
     (folder / "grader-open.py").write_bytes((ROS_SIDE / "opener.py").read_bytes())
     (folder / "python3").symlink_to(sys.executable)
-    (folder / "grader-reachable").write_bytes((ROS_SIDE / "answers.sh").read_bytes())
+    (folder / "grader-reachable").write_bytes((ROS_SIDE / "network_and_screen.sh").read_bytes())
     (folder / "grader-reachable").chmod(0o755)
     for name in BROWSERS:
         (folder / name).symlink_to("grader-open")

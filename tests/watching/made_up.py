@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from grader.arena.asynchronous import Stop, Stopped
+from grader.arena.interruption import Stop, Stopped
 from grader.errors import ExitCode
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult
 from grader.model.verdict import Status

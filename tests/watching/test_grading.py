@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from grader import pipeline
-from grader.arena.asynchronous import Stop, Stopped, run_until_signal
+from grader.arena.interruption import Stop, Stopped, run_until_signal
 from grader.cli.main import build_parser
 from grader.errors import Busy, ExitCode, HostError, OutputError, SandboxMissing, SubmissionError
 from grader.model.progress import Silence

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.asynchronous import Stop
+from grader.arena.interruption import Stop
 from grader.student.watching import Saves, changed_files, is_ignored, take_snapshot
 from tests.watching.labs import append, copy_of, write
 

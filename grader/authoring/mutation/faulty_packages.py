@@ -35,11 +35,11 @@ from grader.model.mutants import (
 )
 from grader.model.record import Record
 from grader.model.version import MUTANTS
-from grader.rubric.faults import model_faults
+from grader.rubric.fault_words import model_faults
 from grader.rubric.find import rubrics_folder
 from grader.rubric.load import LoadedRubric, refuse_newer
 from grader.rubric.model import Rubric
-from grader.rubric.source import Fault, KeyPath, Source, as_map, as_maps, read_source
+from grader.rubric.yaml_lines import Fault, KeyPath, Source, as_map, as_maps, read_source
 from grader.untrusted_text import visible
 from grader.wording import did_you_mean
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader import __version__
-from grader.classes.batch.existing_results import Judged, Settler, judge_all, rewrite
 from grader.classes.batch.folder import BatchFolder, write_run
 from grader.classes.batch.job import Executor
+from grader.classes.batch.renew_results import Judged, Settler, judge_all, rewrite
 from grader.classes.batch.run import (
     BatchOptions,
     Watcher,

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from grader import __version__
-from grader.classes.batch.existing_results import Settler, rewrite
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch, write_run
 from grader.classes.batch.job import Executor, Job, Outcome
+from grader.classes.batch.renew_results import Settler, rewrite
 from grader.classes.fetching import prefetch
 from grader.classes.gradebook import write_gradebook
 from grader.classes.overrides import COMMENTS_FILE as BANK

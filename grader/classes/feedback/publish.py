@@ -16,9 +16,9 @@ from typing import Literal
 
 from pydantic import ValidationError
 
-from grader.classes.batch.existing_results import figures_in
 from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.regrade import Change, pairs
+from grader.classes.batch.renew_results import figures_in
 from grader.classes.batch.run import hold_folder
 from grader.classes.gradebook import Row
 from grader.errors import EvidenceError, GraderError, UsageError

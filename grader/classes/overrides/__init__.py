@@ -20,10 +20,10 @@ from grader.errors import RubricError
 from grader.intake.names import safe_name
 from grader.model.result import COMMENT_CHARS, BankComment, CommentId, Override, WrittenOverride
 from grader.model.version import COMMENTS, OVERRIDES
-from grader.rubric.faults import model_faults, shown
+from grader.rubric.fault_words import model_faults, shown
 from grader.rubric.load import refuse_newer
 from grader.rubric.model import Criterion, Rubric
-from grader.rubric.source import Fault, Form, Source, as_map, read_bytes, read_source, source_of
+from grader.rubric.yaml_lines import Fault, Form, Source, as_map, read_bytes, read_source, source_of
 from grader.wording import did_you_mean
 
 FILE = "overrides.yaml"

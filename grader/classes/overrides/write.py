@@ -23,7 +23,7 @@ from grader.errors import Busy, RubricError, UsageError
 from grader.files import atomic_write, lock, open_lock, unwritable
 from grader.model.result import BankComment, Override, WrittenOverride
 from grader.model.version import COMMENTS, OVERRIDES
-from grader.rubric.source import as_map, compose
+from grader.rubric.yaml_lines import as_map, compose
 
 WAIT_S, LOOK_S = 30.0, 0.02
 

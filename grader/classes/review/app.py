@@ -26,7 +26,7 @@ from markupsafe import Markup, escape
 from werkzeug.exceptions import Forbidden, HTTPException, NotFound
 from werkzeug.wrappers import Response as AnyResponse
 
-from grader.classes.batch.existing_results import figures_in
+from grader.classes.batch.renew_results import figures_in
 from grader.classes.gradebook import Row
 from grader.classes.overrides import bounds
 from grader.classes.review.cards import (
@@ -432,7 +432,7 @@ def _now() -> str:
 
 
 def _own(name: str) -> Markup:
-    return Markup(files(__package__).joinpath("look", name).read_text(encoding="utf-8"))  # noqa: S704 - ours
+    return Markup(files(__package__).joinpath("static", name).read_text(encoding="utf-8"))  # noqa: S704 - ours
 
 
 FAULTS_SHOWN = 10

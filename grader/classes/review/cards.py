@@ -10,8 +10,8 @@ from datetime import date
 from itertools import chain, count
 
 from grader.classes.gradebook import Row
-from grader.classes.review.requests import Request
 from grader.classes.review.session import mark
+from grader.classes.review.student_requests import Request
 from grader.model.result import (
     AUTHOR_CHARS,
     BANK_CHARS,

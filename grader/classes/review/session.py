@@ -17,8 +17,8 @@ from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 
-from grader.classes.batch.existing_results import Rewriting, Settler, rewrite, rewrite_all
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
+from grader.classes.batch.renew_results import Rewriting, Settler, rewrite, rewrite_all
 from grader.classes.batch.run import GRADEBOOK, hold_folder, ids_of, write_books
 from grader.classes.feedback.publish import read_published
 from grader.classes.overrides import COMMENTS_FILE as BANK
@@ -35,7 +35,7 @@ from grader.classes.overrides import (
 from grader.classes.overrides.write import write_override, write_overrides
 from grader.classes.review.background import BackgroundWriter, Pace
 from grader.classes.review.blind import Mask, aliases, mask_of
-from grader.classes.review.requests import Requests, read_requests, request_files, waiting
+from grader.classes.review.student_requests import Requests, read_requests, request_files, waiting
 from grader.classes.review.submissions import Item, Submissions, alike, stamp_of
 from grader.errors import Busy, GraderError, OutputError, RubricError, UsageError
 from grader.files import unwritable

@@ -116,26 +116,26 @@ def batch(
         from grader.classes.batch.run import BatchOptions
         from grader.classes.roster import read_roster
         from grader.classes.roster.platforms import is_download, unpack_download
-        from grader.cli import batches
+        from grader.cli import classes
         from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric)
     out = out or DEFAULT_OUT
-    local = batches.allowed_folders(allow_local, remote_only=remote_only)
+    local = classes.allowed_folders(allow_local, remote_only=remote_only)
     listed = unpack_download(roster, out) if is_download(roster) else roster
-    named = batches.with_package(read_roster(listed, local), package or "")
+    named = classes.with_package(read_roster(listed, local), package or "")
     options = BatchOptions(
         out=out,
-        jobs=jobs or batches.default_jobs(loaded, static=static),
+        jobs=jobs or classes.default_jobs(loaded, static=static),
         sandbox=sandbox,
         static_only=static,
-        before=batches.parse_before(before),
+        before=classes.parse_before(before),
         only=only,
         cluster=cluster or "",
         cluster_insecure=cluster_insecure,
         allow_local=tuple(str(folder) for folder in local.folders),
         remote_only=remote_only,
     )
-    return batches.grade_class(named, rubric, loaded, options, exchange, as_json=as_json)
+    return classes.grade_class(named, rubric, loaded, options, exchange, as_json=as_json)
 
 
 @command("regrade", group=INSTRUCTORS, exit_codes=CLASS_EXIT_CODES, runs_code=True)
@@ -156,7 +156,7 @@ def regrade(
         from grader.classes.batch.job import LocalExecutor
         from grader.classes.batch.regrade import regrade as judge_again
         from grader.classes.batch.regrade import run_missing
-        from grader.cli import batches
+        from grader.cli import classes
         from grader.cli.class_display import open_class_display, print_regraded
         from grader.cli.host_support import warn_without_sandbox
         from grader.portable import cores
@@ -165,16 +165,16 @@ def regrade(
     source = rubric or batch.run.rubric_source
     loaded = load_rubric(source)
     own = cores()
-    batch, regraded = judge_again(batch, loaded, batches.rubric_source(source), jobs or own)
+    batch, regraded = judge_again(batch, loaded, classes.rubric_source(source), jobs or own)
     if run_missing_too and any(one.missing for one in regraded):
         warn_without_sandbox(sandbox, loaded)
         with open_class_display() as watcher:
-            executor = LocalExecutor(jobs or own * batches.JOBS_PER_CORE)
+            executor = LocalExecutor(jobs or own * classes.JOBS_PER_CORE)
             batch, regraded = run_missing(
                 batch, loaded, regraded, executor=executor, watcher=watcher, sandbox=sandbox
             )
     print_regraded(batch, regraded, as_json=as_json)
-    return batches.exit_code(batch.run)
+    return classes.exit_code(batch.run)
 
 
 @command("review", group=INSTRUCTORS)
@@ -363,8 +363,8 @@ def report(
 ) -> ExitCode:
     """Write the reports of a result or a class again, without ROS."""
     with loading():
-        from grader.classes.batch.existing_results import has_result
         from grader.classes.batch.folder import RUN, open_batch
+        from grader.classes.batch.renew_results import has_result
         from grader.cli import results
     batch = open_batch(folder) if (folder / RUN).is_file() else None
     if batch is not None:

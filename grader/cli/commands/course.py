@@ -28,8 +28,8 @@ LAB = Argument("NAME", "the lab's name in that file")
 def status(*, course: Annotated[Path, COURSE], as_json: JsonFlag = False) -> ExitCode:
     """List the labs of a course: what is graded, open, published and sent, and the next command for each."""
     with loading():
-        from grader.cli import batches
-    return batches.print_status(course, as_json=as_json)
+        from grader.cli import classes
+    return classes.print_status(course, as_json=as_json)
 
 
 @command("course grade", group=INSTRUCTORS, exit_codes=CLASS_EXIT_CODES, runs_code=True)
@@ -65,11 +65,11 @@ def grade(
     The same command continues one that was stopped.
     """
     with loading():
-        from grader.cli import batches
-    return batches.grade_lab(
+        from grader.cli import classes
+    return classes.grade_lab(
         course,
         lab,
-        batches.Asked(
+        classes.Asked(
             jobs=jobs, only=only, allow_local=allow_local, static=static, sandbox=sandbox, as_json=as_json
         ),
     )
@@ -87,8 +87,8 @@ def publish(
 ) -> ExitCode:
     """Publish one lab of a course, and return it to the students by the course's form of feedback."""
     with loading():
-        from grader.cli import batches
-    return batches.publish_lab(course, lab, dry_run=dry_run, author=author)
+        from grader.cli import classes
+    return classes.publish_lab(course, lab, dry_run=dry_run, author=author)
 
 
 @command("course gradebook", group=INSTRUCTORS)
@@ -117,8 +117,8 @@ def gradebook(
     It has what is published; of a lab of which nothing is published, it has results as they are now, and says so.
     """
     with loading():
-        from grader.cli import batches
-    return batches.write_gradebook_of(
+        from grader.cli import classes
+    return classes.write_gradebook_of(
         course,
-        batches.Wanted(form=form, out=out, template=template, column=column, per_lab=per_lab, drafts=drafts),
+        classes.Wanted(form=form, out=out, template=template, column=column, per_lab=per_lab, drafts=drafts),
     )

@@ -54,8 +54,8 @@ def publish(
     Results are drafts until then, and changes after it are drafts until it is run again.
     """
     with loading():
-        from grader.cli import returning
-    return returning.publish(
+        from grader.cli import publishing
+    return publishing.publish(
         folder, only, dry_run=dry_run, show_hidden=show_hidden, author=author, as_json=as_json
     )
 
@@ -100,7 +100,7 @@ def feedback(
     with loading():
         from grader.classes.feedback.forms import Settings
         from grader.classes.feedback.send import Wanted
-        from grader.cli import returning
+        from grader.cli import publishing
         from grader.cli.output import say_beside
     given = {
         "--out": out is not None,
@@ -110,7 +110,7 @@ def feedback(
         "--issues": issues,
         "--public": public,
     }
-    returning.check_options(FORMS[form], given)
+    publishing.check_options(FORMS[form], given)
     settings = Settings(
         folder=folder,
         out=out,
@@ -121,8 +121,8 @@ def feedback(
         public=public,
         told=say_beside,
     )
-    wanted = Wanted(only=only, changed_since=returning.parse_since(changed_since), again=again)
-    return returning.send(folder, FORMS[form], settings, wanted, drafts=drafts, dry_run=dry_run)
+    wanted = Wanted(only=only, changed_since=publishing.parse_since(changed_since), again=again)
+    return publishing.send(folder, FORMS[form], settings, wanted, drafts=drafts, dry_run=dry_run)
 
 
 @command("requests", group=INSTRUCTORS, notes=f"variables:\n{TOKENS}", exit_codes=REQUESTS_EXIT_CODES)
@@ -143,7 +143,7 @@ def requests(
     Questions are rows of DIR/requests*.csv; `grader review` shows them beside the criterion, and takes the answer.
     """
     with loading():
-        from grader.cli import returning
+        from grader.cli import publishing
     if label and forge is None:
         raise UsageError("--label chooses among the issues of a forge", hint="give --from, too")
-    return returning.list_requests(folder, forge, label, as_json=as_json)
+    return publishing.list_requests(folder, forge, label, as_json=as_json)

@@ -132,7 +132,7 @@ def judge(
 ) -> ExitCode:
     """Judge recorded evidence again, without ROS."""
     with loading():
-        from grader.classes.batch.existing_results import submissions_in
+        from grader.classes.batch.renew_results import submissions_in
         from grader.cli.results import judge_evidence, judge_submissions
         from grader.portable import cores
         from grader.rubric.load import load_rubric

@@ -1,6 +1,6 @@
 """Repairs of Python sources: what does not parse, names and calls that are missing, and names that ROS is told.
 
-The sources are read in a child process with limits (`grader/package/python_child.py`); here its answer is put in words.
+The sources are read in a child process with limits (`package/source_repair.py`); here its answer is put in words.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from grader.package.python import cause_of
 from grader.package.repairs.editing import Files
 from grader.wording import join_words, plural
 
-EXAMINE = "grader.package.python_child:examine"
+EXAMINE = "grader.package.source_repair:examine"
 LIMITS = {"memory_bytes": 1 << 30, "cpu_s": 20, "file_bytes": 32 << 20, "answer_bytes": 16 << 20}
 WALL_S = 10.0
 INDENTED_SHOWN = 12

@@ -14,7 +14,7 @@ from typing import ParamSpec, TypeVar
 from grader.checks import CHECKS
 from grader.evidence.run import Run
 from grader.judging.facts import PACKAGE_RUN, Facts, try_facts
-from grader.judging.other_runs import split_runs
+from grader.judging.repeats_and_repairs import split_runs
 from grader.model.figure import Figure, Figures
 from grader.model.result import CriterionResult
 from grader.model.verdict import Verdict

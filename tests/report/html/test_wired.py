@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import grader.report.figures
 from grader import pipeline
-from grader.classes.batch import existing_results
-from grader.classes.batch.existing_results import rewrite
+from grader.classes.batch import renew_results
+from grader.classes.batch.renew_results import rewrite
 from grader.model.figure import Figures
 from grader.report.files import write_reports
 from grader.results import Results
@@ -38,9 +38,9 @@ def test_a_result_is_drawn_from_the_runs_that_it_was_judged_from():
 def test_a_result_that_is_written_again_is_drawn_again(tmp_path, monkeypatch):
     kept(tmp_path / "ada")
     loaded = []
-    monkeypatch.setattr(existing_results, "load_evidence", lambda paths: loaded.append(paths) or {})
+    monkeypatch.setattr(renew_results, "load_evidence", lambda paths: loaded.append(paths) or {})
     drawn = figures().model_copy(update={"consoles": {"package": console("built again")}})
-    monkeypatch.setattr(existing_results, "figures_of", lambda *_: drawn)
+    monkeypatch.setattr(renew_results, "figures_of", lambda *_: drawn)
     rewrite(tmp_path / "ada", result(), rubric(), {"some-check": {"Why it matters on a robot": "It does."}})
     text = (tmp_path / "ada" / "report.html").read_text()
     assert loaded == [[tmp_path / "ada" / "evidence"]]

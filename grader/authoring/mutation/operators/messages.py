@@ -31,7 +31,7 @@ from grader.authoring.mutation.source_edits import (
     misspelt_literal,
     texts_in,
 )
-from grader.model.interfaces import PARTS, parse_interface
+from grader.model.message_definitions import PARTS, parse_interface
 from grader.model.package import InterfaceField
 from grader.model.record import Record
 

@@ -11,9 +11,9 @@ from typing import Annotated, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from grader.checks.parameter_docs import UNITS
+from grader.rubric.check_parameters import UNITS
 from grader.rubric.scenario import NAME_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
-from grader.rubric.source import Fault, KeyPath
+from grader.rubric.yaml_lines import Fault, KeyPath
 from grader.wording import did_you_mean, shorten
 
 PATTERN_RULES = {

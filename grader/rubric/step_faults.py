@@ -9,9 +9,9 @@ from typing import Any
 from grader.errors import EvidenceError
 from grader.installable import noetic_messages
 from grader.ros_packages import ros_packages
-from grader.rubric.faults import model_faults
+from grader.rubric.fault_words import model_faults
 from grader.rubric.scenario import STEP_S_MAX, Step, Transform
-from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts
 from grader.wording import did_you_mean
 
 KINDS = tuple(Step.model_fields)

@@ -15,9 +15,9 @@ from grader.classes.feedback.forges import Comments
 from grader.classes.feedback.forms import FORMS, Form, Settings
 from grader.classes.feedback.publish import Publishing, Step, plan, read_published, refuse_other_rubric
 from grader.classes.feedback.send import Delivery, Failure, Selection, Wanted, deliver, faults, open_selection
-from grader.classes.review.requests import Asked, fetch, rows_of, waiting, write_requests
 from grader.classes.review.serve import git_user
 from grader.classes.review.session import ReviewSession, open_session
+from grader.classes.review.student_requests import Asked, fetch, rows_of, waiting, write_requests
 from grader.classes.roster.entries import parse_time
 from grader.cli.output import say, say_beside, say_document, say_json
 from grader.errors import ExitCode, NotSent, UsageError

@@ -25,8 +25,8 @@ from grader.checks.registry import collecting
 from grader.model.verdict import Verdict
 from grader.rubric.course_packages import read_packages, read_starter
 from grader.rubric.pytest_check import BAG, PYTHON, FileFault, pytest_check, read_beside
-from grader.rubric.source import Fault, KeyPath, as_map, as_maps
-from grader.rubric.steps import bag_faults, played_bags
+from grader.rubric.step_faults import bag_faults, played_bags
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
 from grader.untrusted_text import visible
 
 PYTEST = "pytest"

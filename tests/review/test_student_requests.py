@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.classes.review.requests import Request, read_requests, request_files
+from grader.classes.review.student_requests import Request, read_requests, request_files
 from grader.model.batch import Entry
 from grader.rubric.load import load_rubric
 from tests.review.a_class import overrides_of, points_of, result_of

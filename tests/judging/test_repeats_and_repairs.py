@@ -11,7 +11,7 @@ import pytest
 from grader.evidence.run import Run
 from grader.judging import judge
 from grader.judging.judge import judge_all_runs
-from grader.judging.other_runs import is_used_by
+from grader.judging.repeats_and_repairs import is_used_by
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
 from tests.judging.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, SCENARIO, rubric

@@ -37,7 +37,7 @@ from grader.classes.gradebook.table import Form
 from grader.classes.roster import Local, Roster, read_roster
 from grader.classes.roster.entries import parse_time
 from grader.classes.roster.platforms import is_download, unpack_download
-from grader.cli import returning
+from grader.cli import publishing
 from grader.cli.class_display import open_class_display, print_batch
 from grader.cli.host_support import require_room, warn_without_sandbox
 from grader.cli.output import say, say_beside, say_json
@@ -229,14 +229,14 @@ def publish_lab(path: Path, name: str, *, dry_run: bool, author: str | None) -> 
     """Publish one lab, send it by the course's form of feedback, and return the worse exit code of both."""
     course = load_course(path)
     folder = course.results(name)
-    published = returning.publish(
+    published = publishing.publish(
         folder, (), dry_run=dry_run, show_hidden=False, author=author, as_json=False
     )
     form = course.course.feedback
     if form is None or dry_run:
         return published
     settings = Settings(folder=folder, told=say_beside)
-    sent = returning.send(folder, FORMS[form], settings, WantedFeedback(), drafts=False, dry_run=False)
+    sent = publishing.send(folder, FORMS[form], settings, WantedFeedback(), drafts=False, dry_run=False)
     return sent if sent is not ExitCode.PASSED else published
 
 
