@@ -1,10 +1,12 @@
 """Programs that run outside of every sandbox: how they are found, and which environment they get.
 
-Those that stand around students' code are looked for, and told, nothing that depends on anybody's variables: a program
-found by the PATH of the person who grades, or started with a student's LD_LIBRARY_PATH, may not be the one it is taken
-for. Others (git, Python) are those of the user. You may stand in a student's folder when you grade, and git is started
-in one. An empty entry in a list of folders stands for that folder, and `$LD_LIBRARY_PATH:/usr/local/lib` has one
-wherever the variable was empty before.
+A name comes in, and an absolute path goes out, None where there is none. `find_host_program` is for what stands around
+students' code (`bwrap`, `setpriv`): it looks in fixed folders, whatever anybody's variables say, because a program
+found by the PATH of the person who grades may not be the one it is taken for. `find_user_program` is for the user's own
+(git, Python). `loading_environment` and `with_absolute_paths` give the variables that programs are started with.
+
+You may stand in a student's folder when you grade, and git is started in one. An empty entry in a list of folders
+stands for that folder, and `$LD_LIBRARY_PATH:/usr/local/lib` has one wherever the variable was empty before.
 """
 
 from __future__ import annotations

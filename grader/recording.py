@@ -1,6 +1,9 @@
-"""Record what a rubric needs of one submission: by which recorder, what is recorded again, and what besides.
+"""Records what a rubric needs of one submission: by which recorder, what is recorded again, and what besides.
 
-A submission with its facts comes in, evidence goes out. How a run is recorded is the business of `arena`.
+A `Job` comes in: the submission, its facts, the rubric and a folder. Evidence goes out, in that folder. `make_recorder`
+chooses the arena, the files alone or recordings that were handed in; `record_all` records each scenario.
+`judge_recorded` judges them and records again what the machine was too late for; `record_other_runs` adds repeats of
+losses and the runs of a repaired copy. How a run is recorded is the business of `arena`.
 """
 
 from __future__ import annotations

@@ -1,5 +1,9 @@
-"""What a recording of a submission consists of, and the recorder that runs nothing: the package's files alone are
-evidence then. It needs no ROS, and no Linux."""
+"""The recorder that runs nothing, and what every recording has: it needs no ROS, and no Linux.
+
+A submission and its facts come in; `package.mcap` goes out, with the facts, the files as attachments and the reason why
+nothing was run. `StaticRecorder` is the entry, used as `arena.recorder.Recorder` is. That one too fills a `Recording`,
+and takes `metadata`, `write_files` and `left_out_events` from here.
+"""
 
 from __future__ import annotations
 

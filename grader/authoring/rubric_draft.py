@@ -1,6 +1,8 @@
-"""Rubrics in the making: first those that only say what of a package is run, whose criterion is never judged.
+"""Drafts of rubrics for `grader rubric new`: what is run to look at a correct package, and the YAML that comes of it.
 
-Then scenarios, criteria and points that add up, and their text as YAML that people can edit.
+A package's folder and facts come in, and `find_parts` gives what can be started. `first_look` and `second_look` give
+rubrics that only run it and judge nothing (`only_runs`). What was observed there becomes scenarios, criteria and points
+(`assign_points`) on a `Sheet`, and `rubric_text` gives the YAML that people go on to edit.
 """
 
 from __future__ import annotations

@@ -1,4 +1,10 @@
-"""What runs besides the first say of a criterion: scenarios that were run once more, and a repaired copy. Pure."""
+"""What runs besides the first say of a criterion: scenarios that were run once more, and a repaired copy. Pure.
+
+All runs of the evidence come in, and `split_runs` sorts them into the first ones, repeats and those of the copy. With
+the verdicts on these, `drop_unrepeated_losses` takes back losses that did not come again, and `apply_repaired_copy`
+gives the shares of points that were earned on the copy. `repairs_of` says what was repaired there; `concerns` and
+`is_used_by` say which criteria and scenarios a repair could matter to, before the copy is run (`repaired_copy.py`).
+"""
 
 from __future__ import annotations
 

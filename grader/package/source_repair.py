@@ -1,5 +1,9 @@
-"""What a child process with limits makes of Python sources that do not run: each mistake with the text that has it
-repaired, and the names that the last text uses. The standard library and fissix only; nothing is executed."""
+"""Finds mistakes in Python sources that do not run, and repairs their text. The standard library and fissix only.
+
+`examine` is the entry; it runs in a child process with limits (`limited_child.py`). Pairs of a file's name and its text
+come in; for each, the steps go out (a mistake, and the text that has it repaired), and the names that the last text
+uses. Nothing is executed. `package/repairs/python.py` puts the answer in words.
+"""
 
 from __future__ import annotations
 

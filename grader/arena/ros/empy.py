@@ -1,5 +1,9 @@
 #!/usr/bin/env python3
-"""Stands before `empy`, which Python would compile again on every start: the same program, from its module."""
+"""Runs `empy` from its module, whose compiled form Python keeps; of a program it keeps none, and compiles it each time.
+
+It takes the place of `empy` in the sandbox, with the same arguments and output: the template engine of ROS that makes
+message classes. `@EM@` is replaced by the path of its module when it is put there (`sandbox_files.py`).
+"""
 
 import sys
 from importlib.machinery import SourceFileLoader

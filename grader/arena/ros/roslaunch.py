@@ -1,6 +1,10 @@
 #!/usr/bin/env python3
-"""Stands before `roslaunch`, and runs it. It asks distutils for one function; where setuptools gives its own distutils
-in place of Python's (`_distutils_hack`), all of setuptools would be loaded for that on every start."""
+"""Runs the real `roslaunch`, with Python's own distutils loaded before it.
+
+It takes the place of `roslaunch` in the sandbox, with the same arguments and output. roslaunch asks distutils for one
+function; where setuptools gives its own distutils in place of Python's (`_distutils_hack`), all of setuptools would be
+loaded for that on every start. `@PROGRAM@` is replaced by the path of the real one (`sandbox_files.py`).
+"""
 
 import os
 import runpy

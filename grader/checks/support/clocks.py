@@ -1,4 +1,9 @@
-"""The run's clocks, whether numbers in messages are a time that grows as they do, and how late the machine was."""
+"""The run's clocks, whether numbers in messages are a time that grows as they do, and how late the machine was.
+
+A run and times of its recording come in. `clocks_at`, `run_seconds` and `ros_seconds` give what its clocks said then;
+`wrong_growth` gives the verdict on numbers that should be a time, None where they are one. `lateness` gives how late
+the machine was in a stretch of time, and `excused` opens a verdict that this can explain.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Fields of messages by their path, and values of messages, services and parameters: as text, and where two differ."""
+"""Fields of messages by their path, and values of messages, services and parameters: as text, and where two differ.
+
+`values_at` gives what a decoded message has at a path (`pose.position.x`), and `readings` the same of all messages of
+channels, with their times; `no_field` gives the verdict where there is no such field. `differences` compares what came
+with what was wanted; `fields_text` and `value_text` write values as reports show them.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
-"""Points for a learning platform: one mark per submission, and a new file to import made from the roster alone.
+"""A learning platform's rows and a class's students: which belong together, and which marks they get.
 
-`match` says which row of a platform's export belongs to which student: only where there is no doubt.
+`kinds` says what a platform's columns are; `row_identity` and `entry_identity` give who a row and a student are, and
+`match` which belong together, only where there is no doubt. A `Book` and its rows come in, and `marks_of` gives one
+mark per submission; `new_import_file` gives a file to import, made from the roster alone.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """`requests*.csv`: what students ask about a criterion, written by a person, a form or `grader requests`.
 
-Every file of that name in the class's folder is read. The columns are found by their headings: those of a form are
-whole questions.
+`request_files` gives the class's files, and `read_requests` what they ask, by submission and criterion; columns are
+found by their headings, since those of a form are whole questions. `waiting` leaves those that no decision has answered
+yet. `fetch` takes issues from GitHub or GitLab, and `write_requests` writes them as such a file.
 """
 
 from __future__ import annotations
