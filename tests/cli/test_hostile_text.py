@@ -18,8 +18,8 @@ import grader
 from grader.cli.commands.grading import inspect
 from grader.cli.display import LiveSteps, PlainSteps
 from grader.cli.errors import guarded, report
-from grader.cli.labs import print_test
 from grader.cli.output import say, say_json
+from grader.cli.rubric_test import print_test
 from grader.errors import RubricError, SubmissionError
 from grader.evidence.events import ActorEvent
 from grader.evidence.inspect import inspect_run

@@ -226,19 +226,21 @@ def run_rubric_test(
 ) -> ExitCode:
     """Grade a correct package, then mutants of it that must lose marks."""
     with loading():
-        from grader.cli import labs
+        from grader.cli import rubric_test
         from grader.cli.host_support import require_room, warn_without_sandbox
         from grader.cli.output import say_json
     require_room(gradings=jobs)
-    plan = labs.plan_test(rubric, solution, only=only, jobs=jobs, out=out, everything=write, sandbox=sandbox)
+    plan = rubric_test.plan_test(
+        rubric, solution, only=only, jobs=jobs, out=out, everything=write, sandbox=sandbox
+    )
     warn_without_sandbox(sandbox, plan.rubric)
-    tested = labs.run_plan(plan, temporary=out is None)
+    tested = rubric_test.run_plan(plan, temporary=out is None)
     if write is not None and not tested.reference.lost:
-        labs.write_mutants(plan, tested, write)
+        rubric_test.write_mutants(plan, tested, write)
     if as_json:
         say_json(tested.model_dump(mode="json", by_alias=True))
     else:
-        labs.print_test(tested, sys.stdout)
+        rubric_test.print_test(tested, sys.stdout)
     return ExitCode.PASSED if tested.passed else ExitCode.BELOW_PASS_MARK
 
 
