@@ -17,7 +17,7 @@ from grader.model.result import GradingResult
 
 TIMES = 5
 GRADER = (sys.executable, "-m", "grader")
-FIRST, LAST = " manifest ", " points"
+FIRST, LAST = " pass: manifest", " criteria passed"
 """What stands in the line of the first verdict, and in that of the result."""
 
 
@@ -89,7 +89,7 @@ def _first_verdict_s() -> float:
     with subprocess.Popen(argv, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         lines = iter(process.stdout or ())
         first_s = next((meter.wall_s() for line in lines if FIRST in line), None)
-        passed = any(LAST in line for line in lines)
+        passed = LAST in "".join(lines)
     if first_s is None or not passed or process.returncode != 0:
         raise NotMeasured(f"grader check ended with {process.returncode}, and not as it should")
     return first_s
