@@ -26,7 +26,7 @@ MISTAKES = [
         f"✗ talker-executable {MINUS}5 scripts/talker.py:11",
         "SyntaxError: the line that begins a block ends with `:`",
         "while not rospy.is_shutdown();",
-        "fix: while not rospy.is_shutdown():",
+        "fix: write while not rospy.is_shutdown():",
     ),
     (
         "mcr2-basic-comms/message-without-time",
@@ -51,7 +51,7 @@ MISTAKES = [
     ),
     (
         "mcr2-basic-comms/listener-not-executable",
-        f"✗ listener-executable {MINUS}5 scripts/listener.py:1",
+        f"✗ listener-executable {MINUS}5 scripts/listener.py",
         "has no executable bit",
         f"✗ cmake-install {MINUS}10 CMakeLists.txt:48",
         "chmod +x scripts/listener.py",
