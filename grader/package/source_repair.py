@@ -62,6 +62,7 @@ ROLES = {
     "delete_param": "set-param",
 }
 OLD_PRINT = re.compile(r"\bprint\b(?!\s*\()")
+CONTINUES = re.compile(r"(elif|else|except|finally)\b")
 BLOCKS = re.compile(r"\s*(if|elif|else|for|while|def|class|try|except|finally|with)\b")
 
 Step = dict[str, Any]
@@ -180,11 +181,27 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
         return
     if "global declaration" in error["message"]:
         yield from _with_global_first(text, error["line"])
+    if error["message"].startswith("expected an indented block"):
+        yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
     yield from (("python2", candidate) for candidate in _as_python3(lines, at))
     yield "characters", _with_line(lines, at, lines[at].translate(PLAIN))
     for line in dict.fromkeys((at, max(at - 1, 0))):
         for changed in _with_token(lines[line], error if line == at else None):
             yield "token", _with_line(lines, line, changed)
+
+
+def _with_body_indented(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with the line indented, where it alone can be the body of the block that begins above it."""
+
+    def indentation(line: str) -> str:
+        return line[: len(line) - len(line.lstrip())]
+
+    head = next((line for line in reversed(lines[:at]) if _code(line).strip()), "")
+    after = next((line for line in lines[at + 1 :] if _code(line).strip()), "")
+    own = indentation(lines[at])
+    ends = len(indentation(after)) < len(own) or not after or CONTINUES.match(after.strip())
+    if lines[at].strip() and own == indentation(head) and ends:
+        yield _with_line(lines, at, "    " + lines[at])
 
 
 def _with_global_first(text: str, number: int) -> Iterator[tuple[str, str]]:

@@ -117,6 +117,11 @@ CASES = {
     "no-shebang": (swapped(TALKER, ("#!/usr/bin/env python3\n", "")), ["shebang"], "cannot be started"),
     "shebang-blank": ({TALKER: "\n" + SCRIPT}, ["shebang"], "`#!` comes in line 2"),
     "tabs-of-8": (swapped(TALKER, ("        publisher.pub", "\tpublisher.pub")), ["python-syntax"], "tabs and spaces"),
+    "body-not-indented": (
+        swapped(TALKER, ("\nmain()", "\nif __name__ == '__main__':\nmain()")),
+        ["python-syntax"],
+        "the line after a `:` must be indented",
+    ),
     "tabs-of-4": (swapped(TALKER, ("    rate = ", "\trate = ")), ["python-syntax"], "line 8 of src/talker.py: tabs"),
     "print": (swapped(TALKER, ("        rate.sleep()", "        print 'a', 1\n        rate.sleep()")),
               ["python-syntax"], "line 11 of src/talker.py: this is Python 2: `print`"),

@@ -28,6 +28,7 @@ ATTEMPTS = 3
 
 Cause = Literal[
     "tabs",
+    "indent",
     "python2",
     "characters",
     "token",
@@ -130,7 +131,7 @@ def _joined(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
         if (
             groups
             and groups[-1][0] == step.cause
-            and step.cause not in ("token", "module", "import", "attribute")
+            and step.cause not in ("token", "indent", "module", "import", "attribute")
         ):
             groups[-1][1].append(step)
         else:
@@ -174,6 +175,10 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
         "tabs": (
             f"{place}: tabs and spaces are mixed in the indentation",
             _indented(before, steps[-1].text),
+        ),
+        "indent": (
+            f"{place}: the line after a `:` must be indented",
+            f"indent line {first.line} by four spaces",
         ),
         "global": (
             f"{place}: `global {word}` stands below a line that uses {word}",
