@@ -12,10 +12,11 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from http.client import HTTPConnection, HTTPResponse
 from pathlib import Path
-from urllib.parse import urlencode
+from urllib.parse import urlencode, urlsplit
 
 from benchmarks.figures import Found, NotMeasured, Options, Row, spread
 from benchmarks.gradings import cores, folder_for
+from benchmarks.pages import browser_page, class_page, review
 from benchmarks.thousands import RUBRIC, batch, made
 
 COUNT, TIMES = 1000, 20
@@ -26,7 +27,7 @@ STYLE = """
     points: 10
     check: manual
 """
-ADDRESS = re.compile(r"http://127\.0\.0\.1:(\d+)/\?token=[\w-]+")
+ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+/\?token=[\w-]+")
 BANK = {"style": {f"c{number}": {"text": f"Remark {number}", "points": number} for number in range(10)}}
 ANSWER_S = 120
 
@@ -39,11 +40,23 @@ def measure(options: Options) -> Found:
         out = folder / "out"
         batch(made(folder / "in", count), out, options.jobs or cores(), rubric)
         (out / "comments.yaml").write_text(json.dumps(BANK))
-        with _review(out) as tab:
-            rows = list(_pages(tab, times))
-            rows += list(_decisions(tab, times))
+        rows = list(_in_a_browser(out, times))
+        with _review(out) as address:
+            tab = _Tab(address)
+            rows += _pages(tab, times)
+            rows += _decisions(tab, times)
         faults = () if _decided(out) == count else (f"{_decided(out)} of {count} decisions are there",)
     return Found(runs=f"{count} submissions, {times} of each", tables=(spread(rows),), faults=faults)
+
+
+def _in_a_browser(out: Path, times: int) -> Iterator[Row]:
+    """Yield the class page's actions, then those of a review, which takes back what it decides."""
+    with browser_page() as page:
+        for what, values in class_page(page, out / "index.html", times).items():
+            yield _row(f"class page: {what}", values)
+        with _review(out) as address:
+            for what, values in review(page, address, times).items():
+                yield _row(f"review in a browser: {what}", values)
 
 
 def _pages(tab: _Tab, times: int) -> Iterator[Row]:
@@ -90,7 +103,8 @@ def _decided(out: Path) -> int:
 
 
 @contextmanager
-def _review(out: Path) -> Iterator[_Tab]:
+def _review(out: Path) -> Iterator[str]:
+    """Run the command in a process of its own, and yield the address that it prints."""
     argv = [sys.executable, "-u", "-m", "grader", "review", str(out), "--no-browser", "--author", "ann"]
     with subprocess.Popen(argv, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None  # noqa: S101 - opened with PIPE
@@ -98,7 +112,7 @@ def _review(out: Path) -> Iterator[_Tab]:
         if not found:
             raise NotMeasured("grader review did not begin")
         try:
-            yield _Tab(int(found[1]), found[0])
+            yield found[0]
         finally:
             process.send_signal(signal.SIGINT)
             process.communicate()
@@ -107,9 +121,10 @@ def _review(out: Path) -> Iterator[_Tab]:
 class _Tab:
     """A browser's tab: the cookie, and the addresses of all submissions."""
 
-    def __init__(self, port: int, address: str) -> None:
-        self._port, self._headers = port, dict[str, str]()
-        answer, _ = self._ask("GET", address.partition(str(port))[2], None)
+    def __init__(self, address: str) -> None:
+        parts = urlsplit(address)
+        self._port, self._headers = parts.port, dict[str, str]()
+        answer, _ = self._ask("GET", f"{parts.path}?{parts.query}", None)
         self._headers["Cookie"] = str(answer.getheader("Set-Cookie")).partition(";")[0]
         self.keys = list(dict.fromkeys(re.findall(r'href="/s/([^"/]+)/', self.get("/"))))
         self.csrf = self._form(self.keys[0])["csrf"]
