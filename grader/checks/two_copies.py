@@ -16,7 +16,16 @@ from grader.checks.support.console_output import (
     sent_by,
 )
 from grader.checks.support.exit_causes import explain_end, lifetime_text
-from grader.checks.support.processes import NO_SCRIPT_HINT, GlobalName, Life, are_noted, life, lives, nodes_of
+from grader.checks.support.processes import (
+    NO_SCRIPT_HINT,
+    GlobalName,
+    Life,
+    are_noted,
+    life,
+    lives,
+    named_at,
+    nodes_of,
+)
 from grader.checks.support.text import GET_TIME, INIT, LOOP, SPIN, VALUE, in_words, init
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
@@ -87,7 +96,7 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
     if isinstance(trio, Verdict):
         return trio.about(expected=expected)
     verdict = (
-        _taken_over(run, trio, params)
+        _taken_over(package, run, trio, params)
         or _not_both_alive(package, run, trio)
         or _unnamed(run, trio)
         or _heard(package, run, trio, params)
@@ -125,7 +134,7 @@ def _not_started(package: PackageFacts, run: Run, params: CopiesParams) -> Verdi
     return unjudged("no copy was started: there is no script to run", hint=NO_SCRIPT_HINT)
 
 
-def _taken_over(run: Run, trio: Trio, params: CopiesParams) -> Verdict | None:
+def _taken_over(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) -> Verdict | None:
     """One name for both: the master has the copy that had it first shut down."""
     shared = [n for n in trio.first_nodes if n in trio.second_nodes]
     told = [one for one in trio[:2] if any(SAME_NAME in c.line for _, c in run.lines(one.name))]
@@ -135,10 +144,15 @@ def _taken_over(run: Run, trio: Trio, params: CopiesParams) -> Verdict | None:
     down = "the first copy is shut down" if trio.first.ended_early else "the first copy is told to shut down"
     if trio.second.ended_early:
         down = "the first takes it back, and both are shut down"
-    message = f"the second copy takes the name {name} over, and {down}: ROS allows each name once"
+    message = f"both copies are called {name}, and ROS allows each name once: {down}"
     base = name.strip("/")
-    hint = f"write {init(base, anonymous=True)}: then each copy has its own name"
-    return partial(params.taken_over_score, message, hint=hint, measured=f"one name for two copies: {name}")
+    return partial(
+        params.taken_over_score,
+        message,
+        hint=f"write {init(base, anonymous=True)}, so that each copy has its own name",
+        measured=f"one name for two copies: {name}",
+        citations=(*named_at(package, run, "node-name", base), cite(run, "/grader/graph")),
+    )
 
 
 def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | None:

@@ -281,7 +281,8 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
     said = verdict.message
     words = [said, *(one.message for one in repairs if one.file not in said and one.message not in said)]
     if _is_next(verdict, copy, repairs):
-        words.append(f"with that repaired, {copy.message}")
+        untold = [clause for clause in copy.message.split("; ") if clause not in said]
+        words += [f"with that repaired, {'; '.join(untold)}"] if untold else []
         hints += [f"then {copy.hint}"] if copy.hint else []
     return verdict.model_copy(update={"message": "; ".join(words), "hint": "; ".join(hints)})
 

@@ -294,7 +294,6 @@ MEANINGS = {
     Status.ERROR: "the grader could not judge it; no points are lost for good",
     Status.MANUAL: "a person awards these points",
 }
-MENDED = frozenset({Status.FAIL, Status.PARTIAL})
 ADVICE = {Status.FAIL: "How to fix it", Status.PARTIAL: "How to fix it", Status.PASS: "Hint"}
 FAULTS = {
     "submission": "The problem is in what was submitted: fix it and submit it again.",
@@ -397,3 +396,10 @@ def lost_words(criterion: CriterionResult, blocked: float, alike: float = 0.0) -
     more = [f"{number(alike)} more where the same mistake shows"] if alike else []
     more += [f"{number(blocked)} more in what it blocks"] if blocked else []
     return ", and ".join([said, *more])
+
+
+def is_own_fault(criterion: CriterionResult) -> bool:
+    """Return whether what the criterion asks for is wrong, and not only what a repaired copy has right."""
+    if (repaired := criterion.repaired) and not repaired.charged:
+        return criterion.points < repaired.share * criterion.max_points
+    return criterion.status in {Status.FAIL, Status.PARTIAL}

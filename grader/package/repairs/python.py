@@ -178,7 +178,7 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
         ),
         "indent": (
             f"{place}: the line after a `:` must be indented",
-            f"indent line {first.line} by four spaces",
+            f"indent line {first.line} by four more spaces",
         ),
         "global": (
             f"{place}: `global {word}` stands below a line that uses {word}",

@@ -21,8 +21,8 @@ from grader.report.html.shell import environment, policy, prose, script, style
 from grader.report.sentences import (
     ADVICE,
     MEANINGS,
-    MENDED,
     SIGNS,
+    is_own_fault,
     lost_words,
     visible_words,
     without_sandbox,
@@ -350,7 +350,7 @@ class Maker:
             message=sentence(without_place(criterion.message, place)),
             why=self._prose(docs.get(MATTERS, "")),
             how=self._prose(docs.get(MEASURED, "")),
-            fix=self._prose(docs.get(FIX, "")) if criterion.status in MENDED else NOTHING,
+            fix=self._prose(docs.get(FIX, "")) if is_own_fault(criterion) else NOTHING,
             hint=self._prose(sentence(without_place(criterion.hint, place))),
             where=self._where(criterion),
             code=code,
