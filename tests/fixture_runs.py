@@ -82,7 +82,7 @@ TOGETHER = {
     ),
     "service-client": (
         "build-unknown-component",
-        "fields-of-32-bits+error-kept-quiet",
+        "fields-of-32-bits",
         "numbers-swapped+adds-by-itself",
     ),
     "sheffield-com2009-week1": (
