@@ -55,9 +55,9 @@ class RunState:
     are registered now, `published` their topics, `talking` when each first sent a message, `owners` the processes of
     all nodes so far. `lost_s` is what others took of the run's time while they filled the machine: so much longer a
     node is waited for. Of that, `lost_before_s` was gone at `started_s`, `lost_before_last_s` at `last_start_s`.
-    `waited_s`: so long steps had waited in vain by `started_s`. `least_s` is how long nodes are watched, even where
-    nothing more is to come. `naps`: the package's programs sleep for times of their own, which may look like
-    `spin()` from outside."""
+    `waited_s`: how long steps had waited by `started_s` for what never came. `least_s` is how long nodes are
+    watched, even where nothing more is to come. `naps`: the package's programs sleep for times of
+    their own, which may look like `spin()` from outside."""
 
     least_s: float = 0.0
     naps: bool = False

@@ -115,7 +115,7 @@ def _fault(line: int | None, kind: str, message: str, cause: str) -> Fault:
 
 
 def _meaning(root: etree._Element, said: list[str]) -> Package:
-    """Return what catkin_pkg makes of it. It gets the tree written anew, so that no DTD reaches its XML parser."""
+    """Return what catkin_pkg makes of it. It gets the tree as newly written XML, so that no DTD reaches its parser."""
     _shorten(root)
     text = etree.tostring(root, encoding="unicode", with_tail=False)
     package = parse_package_string(text, warnings=said)

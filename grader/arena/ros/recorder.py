@@ -179,7 +179,7 @@ class Recorder:
         return sock, header
 
     def pass_on(self, topic, pieces):
-        """Pass log messages on to whoever listens to all of them."""
+        """Pass log messages on to the subscribers of /rosout_agg."""
         if topic == ROSOUT and self.on_log is not None:
             self.on_log(pieces)
 

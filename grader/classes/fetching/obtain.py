@@ -304,7 +304,7 @@ class Prefetch:
         for number in range(max(1, threads)):
             own = room / str(number)
             own.mkdir()
-            # Whoever is interrupted does not wait for a server: git ends with the thread that started it.
+            # After Ctrl-C no server is waited for: git ends with the thread that started it.
             thread = threading.Thread(target=self._work, args=(own,), name="prefetch", daemon=True)
             thread.start()
             self._threads.append(thread)
