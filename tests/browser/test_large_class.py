@@ -96,6 +96,29 @@ def test_each_action_of_the_class_page(visit, out, took, complaints) -> None:
     complaints.clear()
 
 
+def _through_the_pages(page, took, timing) -> None:
+    """By keys over the end of a page and back, to a submission and back, and a search over all pages."""
+    rows = page.locator("a.row")
+    rows.last.focus()
+    took["next page"] = timing.following(lambda: page.keyboard.press("j"), "keydown")
+    assert rows.all_inner_texts() == IDS[100:200]
+    expect(rows.first).to_be_focused()
+    took["previous page"] = timing.following(lambda: page.keyboard.press("k"), "keydown")
+    assert rows.all_inner_texts() == IDS[:100]
+    expect(rows.last).to_be_focused()
+    page.get_by_role("link", name="Next page").click()
+    page.get_by_role("link", name="Next page").click()
+    expect(rows.first).to_have_text(IDS[200])
+    took["open a row of the last page"] = timing.following(rows.nth(50).click)
+    expect(page.get_by_role("heading", level=1)).to_have_text(IDS[250])
+    took["back to the list"] = timing.following(page.get_by_role("link", name="All", exact=True).click)
+    assert rows.all_inner_texts() == IDS[200:]
+    expect(rows.nth(50)).to_be_focused()
+    page.get_by_role("searchbox").fill("ent 25")
+    took["search"] = timing.following(lambda: page.keyboard.press("Enter"), "keydown")
+    assert rows.all_inner_texts() == [IDS[25], *IDS[250:260]]
+
+
 @pytest.mark.full
 def test_each_action_of_the_review(visit, out, took) -> None:
     server = Server(out)
@@ -104,7 +127,9 @@ def test_each_action_of_the_review(visit, out, took) -> None:
     timing = Timing(page)
     rows, heading = page.locator("a.row"), page.get_by_role("heading", level=1)
     took["list of the class"] = timing.opening(home)
-    assert rows.all_inner_texts() == IDS
+    assert rows.all_inner_texts() == IDS[:100]
+    _through_the_pages(page, took, timing)
+    page.goto(home)
     took["one filter of it"] = timing.following(
         page.get_by_role("link", name=re.compile("^Inconclusive")).click
     )

@@ -8,10 +8,14 @@ from pathlib import Path
 import pytest
 
 from grader.classes.overrides import read_overrides
+from grader.classes.review.app import create_app
+from grader.classes.review.session import open_session
 from grader.errors import RubricError
 from grader.model.result import Override
+from grader.model.verdict import Status
 from tests.overrides.samples import IDS, rubric
-from tests.review.a_class import overrides_of, points_of, result_of
+from tests.review.a_class import Who, a_class, overrides_of, points_of, result_of
+from tests.review.conftest import PORT, QUICK, TOKEN, Page
 
 WAIT_S = 60
 BANK = """\
@@ -119,3 +123,30 @@ def test_one_decision_for_all_alike_and_back(page, out, review) -> None:
     page.save("ada", "style", points="7")
     assert page.send("dana", "style", page.form("dana", "style"), do="undo").status_code == 303
     assert {key: one["style"]["points"] for key, one in overrides_of(out).items()} == {"ada": 7, "eve": 2}
+
+
+LATE = {"status": Status.INCONCLUSIVE, "points": 0.0, "message": "the machine was late"}
+WHOS = (
+    Who(id="ada", changes={"chatter-rate": LATE}),
+    Who(id="dana", changes={"chatter-rate": LATE | {"message": "tf2_ros is not installed here"}}),
+    Who(id="eve", changes={"chatter-rate": LATE}),
+    Who(id="finn"),
+)
+
+
+def test_alike_is_what_its_own_check_said(tmp_path) -> None:
+    out = a_class(tmp_path / "out", WHOS)
+    page = Page(create_app(open_session(out, QUICK), port=PORT, token=TOKEN, author="A. Miller"))
+    offers = {name: page.text(f"/s/{name}/?c=chatter-rate") for name in ("ada", "dana", "eve", "finn")}
+    assert [name for name, text in offers.items() if "Save for all 2 alike" in text] == ["ada", "eve"]
+    assert not any("Save for all" in offers[name] for name in ("dana", "finn"))
+
+
+def test_one_that_is_decided_already_is_changed_with_those_alike(page, out) -> None:
+    page.save("dana", "style", points="2")
+    form = page.form("dana", "style")
+    assert "Save for all 3 alike" in page.text("/s/dana/?c=style")
+    assert page.send("dana", "style", form, points="6", do="alike").status_code == 303
+    assert {one["style"]["points"] for one in overrides_of(out).values()} == {6}
+    assert page.send("dana", "style", form, points="1", do="alike").status_code == 409
+    assert {one["style"]["points"] for one in overrides_of(out).values()} == {6}

@@ -75,9 +75,48 @@ def test_neighbours_at_both_ends(page) -> None:
 
 
 def test_a_place_in_an_empty_class() -> None:
-    place = place_of((), {"show": "manual", "q": "x" * 500}, at="nobody")
+    place = place_of((), {"show": "manual", "q": "x" * 500, "page": "7"}, at="nobody")
     assert (place.before, place.after, place.position, place.total) == ("", "", 0, 0)
+    assert (place.page, place.pages, place.rows) == (1, 1, [])
     assert len(place.q) == 100
+
+
+@pytest.mark.parametrize(
+    ("asked", "number", "names"),
+    [
+        ("", 1, ["ada", "dana"]),
+        ("2", 2, ["eve", "fay"]),
+        ("3", 3, ["gus"]),
+        ("99", 3, ["gus"]),
+        ("0", 1, ["ada", "dana"]),
+        ("-1", 1, ["ada", "dana"]),
+        ("٢", 1, ["ada", "dana"]),
+    ],
+)
+def test_the_pages_of_a_long_list(page, monkeypatch, asked, number, names) -> None:
+    monkeypatch.setattr("grader.classes.review.submissions.PAGE", 2)
+    text = page.client.get("/", query_string={"page": asked}).text
+    assert rows(text) == names
+    first = 2 * number - 1
+    assert f">{first} to {first + len(names) - 1} of 5<" in text
+    assert ('rel="prev"' in text, 'rel="next"' in text) == (number > 1, number < 3)
+
+
+def test_pages_keep_filter_and_words_and_are_found_again(page, review, monkeypatch) -> None:
+    monkeypatch.setattr("grader.classes.review.submissions.PAGE", 2)
+    text = page.text("/?show=manual&q=a&page=1")
+    assert rows(text) == ["ada", "dana"]
+    assert "Pages of the list" not in text
+    text = page.text("/?show=manual")
+    assert 'href="/?page=2&amp;show=manual"' in text
+    assert rows(page.text("/?q=gus&page=1")) == ["gus"]
+    assert 'href="/?page=2&amp;show=manual#row-eve"' in page.text("/s/eve/?show=manual")
+    assert 'href="/#row-ada"' in page.text("/s/ada/")
+    page.save("eve", "style", points="1")
+    page.save("eve", "answers", points="1")
+    assert review.background.wait(60)
+    assert rows(page.text("/?show=manual&page=2")) == ["ada", "dana"]
+    assert 'id="all" href="/?show=manual"' in page.text("/s/eve/?show=manual")
 
 
 @pytest.mark.full
@@ -127,7 +166,7 @@ def test_a_decision_from_elsewhere_is_shown(page, out) -> None:
     assert "by hand</textarea>" in text
 
 
-def test_without_a_report_the_page_says_so(page) -> None:
+def test_without_a_report_the_numbersays_so(page) -> None:
     assert "There is no report" in page.text("/s/gus/")
 
 

@@ -92,6 +92,7 @@ def _parsed(raw: bytes) -> Source:
     return source_of(raw, FILE, FORM)
 
 
+@lru_cache(maxsize=20_000)
 def folder_key(name: str) -> str:
     """What two names of the same folder of results have in common."""
     return safe_name(name).casefold()

@@ -121,7 +121,7 @@ class _Views:
             titles={c.id: c.title for c in self._session.rubric.rubric.criteria},
             run=self._session.submissions.batch().run,
             place=place,
-            items=place.shown,
+            items=place.rows,
             troubles=self._troubles(),
         )
 
@@ -175,10 +175,10 @@ class _Views:
         do, session = request.form.get("do"), self._session
         if do == "undo" and (one := session.decisions().written.get(item.entry.id, {}).get(criterion)):
             return f"{plural(session.undo_together(criterion, one.together), 'submission')} taken back"
-        line = item.lines.get(criterion)
-        if do == "alike" and wanted is not None and line is not None:
-            return plural(session.save_together(criterion, line.diagnosis, wanted), "submission")
-        return session.save(item, criterion, wanted, request.form.get("seen", ""))
+        seen = request.form.get("seen", "")
+        if do == "alike" and wanted is not None:
+            return plural(session.save_together(item, criterion, wanted, seen), "submission")
+        return session.save(item, criterion, wanted, seen)
 
     def comments(self) -> str:
         """All comments of the bank, each with a form, and one for a new one."""
@@ -299,6 +299,7 @@ class _Views:
         items = self._session.items()
         place = place_of(items, request.values, at=item.key)
         ids = [criterion.id for criterion in row.result.criteria]
+        shown = [place.criterion] if place.criterion in ids else ids
         return render_template(
             "submission.html",
             run=self._session.submissions.batch().run,
@@ -306,7 +307,7 @@ class _Views:
             row=row,
             cards=found.only(place.criterion) if place.criterion in ids else found,
             place=place,
-            alike={name: len(alike(items, name, line.diagnosis)) for name, line in item.lines.items()},
+            alike={name: len(alike(items, name, item)) for name in shown},
             code=self._code(item, place.criterion) if place.criterion in ids else (),
             anchor=f"#criterion-{ids.index(place.criterion) + 1}" if place.criterion in ids else "",
             waits=self._session.waits(item),

@@ -236,14 +236,17 @@ class ReviewSession:
         self.background.changed()
         return waits
 
-    def save_together(self, criterion: str, diagnosis: str, wanted: WrittenOverride) -> int:
-        """Decide the same for all submissions of one diagnosis that no one has decided; return how many these are.
+    def save_together(self, item: Item, criterion: str, wanted: WrittenOverride, seen: str) -> int:
+        """Decide the same for a submission and all that are `alike`; return how many these are.
 
-        All are written at once, with a word by which they can be taken back at once.
+        All are written at once, with a word by which they can be taken back at once. Raises Conflict as `save` does.
         """
         wanted = wanted.model_copy(update={"together": secrets.token_hex(6)})
         with self._saving, hold_review(self.path):
-            those = alike(self.items(), criterion, diagnosis)
+            now = self.overrides().get(item.entry.id, {}).get(criterion)
+            if mark(now) != seen:
+                raise Conflict(now)
+            those = [item, *(one for one in alike(self.items(), criterion, item) if one.key != item.key)]
             self._write_together(those, criterion, wanted)
         return len(those)
 

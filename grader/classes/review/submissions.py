@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import re
 import threading
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -42,9 +45,9 @@ Stamp = tuple[int, int, int] | None
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """What a list shows of one criterion of a submission; `kinds` are the filters that show it, `diagnosis` is alike
-    for what checks found alike, and `said` is how this one's check put it. `waits`
-    says whether it would be open without a decision."""
+    """What a list shows of one criterion of a submission; `kinds` are the filters that show it, `said` is what its
+    check said. `diagnosis` is the same for what checks said alike, and empty where the check itself awards the points.
+    `waits` says whether it would be open without a decision."""
 
     status: Status
     points: float
@@ -59,7 +62,8 @@ class Line:
 @dataclass(frozen=True, kw_only=True)
 class Item:
     """One submission in the list. `key` names its folder and stands in addresses, `kinds` are the filters that show it,
-    `open` counts the criteria that no one has decided, by status; `lines` has what is to be said of each criterion.
+    `open` counts the criteria that no one has decided, by status; `lines` has what is to be said of each criterion,
+    and `decided` names those that a person has decided as the result says.
     `alias` stands in place of its id and names while these are hidden."""
 
     key: str
@@ -72,6 +76,7 @@ class Item:
     late: bool
     gradable: bool
     lines: Mapping[str, Line]
+    decided: frozenset[str]
     alias: str = ""
 
     @property
@@ -126,10 +131,8 @@ class Item:
     def with_decisions(self, decided: Mapping[str, Override]) -> Item:
         """Return it as the list shows it with these decisions, which its result may not have yet."""
         changed = {}
-        for name, one in self.lines.items():
-            now = decided.get(name)
-            if (now is not None) == ("decided" in one.kinds):
-                continue
+        for name in (self.decided ^ decided.keys()) & self.lines.keys():
+            one, now = self.lines[name], decided.get(name)
             kinds = one.kinds - {"open", "decided", "changed"} | ({"decided"} if now else set())
             kinds |= {"open"} if one.waits and not now else set()
             changed[name] = replace(one, kinds=kinds, author=now.author if now else "")
@@ -179,7 +182,7 @@ class Submissions:
 
     def _item(self, key: str, one: BatchFolder) -> Item:
         run = one.run
-        made_of = (stamp_of(self.path / key / RESULT), run.entries, run.faults, run.rubric)
+        made_of = (stamp_of(f"{self.path}/{key}/{RESULT}"), run.entries, run.faults, run.rubric)
         with self._lock:
             found = self._items.get(key)
         if found is None or found[0] != made_of:
@@ -223,6 +226,7 @@ def item_of(row: Row) -> Item:
         late=result.late is not None and result.late.late_s > 0,
         gradable=kind not in {MISSING, ROSTER},
         lines=_lines(result),
+        decided=frozenset(override.criterion for override in result.overrides),
     )
 
 
@@ -246,15 +250,17 @@ def _lines(result: GradingResult) -> dict[str, Line]:
         }
         automatic = by.automatic if by else criterion
         said = line(automatic.message, SAID_CHARS)
+        waits = automatic.status.is_open and criterion.counts
+        is_lost_or_waits = automatic.status.is_lost or waits
         found[criterion.id] = Line(
             status=criterion.status,
             points=criterion.points,
             full=criterion.full,
             kinds=frozenset(kind for kind, holds in kinds.items() if holds),
-            diagnosis=_diagnosis(said) if automatic.status.is_lost else "",
+            diagnosis=f"{automatic.status.value}: {_diagnosis(said)}" if is_lost_or_waits else "",
             said=said,
             author=by.author if by else "",
-            waits=automatic.status.is_open and criterion.counts,
+            waits=waits,
         )
     return found
 
@@ -270,10 +276,10 @@ def _kinds(result: GradingResult, waiting: dict[Status, int]) -> frozenset[str]:
     return frozenset(kind for kind, holds in found.items() if holds)
 
 
-def stamp_of(path: Path) -> Stamp:
+def stamp_of(path: Path | str) -> Stamp:
     """Another one once the file is another one; None where there is none."""
     try:
-        found = path.stat()
+        found = os.stat(path)  # noqa: PTH116 - a thousand paths for each page
     except OSError:
         return None
     return found.st_mtime_ns, found.st_size, found.st_ino
@@ -281,6 +287,8 @@ def stamp_of(path: Path) -> Stamp:
 
 WORDS_CHARS = 100
 SAID_CHARS = 300
+PAGE = 100
+"""Rows of one page of the list; a browser takes longer to lay out a thousand than anybody wants to wait."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -289,6 +297,7 @@ class Navigation:
 
     `before` and `after` are the addresses of the neighbours of the submission one is at, empty where there is none; it
     need not be shown itself, as it may have left the filter by what was decided. `position` counts from 1, 0 for that.
+    `page` counts from 1 too: the one that is asked for, or the one on which the submission is.
     """
 
     kind: str
@@ -300,6 +309,22 @@ class Navigation:
     before: str = ""
     after: str = ""
     position: int = 0
+    page: int = 1
+
+    @property
+    def pages(self) -> int:
+        """How many pages the list has."""
+        return _pages(self.shown)
+
+    @property
+    def first(self) -> int:
+        """The place of the page's first row in the whole list, counted from 0."""
+        return (self.page - 1) * PAGE
+
+    @property
+    def rows(self) -> Sequence[Item]:
+        """The submissions of the page."""
+        return self.shown[self.first : self.first + PAGE]
 
     @property
     def kept(self) -> dict[str, Any]:
@@ -326,17 +351,27 @@ def place_of(items: Sequence[Item], asked: Mapping[str, str], *, at: str = "") -
     ahead = {item.key for item in items[:here]} if here > 0 else set()
     left = [item.address for item in shown if item.key in ahead]
     right = [item.address for item in shown if item.key not in ahead and item.key != at]
+    page = len(left) // PAGE + 1 if here >= 0 else _page_asked(asked.get("page", ""))
     return Navigation(
         kind=kind,
         q=q,
         criterion=criterion,
         shown=shown,
-        counts={name: sum(name in item.kinds_of(criterion) for item in items) for name in filters},
+        counts=Counter(kind for item in items for kind in item.kinds_of(criterion)),
         total=len(items),
         before=left[-1] if left else "",
         after=right[0] if right else "",
         position=len(left) + 1 if any(item.key == at for item in shown) else 0,
+        page=min(page, _pages(shown)),
     )
+
+
+def _pages(shown: Sequence[Item]) -> int:
+    return max(1, -(-len(shown) // PAGE))
+
+
+def _page_asked(text: str) -> int:
+    return max(1, int(text)) if re.fullmatch(r"[0-9]{1,6}", text) else 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -352,20 +387,29 @@ class Across:
 
 def across(items: Sequence[Item], criteria: Iterable[tuple[str, str]]) -> list[Across]:
     """Return this of each of these criteria (id, title), those with most open ones first."""
-    found = []
-    for name, title in criteria:
-        kinds = [(item.address, item.kinds_of(name)) for item in items]
-        counts = {kind: sum(kind in those for _, those in kinds) for kind in FILTERS_OF_ONE}
-        first = next((address for address, those in kinds if "open" in those), "")
-        found.append(Across(id=name, title=title, counts=counts, first=first))
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
+    first: dict[str, str] = {}
+    for item in items:
+        for name, one in item.lines.items():
+            counts[name].update(one.kinds)
+            if "open" in one.kinds:
+                first.setdefault(name, item.address)
+    found = [
+        Across(id=name, title=title, counts=counts[name], first=first.get(name, ""))
+        for name, title in criteria
+    ]
     return sorted(found, key=lambda one: -one.counts["open"])
 
 
-def alike(items: Iterable[Item], criterion: str, diagnosis: str) -> list[Item]:
-    """Return those with that diagnosis of the criterion that no one has decided and that are open or lost."""
+def alike(items: Iterable[Item], criterion: str, to: Item) -> list[Item]:
+    """Return that submission, and all others whose check said the same of the criterion and that no one has decided.
+    None where the check itself awards the points."""
+    diagnosis = to.lines[criterion].diagnosis if criterion in to.lines else ""
+    if not diagnosis:
+        return []
     lines = ((item, item.lines.get(criterion)) for item in items)
     return [
         item
         for item, one in lines
-        if one and one.diagnosis == diagnosis and one.kinds & {"open", "lost"} and "decided" not in one.kinds
+        if one and one.diagnosis == diagnosis and ("decided" not in one.kinds or item.key == to.key)
     ]

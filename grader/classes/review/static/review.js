@@ -88,14 +88,12 @@ window.addEventListener("beforeunload", (event) => {
 
 const step = (by) => {
   const rows = [...document.querySelectorAll("a.row")];
-  if (rows.length) {
-    const at = rows.indexOf(document.activeElement);
-    const to = rows[at < 0 ? 0 : Math.min(Math.max(at + by, 0), rows.length - 1)];
-    to.focus();
-    return;
-  }
+  const at = rows.indexOf(document.activeElement);
+  const to = rows[at < 0 ? 0 : at + by];
   const link = document.getElementById(by > 0 ? "after" : "before");
-  if (link) link.click();
+  if (to) to.focus();
+  else if (rows.length && link) window.location.assign(link.href + (by > 0 ? "#first" : "#last"));
+  else if (link) link.click();
 };
 
 const STEPS = { j: 1, ArrowRight: 1, k: -1, ArrowLeft: -1 };
@@ -135,6 +133,8 @@ document.querySelectorAll("form.decide").forEach((form) => {
   form.dataset.at = written(form);
   if (typed(form) !== form.dataset.at) look(form); // typed before this script came
 });
+const edge = { "#first": 0, "#last": -1 }[window.location.hash];
+if (edge !== undefined) [...document.querySelectorAll("a.row")].at(edge)?.focus();
 document.getElementById("anew")?.addEventListener("click", (event) => {
   event.target.hidden = true;
   const frame = document.getElementById("report");
