@@ -24,7 +24,7 @@ from grader.report.sentences import (
     without_sandbox,
 )
 from grader.report.text import line, markdown, markdown_block, markdown_code
-from grader.report.view import Loss, arrange, not_graded, places, pointed_at, points_of
+from grader.report.view import Loss, arrange, commands_in, not_graded, places, pointed_at, points_of
 from grader.rubric.model import Rubric
 from grader.wording import number
 
@@ -197,7 +197,11 @@ class _Writer:
         rows = {"Measured": criterion.measured, "Expected": criterion.expected, "Hint": criterion.hint}
         yield from (f"- {name}: {self._text(value)}" for name, value in rows.items() if value)
         if criterion.reproduce:
-            yield f"- See it yourself: {self._code(criterion.reproduce)}"
+            shown = (
+                self._code(text) if is_command else self._text(text)
+                for text, is_command in commands_in(criterion.reproduce)
+            )
+            yield f"- See it yourself: {' '.join(shown)}"
         if criterion.citations:
             yield f"- Where: {', '.join(self._code(cited) for cited in places(criterion))}"
 

@@ -364,10 +364,12 @@ def in_short(result: GradingResult, view: ReportView) -> str:
         return "You lost nothing: every criterion that counts is met. Well done!"
     said = [] if late > 0 or result.gate else ["You lost nothing."]
     if lost > 0:
-        costs = "costs" if len(view.lost) == 1 else "cost"
-        said = [f"{plural(len(view.lost), 'thing')} {costs} you {count_points(lost)}."]
+        one = len(view.lost) == 1
+        said = [
+            f"{'One mistake costs' if one else f'{len(view.lost)} mistakes cost'} you {count_points(lost)}."
+        ]
     if len(view.lost) > 1:
-        said.append(f"The first one alone is worth {count_points(view.lost[0].points)}.")
+        said.append(f"The first one alone costs {count_points(view.lost[0].points)}.")
     if result.gate:
         cost = result.gate.points_before - result.gate.at_most
         said.append(f"Without {result.gate.criterion}, {count_points(cost)} do not count.")

@@ -29,6 +29,7 @@ from grader.report.view import (
     ReportView,
     arrange,
     file_places,
+    hint_beside,
     not_graded,
     pointed_at,
     points_of,
@@ -214,7 +215,7 @@ class Terminal:
         alike = {a.id for a in loss.alike}
         rows = [
             ("expected", "" if code else c.expected),
-            ("fix", without_place(c.hint, place)),
+            ("fix", hint_beside(c, place)),
             ("also at", ", ".join(others)),
             ("see", c.reproduce),
             ("also costs", ", ".join(f"{a.id} {self._cost(a)}" for a in loss.alike)),

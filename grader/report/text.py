@@ -16,13 +16,14 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 
 from grader.untrusted_text import clip, json_text, line, text_limit, visible, without_ci_commands
 
 __all__ = [
     "clip",
+    "code_parts",
     "csv_cell",
     "csv_text",
     "html",
@@ -157,6 +158,40 @@ def _escape_line_start(shown: str) -> str:
     if _FIRST.match(shown):
         return f"\\{shown}"
     return _NUMBERED.sub(r"\1\\\2", shown, count=1) if _NUMBERED.match(shown) else shown
+
+
+_TEXT_ARGUMENTS = r"(?:[^()`]|\((?:[^()`]|\([^()`]*\))*\)){0,200}"
+_CODE = re.compile(
+    rf"""
+      `(?P<marked>[^`]+)`
+    | (?P<found>
+        </?[A-Za-z][^<>`]*>(?!')                            # a tag
+      | \#!/[\w/.-]+(?:\ [\w.]+)?                         # the first line of a script
+      | (?<![\w./])(?:[\w.]+\ [-+*/%]?=\ )?\w[\w.]*\((?!s\)|es\)){_TEXT_ARGUMENTS}\)(?:\.\w+(?:\({_TEXT_ARGUMENTS}\))?)*
+      | (?<![\w./~>])~?/?(?<=[~/])[A-Za-z]\w*(?:/\w+)*/?      # a topic, a path
+      | \$\{{\w+\}}\)*
+      | (?<![\w./-])[\w./-]*\w\.(?:py|launch|xml|ya?ml|txt|msg|srv|action|cpp|h|hpp|sh|bag|test|csv)(?![\w(/])
+      | (?<![\w./])[a-z]\w*/[A-Z]\w*(?![\w/])              # a type: std_msgs/Int8
+      | (?<![\w./@-])(?:[A-Za-z]\w*\.)+[A-Za-z_]\w*(?<!e\.g)(?<!i\.e)(?![\w(/])
+      | (?<![\w./])\w*[^\W\d]_\w+(?![\w/])
+      | \bfrom\ [\w.]+\ import\ \w+
+      )
+    """,
+    re.VERBOSE,
+)
+
+
+def code_parts(text: str) -> Iterator[tuple[str, bool]]:
+    """Yield the text in pieces, and of each whether it is code: what stands between backticks, which are left out, and
+    what shows by itself that it is: a call, a tag, a name of ROS's, a file."""
+    end = 0
+    for found in _CODE.finditer(text):
+        if found.start() > end:
+            yield text[end : found.start()], False
+        yield found["marked"] or found["found"], True
+        end = found.end()
+    if end < len(text):
+        yield text[end:], False
 
 
 CELL_CHARS = 2000

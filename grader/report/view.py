@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from unicodedata import east_asian_width
@@ -185,6 +185,28 @@ def file_places(criterion: CriterionResult) -> list[str]:
     return [clip(_place(citation), PLACE_CHARS) for citation in cited]
 
 
+def hint_beside(criterion: CriterionResult, place: str) -> str:
+    """Return the hint as it stands beside the line of code at `place`: the line is named, its file is not."""
+    hint = criterion.hint
+    file, _, number = place.rpartition(":")
+    if file:
+        hint = re.sub(
+            rf"(?:(?<=; )|^){re.escape(file)},? line (\d+): (?!.*\bline \1\b)",
+            r"in line \1, ",
+            hint,
+            flags=re.DOTALL,
+        )
+    told = without_place(hint, place)
+    whole = len(file_places(criterion)) == 1 and "line" not in told and WHOLE_LINE.match(told)
+    return f"in line {number}, {told}" if file and whole else told
+
+
+WHOLE_LINE = re.compile(
+    r"write (?!.*( at | above| below| before| after| inside| every| each))(?=\S)", re.DOTALL
+)
+"""A hint that says what to write, and not where."""
+
+
 def without_place(text: str, place: str) -> str:
     """Return what is said of a place (`src/talker.py:17`) that stands beside it, without naming its file again."""
     file, _, number = place.rpartition(":")
@@ -194,6 +216,72 @@ def without_place(text: str, place: str) -> str:
     text = next((text.removeprefix(one) for one in beginnings if text.startswith(one)), text)
     text = text.replace(f" ({file}, line {number})", "").replace(f"line {number} of {file}", f"line {number}")
     return text.replace(f"{file}, line {number}", f"line {number}")
+
+
+HEADLINE_CHARS = 110
+STOPS = re.compile(r"; |(?<!Error)(?<!Exception)(?<!failed): (?!')")
+LAST_BRACKET = re.compile(r" \((?=[a-z]+ [^()]*\)$)")
+"""Where a message may go on with what is less important."""
+
+
+def headline(text: str, chars: int = HEADLINE_CHARS) -> tuple[str, str]:
+    """Return what a message says first, and the rest of a long one: what follows its last stop that leaves no more than
+    `chars`. A message without one is a headline as a whole."""
+    if len(text) <= chars:
+        return text, ""
+    stops = [at for at in _outside(text, STOPS) if HEADLINE_LEAST <= at.start() <= chars]
+    if text.endswith(")"):
+        stops += [at for at in _outside(text, LAST_BRACKET) if HEADLINE_LEAST <= at.start() <= chars]
+    best = max(stops, key=lambda at: (at[0] == "; ", at.start()), default=None)
+    if best is None:
+        return text, ""
+    return text[: best.start()], text[best.end() :].removesuffix(")" if best[0] == " (" else "")
+
+
+HEADLINE_LEAST = 20
+STEPS = re.compile(r"; (?:and )?(?:then )?")
+ORDERS = re.compile(
+    r"""(\S+\ line\ \d+:\ |in\ line\ \d+,\ |first\ )?
+    (add|begin|call|change|check|chmod|correct|create|declare|delete|dos2unix|end|fill|fix|git|give|hand|indent|install|keep|let
+    |list|look|make|move|name|open|pass|print|publish|put|remove|rename|replace|run|send|set|start|stop|subscribe|take|try|use|write)\b
+    """,
+    re.VERBOSE,
+)
+
+
+def steps(hint: str) -> list[str]:
+    """Return what a hint tells to do, one thing after the other; a hint that tells one thing is its only one."""
+    ends = list(_outside(hint, STEPS))
+    begins = [0, *(at.end() for at in ends)]
+    found = [hint[a:b] for a, b in zip(begins, [*(at.start() for at in ends), len(hint)], strict=True)]
+    return found if all(map(ORDERS.match, found)) else [hint]
+
+
+def _outside(text: str, wanted: re.Pattern[str]) -> Iterator[re.Match[str]]:
+    """Yield where it is found outside of brackets, quotes and code."""
+    depth, quoted = 0, ""
+    for i, letter in enumerate(text):
+        if not quoted and not depth and (found := wanted.match(text, i)):
+            yield found
+        if quoted:
+            quoted = "" if letter == quoted else quoted
+        elif letter in '`"' or (letter == "'" and not text[i - 1 : i].isalnum()):
+            quoted = letter
+        else:
+            depth = max(0, depth + (letter in "([{<") - (letter in ")]}>"))
+
+
+def commands_in(reproduce: str) -> Iterator[tuple[str, bool]]:
+    """Yield what shows a loss in pieces, and of each whether it is a command. A text without any between backticks is
+    one command."""
+    parts = COMMAND.split(reproduce)
+    alone = len(parts) == 1
+    for i, part in enumerate(parts):
+        if part.strip():
+            yield part.strip(), alone or i % 2 == 1
+
+
+COMMAND = re.compile(r"(?<!`)`([^`]+)`(?!`)")
 
 
 STARTS = re.compile(

@@ -57,7 +57,7 @@ class Criterion(Record):
     hint: str = ""
     """What to do, in place of the check's own hint."""
     reproduce: str = ""
-    """A command with which students can see it themselves."""
+    """A command with which students can see it themselves, or a sentence with its commands between backticks."""
 
     @property
     def extra(self) -> float:

@@ -16,7 +16,7 @@ from grader.report.html.page import render_html
 from tests.browser.conftest import DESKTOP, PHONE
 from tests.browser.test_class_page import LOOKS
 from tests.report.hostile import ESCAPES, result, rubric
-from tests.report.html.made import SCRIPT, counter, figures, graph, heard, hostile_figures, rate
+from tests.report.html.made import SCRIPT, code, counter, figures, graph, heard, hostile_figures, rate
 from tests.report.nasty import STEERING
 from tests.report.test_every_report import of, spoiled
 
@@ -68,7 +68,42 @@ def test_points_and_what_was_lost_are_what_one_sees_first(visit, written, size) 
     page = visit(written, size=size)
     assert page.locator("#points").bounding_box()["y"] < size.height / 2
     lost = page.locator("article[data-status=fail], article[data-status=partial]").first
-    assert lost.bounding_box()["y"] < 1.5 * size.height
+    assert lost.locator(".message").bounding_box()["y"] < 0.6 * size.height
+
+
+def test_what_is_cut_off_shows_that_it_scrolls_and_is_reached_by_keys(visit, written) -> None:
+    page = opened(visit(written, size=PHONE))
+    cut = page.locator(".scroll").evaluate_all(
+        """all => all.filter((one) => one.scrollWidth > one.clientWidth).map((one) => [
+            one.tabIndex, getComputedStyle(one).backgroundAttachment.split(", ").slice(0, 4).join(" "),
+            [...one.querySelectorAll("svg.plot, table")].map((in_it) => getComputedStyle(in_it).backgroundColor)])"""
+    )
+    assert cut, "a phone is too narrow for some of it"
+    for tab, attached, above in cut:
+        assert tab == 0
+        assert attached == "local local scroll scroll", "shadows at the edge behind which there is more"
+        assert set(above) <= {"rgba(0, 0, 0, 0)"}, "nothing hides them"
+
+
+def test_the_rate_and_a_short_graph_fit_a_phone(visit, written) -> None:
+    page = opened(visit(written, size=PHONE))
+    for kind in ("rate", "graph"):
+        plot = page.locator(f"[data-figure={kind}] .scroll:has(svg)").first
+        assert plot.evaluate("one => one.scrollWidth <= one.clientWidth"), kind
+
+
+def test_a_wrapped_line_of_code_keeps_its_indentation(visit, tmp_path) -> None:
+    line = "        publisher.publish(some_message, " + "and_another, " * 5 + ")"
+    shown = figures().model_copy(update={"by_criterion": {"chatter-rate": (code(lines=("x", line, "y")),)}})
+    path = tmp_path / "report.html"
+    path.write_text(render_html(result(), rubric(), shown), encoding="utf-8")
+    shown = visit(path, size=PHONE).locator("[data-figure=code]").first
+    marked, number = shown.locator("mark"), shown.locator(".marked .ln").bounding_box()
+    lefts = marked.evaluate("one => [...one.getClientRects()].map((line) => Math.round(line.left))")
+    assert marked.bounding_box()["height"] > 1.5 * shown.locator(".row").last.bounding_box()["height"], (
+        "it is wrapped"
+    )
+    assert min(lefts) - number["x"] - number["width"] > 40
 
 
 def test_the_rate_has_a_dot_for_each_gap_its_band_and_the_gaps_histogram(shown) -> None:
@@ -120,7 +155,10 @@ def test_the_console_has_its_lines_with_times(shown) -> None:
 def test_the_cited_line_is_marked_among_those_around_it(shown) -> None:
     code = shown.locator("[data-figure=code]").first
     assert code.locator("pre .row").count() == 3
-    assert code.locator("mark").all_inner_texts() == ["    rate.sleep"]
+    assert code.locator("mark").all_inner_texts() == ["rate.sleep"]
+    assert code.locator(".row").nth(1).locator("> span").nth(1).text_content() == "    ", (
+        "indented as in the file"
+    )
     rows = [row.bounding_box() for row in code.locator("pre .row").all()]
     assert [row["y"] for row in rows] == sorted({row["y"] for row in rows}), "each line below the one before"
     assert {round(after["y"] - before["y"] - before["height"]) for before, after in pairwise(rows)} == {0}

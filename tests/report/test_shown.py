@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.model.verdict import FileCitation
-from grader.report.text import markdown_block
-from grader.report.view import caret
+from grader.report.text import code_parts, markdown_block
+from grader.report.view import caret, commands_in, headline, hint_beside, steps
 from grader.untrusted_text import (
     HIDDEN_CATEGORIES,
     clip,
@@ -23,7 +23,96 @@ from grader.untrusted_text import (
     visible,
     without_ci_commands,
 )
+from tests.report.hostile import result
 from tests.report.nasty import ANY_TEXT, STEERING, TEXTS
+
+FLOOD = "`/chatter` runs at about 5,500 Hz instead of 10 Hz; the loop does not sleep (src/talker.py, line 14)"
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("write rate.sleep() in the loop", ["rate.sleep()"]),
+        ("rate = rospy.Rate(10) before it", ["rate = rospy.Rate(10)"]),
+        (
+            "use rospy.Publisher('/chatter', String, queue_size=10)",
+            ["rospy.Publisher('/chatter', String, queue_size=10)"],
+        ),
+        (
+            'write <node pkg="lab1" type="talker.py" name="t"/>; then build',
+            ['<node pkg="lab1" type="talker.py" name="t"/>'],
+        ),
+        ("/chatter carries std_msgs/String", ["/chatter", "std_msgs/String"]),
+        ("a `:` of src/talker.py", [":", "src/talker.py"]),
+        ("write #!/usr/bin/env python3 first", ["#!/usr/bin/env python3"]),
+        ("5 of 10, and/or 3/4, e.g. ada@york.ac.uk: it's 'hello world <seconds>'", []),
+        ("the test(s) of the first node; 2.5 s, i.e. late", []),
+    ],
+)
+def test_code_in_a_sentence_is_found(text, code) -> None:
+    parts = list(code_parts(text))
+    assert [part for part, is_code in parts if is_code] == code
+    assert "".join(part for part, _ in parts) == text.replace("`", "")
+
+
+@given(ANY_TEXT)
+def test_no_text_is_lost_by_looking_for_code(text) -> None:
+    assert "".join(part for part, _ in code_parts(text)).replace("`", "") == text.replace("`", "")
+
+
+def test_a_long_message_says_the_verdict_first() -> None:
+    assert headline(FLOOD) == (FLOOD, "")
+    first, rest = headline(f"{FLOOD}; rosrun answers: nothing at all")
+    assert (first, rest) == (FLOOD, "rosrun answers: nothing at all")
+    long = "it ends with NameError: name 'mgs; not' is not defined " + "x" * 100
+    assert headline(long) == (long, "")
+
+
+def test_a_fix_with_several_steps_is_told_step_by_step() -> None:
+    assert steps('line 2: write <a b="; c">') == ['line 2: write <a b="; c">']
+    assert steps("src/a.py line 2: write f(1; 2); then add g()") == [
+        "src/a.py line 2: write f(1; 2)",
+        "add g()",
+    ]
+    assert steps("it is late; grade it") == ["it is late; grade it"], "a reason is no step"
+
+
+@pytest.mark.parametrize(
+    ("hint", "shown"),
+    [
+        ("src/a.py line 3: write f()", "in line 3, write f()"),
+        ("src/a.py line 3: indent line 3 by four spaces", "indent line 3 by four spaces"),
+        ("write f()", "in line 3, write f()"),
+        ("write f() after the loop", "write f() after the loop"),
+        (
+            "src/a.py line 3: write f(); src/b.py line 4: write g()",
+            "in line 3, write f(); src/b.py line 4: write g()",
+        ),
+    ],
+)
+def test_a_fix_says_in_which_line(hint, shown) -> None:
+    criterion = (
+        result()
+        .criteria[0]
+        .model_copy(update={"hint": hint, "citations": (FileCitation(file="src/a.py", line=3),)})
+    )
+    assert hint_beside(criterion, "src/a.py:3") == shown
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("rostopic hz /chatter", [("rostopic hz /chatter", True)]),
+        (
+            "In two terminals: `rosrun a b` Then: `rosnode list`",
+            [("In two terminals:", False), ("rosrun a b", True), ("Then:", False), ("rosnode list", True)],
+        ),
+        ("", []),
+    ],
+)
+def test_commands_are_told_from_the_sentence_around_them(text, parts) -> None:
+    assert list(commands_in(text)) == parts
+
 
 TO_A_CI = re.compile(r"^\s*::|##[A-Za-z]*\[", re.MULTILINE)
 

@@ -210,6 +210,7 @@ def _code(figure: CodeFigure, name: str) -> Drawn:
             (
                 number,
                 number in figure.marked,
+                text[: len(text) - len(text.lstrip())],
                 _parts(text, figure.columns.get(number), figure.ends.get(number)),
             )
             for number, text in enumerate(figure.lines, start=figure.first_line)
@@ -218,14 +219,15 @@ def _code(figure: CodeFigure, name: str) -> Drawn:
 
 
 def _parts(text: str, column: int | None, end: int | None) -> tuple[str, str, str]:
-    """Return what stands before the place that is meant, that itself, and the rest; all is the rest where no place is
-    known."""
-    if column is None or column < 1:
-        return "", "", text
+    """Return what stands between the indentation and the place that is meant, that itself, and the rest; all is the
+    rest where no place is known."""
+    indent = len(text) - len(text.lstrip())
+    if column is None or column <= indent:
+        return "", "", text[indent:]
     begin = column - 1
     word = re.compile(r"\w+").match(text, begin)
     at_end = end - 1 if end and end > column else word.end() if word else column
-    return text[:begin], text[begin:at_end], text[at_end:]
+    return text[indent:begin], text[begin:at_end], text[at_end:]
 
 
 def _path(figure: PathFigure, name: str) -> Drawn:

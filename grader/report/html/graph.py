@@ -14,7 +14,7 @@ from grader.report.html.svg import drawing, element, text
 from grader.wording import shorten
 
 MOST = 40
-HEIGHT, ROW, COLUMN_GAP, EDGE = 44.0, 66.0, 56.0, 14.0
+HEIGHT, ROW, COLUMN_GAP, EDGE = 44.0, 66.0, 40.0, 8.0
 LETTER, SMALL_LETTER = 8.2, 6.6
 NAME_CHARS = 32
 Place = tuple[float, float, float]

@@ -32,12 +32,16 @@ from grader.report.view import (
     Loss,
     ReportView,
     arrange,
+    commands_in,
     file_places,
+    headline,
     hidden_ids,
+    hint_beside,
     not_graded,
     places,
     points_of,
     sentence,
+    steps,
     without_place,
 )
 from grader.rubric.model import Rubric
@@ -175,9 +179,9 @@ def _bar_words(result: GradingResult) -> str:
 def _sections(result: GradingResult, page: Page) -> Iterator[tuple[str, str]]:
     """The ids of the page's parts, and what they are called in its list of parts."""
     if page.lost:
-        yield "lost", f"What you lost ({len(page.lost)})"
+        yield "lost", f"To fix ({len(page.lost)})"
     if page.open:
-        yield "open", f"Still open ({len(page.open)})"
+        yield "open", f"Open ({len(page.open)})"
     if page.advice:
         yield "advice", "Advice"
     if result.notes:
@@ -187,7 +191,7 @@ def _sections(result: GradingResult, page: Page) -> Iterator[tuple[str, str]]:
     yield "all", "All criteria"
     if page.ran:
         yield "ran", "What ran"
-    yield "about", "About this report"
+    yield "about", "About"
 
 
 T = TypeVar("T")
@@ -223,13 +227,16 @@ DETAILS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Card:
-    """One criterion. `anchor` is its id on the page. `lost` says what it cost, with what it holds back; `advice` is the
-    title of its hint. `code` are the lines that it cites, `figures` what was measured, the most telling first.
+    """One criterion. `anchor` is its id on the page. `message` is what it says first and `rest` what else. `lost` says
+    what it cost, with what it holds back; `advice` is the title of its hint, which has steps. `seen` is how to see it:
+    texts, and which of them are commands. `code` are the lines that it cites, `figures` what was measured, the most
+    telling first.
     `repaired` were judged with its fault repaired."""
 
     anchor: str
     criterion: CriterionResult
     message: str
+    rest: str
     hidden: bool
     advice: str
     sign: str
@@ -239,7 +246,8 @@ class Card:
     why: Markup = NOTHING
     how: Markup = NOTHING
     fix: Markup = NOTHING
-    hint: Markup = NOTHING
+    hint: Sequence[Markup] = ()
+    seen: Sequence[tuple[str, bool]] = ()
     where: Sequence[str] = ()
     code: Sequence[Drawn] = ()
     figures: Sequence[Drawn] = ()
@@ -345,13 +353,18 @@ class Maker:
         drawn = [self._drawer.draw(figure) for figure in own]
         code = [figure for figure in drawn if figure.kind == "code"]
         place = next(iter(file_places(criterion)), "") if code else ""
+        message, rest = headline(without_place(criterion.message, place))
         return replace(
             self._short(criterion),
-            message=sentence(without_place(criterion.message, place)),
+            message=sentence(message),
+            rest=sentence(rest),
             why=self._prose(docs.get(MATTERS, "")),
             how=self._prose(docs.get(MEASURED, "")),
             fix=self._prose(docs.get(FIX, "")) if is_own_fault(criterion) else NOTHING,
-            hint=self._prose(sentence(without_place(criterion.hint, place))),
+            hint=[
+                self._prose(sentence(step)) for step in steps(hint_beside(criterion, place)) if criterion.hint
+            ],
+            seen=tuple(commands_in(criterion.reproduce)),
             where=self._where(criterion),
             code=code,
             figures=[figure for figure in drawn if figure.kind != "code"],
@@ -362,6 +375,7 @@ class Maker:
             anchor=self._anchors[criterion.id] if linked else "",
             criterion=criterion,
             message=criterion.message,
+            rest="",
             hidden=criterion.id in self._hidden,
             advice=ADVICE.get(criterion.status, "What to do"),
             sign=SIGNS[criterion.status],

@@ -25,7 +25,7 @@ from grader.report.html.svg import (
 from grader.wording import number, plural
 
 WHOLE = (760.0, 240.0)
-CLOSE = (760.0, 220.0)
+CLOSE = (460.0, 230.0)
 MANY = 40
 AROUND = 6
 LABELS_MAX = 12

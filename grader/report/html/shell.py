@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import re
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -13,12 +12,11 @@ from jinja2 import DictLoader, Environment, StrictUndefined, pass_context
 from jinja2.runtime import Context
 from markupsafe import Markup, escape
 
-from grader.report.text import line
+from grader.report.text import code_parts, line
 from grader.report.view import of_points
 from grader.wording import number
 
 LIMIT = 1000
-CODE = re.compile(r"`([^`]+)`")
 SUFFIX = ".html"
 
 
@@ -81,10 +79,10 @@ def _unindented(text: str) -> str:
 
 
 def prose(text: str) -> Markup:
-    """Return a text with what stands between backticks as code."""
-    parts = CODE.split(text)
+    """Return a text in which what is code is marked as such."""
     return Markup("").join(
-        Markup("<code>{}</code>").format(part) if i % 2 else escape(part) for i, part in enumerate(parts)
+        Markup("<code>{}</code>").format(part) if is_code else escape(part)
+        for part, is_code in code_parts(text)
     )
 
 

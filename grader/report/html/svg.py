@@ -41,6 +41,10 @@ def dots(points: Iterable[tuple[float, float]]) -> str:
     return "".join(f"M{short(x)} {short(y)}h0" for x, y in points)
 
 
+SHRINKS = 0.72
+"""To such a part of its size a drawing shrinks where there is little room; its letters can still be read then."""
+
+
 def drawing(name: str, size: tuple[float, float], title: str, words: str, *children: Markup) -> Markup:
     """Return the whole `<svg>`: an image to those who cannot see it, with its title and what it shows in words.
 
@@ -55,6 +59,7 @@ def drawing(name: str, size: tuple[float, float], title: str, words: str, *child
         viewBox=f"0 0 {short(width)} {short(height)}",
         width=width,
         height=height,
+        style=f"min-width:{short(SHRINKS * width)}px",
         role="img",
         class_="plot",
         aria_labelledby=f"{name}-title {name}-desc",
