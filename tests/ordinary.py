@@ -49,7 +49,7 @@ def grader(folder: Path, *argv: str | Path, limits: str = ":") -> subprocess.Com
     given = [_closed(base), str(base), str(folder), limits, sys.executable, "-m", "grader", *map(str, argv)]
     command = [*ROOM, "sh", "-ec", SETUP.format(uid=UID), "sh", *given]
     return subprocess.run(
-        command, env=env, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, timeout=240
+        command, env=env, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
     )
 
 

@@ -20,7 +20,7 @@ def test_a_pipe_is_written_to_and_stays_a_pipe(tmp_path: Path) -> None:
     reader = threading.Thread(target=lambda: seen.append(pipe.read_bytes()))
     reader.start()
     atomic_write(pipe, b"criteria")
-    reader.join(5)
+    reader.join()
     assert seen == [b"criteria"]
     assert stat.S_ISFIFO(pipe.stat().st_mode)
 

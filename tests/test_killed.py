@@ -62,7 +62,7 @@ def lane(folder: Path, moments_s: list[float]) -> subprocess.Popen[bytes]:
 
 def finished(process: subprocess.Popen[bytes]) -> list[str]:
     try:
-        out, _ = process.communicate(timeout=240)
+        out, _ = process.communicate()
     finally:
         process.kill()
         process.communicate()

@@ -25,7 +25,7 @@ from grader.rubric.load import load_rubric
 
 REFERENCE = Path(__file__).parents[2] / "reference_solutions" / "leeds-comp3631-lab1"
 
-PATIENCE_S = 20.0
+PATIENCE_S = 600.0
 
 
 class Diary:

@@ -23,5 +23,5 @@ def test_no_name_is_needed(tmp_path: Path) -> None:
     outer = ["bwrap", "--dev-bind", "/", "/", "--ro-bind", str(hosts), "/etc/hosts", "--"]
     argv = [sys.executable, "-m", "grader", "grade", str(ROOT / "reference_solutions" / LAB)]
     argv += ["--rubric", LAB, "--out", str(tmp_path / "out")]
-    done = subprocess.run([*outer, *argv], capture_output=True, text=True, check=False, cwd=ROOT, timeout=200)
+    done = subprocess.run([*outer, *argv], capture_output=True, text=True, check=False, cwd=ROOT)
     assert done.returncode == 0, done.stdout + done.stderr

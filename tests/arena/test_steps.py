@@ -168,7 +168,7 @@ FRAMES = (
     NODE
     + "from std_srvs.srv import SetBool, SetBoolResponse\nrospy.init_node('frames')\n"
     + "for topic in ('/tf', '/tf_static'):\n"
-    + "    rospy.Subscriber(topic, rospy.AnyMsg, lambda m, t=topic: print(t, m._buff[0]))\n"
+    + "    rospy.Subscriber(topic, rospy.AnyMsg, lambda m, t=topic: print(f'{t} {m._buff[0]}\\n', end=''))\n"
     + "rospy.Service('turn', SetBool, lambda r: SetBoolResponse(r.data, str(rospy.get_param('/gain'))))\nrospy.spin()\n"
 )
 

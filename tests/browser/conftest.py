@@ -76,7 +76,7 @@ def _visits(browser: Browser, complaints: list[str]) -> Iterator[Visit]:
             accept_downloads=True,
         )
         contexts.append(context)
-        context.set_default_timeout(60_000)
+        context.set_default_timeout(600_000)
         page = context.new_page()
         address = place.absolute().as_uri() if isinstance(place, Path) else place
         _watch(page, address, complaints)

@@ -98,7 +98,6 @@ class Runner:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             check=False,
-            timeout=280,
         )
         steps[step["id"]] = outputs_in(output.read_text(encoding="utf-8"))
         return done.returncode, done.stdout.decode(errors="replace"), summary.read_text(encoding="utf-8")

@@ -57,7 +57,6 @@ class Job:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             check=False,
-            timeout=280,
         )
         self.log += done.stdout.decode(errors="replace")
         return done.returncode

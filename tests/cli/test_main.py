@@ -140,7 +140,7 @@ def test_a_closed_pipe_is_quiet():
 @pytest.mark.full
 def test_closed_streams_do_no_harm():
     done = subprocess.run(
-        ["/bin/bash", "-c", f"{shlex.quote(sys.executable)} -m grader labs >&- 2>&-"], check=False, timeout=60
+        ["/bin/bash", "-c", f"{shlex.quote(sys.executable)} -m grader labs >&- 2>&-"], check=False
     )
     assert done.returncode == 0
 
@@ -318,6 +318,6 @@ def test_an_interrupt_while_the_program_loads_is_quiet(delay_s, tmp_path):
         with suppress(subprocess.TimeoutExpired):
             child.wait(delay_s)
         child.send_signal(signal.SIGINT)
-        _, stderr = child.communicate(timeout=120)
+        _, stderr = child.communicate()
     assert child.returncode in {130, 2}
     assert b"Traceback" not in stderr

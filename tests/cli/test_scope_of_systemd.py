@@ -16,8 +16,8 @@ import pytest
 MANAGER = Path("/usr/lib/systemd/systemd")
 HIERARCHIES = (Path("/sys/fs/cgroup/unified"), Path("/sys/fs/cgroup/systemd"))
 ROOM = ["unshare", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc", "--propagation", "private"]
-GONE_S = 10.0
-READY_S = 10.0
+GONE_S = 300.0
+READY_S = 300.0
 
 SCRIPT = """
 set -e
@@ -91,7 +91,6 @@ def test_systemd_gives_the_scope_that_is_asked_for(groups: list[Path]) -> None:
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
     )
     assert done.returncode == 0, done.stderr
     scope, belongs, leaf = done.stdout.splitlines()

@@ -16,7 +16,7 @@ from distributed.security import Security
 
 DASK = (sys.executable, "-m", "dask")
 ROOT = Path(__file__).resolve().parents[2]
-PATIENCE_S = 60.0
+PATIENCE_S = 600.0
 
 
 class Cluster:

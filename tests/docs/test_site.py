@@ -36,7 +36,6 @@ def build_site(repository: Path, site: Path) -> subprocess.CompletedProcess[str]
         capture_output=True,
         text=True,
         check=False,
-        timeout=120,
     )
 
 

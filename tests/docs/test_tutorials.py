@@ -39,7 +39,6 @@ def _done(*words: str | Path, folder: Path, environment: Mapping[str, str] | Non
         capture_output=True,
         text=True,
         check=False,
-        timeout=280,
     )
     assert done.returncode == 0, f"{words}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
     return done.stdout

@@ -126,7 +126,7 @@ def test_the_command_overwrites_only_what_was_named(tmp_path, monkeypatch, capsy
 
 def read_by_ros(path: Path) -> dict:
     done = subprocess.run(
-        ["/usr/bin/python3", "-c", READ, str(path)], capture_output=True, text=True, check=True, timeout=60
+        ["/usr/bin/python3", "-c", READ, str(path)], capture_output=True, text=True, check=True
     )
     assert done.stderr == ""
     return json.loads(done.stdout)
@@ -161,7 +161,6 @@ def test_rosbag_info_describes_an_exported_bag(tmp_path):
         capture_output=True,
         text=True,
         check=True,
-        timeout=60,
     )
     assert info.stderr == ""
     assert "messages:    301" in info.stdout

@@ -24,7 +24,6 @@ def git(folder: Path, *args: str) -> str:
         check=True,
         capture_output=True,
         text=True,
-        timeout=60,
     )
     return done.stdout.strip()
 
@@ -187,7 +186,6 @@ class _Handler(BaseHTTPRequestHandler):
             env=environment,
             capture_output=True,
             check=False,
-            timeout=60,
         )
         head, _, body = done.stdout.partition(b"\r\n\r\n")
         headers = dict(line.split(": ", 1) for line in head.decode().splitlines())

@@ -293,7 +293,7 @@ def test_mirrors_are_fetched_ahead(server, monkeypatch):
     since = time.time()
     log = fetches(server, monkeypatch)
     with prefetch(iter(entries), threads=3, fetched_since=since, patience=AT_ONCE) as ahead:
-        assert ahead.wait(60)
+        assert ahead.wait(600)
         assert (ahead.fetched, ahead.failed) == (4, 5)
         assert log.read_text().split().count("fetch") == 3
         log.write_text("")

@@ -162,7 +162,7 @@ def test_tests_that_take_too_long_end_with_what_they_started(tmp_path):
     criteria = TESTS.replace("test_lab.py", "test_lab.py, timeout_s: 10")
     assert broken(tmp_path, text, criteria) == "the tests took longer than 10 s"
     started = Path("/proc", (tmp_path / "pid").read_text(), "cmdline")
-    deadline = time.monotonic() + 5
+    deadline = time.monotonic() + 300
     while runs_on(started) and time.monotonic() < deadline:
         os.sched_yield()
     assert not runs_on(started)

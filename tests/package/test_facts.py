@@ -94,7 +94,6 @@ def test_cmake_says_what_it_was_told(tmp_path, stops):
         env={**os.environ, "PATH": "/usr/bin:/bin"},
         capture_output=True,
         check=not stops,
-        timeout=120,
     )
     static = read_package(package)
     facts = with_build_facts(static, cmake_trace=trace)

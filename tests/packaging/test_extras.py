@@ -72,5 +72,5 @@ def test_a_class_is_looked_at(complete: Installed, folder: Path):
             page = answer.read().decode()
     finally:
         server.send_signal(signal.SIGINT)
-        server.communicate(timeout=30)
+        server.communicate()
     assert all(name in page for name in NAMES)

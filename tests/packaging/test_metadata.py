@@ -18,9 +18,7 @@ CHECKS = {
 
 
 def check(*command: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [str(word) for word in command], capture_output=True, text=True, check=False, timeout=60
-    )
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
 
 
 def spoiled(wheel: Path, folder: Path, *, without: str = "\n", more: str = "") -> Path:

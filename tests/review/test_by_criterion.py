@@ -66,7 +66,7 @@ def test_many_reports_are_written_by_other_processes(page, review, out, monkeypa
     monkeypatch.setattr("grader.classes.review.session.FEW", 0)
     form = page.form("ada", "style", "/s/ada/?c=style")
     page.client.post("/s/ada/c/style", data={**form, "points": "7", "comment": "All alike", "do": "alike"})
-    assert review.background.wait(60)
+    assert review.background.wait(600)
     assert review.left() == 0
     for name in ("ada", "dana", "eve"):
         assert "All alike" in (out / name / "report.html").read_text()

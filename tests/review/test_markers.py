@@ -55,7 +55,7 @@ def test_markers_who_begin_at_once_have_different_shares(tmp_path) -> None:
     for process in processes:
         process.start()
     for process in processes:
-        process.join(60)
+        process.join()
     assert {share_of(tmp_path, name, "3", None).number for name in names} == {0, 1, 2}
 
 

@@ -19,7 +19,7 @@ import pytest
 from tests.watching.labs import copy_of, write
 
 LEEDS = "leeds-comp3631-lab1"
-LONG_S = 200.0
+LONG_S = 900.0
 GIT = shutil.which("git") or "git"
 
 

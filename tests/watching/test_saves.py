@@ -16,7 +16,7 @@ from grader.student.watching import Saves, changed_files, is_ignored, take_snaps
 from tests.watching.labs import append, copy_of, write
 
 LEEDS = "leeds-comp3631-lab1"
-LONG_S = 120.0
+LONG_S = 600.0
 
 
 @pytest.fixture
