@@ -17,6 +17,7 @@ from grader.limited_child import ChildLimits, run_limited
 from grader.model.package import Fault, PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.package.reading import printable
+from grader.package.syntax_fixes import BLOCK, MERGE_MARKER, cause_of_line
 
 CHECK = "grader.arena.ros.syntax:check_all"
 MEMORY_BYTES, CPU_S = 1 << 30, 20
@@ -30,53 +31,44 @@ _TYPOGRAPHIC = (
     ("\u2010\u2011\u2012\u2013\u2014\u2015\u2212", "dash", "-"),
 )
 TEXT_CHARS_MAX = SOURCE_CHARS_MAX = 300
+_VAGUE = (
+    *("invalid syntax", "expected ':'", "invalid decimal", "unexpected EOF", "cannot assign", "can't assign"),
+)
+"""Messages that say less than the line itself."""
 _NEVER_CLOSED = "a bracket that is opened in line {} is never closed"
 _COPIED = "copied from a PDF or a web page"
 
-# On any message: the faulty line itself tells.
-_MARKER = re.compile(r"(<{7}|={7}|>{7})(\s|$)")
-_LINES = (
-    (_MARKER.pattern, "git's merge markers (`<<<<<<<`) are still in the file: keep one version"),
-    (r"^\s*else\s+if\b", "Python writes `elif`, not `else if`"),
-    (r"^\s*except\s+[\w.]+\s*,\s*\w+\s*:", "this is Python 2: write `except Error as name:`"),
-    (r"^\s*raise\s+[\w.]+\s*,", 'this is Python 2: write `raise Error("text")`'),
-    (r"^\s*print\s+[^(=\s]", "this is Python 2: `print` needs brackets, `print(...)`"),
-    (r"^\s*exec\s+[^(=\s]", "this is Python 2: `exec` needs brackets, `exec(...)`"),
-    (r"`", "backticks are Python 2: write `repr(x)` or `str(x)`"),
-    (r"<>", "`<>` is Python 2: write `!=`"),
-    (r"\bur['\"]", '`ur"..."` is Python 2: write `r"..."`'),
-    (r"\b\d+[lL]\b", "a number that ends with `L` is Python 2: leave the `L` out"),
-    (r"\+\+|--\s*$", "Python has no `++` and `--`: write `x += 1`"),
-    (r"&&|\|\|", "Python writes `and`, `or` and `not`"),
-    (r"^\s*(\$|sudo |rosrun |roslaunch |cd |chmod )", "this is a command for the terminal, not Python"),
-    (r"^\s*(if|elif|while)\b[^=(:]*[^=!<>(:]=[^=]", "`=` gives a value to a name; to compare, write `==`"),
-    (r"^\s*(if|elif|else|while|for|def|class|try|except|finally|with)\b.*;\s*$",
-     "the line that begins a block ends with `:`, not with `;`"),
-    (r"^\s*(if|elif|else|while|for|def|class|try|except|finally|with)\b.*:\s*[^\s\w'\"()\[\]{}:]+\s*$",
-     "something stands behind the `:` that ends the line: delete it"),
-    (r"\basync\b(?!\s+(def|for|with)\b)", "`async` is a reserved word since Python 3.7: use another name"),
-)  # fmt: skip
-
 _MESSAGES = (
     (r"inconsistent use of tabs", "tabs and spaces are mixed in the indentation: use four spaces everywhere"),
-    (r"unindent does not match", "this line's indentation matches none of the lines above it"),
-    (r"unexpected indent", "this line is indented further than the one above for no reason"),
-    (r"expected an indented block", "the line after a `:` must be indented (by four spaces)"),
+    (r"unindent does not match",
+     "this line's indentation matches none of the lines above it: start it exactly below a line of the same block"),
+    (r"unexpected indent",
+     "this line is indented further than the one above for no reason: start it exactly below that one"),
+    (r"expected an indented block",
+     "the line after a `:` must be indented: start it four spaces further to the right than the one above"),
     (r"Missing parentheses in call to '(\w+)'", "this is Python 2: `{0}` needs brackets, `{0}(...)`"),
     (r"multiple exception types", "this is Python 2: write `except Error as name:`"),
     (r"leading zeros in decimal", "a number may not begin with 0: write 777, or 0o777 for an octal one"),
     (r"expected ':'", "a colon `:` is missing at the end of the line"),
     (r"'(.)' was never closed", "the bracket `{0}` is opened in this line and never closed"),
-    (r"unmatched '(.)'", "there is one `{0}` too many, or its opening bracket is missing"),
+    (r"unmatched '(.)'", "there is one `{0}` too many, or its opening bracket is missing: count both in this line"),
     (r"closing parenthesis '(.)' does not match opening parenthesis '(.)'",
      "a `{1}` is closed by `{0}`: the two must match"),
-    (r"triple-quoted", "a triple-quoted string is opened and never closed"),
-    (r"EOL while scanning|unterminated (f-)?string", "a quote is opened in this line and never closed"),
-    (r"Maybe you meant '=='|cannot assign to", "`=` gives a value to a name; to compare, write `==`"),
-    (r"forgot a comma", "a comma is missing between two values"),
-    (r"'return' outside function", "`return` is outside every function: is its indentation right?"),
-    (r"'(break|continue)'? .*loop", "`{0}` is outside every loop: is its indentation right?"),
-    (r"'yield' outside", "`yield` is outside every function: is its indentation right?"),
+    (r"triple-quoted", "a triple-quoted string is opened and never closed: write the three quotes where it ends"),
+    (r"EOL while scanning|unterminated (f-)?string",
+     "a quote is opened in this line and never closed: write the same quote where the string ends"),
+    (r"Maybe you meant '=='", "`=` gives a value to a name; to compare, write `==`"),
+    (r"cannot assign to|can't assign to", "what stands on the left of `=` is no name: a value is given to a name"),
+    (r"forgot a comma", "a comma is missing between two values: write `,` between them"),
+    (r"'return' outside function", "`return` is outside every function: indent it like the lines of its function"),
+    (r"'(break|continue)'? .*loop", "`{0}` is outside every loop: indent it like the lines of its loop"),
+    (r"'yield' outside", "`yield` is outside every function: indent it like the lines of its function"),
+    (r"f-string: expecting '}'", "a `{` in the f-string is never closed: write `}` behind its value"),
+    (r"expected 'except' or 'finally'",
+     "a `try:` has no `except` below it: write `except rospy.ROSInterruptException:` there, and `pass` below that"),
+    (r"keyword argument repeated", "an argument is given twice: take one of the two out"),
+    (r"positional argument follows keyword",
+     "a value without a name stands behind one with a name: move what has `=` to the end of the call"),
     (r"UTF-16", "the file is saved as UTF-16: save it as UTF-8"),
     (r"Non-UTF-8 code|codec can't decode byte|invalid or missing encoding",
      "the file is not saved as UTF-8 (accents of an old encoding): save it as UTF-8"),
@@ -86,11 +78,13 @@ _MESSAGES = (
     (r"null bytes", "the file holds null bytes: it is not text, or was saved as UTF-16; save it as UTF-8"),
     (r"after line continuation", r"nothing may follow a backslash `\` at the end of a line"),
     (r"duplicate argument '(\w+)'", "two parameters are both called `{0}`"),
-    (r"unexpected EOF", "the file ends in the middle of something: a bracket, or a block without a body"),
+    (r"unexpected EOF",
+     "the file ends in the middle of something (a bracket, or a block without a body): complete its last lines"),
     (r"too many nested|overflow|too complex|recursion|^$", "the file is nested too deep for Python"),
 )  # fmt: skip
 
-_BLOCK = re.compile(r"\s*(if|elif|else|for|while|def|class|try|except|finally|with)\b")
+_BLOCK = re.compile(rf"\s*{BLOCK}")
+_LONE = re.compile(r"\s*[{}]\s*;?\s*$")
 
 
 class SyntaxReport(Record):
@@ -245,13 +239,13 @@ def cause_of(
     closed, `mixed` whether the file indents with tabs and with spaces.
     """
     message, text = message[:TEXT_CHARS_MAX], text[:TEXT_CHARS_MAX]
-    vague = message.startswith(("invalid syntax", "expected ':'", "invalid decimal", "unexpected EOF"))
+    vague = message.startswith(_VAGUE) or MERGE_MARKER.match(text) or _LONE.match(text)
     odd = "invalid decimal" in message and _strange(text)  # Python 3.10 on `1` and an invisible character
     if odd or "invalid character" in message or "non-printable" in message:
         return _character(message, text)
     if "unindent does not match" in message and mixed:
         return "tabs and spaces are mixed in the indentation of this file: use four spaces everywhere"
-    if (vague or _MARKER.match(text)) and (told := _first(_LINES, _without_texts(text))):
+    if vague and (told := cause_of_line(text)):
         return told
     if opened is not None and vague:
         return _NEVER_CLOSED.format(opened)

@@ -17,18 +17,12 @@ from difflib import get_close_matches
 from itertools import chain
 from typing import Any
 
+from grader.package.syntax_fixes import PLAIN, cause_of_line, corrections, without_brace
+
 STEPS_MAX = 60
 STATEMENT_LINES_MAX = 12
 FIXERS = ("print", "except", "exec", "raise", "repr", "ne", "numliterals", "long", "unicode")
 OLD_NAMES = {"raw_input": "input", "xrange": "range", "unicode": "str", "basestring": "str", "unichr": "chr"}
-PLAIN = str.maketrans(
-    {
-        **dict.fromkeys("\u2018\u2019\u201a\u201b\u2032\u00b4", "'"),
-        **dict.fromkeys("\u201c\u201d\u201e\u201f\u2033\u00ab\u00bb", '"'),
-        **dict.fromkeys("\u00a0\u2002\u2003\u2007\u2009\u202f\u3000", " "),
-        **dict.fromkeys("\u200b\u200c\u200d\u2060\ufeff", ""),
-    }
-)
 MESSAGES = {
     "std_msgs": "Bool Byte Char ColorRGBA Empty Float32 Float32MultiArray Float64 Float64MultiArray Int16 "
     "Int16MultiArray Int32 Int32MultiArray Int64 Int8 Int8MultiArray String UInt16 UInt32 UInt64 UInt8",
@@ -63,7 +57,6 @@ ROLES = {
 }
 OLD_PRINT = re.compile(r"\bprint\b(?!\s*\()")
 CONTINUES = re.compile(r"(elif|else|except|finally)\b")
-BLOCKS = re.compile(r"\s*(if|elif|else|for|while|def|class|try|except|finally|with)\b")
 
 Step = dict[str, Any]
 """`cause`, `line`, the `text` that comes out, and for what does not parse the `error`."""
@@ -143,20 +136,26 @@ def _one_step(text: str, error: Error) -> Step | None:
         further = left is not None and (left["line"] > error["line"] or _is_next(error, left))
         if left is None or further:
             word = re.match(r"name '(\w+)'", error["message"])
-            found = {"cause": cause, "line": error["line"], "error": error, "text": candidate}
+            line = _first_changed(text, candidate) if cause == "braces" else error["line"]
+            found = {"cause": cause, "line": line, "error": error, "text": candidate}
             return {**found, "word": word[1] if word else ""}
     return None
+
+
+def _first_changed(before: str, after: str) -> int:
+    pairs = zip(before.split("\n"), after.split("\n"), strict=False)
+    return next((number for number, (old, new) in enumerate(pairs, start=1) if old != new), 1)
 
 
 def _all_expanded(text: str, width: int) -> str:
     return "\n".join(_expanded(line, width) for line in text.split("\n"))
 
 
-def _like_the_line_before(text: str, number: int) -> str:
+def _like_the_line_before(text: str, number: int, *, tabs: bool = True) -> str:
     """The line with that number begins where the one before it does, which an editor showed below each other."""
     lines = text.split("\n")
     before = next((line for line in reversed(lines[: number - 1]) if line.strip()), "")
-    if number <= len(lines) and "\t" in lines[number - 1] and not before.rstrip().endswith(":"):
+    if number <= len(lines) and tabs == ("\t" in lines[number - 1]) and not before.rstrip().endswith(":"):
         indentation = before[: len(before) - len(before.lstrip())]
         lines[number - 1] = indentation + lines[number - 1].lstrip()
     return "\n".join(lines)
@@ -184,10 +183,31 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     if error["message"].startswith("expected an indented block"):
         yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
     yield from (("python2", candidate) for candidate in _as_python3(lines, at))
-    yield "characters", _with_line(lines, at, lines[at].translate(PLAIN))
+    if error["message"] == "unexpected indent":
+        yield "outdent", _like_the_line_before(text, error["line"], tabs=False)
+    if any(map(without_brace, lines[: at + 1])):
+        yield "braces", _without_braces(lines)
     for line in dict.fromkeys((at, max(at - 1, 0))):
-        for changed in _with_token(lines[line], error if line == at else None):
-            yield "token", _with_line(lines, line, changed)
+        told = (error["message"], error["column"]) if line == at else ()
+        for changed in corrections(lines[line], *told):
+            cause = "characters" if changed == lines[line].translate(PLAIN) else "token"
+            yield cause, _with_line(lines, line, changed)
+    if cause_of_line(lines[at]).endswith("delete this line"):
+        yield "token", "\n".join([*lines[:at], *lines[at + 1 :]])
+
+
+def _without_braces(lines: list[str]) -> str:
+    """Return the text with `:` where a block begins with `{`, and without the `}` of these blocks."""
+    opened, kept = 0, []
+    for line in lines:
+        if head := without_brace(line):
+            opened += 1 - line.strip().startswith("}")
+            kept.append(head)
+        elif opened and line.strip() in ("}", "};"):
+            opened -= 1
+        else:
+            kept.append(line)
+    return "\n".join(kept)
 
 
 def _with_body_indented(lines: list[str], at: int) -> Iterator[str]:
@@ -292,31 +312,6 @@ def _code(line: str) -> str:
     return emptied.rstrip()
 
 
-def _with_token(line: str, error: Error | None) -> Iterator[str]:
-    """Yield the line with one token more: a quote, a colon or a closing bracket."""
-    if not line.strip():
-        return
-    comment = re.search(r"\s*(#[^'\"]*)?$", line)
-    end = comment.start() if comment else len(line)
-    code, rest = line[:end], line[end:]
-    if error is not None and re.search("unterminated|EOL while", error["message"]):
-        at = (error["column"] or 1) - 1
-        quote = line[at : at + 1].strip("rbfu") or line[at + 1 : at + 2]
-        tail = re.search(r"[)\]}:,\s]*$", line)
-        cut = tail.start() if tail else len(line)
-        if quote in ("'", '"'):
-            yield line[:cut] + quote + line[cut:]
-            yield line + quote
-    if BLOCKS.match(line) and code.endswith(";"):
-        yield f"{code[:-1].rstrip()}:{rest}"
-    if BLOCKS.match(line) and not code.endswith(":"):
-        yield f"{code}:{rest}"
-    for bracket in ")]}":
-        yield code + bracket + rest
-        if code.endswith(":"):
-            yield f"{code[:-1]}{bracket}:{rest}"
-
-
 # ---- what parses, and is not meant
 
 
@@ -383,11 +378,17 @@ def _bound(tree: ast.Module) -> set[str]:
 
 
 def _with_modules(text: str, types: list[str]) -> Iterator[Step]:
-    """`from std_msgs import String` and `from std_msg.msg import String`, for `from std_msgs.msg import String`."""
+    """`from std_msgs import String`, `from std_msg.msg import String` and `import std_msgs.msg.String`, for
+    `from std_msgs.msg import String`."""
     known = {package: set(names.split()) for package, names in MESSAGES.items()}
     for package, _, name in (kind.partition("/") for kind in types):
         known.setdefault(package, set()).add(name)
     for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            for step in _with_class_imported(text, node, known):
+                text = step["text"]
+                yield step
+            continue
         if not isinstance(node, ast.ImportFrom) or node.level or not node.module:
             continue
         module = node.module
@@ -402,6 +403,19 @@ def _with_modules(text: str, types: list[str]) -> Iterator[Step]:
             for step in _step("module", at + 1, text, _with_line(lines, at, after), module):
                 text = step["text"]
                 yield step
+
+
+def _with_class_imported(text: str, node: ast.Import, known: dict[str, set[str]]) -> Iterator[Step]:
+    parts = node.names[0].name.split(".")
+    package, module, name = parts if len(parts) == 3 else ("", "", "")
+    lines, at = text.split("\n"), node.lineno - 1
+    if len(node.names) > 1 or node.names[0].asname or module != "msg" or name not in known.get(package, ()):
+        return
+    whole = f"{package}.msg.{name}"
+    used = any(isinstance(n, ast.Attribute) and ast.unparse(n) == whole for n in ast.walk(ast.parse(text)))
+    right = f"import {package}.msg" if used else f"from {package}.msg import {name}"
+    after = re.sub(rf"import\s+{re.escape(whole)}\b", right, lines[at], count=1)
+    yield from _step("module", at + 1, text, _with_line(lines, at, after), whole)
 
 
 def _with_imports(text: str, types: list[str]) -> Iterator[Step]:

@@ -9,6 +9,7 @@ import pytest
 
 from grader.checks.support.exit_causes import syntax_hint
 from grader.package.python import cause_of, check_syntax, read_syntax_report
+from grader.package.syntax_fixes import corrected
 
 # Each text, the line of its fault, and words of its cause; all hold under Python 3.8 as under the newest.
 CASES = {
@@ -387,9 +388,9 @@ def test_a_message_that_says_enough_has_no_cause():
         ("x = \u2018it's\u2019", "line 1: type a plain '"),
         ("x =\u00a01", "line 1: write `x = 1`"),
         ("print x, y", "line 1: write `print(x, y)`"),
-        ("print x  # twice", "line 1: `print` needs brackets, `print(...)`"),
+        ("print x  # twice", "line 1: write `print(x) # twice`"),
         ("while True", "line 1: write `while True:`"),
-        ("while True:-\n    pass", "line 1: delete it"),
+        ("while True:-\n    pass", "line 1: write `while True:`"),
         ("print 'a' +", "line 1: `print` needs brackets, `print(...)`"),
         ("if x = 1:\n    pass", "line 1: write `if x == 1:`"),
         ("try:\n    pass\nexcept IOError, e:\n    pass", "line 3: write `except IOError as e:`"),
@@ -400,3 +401,83 @@ def test_a_message_that_says_enough_has_no_cause():
 def test_the_hint_names_the_repair_where_the_cause_is_known(tmp_path, source, hint):
     (tmp_path / "a.py").write_text(source)
     assert syntax_hint(check_syntax(tmp_path, ["a.py"]).faults["a.py"]) == hint
+
+
+# A line as C++, the shell or Python 2 has it, and the line that the hint names; "" where it only says what to do.
+HABITS = {
+    "while not rospy.is_shutdown();": "while not rospy.is_shutdown():",
+    "while !rospy.is_shutdown():": "while not rospy.is_shutdown():",
+    "while (!done && n < 3):": "while (not done and n < 3):",
+    "if a || b:": "if a or b:",
+    "if n == 127 {": "if n == 127:",
+    "def talker() {": "def talker():",
+    "void talker():": "def talker():",
+    "function talker():": "def talker():",
+    "Def talker():": "def talker():",
+    "While True:": "while True:",
+    "whlie True:": "while True:",
+    "Import rospy": "import rospy",
+    "form std_msgs.msg import String": "from std_msgs.msg import String",
+    "import String from std_msgs.msg": "from std_msgs.msg import String",
+    "from std_msgs.msg import String Int8": "from std_msgs.msg import String, Int8",
+    "n++;": "n += 1",
+    "self.n--": "self.n -= 1",
+    "int n = 0;": "n = 0",
+    "String msg": "msg = String()",
+    "std_msgs::String msg;": "msg = String()",
+    "var n = 0": "n = 0",
+    "my count = 0": "my_count = 0",
+    "my-count = 0": "my_count = 0",
+    "for (int i = 0; i < 128; i++) {": "for i in range(0, 128):",
+    "if n === 127:": "if n == 127:",
+    "if n =< 127:": "if n <= 127:",
+    "if n == 127 then:": "if n == 127:",
+    "if __name__ = '__main__':": "if __name__ == '__main__':",
+    "// counts": "# counts",
+    "n = 0 // counts up": "n = 0 # counts up",
+    "/* counts */": "# counts",
+    "rate = new rospy.Rate(10)": "rate = rospy.Rate(10)",
+    "pub->publish(n)": "pub.publish(n)",
+    "rate = rospy::Rate(10)": "rate = rospy.Rate(10)",
+    "rate.sleep();;": "rate.sleep()",
+    "rate.sleep():": "rate.sleep()",
+    ">>> n = 0": "n = 0",
+    "rospy.loginfo(text": "rospy.loginfo(text)",
+    "rospy.loginfo(text))": "rospy.loginfo(text)",
+    "rospy.loginfo(text]": "rospy.loginfo(text)",
+    "def talker(:": "def talker():",
+    "pub = Publisher('chatter, String)": "pub = Publisher('chatter', String)",
+    "pub = Publisher('chatter\", String)": "pub = Publisher('chatter', String)",
+    "pub = Publisher(/chatter, String)": "pub = Publisher('/chatter', String)",
+    "pub = Publisher('chatter' String)": "pub = Publisher('chatter', String)",
+    "text = 'hello %s' get_time()": "text = 'hello %s' % get_time()",
+    "text = f'hello {n'": "text = f'hello {n}'",
+    "text = 'a && b' + n++": "",
+    "text = hello world %s": "",
+    "class = 3": "",
+    "$ chmod +x talker.py": "",
+    "using namespace std;": "",
+}
+
+
+@pytest.mark.parametrize(("line", "right"), HABITS.items())
+def test_habits_of_other_languages_are_named_with_the_line_that_is_right(tmp_path, line, right):
+    after = "\n    pass\n" if right.endswith(":") else "\n"
+    (tmp_path / "a.py").write_text("x = 1\n" + line + after)
+    fault = check_syntax(tmp_path, ["a.py"]).faults["a.py"]
+    hint = syntax_hint(fault)
+    assert fault.cause
+    assert fault.line == 2
+    assert f"line 2: write `{right}`" in hint if right else "write `text" not in hint
+
+
+def test_a_right_line_is_never_corrected():
+    lines = (
+        "x = a[1::2]",
+        "print(1 // 2)",
+        "d = {'a': 1}",
+        "n = -1  # n++",
+        "s = 'else if'",
+        "if not (a or b): pass",
+    )
+    assert [corrected(line) for line in lines] == [""] * len(lines)

@@ -14,6 +14,7 @@ import difflib
 import io
 import json
 import os
+import re
 import sys
 import tokenize
 import warnings
@@ -46,6 +47,10 @@ PLAIN_MODULES = {
 NAMES_LIMIT = 500
 MODULE_NAMES = {"__file__", "__builtins__", "__annotations__", "WindowsError"}
 PAIRS = {")": "(", "]": "[", "}": "{"}
+BRACE = re.compile(
+    r"\s*(\}\s*)?(if|elif|else|while|for|def|class|try|except|finally|with)\b(.*[\w\])\"])?\s*\{\s*(#.*)?$"
+)
+"""A block that begins as in C++: what Python says of it is said of a line below."""
 ENCODINGS = (SyntaxError, LookupError, UnicodeDecodeError)
 
 
@@ -146,6 +151,12 @@ def syntax_fault(error, data):
     lines = io.StringIO(data.decode(encoding), newline=None).read().split("\n")
     line = getattr(error, "lineno", None)
     known = line is not None and 0 < line <= len(lines)
+    braced = next(
+        (n for n in range(line or 0) if len(lines[n]) <= TEXT_LIMIT and BRACE.match(lines[n])), None
+    )
+    if known and braced is not None:
+        at = lines[braced].index("{") + 1
+        return fault("SyntaxError", braced + 1, at, "invalid syntax", text=lines[braced])
     begins = {text[0] for text in lines if text[:1] in ("\t", " ") and text.strip()}
     return fault(
         type(error).__name__,
@@ -485,10 +496,14 @@ def misspelt(tree):
             own.update(node.names)
     if "*" in own or len(own) > NAMES_LIMIT:
         return
+    attributes = {
+        dotted(n) for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)
+    }
     known = own | set(dir(builtins)) | MODULE_NAMES
     for node in names:
         if node.id not in known:
             near = difflib.get_close_matches(node.id[:TEXT_LIMIT], sorted(own), 1, 0.8)
+            near = ["self." + node.id] if "self." + node.id in attributes else near
             near = near or [name for name in sorted(own) if sorted(name) == sorted(node.id)]
             if near:
                 message = "`%s` is not defined anywhere: did you mean `%s`?" % (node.id[:TEXT_LIMIT], near[0])

@@ -20,6 +20,7 @@ _NO_NUMBER = re.compile(
 )
 _LOCAL = re.compile(r"local variable '(\w+)'")
 _OPERANDS = re.compile(r"unsupported operand type\(s\) for \S+ '(\w+)' and '(\w+)'")
+_ONE_TOO_MANY = re.compile(r"(\w+)\(\) takes (\d+) positional arguments? but (\d+) (?:was|were) given")
 _CALLED = re.compile(r"'(\w+)' object is not callable")
 _WANTS_NUMBER = re.compile(r"(?:real number|a number) is required, not (\w+)|must be real number, not (\w+)")
 
@@ -78,6 +79,21 @@ def _value(message: str, _source: str, _marked: tuple[int, int] | None) -> Meani
 
 
 def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    if meaning := _call(message, source):
+        return meaning
+    if "'NoneType' object" in message:
+        return _none()
+    if wanted := _WANTS_NUMBER.search(message):
+        kind = wanted[1] or wanted[2]
+        hint = "write %s for %d or %f" if "%" in source else "turn the text into a number: `float(…)`"
+        return f"a number is wanted here, and it is of the type {kind}", hint
+    if given := _OPERANDS.search(message):
+        return _operands(given[1], given[2])
+    return None
+
+
+def _call(message: str, source: str) -> Meaning | None:
+    """Of a call: a module, a value, or a method without `self`."""
     if message == "'module' object is not callable":
         return (
             "a module is called",
@@ -88,14 +104,10 @@ def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning
             f"what is called is a value ({called[1]}), no function",
             "give the variable another name than the function",
         )
-    if "'NoneType' object" in message:
-        return _none()
-    if wanted := _WANTS_NUMBER.search(message):
-        kind = wanted[1] or wanted[2]
-        hint = "write %s for %d or %f" if "%" in source else "turn the text into a number: `float(…)`"
-        return f"a number is wanted here, and it is of the type {kind}", hint
-    if given := _OPERANDS.search(message):
-        return _operands(given[1], given[2])
+    given = _ONE_TOO_MANY.search(message)
+    if given and int(given[3]) == int(given[2]) + 1 and f".{given[1]}(" in source:
+        method = given[1]
+        return f"`{method}` is called on an object, and takes no `self`", f"write `def {method}(self, …):`"
     return None
 
 

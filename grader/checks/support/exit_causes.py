@@ -19,6 +19,7 @@ from grader.evidence.run import Run
 from grader.installable import ROS_2, install_hint, known_packages, noetic_messages
 from grader.model.package import Fault, PackageFacts, PythonSlip
 from grader.model.verdict import Citations, FileCitation, Verdict, inconclusive
+from grader.package.syntax_fixes import corrected, without_brace
 from grader.wording import join_words, seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
@@ -45,7 +46,7 @@ CAUSES = {
     "NameError": ("", "check the spelling, and that it is imported or assigned before it is used"),
     "ROSSerializationException": ("", "publish a value that fits the message's type"),
     "SerializationError": ("", "publish a value that fits the message's type"),
-    "SyntaxError": ("", "fix that line, or the one above it"),
+    "SyntaxError": ("", "compare that line, and the end of the one above it, with the handout's, sign by sign"),
     "IndentationError": ("", "indent every block by four spaces, each of its lines the same"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }  # fmt: skip
@@ -56,6 +57,11 @@ SLIPS = {
     **{f"name '{old}' is not defined": (f"`{old}` is Python 2", f"write `{new}`, as in Python 3")
        for old, new in {"xrange": "range", "unicode": "str", "basestring": "str", "long": "int", "unichr": "chr",
                         "reduce": "functools.reduce", "file": "open"}.items()},
+    **{f"name '{old}' is not defined": (f"Python has no `{old}`", f"write `{new}` for `{old}`")
+       for old, new in {"true": "True", "false": "False", "TRUE": "True", "FALSE": "False", "null": "None",
+                        "NULL": "None", "nullptr": "None", "nil": "None", "none": "None", "this": "self",
+                        "printf": "print", "cout": "print(…)", "Pass": "pass", "Break": "break",
+                        "Continue": "continue"}.items()},
     **{f"'{kind}' object has no attribute 'data'": (f"it is the {kind} inside the message", "leave out `.data` here")
        for kind in ("int", "float", "str", "bool")},
     "namespaces are not allowed in node names": ("the name in `rospy.init_node(…)` has a slash in it",
@@ -74,16 +80,6 @@ SLIPS = {
      "the message gets a different number of values than it has fields",
      'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not by a comma'),
 }  # fmt: skip
-# of a line that Python cannot parse: what its cause speaks of, and how the line is written instead
-_REWRITES = (
-    ("typographic quote|no-break space|special space",
-     ((r"[\u2018-\u201b]", "'"), (r"[\u201c-\u201f]", '"'), (r"[\u00a0\u2000-\u200a\u202f\u3000]", " "))),
-    ("`print` needs brackets", ((r"^(\s*)print\s+([^>(\s].*[^,\s])\s*$", r"\1print(\2)"),)),
-    ("`except Error as name:`", ((r"^(\s*except\s+[\w.]+)\s*,\s*(\w+\s*:)", r"\1 as \2"),)),
-    ("a colon `:` is missing", ((r"\s*$", ":"),)),
-    ("to compare, write `==`", ((r"(?<![=!<>])=(?!=)", "=="),)),
-    ("`elif`, not `else if`", ((r"\belse\s+if\b", "elif"),)),
-)  # fmt: skip
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
@@ -95,7 +91,8 @@ _ADDED = re.compile(
 )
 _NAME = re.compile(r"name '(\w+)' is not defined")
 _BY_PYTHON = re.compile(r"\. Did you mean: '(\w+)'\?$")
-_MEANT = re.compile(r"did you mean `(\w+)`\?$")
+_MEANT = re.compile(r"did you mean `([\w.]+)`\?$")
+_IN_MODULE = re.compile(r"No module named '(\w+\.(?:msg|srv))\.(\w+)'")
 _FROM_PACKAGE = re.compile(r"cannot import name '(\w+)' from '(\w+)'")
 _NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
 _NO_ATTRIBUTE = re.compile(r"(?:module|type object)? ?'([\w.]+)'(?: object)? has no attribute '(\w+)'")
@@ -173,7 +170,9 @@ class Traceback(NamedTuple):
 def syntax_hint(fault: Fault) -> str:
     """Return how to repair a file that Python cannot parse: the line as it has to be where that is known."""
     where = f"line {fault.line}: " if fault.line else ""
-    if bracket := re.match(r"the bracket `(.)`|(a bracket)", fault.cause):
+    right = corrected(fault.source, fault.message, fault.column)
+    bracket = re.match(r"the bracket `(.)`|(a bracket)", fault.cause)
+    if bracket and not right:
         closing = {"(": "`)`", "[": "`]`", "{": "`}`"}.get(bracket[1], "the bracket that closes it")
         return f"{where}write {closing} at the end of what is opened there"
     if below := re.match(r"(`global \w+`) stands below", fault.cause):
@@ -183,31 +182,10 @@ def syntax_hint(fault: Fault) -> str:
             if inside
             else f"{where}delete this line"
         )
-    if right := _rewritten(fault):
-        return f"{where}write `{shown(right)}`"
+    if right:
+        braces = ", and delete the `}` that closes the block" if without_brace(fault.source) else ""
+        return f"{where}write `{shown(right.strip())}`{braces}"
     return fault.fix or CAUSES.get(fault.kind, ("", "save the file as plain UTF-8 text"))[1]
-
-
-def _rewritten(fault: Fault) -> str:
-    """Return the faulty line put right; "" where that is not sure, as beside a comment or a text with other quotes."""
-    source = fault.source.strip()
-    rules = next((rules for told, rules in _REWRITES if re.search(told, fault.cause)), ())
-    if "#" in source or ";" in source or (re.search("['\"]", source) and "quote" in fault.cause):
-        return ""
-    right = source
-    for pattern, new in rules:
-        right = re.sub(pattern, new, right, count=0 if len(rules) > 1 else 1)
-    return right if right != source and _parses(right) else ""
-
-
-def _parses(line: str) -> bool:
-    """Return whether a line is good Python by itself, or the beginning of a block."""
-    before = {"el": "if 1: pass\n", "ex": "try: pass\n", "fi": "try: pass\n"}.get(line[:2], "")
-    try:
-        ast.parse(before + line + (" pass" if line.endswith(":") else ""))
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return False
-    return True
 
 
 def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
@@ -418,6 +396,9 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     source = found.own_frames[-1].source if found.own_frames else ""
     if found.kind == "IndexError" and "argv" in source:
         return "it reads a command-line argument, but is started without any", ARGUMENT_HINT
+    name = _NAME.search(found.message)
+    if name and re.search(rf"//.*\b{name[1]}\b", source):
+        return "a comment begins with `#` in Python", f"write `{shown(source.replace('//', '#', 1))}`"
     known = next((known for said, known in SLIPS.items() if said in found.message), None)
     meant = known or _other_name(found, package)
     frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
@@ -438,6 +419,8 @@ def _other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | No
 
 def _other_module(message: str) -> tuple[str, str] | None:
     """Return where messages come from that are imported from `std_msgs`, or from a package of nearly that name."""
+    if inner := _IN_MODULE.search(message):
+        return f"{inner[2]} is a class in {inner[1]}", f"write `from {inner[1]} import {inner[2]}`"
     asked, wanted = _NO_MODULE.search(message), _FROM_PACKAGE.search(message)
     if asked and asked[1] in ROS_2:
         return f"{asked[1]} is of ROS 2", "this lab is for ROS 1: write the node with rospy"

@@ -29,6 +29,8 @@ ATTEMPTS = 3
 Cause = Literal[
     "tabs",
     "indent",
+    "outdent",
+    "braces",
     "python2",
     "characters",
     "token",
@@ -131,7 +133,7 @@ def _joined(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
         if (
             groups
             and groups[-1][0] == step.cause
-            and step.cause not in ("token", "indent", "module", "import", "attribute")
+            and step.cause not in ("token", "indent", "outdent", "module", "import", "attribute")
         ):
             groups[-1][1].append(step)
         else:
@@ -180,6 +182,14 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
             f"{place}: the line after a `:` must be indented",
             f"indent line {first.line} by four more spaces",
         ),
+        "outdent": (
+            f"{place}: this line is indented further than the one above for no reason",
+            f"start line {first.line} exactly below the line above it",
+        ),
+        "braces": (
+            f"{place}: Python has no `{{` and `}}` around a block",
+            "end the first line of each block with `:` in place of `{`, and delete each `}` that ends a block",
+        ),
         "global": (
             f"{place}: `global {word}` stands below a line that uses {word}",
             f"write `global {names}` as the first line of the function, and nowhere else in it",
@@ -208,4 +218,5 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
         return said[cause]
     error = first.error
     told = cause_of(error.message, error.text, column=error.column) if error else ""
-    return f"{place}: {told or (error.message if error else 'not Python 3')}", ""
+    fix = f"delete line {first.line}" if told.endswith("delete this line") else ""
+    return f"{place}: {told or (error.message if error else 'not Python 3')}", fix

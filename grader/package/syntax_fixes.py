@@ -1,0 +1,310 @@
+"""What is wrong with a line that Python cannot parse, in a student's words, and the line as it should be.
+
+A line and what Python says of it come in; a cause and the corrected line go out. The table knows the habits of
+Python 2, C++ and the shell. Pure, and the standard library only: `source_repair.py` calls it in a child process.
+"""
+
+from __future__ import annotations
+
+import ast
+import keyword
+import re
+from collections.abc import Iterator
+from difflib import get_close_matches
+from typing import NamedTuple
+
+LINE_CHARS_MAX = 300
+BLOCK = r"(?:if|elif|else|while|for|def|class|try|except|finally|with)\b"
+MERGE_MARKER = re.compile(r"(<{7}|={7}|>{7})(\s|$)")
+_BLOCK = re.compile(rf"\s*{BLOCK}")
+_BRACE = rf"(?:\}}\s*)?{BLOCK}(?:.*[\w\])\"])?\s*\{{$"
+_TEXT = re.compile(r"""("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|#.*""")
+_NUMBERS = r"int|float|double|long|short|char|bool|byte|unsigned|size_t"
+_FOR = (
+    r"^(\s*)for\s*\(\s*(?:\w+\s+)?(\w+)\s*=\s*(\w+)\s*;\s*\2\s*<\s*([\w.()]+)\s*;"
+    r"\s*(?:\2\s*\+\+|\+\+\s*\2|\2\s*\+=\s*1)\s*\)\s*[:{;]?$"
+)
+_TYPES = rf"{_NUMBERS}|str|string|auto|var|let|const|static|final|(?:\w+(?:::|\.))*[A-Z]\w*|\w+(?:::\w+)+"
+_CLOSING = {"(": ")", "[": "]", "{": "}"}
+_HEADS = {
+    **dict.fromkeys(("elif", "else"), "if 1: pass\n"),
+    **dict.fromkeys(("except", "finally"), "try: pass\n"),
+}
+_GAP = re.compile(r"(?<=[\w\")\]])\s+(?=[\w\"(\[{])")
+_CLOSED_ENOUGH = re.compile(r"([\w\")\]}]:?|\(:)$")
+_STATEMENTS = (
+    *(
+        "assert",
+        "break",
+        "class",
+        "continue",
+        "def",
+        "del",
+        "elif",
+        "else",
+        "except",
+        "finally",
+        "for",
+        "from",
+        "global",
+    ),
+    *("if", "import", "pass", "raise", "return", "try", "while", "with"),
+)
+_RESERVED = "|".join(keyword.kwlist[3:])
+PLAIN = str.maketrans(
+    {
+        **dict.fromkeys("\u2018\u2019\u201a\u201b\u2032\u00b4", "'"),
+        **dict.fromkeys("\u201c\u201d\u201e\u201f\u2033\u00ab\u00bb", '"'),
+        **dict.fromkeys("\u00a0\u2002\u2003\u2007\u2009\u202f\u3000", " "),
+        **dict.fromkeys("\u200b\u200c\u200d\u2060\ufeff", ""),
+    }
+)
+"""What web pages and PDF files have in place of plain quotes and spaces."""
+
+
+class _Habit(NamedTuple):
+    """`pattern` is looked for in the line without its comment and its texts' contents; `{0}` in `cause` is its first
+    group. `rewrites` are pairs for `re.sub`, one after the other."""
+
+    pattern: str
+    cause: str
+    rewrites: tuple[tuple[str, str], ...] = ()
+
+
+_HABITS = (
+    _Habit(MERGE_MARKER.pattern, "git's merge markers (`<<<<<<<`) are still in the file: keep one version"),
+    _Habit(r"^\s*(\$|sudo |rosrun |roslaunch |cd |chmod )",
+           "this is a command for the terminal, not Python: delete this line"),
+    _Habit(r"^\s*(using\s+namespace\b|#\s*include\b)", "this is C++, not Python: delete this line"),
+    _Habit(r"^\s*>>>", "`>>>` is printed by Python's prompt: leave it out", ((r">>>\s?", ""),)),
+    _Habit(r"^\s*//", "a comment begins with `#` in Python", ((r"//+\s*", "# "),)),
+    _Habit(r"^\s*/\*", "a comment begins with `#` in Python",
+           ((r"/\*+\s*", "# "), (r"\s*\*+/\s*$", ""))),
+    _Habit(r"\S\s*//\s*\w+\s+\w", "a comment begins with `#` in Python", ((r"\s*;*\s*//\s*", "  # "),)),
+    _Habit(r"^\s*(?:\}\s*)?for\s*\(.*;.*;.*\)", "Python's `for` takes its values from a range or a list",
+           ((_FOR, r"\1for \2 in range(\3, \4):"),)),
+    _Habit(r"\b(else\s+if|elseif|elsif)\b", "Python writes `elif`, not `{0}`",
+           ((r"^(\s*)\}\s*", r"\1"), (r"\b(?:else\s+if|elseif|elsif)\b", "elif"))),
+    _Habit(r"^\s*except\s+[\w.]+\s*,\s*\w+\s*:", "this is Python 2: write `except Error as name:`",
+           ((r"^(\s*except\s+[\w.]+)\s*,\s*(\w+\s*:)", r"\1 as \2"),)),
+    _Habit(r"^\s*raise\s+[\w.]+\s*,", 'this is Python 2: write `raise Error("text")`',
+           ((r"^(\s*raise\s+[\w.]+)\s*,\s*(.+)$", r"\1(\2)"),)),
+    _Habit(r"^\s*print\s+[^(=\s]", "this is Python 2: `print` needs brackets, `print(...)`",
+           ((r"^(\s*)print\s+([^>(\s](?:.*[^,;\s])?)\s*;*$", r"\1print(\2)"),)),
+    _Habit(r"^\s*exec\s+[^(=\s]", "this is Python 2: `exec` needs brackets, `exec(...)`",
+           ((r"^(\s*)exec\s+(.+)$", r"\1exec(\2)"),)),
+    _Habit(r"`", "backticks are Python 2: write `repr(x)` or `str(x)`", ((r"`([^`]+)`", r"repr(\1)"),)),
+    _Habit(r"<>", "`<>` is Python 2: write `!=`", ((r"\s*<>\s*", " != "),)),
+    _Habit(r"\bur['\"]", '`ur"..."` is Python 2: write `r"..."`', ((r"\bur(?=['\"])", "r"),)),
+    _Habit(r"\b\d+[lL]\b", "a number that ends with `L` is Python 2: leave the `L` out",
+           ((r"\b(\d+)[lL]\b", r"\1"),)),
+    _Habit(r"\+\+|--\s*;*\s*$", "Python has no `++` and `--`: write `x += 1` in a line of its own",
+           ((r"^(\s*)([\w.]+)\s*([+-])\3\s*;*$", r"\1\2 \3= 1"), (r"^(\s*)([+-])\2\s*([\w.]+)\s*;*$", r"\1\3 \2= 1"))),
+    _Habit(r"&&|\|\||!(?!=)", "Python writes `and`, `or` and `not`",
+           ((r"\s*&&\s*", " and "), (r"\s*\|\|\s*", " or "), (r"!(?!=)\s*", "not "))),
+    _Habit(r"(===|!==|=<|=>|\bnot\s*=)", "Python compares with `==`, `!=`, `<=` and `>=`, not with `{0}`",
+           ((r"===", "=="), (r"!==", "!="), (r"=<", "<="), (r"=>", ">="), (r"\s*\bnot\s*=+", " !="))),
+    _Habit(rf"^\s*{_BRACE}", "Python has no `{` and `}` around a block: end its first line with `:`",
+           ((rf"^(\s*)(?:\}}\s*)?({BLOCK}.*?)\s*\{{$", r"\1\2:"),)),
+    _Habit(r"^\s*[{}]\s*;?$", "this bracket closes nothing: delete this line"),
+    _Habit(r"^\s*(?:if|elif|while)\b.*\b(then|do)\s*:?$", "the line that begins a block ends with `:`, not with `{0}`",
+           ((r"\s+(?:then|do)\s*:?$", ":"),)),
+    _Habit(r"^\s*(if|elif|while)\b[^=(:]*[^=!<>(:]=[^=]", "`=` gives a value to a name; to compare, write `==`",
+           ((r"(?<![=!<>])=(?!=)", "=="),)),
+    _Habit(rf"^\s*{BLOCK}.*;$", "the line that begins a block ends with `:`, not with `;`",
+           ((r"\s*:?(\s*;)+$", ":"),)),
+    _Habit(rf"^\s*{BLOCK}.*:\s*[^\s\w'\"()\[\]{{}}:]+$",
+           "something stands behind the `:` that ends the line: delete it",
+           ((r":[^:]*$", ":"),)),
+    _Habit(r"^\s*(?!lambda\b)(?:\w+(?:\.\w+)+\(.*|[\w.]+\s*=(?!=).*)[^:]:$",
+           "only a line that begins a block ends with `:`: leave it out", ((r"\s*:$", ""),)),
+    _Habit(r"(?<![\w.])0+[1-9]\d*(?![\w.])",
+           "a number may not begin with 0: leave it out, or write 0o for an octal one",
+           ((r"(?<![\w.])0+(?=[1-9]\d*(?![\w.]))", ""),)),
+    _Habit(r";\s*;$", "a line of Python ends without `;`: delete it", ((r"(\s*;)+$", ""),)),
+    _Habit(r"\basync\b(?!\s+(def|for|with)\b)", "`async` is a reserved word since Python 3.7: use another name"),
+    _Habit(rf"^\s*(?:self\.)?({_RESERVED})\s*=(?!=)",
+           "`{0}` is a reserved word of Python: use another name"),
+    _Habit(r"^\s*import\s+[\w, ]+\sfrom\s+[\w.]+\s*;*$", "the module comes first: write `from module import name`",
+           ((r"^(\s*)import\s+(.+?)\s+from\s+([\w.]+)\s*;*$", r"\1from \3 import \2"),)),
+    _Habit(r"^\s*(?:public\s+|private\s+|static\s+)*(void|function|func|fun|fn|sub|define|int|float|double|bool|string)"
+           r"\s+\w+\s*\(.*\)", "a function begins with `def`, not with `{0}`",
+           ((r"^(\s*)(?:public\s+|private\s+|static\s+)*\w+\s+(\w+\s*\(.*?\))\s*[:{]?$", r"\1def \2:"),)),
+    _Habit(r"\bnew\s+[A-Za-z_]", "Python has no `new`: leave it out", ((r"\bnew\s+", ""),)),
+    _Habit(rf"^\s*(?!(?i:{_RESERVED}|print)\b)({_TYPES})\s+[A-Za-z_]\w*\s*(;*$|=[^=])",
+           "a name has no type in Python: leave `{0}` out, and give it a value",
+           ((rf"^(\s*)(?:(?:{_TYPES})\s+)+([A-Za-z_]\w*\s*=.*?)\s*;*$", r"\1\2"),
+            (rf"^(\s*)(?:{_NUMBERS})\s+([A-Za-z_]\w*)\s*;*$", r"\1\2 = 0"),
+            (r"^(\s*)(?:std_msgs::|std_msgs\.msg\.)?([A-Z]\w*)\s+([A-Za-z_]\w*)\s*;*$", r"\1\3 = \2()"))),
+    _Habit(r"[\w)](->|::)[A-Za-z_]", "Python writes a dot, `.`, where C++ has `{0}`",
+           ((r"(?<=[\w)])(?:->|::)(?=[A-Za-z_])", "."),)),
+    _Habit(rf"^\s*(?!(?:{_RESERVED}|print)\b)[a-z_]\w*\s+[a-z_]\w*\s*=(?!=)", "a name has no space in it",
+           ((r"^(\s*)(\w+)\s+(\w+)(\s*=)", r"\1\2_\3\4"),)),
+    _Habit(r"^\s*[A-Za-z_]\w*(?:-\w+)+\s*=(?!=)", "a name has no `-` in it",
+           tuple([(r"^(\s*\w+)-(\w+)", r"\1_\2")] * 3)),
+    _Habit(r"^\s*\d+[A-Za-z_]\w*\s*=(?!=)", "a name begins with a letter, not with a digit: use another name"),
+    _Habit(r"[(,=]\s*/\w[\w/]*\s*[,)]", "a topic's name is a string: write it in quotes",
+           ((r"([(,=]\s*)(/\w[\w/]*)(?=\s*[,)])", r"\1'\2'"),)),
+    _Habit(r"(?<![\"')\]])(?<![\"')\]]\s)%[sdf]\b(?!\s*[.(\[])",
+           'the string has no quotes around it: write `"` before and after it'),
+)  # fmt: skip
+
+
+def cause_of_line(line: str) -> str:
+    """Return what is wrong with a line that does not parse; "" where the table does not know it."""
+    code, comment, texts = _taken_apart(line[:LINE_CHARS_MAX])
+    for habit in _HABITS:
+        if found := re.search(habit.pattern, code + comment if "include" in habit.pattern else code):
+            return (
+                habit.cause.replace("{0}", found[1])
+                if found.groups() and "{0}" in habit.cause
+                else habit.cause
+            )
+    if meant := _keyword(code):
+        return f"Python writes `{meant[1]}`, not `{meant[0]}`"
+    apart = next(_with_separator(code, texts), "")
+    return (
+        f"`{'%' if apart.count('%') > code.count('%') else ','}` is missing between two values"
+        if apart
+        else ""
+    )
+
+
+def without_brace(line: str) -> str:
+    """Return the first line of a block with `:` in place of the `{` that C++ has there; "" for any other line."""
+    code, comment, texts = _taken_apart(line[:LINE_CHARS_MAX])
+    if not re.match(rf"\s*{_BRACE}", code):
+        return ""
+    return _together(re.sub(rf"^(\s*)(?:\}}\s*)?({BLOCK}.*?)\s*\{{$", r"\1\2:", code), comment, texts)
+
+
+def corrected(line: str, message: str = "", column: int | None = None) -> str:
+    """Return the line as it should be, with its indentation and its comment; "" where that is not sure.
+
+    `message` is what Python says of the line, and `column` the place, from 1.
+    """
+    return next((one for one in corrections(line, message, column) if one != line and _parses(one)), "")
+
+
+def corrections(line: str, message: str = "", column: int | None = None) -> Iterator[str]:
+    """Yield the line with one mistake after the other put right, then with the token that Python asks for."""
+    if len(line) > LINE_CHARS_MAX or not line.strip():
+        return
+    yield line.translate(PLAIN)
+    code, comment, texts = _taken_apart(line.translate(PLAIN))
+    code = re.sub("[\u2010-\u2015\u2212]", "-", code)
+    yield _together(code, comment, texts)
+    for habit in _HABITS:
+        before = code
+        for pattern, new in habit.rewrites if re.search(habit.pattern, code) else ():
+            code = re.sub(pattern, new, code)
+        if code != before:
+            yield _together(code, comment, texts)
+    if meant := _keyword(code):
+        code = re.sub(r"^(\s*)\w+", rf"\g<1>{meant[1]}", code)
+        yield _together(code, comment, texts)
+    plain = code.rstrip(" ;")
+    yield _together(plain, comment, texts)
+    if _BLOCK.match(plain) and not plain.endswith(":"):
+        yield _together(f"{plain}:", comment, texts)
+    yield from (_together(one, comment, texts) for one in _with_separator(plain, texts))
+    yield from _with_bracket(line, message, column)
+    yield from _with_quote(line, message, column)
+
+
+def _taken_apart(line: str) -> tuple[str, str, list[str]]:
+    """Return the line with its texts emptied and without its comment, the comment, and the texts."""
+    texts = [found[1] for found in _TEXT.finditer(line) if found[1]]
+    comment = next((found[0] for found in _TEXT.finditer(line) if not found[1]), "")
+    code = _TEXT.sub(lambda found: '""' if found[1] else "", line)
+    return code.rstrip(), code[len(code.rstrip()) :] + comment if comment else "", texts
+
+
+def _together(code: str, comment: str, texts: list[str]) -> str:
+    left = iter(texts)
+    return re.sub('""', lambda found: next(left, found[0]), code) + comment
+
+
+def _keyword(code: str) -> tuple[str, str] | None:
+    """Return the first word of a line, and the keyword that is spelt nearly like it."""
+    first = re.match(r"\s*(\w+)(?=\s+[\w\"'(\[{]|\s*:?$)", code)
+    word = first[1] if first else ""
+    if word in keyword.kwlist or not word:
+        return None
+    alike = [one for one in _STATEMENTS if sorted(one) == sorted(word.lower())]
+    near = alike or get_close_matches(word.lower(), _STATEMENTS, 1, 0.8)
+    return (word, near[0]) if near else None
+
+
+def _with_separator(code: str, texts: list[str]) -> Iterator[str]:
+    """Yield the line with the `%` or the comma that is missing between two values, where there is one place for it."""
+    found = []
+    for gap in _GAP.finditer(code):
+        before, after = code[: gap.start()], code[gap.end() :]
+        text = texts[before.count('""') - 1] if before.endswith('""') and texts else ""
+        depth = sum(map(before.count, "([{")) - sum(map(before.count, ")]}"))
+        if re.search(r"%[\d.]*[sdfgir]", text):
+            found.append(f"{before} % {after}")
+        elif depth > 0 or re.match(r"\s*(from|import)\b", code):
+            found.append(f"{before}, {after}")
+    good = [one for one in found if _parses(_together(one, "", texts))]
+    yield from good if len(good) == 1 else ()
+
+
+def _with_bracket(line: str, message: str, column: int | None) -> Iterator[str]:
+    """Yield the line without the bracket that closes nothing, with the right one, or with the one that is missing."""
+    at = (column or 0) - 1
+    if (extra := re.search(r"unmatched '(.)'", message)) and line[at : at + 1] == extra[1]:
+        yield line[:at] + line[at + 1 :]
+    if (wrong := re.search(r"'(.)' does not match opening parenthesis '(.)'", message)) and line[
+        at : at + 1
+    ] == wrong[1]:
+        yield line[:at] + _CLOSING[wrong[2]] + line[at + 1 :]
+    if "expecting '}'" in message:
+        quotes = [found.start() for found in re.finditer("[\"']", line)]
+        yield from (f"{line[:quote]}}}{line[quote:]}" for quote in reversed(quotes))
+    code, comment, texts = _taken_apart(line)
+    closing = ""
+    for char in code:
+        if char in _CLOSING:
+            closing = _CLOSING[char] + closing
+        elif closing.startswith(char):
+            closing = closing[1:]
+    if closing and _CLOSED_ENOUGH.search(code):
+        colon = ":" if code.endswith(":") else ""
+        yield _together(code.removesuffix(":") + closing + colon, comment, texts)
+
+
+def _with_quote(line: str, message: str, column: int | None) -> Iterator[str]:
+    """Yield the line with the quote that ends its text: behind a name, at the end, or in place of another quote."""
+    if column is None or not re.search("unterminated|EOL while", message):
+        return
+    at = column - 1
+    quote = line[at : at + 1].strip("rbfu") or line[at + 1 : at + 2]
+    other = {"'": '"', '"': "'"}.get(quote)
+    if other is None:
+        return
+    begin = line.index(quote, at) + 1
+    for found in re.finditer(other, line[begin:]):
+        yield line[: begin + found.start()] + quote + line[begin + found.end() :]
+    if name := re.match(r"[\w/~]+(?=\s*[,)\]])", line[begin:]):
+        yield line[: begin + name.end()] + quote + line[begin + name.end() :]
+    end = re.search(r"[)\]}:,\s]*$", line)
+    cut = end.start() if end else len(line)
+    yield line[:cut] + quote + line[cut:]
+    yield line + quote
+
+
+def _parses(line: str) -> bool:
+    """Return whether a line is good Python by itself, or the beginning of a block."""
+    code, _, texts = _taken_apart(line.strip())
+    word = re.match(r"\w*", code)
+    before = _HEADS.get(word[0] if word else "", "")
+    after = (" pass" if code.endswith(":") else "") + (
+        "\nfinally: pass" if re.match(r"try\s*:", code) else ""
+    )
+    try:
+        ast.parse(before + _together(code, "", texts) + after)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return False
+    return True
