@@ -21,7 +21,7 @@ from grader.evidence.reader import load_evidence
 from grader.evidence.run import Run
 from grader.intake import safe_name
 from grader.judging import judge
-from grader.judging.settle import settle
+from grader.judging.settle import awarded, settle
 from grader.judging.summary import overall_status, total_fields
 from grader.model.result import Automatic, CriterionResult, GradingResult, Lateness
 from grader.report.files import result_text
@@ -209,9 +209,9 @@ def _remarks(result: GradingResult, again: GradingResult) -> Iterator[Finding]:
     if result.environment.grader != __version__:
         text = f"graded by {result.environment.grader}, judged again by {__version__}"
         yield Finding(about="grader", text=text, wrong=False)
-    if result.overrides:
-        who = ", ".join(sorted({o.author or "someone unnamed" for o in result.overrides}))
-        text = f"people decided {plural(len(result.overrides), 'criterion', 'criteria')}: {who}"
+    if decided := awarded(result.overrides):
+        who = ", ".join(sorted({o.author or "someone unnamed" for o in decided.values()}))
+        text = f"people decided {plural(len(decided), 'criterion', 'criteria')}: {who}"
         yield Finding(about="result", text=text, wrong=False)
 
 

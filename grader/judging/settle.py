@@ -5,7 +5,7 @@ Lateness is pure arithmetic on absolute times. A day is 24 hours, whatever the c
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from datetime import datetime, timedelta, timezone
 from decimal import Decimal
 from typing import Literal
@@ -55,17 +55,14 @@ def settle(
     judged = take_in(automatic.criteria)
     said = {criterion.id: _automatic(criterion) for criterion in judged}
     applied = tuple(_applied(name, overrides[name], said[name], before) for name in said if name in overrides)
-    decided = {override.criterion: override for override in applied}
-    criteria = tuple(
-        _decided(criterion, decided[criterion.id], rubric.digits) if criterion.id in decided else criterion
-        for criterion in judged
-    )
+    decided = awarded(applied)
+    criteria = tuple(_decided(criterion, decided.get(criterion.id), rubric.digits) for criterion in judged)
     criteria = leave_out(rubric, criteria)
     points = total_points(rubric, criteria)
     late = lateness(points, rubric, handed_in)
     update = {
         **total_fields(rubric, criteria),
-        "status": status_after_overrides(result, criteria, decided.keys()),
+        "status": status_after_overrides(result, criteria, decided),
         "points": late.points if late else points,
         "criteria": criteria,
         "overrides": applied,
@@ -73,6 +70,11 @@ def settle(
         "late": late,
     }
     return automatic.model_copy(update=update)
+
+
+def awarded(overrides: Iterable[AppliedOverride]) -> dict[str, AppliedOverride]:
+    """Return, by criterion, those with points: not those that only answer a student or say something more."""
+    return {override.criterion: override for override in overrides if override.awards}
 
 
 def unsettled(result: GradingResult, rubric: Rubric) -> GradingResult:
@@ -119,7 +121,7 @@ def _applied(
         criterion=criterion,
         automatic=now,
         was=was,
-        changed=(was.status, was.points) != (now.status, now.points),
+        changed=override.awards and (was.status, was.points) != (now.status, now.points),
     )
 
 
@@ -128,8 +130,10 @@ def _is(earlier: AppliedOverride, override: Override) -> bool:
     return all(getattr(earlier, name) == getattr(override, name) for name in Override.model_fields)
 
 
-def _decided(criterion: CriterionResult, override: Override, digits: int) -> CriterionResult:
-    """Return the criterion with a person's points. What was expected and measured stays."""
+def _decided(criterion: CriterionResult, override: Override | None, digits: int) -> CriterionResult:
+    """Return the criterion with a person's points, if there are any. What was expected and measured stays."""
+    if override is None or override.points is None:
+        return criterion
     points = round_half_up(override.points, digits)
     least = criterion.full - criterion.max_points - abs(criterion.extra)
     status = Status.PASS if points >= criterion.full else Status.PARTIAL if points > least else Status.FAIL

@@ -74,7 +74,8 @@ class WrittenOverride(Record):
     """An override as `overrides.yaml` has it."""
 
     points: float | None = None
-    """The points that count: from 0 to the criterion's, below 0 for a penalty; null: as its `comments` say."""
+    """The points that count: from 0 to the criterion's, below 0 for a penalty; null: as its `comments` say, and where
+    these say nothing of points, as the check says."""
     comment: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
     """What the student reads, below the texts of its `comments`."""
     author: Annotated[str, Field(max_length=AUTHOR_CHARS)] = ""
@@ -92,10 +93,10 @@ class WrittenOverride(Record):
 
 
 class Override(Record):
-    """Points that a person awards for one criterion of one submission."""
+    """Points that a person awards for one criterion of one submission, or only a note or an answer."""
 
-    points: float
-    """The points that count: from 0 to the criterion's, below 0 for a penalty."""
+    points: float | None
+    """The points that count: from 0 to the criterion's, below 0 for a penalty; null: those of the check."""
     comment: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
     """What the student reads."""
     author: Annotated[str, Field(max_length=AUTHOR_CHARS)] = ""
@@ -110,6 +111,11 @@ class Override(Record):
     """The questions that the answer is to, by their digests; empty: all that there are."""
     together: str = Field(default="", exclude_if=lambda value: not value)
     """The same word for all that were decided in one go."""
+
+    @property
+    def awards(self) -> bool:
+        """Whether it has points: else the check's verdict counts."""
+        return self.points is not None
 
 
 class Automatic(Record):

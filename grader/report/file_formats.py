@@ -260,7 +260,7 @@ def _overrides() -> Schema:
     override = _with_empty(
         WrittenOverride, ("comment", "author", "comments", "answer", "answered", "together")
     )
-    override["anyOf"] = [{"required": ["points"]}, {"required": ["comments"]}]
+    override["anyOf"] = [{"required": [name]} for name in ("points", "comments", "comment", "answer")]
     return _two_levels("overrides", "What people decided: by submission, then by criterion.", override)
 
 

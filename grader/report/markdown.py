@@ -12,10 +12,10 @@ from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
 from grader.report import sentences
 from grader.report.sentences import (
-    DECIDED_TITLE,
     NOT_SETTLED,
     automatic_words,
     decided_criteria,
+    decided_title,
     decision,
     look_again,
     score_words,
@@ -161,7 +161,7 @@ class _Writer:
         found = decided_criteria(result)
         if not found:
             return
-        yield from (f"## {DECIDED_TITLE}", "")
+        yield from (f"## {decided_title(result)}", "")
         for override, criterion in self._first(found):
             yield f"- {self._code(criterion.id)}: {points_of(criterion)} {self._text(decision(override))}"
             automatic = automatic_words(override, criterion)

@@ -24,7 +24,7 @@ from grader.rubric.made_up import as_text
 from grader.rubric.model import Rubric
 from grader.wording import join_words, number, plural
 
-DECIDED_TITLE = "Decided by a person"
+DECIDED_TITLE, NOTES_TITLE = "Decided by a person", "Notes by a person"
 CHANGED_TITLE = "Changed since it was first published"
 BY = {"roster": "as the roster says", "commit": "the commit's date", "nobody": "not known"}
 
@@ -154,16 +154,17 @@ def _time(time: datetime) -> str:
 
 
 def decision(override: AppliedOverride) -> str:
-    """`by A. Miller, 2026-11-02: clear names`, as far as it is known."""
+    """`by A. Miller, 2026-11-02: clear names`, as far as it is known; `with a note by …` where the points are the
+    check's."""
     who = ", ".join(part for part in (override.author or "a person", str(override.date or "")) if part)
     answer = f"to your request: {override.answer}" if override.answer else ""
     said = "; ".join(text for text in (override.comment, answer) if text)
-    return f"by {who}{': ' if said else ''}{said}"
+    return f"{'by' if override.awards else 'with a note by'} {who}{': ' if said else ''}{said}"
 
 
 def automatic_words(override: AppliedOverride, criterion: CriterionResult) -> str:
-    """`fail 0/10: 5 Hz, not 10 Hz`; empty where the points are a person's to award anyway."""
-    if override.automatic.status is Status.MANUAL:
+    """`fail 0/10: 5 Hz, not 10 Hz`; empty where that counts, or the points are a person's to award anyway."""
+    if override.automatic.status is Status.MANUAL or not override.awards:
         return ""
     message = override.automatic.message
     return _said(override.automatic, criterion) + (f": {message}" if message else "")
@@ -188,6 +189,11 @@ def decided_criteria(result: GradingResult) -> list[tuple[AppliedOverride, Crite
     return [
         (override, by_id[override.criterion]) for override in result.overrides if override.criterion in by_id
     ]
+
+
+def decided_title(result: GradingResult) -> str:
+    """Return the heading above these."""
+    return DECIDED_TITLE if any(override.awards for override in result.overrides) else NOTES_TITLE
 
 
 NOT_SETTLED = "some criteria could not be judged; no points are lost for good."

@@ -148,7 +148,8 @@ class Terminal:
             )
         ]
         parts += self._section(
-            sentences.DECIDED_TITLE, [self._decision(o, c) for o, c in sentences.decided_criteria(result)]
+            sentences.decided_title(result),
+            [self._decision(o, c) for o, c in sentences.decided_criteria(result)],
         )
         parts += self._section(NOTICED_TITLE, self._noticed(result.notes))
         parts += self._reached(result, unrun, full=full)

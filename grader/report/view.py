@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from unicodedata import east_asian_width
 
 from grader.errors import PackageNotFound, SubmissionError
-from grader.judging.settle import lateness
+from grader.judging.settle import awarded, lateness
 from grader.judging.summary import total_fields, total_points
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult, GradingResult
@@ -65,7 +65,7 @@ def arrange(result: GradingResult, rubric: Rubric | None = None) -> ReportView:
     ]
     losses.sort(key=lambda loss: -loss.points)
     told = {c.id for loss in losses for c in (loss.criterion, *loss.blocked)}
-    told |= {override.criterion for override in result.overrides}
+    told |= awarded(result.overrides).keys()
     return ReportView(
         lost=_told_once([loss for loss in losses if not loss.criterion.status.is_open]),
         open=_folded([loss for loss in losses if loss.criterion.status.is_open]),
@@ -376,7 +376,7 @@ def without_hidden(result: GradingResult, rubric: Rubric) -> GradingResult:
         "late": late,
         "points": late.points if late else points,
         "max_points": round(sum(c.max_points for c in shown), 6),
-        "status": _status(result, shown, {o.criterion for o in decided}),
+        "status": _status(result, shown, awarded(decided)),
     }
     return result.model_copy(update=update)
 
@@ -444,7 +444,7 @@ def _in_one(criteria: list[CriterionResult]) -> tuple[CriterionResult, ...]:
     return (row,)
 
 
-def _status(result: GradingResult, shown: tuple[CriterionResult, ...], decided: set[str]) -> str:
+def _status(result: GradingResult, shown: tuple[CriterionResult, ...], decided: Collection[str]) -> str:
     if result.error and any(c.counts and c.id not in decided for c in shown):
         return "error"
     statuses = {c.status for c in shown if c.counts}

@@ -97,7 +97,8 @@ Alice:
   style: {points: 8}
 no: 7
 zoe-muller:
-  style: {comment: "", points: }
+  style: {comment: names, points: }
+  chatter-rate: {author: Kim, comment: ""}
 """
     assert faults(tmp_path, text) == [
         '1: schema: must be "grader.overrides/1", not "grader.override/1"',
@@ -114,6 +115,7 @@ zoe-muller:
         f'11: Alice.style.date: must be a day such as 2026-11-02, not "soon", or {TIME}, not "soon"',
         "13: no: must be a map from criteria to points, not 7",
         "15: zoe-muller.style.points: must be a number, not empty",
+        "16: zoe-muller.chatter-rate.points: is missing",
     ]
 
 

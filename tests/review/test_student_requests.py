@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 
 from grader.classes.review.student_requests import Request, read_requests, request_files
+from grader.judging.settle import settle
 from grader.model.batch import Entry
+from grader.model.verdict import Status
 from grader.rubric.load import load_rubric
 from tests.review.a_class import overrides_of, points_of, result_of
 from tests.review.test_pages import rows
@@ -114,6 +116,64 @@ def test_the_answer_is_kept_and_the_student_reads_it(page, out) -> None:
     assert said.endswith("by A. Miller; to your request: It wraps at 127, see line 12.")
     assert "It wraps at 127, see line 12." in (out / "dana" / "report.html").read_text()
     assert rows(page.text("/?show=asked")) == ["ada"]
+
+
+@pytest.mark.usefixtures("asked")
+def test_an_answer_alone_leaves_the_points_to_the_check(page, out, review) -> None:
+    page.save("dana", "counter-wrap", answer="See line 12.")
+    written = overrides_of(out)["dana"]["counter-wrap"]
+    assert (written["answer"], "points" in written) == ("See line 12.", False)
+    assert review.background.wait(60)
+    (applied,) = result_of(out, "dana").overrides
+    assert (applied.points, applied.answer, points_of(out, "dana", "counter-wrap")) == (
+        None,
+        "See line 12.",
+        0,
+    )
+    assert rows(page.text("/?show=asked")) == ["ada"]
+    assert rows(page.text("/?c=counter-wrap&show=lost")) == ["dana"]
+    assert rows(page.text("/?c=counter-wrap&show=decided")) == []
+    report = (out / "dana" / "report.md").read_text()
+    assert "## Notes by a person" in report
+    assert "0/15 with a note by A. Miller" in report
+    assert "to your request: See line 12." in report
+    assert "counter-wrap: See line 12. (A. Miller)" in (out / "gradebook.csv").read_text()
+
+
+@pytest.mark.usefixtures("asked")
+def test_a_regrade_after_an_answer_alone_counts_as_the_check_says(page, out, review) -> None:
+    page.save("dana", "counter-wrap", answer="It was our mistake: judged again.")
+    assert review.background.wait(60)
+    answered = result_of(out, "dana")
+    better = [
+        c.model_copy(update={"status": Status.PASS, "points": c.full}) if c.id == "counter-wrap" else c
+        for c in answered.criteria
+    ]
+    judged = answered.model_copy(update={"criteria": tuple(better), "overrides": ()})
+    again = settle(
+        judged,
+        review.rubric.rubric,
+        overrides=review.overrides()["dana"],
+        handed_in=None,
+        before=answered.overrides,
+    )
+    (note,) = again.overrides
+    assert (note.answer, note.changed) == ("It was our mistake: judged again.", False)
+    assert next(c.points for c in again.criteria if c.id == "counter-wrap") == 15
+    assert again.points == answered.points + 15
+
+
+@pytest.mark.usefixtures("asked")
+def test_an_answer_alone_leaves_what_is_open_open(page, out, review) -> None:
+    page.save("ada", "style", answer="We shall look.")
+    assert review.background.wait(60)
+    assert "ada" in rows(page.text("/?c=style&show=open"))
+    assert rows(page.text("/?show=asked")) == ["dana"]
+    form = page.form("eve", "style")
+    page.send("eve", "style", form, points="6", do="alike")
+    assert overrides_of(out)["ada"]["style"].keys() == {"answer", "author", "date", "answered"}
+    page.save("ada", "style", answer="We shall look.", points="9")
+    assert "ada" in rows(page.text("/?c=style&show=decided"))
 
 
 @pytest.mark.usefixtures("asked")

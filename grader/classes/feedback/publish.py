@@ -389,7 +389,7 @@ def _override(override: AppliedOverride | None) -> str:
     if override is None:
         return "an override was taken back"
     comment = f", {override.comment}" if override.comment else ""
-    return f"override by {override.author or 'a person'}{comment}"
+    return f"{'override' if override.awards else 'note'} by {override.author or 'a person'}{comment}"
 
 
 def _whole(before: GradingResult, after: GradingResult) -> Iterator[str]:

@@ -87,7 +87,7 @@ def late_text(result: GradingResult) -> str:
 
 
 def comment(result: GradingResult) -> str:
-    """What people said when they gave points themselves."""
+    """What people said when they gave points themselves, or answered."""
     return "; ".join(_override(override) for override in result.overrides)
 
 
@@ -101,7 +101,8 @@ def error_text(result: GradingResult) -> str:
 
 def _override(override: AppliedOverride) -> str:
     author = f" ({override.author})" if override.author else ""
-    return f"{override.criterion}: {override.comment or 'points given by a person'}{author}"
+    said = "; ".join(filter(None, (override.comment, override.answer)))
+    return f"{override.criterion}: {said or 'points given by a person'}{author}"
 
 
 def _free(name: str, kind: str, taken: set[str]) -> str:

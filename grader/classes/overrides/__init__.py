@@ -146,7 +146,12 @@ class _Reading:
     def _faults(self, key: str, criterion: str, given: object) -> list[Fault]:
         path = (key, criterion)
         comments = as_map(given).get("comments")
-        found = model_faults(WrittenOverride if comments else Override, _without_empty(given), path)
+        found = model_faults(WrittenOverride, _without_empty(given), path)
+        if isinstance(given, dict) and given.get("points") is None and not comments:
+            if "points" in given:
+                found.append(((*path, "points"), "must be a number, not empty"))
+            elif not given.get("comment") and not given.get("answer"):
+                found.append(((*path, "points"), "is missing"))
         if criterion not in self._points:
             near = did_you_mean(criterion, self._points)
             return [(path, f'there is no criterion "{criterion}"{near}'), *found]
@@ -241,14 +246,15 @@ def bounds(criterion: Criterion) -> tuple[float, float]:
 
 def resolve(written: WrittenOverride, criterion: Criterion, bank: Bank) -> Override:
     """Return what an override comes to. Points that it does not have are those of its last comment with points, else
-    the criterion's own; the changes of all its comments are added."""
+    the criterion's own; the changes of all its comments are added. Where no comment says anything of points, there are
+    none: the check's verdict counts."""
     known = bank.get(criterion.id, {})
     used = [known[name] for name in written.comments if name in known]
     least, most = bounds(criterion)
     points = written.points
-    if points is None:
+    if points is None and any((one.points, one.change) != (None, None) for one in used):
         whole = [one.points for one in used if one.points is not None]
         points = (whole[-1] if whole else criterion.points) + sum(one.change or 0.0 for one in used)
     texts = [*(one.text for one in used), *([written.comment] if written.comment else [])]
-    fields = written.model_dump() | {"points": min(most, max(least, points))}
+    fields = written.model_dump() | {"points": None if points is None else min(most, max(least, points))}
     return Override(**fields | {"comment": "\n".join(texts)[:COMMENT_CHARS]})

@@ -279,6 +279,7 @@ class _Views:
         if form.get("do") in {"remove", "undo"}:
             return None
         known = self._session.decisions().bank.get(asked.id, {})
+        comments = [name for name in dict.fromkeys(form.getlist("bank")) if name in known]
         wanted = override_of(
             form.get("points", ""),
             form.get("comment", ""),
@@ -287,7 +288,8 @@ class _Views:
             most=most,
             reason=asked.check != MANUAL,
             answer=form.get("answer", ""),
-            comments=[name for name in dict.fromkeys(form.getlist("bank")) if name in known],
+            comments=comments,
+            pointed=any((known[name].points, known[name].change) != (None, None) for name in comments),
         )
         answered = self._session.answered(item, asked.id, wanted.answer) if form.get("do") != "alike" else ()
         return wanted.model_copy(update={"answered": answered})

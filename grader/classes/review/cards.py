@@ -82,6 +82,11 @@ class Card:
         return SIGNS[self.criterion.status]
 
     @property
+    def awarded(self) -> bool:
+        """Whether the points are a person's."""
+        return self.override is not None and self.override.awards
+
+    @property
     def seen(self) -> str:
         """What its form says that it was made from."""
         return mark(self.override)
@@ -92,8 +97,6 @@ class Card:
         if self.draft and self.draft.typed:
             return self.draft.points
         points = self.decided.written.points if self.decided else None
-        if self.requests and not self.decided and not self.criterion.status.is_open:
-            points = self.criterion.points
         return "" if points is None else form_number(points)
 
     @property
@@ -120,7 +123,7 @@ class Card:
     @property
     def said(self) -> str:
         """What the check says, where a person decided."""
-        if self.applied is None or self.manual:
+        if self.applied is None or not self.applied.awards or self.manual:
             return ""
         return verdict(self.applied.automatic.status, self.applied.automatic.points, self.criterion.full)
 
@@ -160,8 +163,8 @@ def cards(row: Row, rubric: Rubric, known: Known, drafts: Mapping[str, Draft]) -
     """Return the cards of a submission."""
     found = [card(row, rubric, name, known, drafts) for name in (c.id for c in row.result.criteria)]
     whole = row.result.error is None
-    mine = [c for c in found if c.override is not None]
-    waiting = [c for c in found if c.override is None and _waits(c, whole=whole)]
+    mine = [c for c in found if c.awarded]
+    waiting = [c for c in found if not c.awarded and _waits(c, whole=whole)]
     others = [c for c in found if c not in mine and c not in waiting]
     return Cards(waiting=waiting, decided=mine, rest=sorted(others, key=_nothing_lost))
 
@@ -218,12 +221,13 @@ def override_of(
     most: float,
     reason: bool,
     comments: Sequence[str] = (),
+    pointed: bool = False,
     answer: str = "",
 ) -> WrittenOverride:
-    """Raises Wrong. A `reason` is asked for where a check has judged; an `answer` is one, and comments of the bank are,
-    which stand for points too."""
-    value = None if comments and not points.strip() else _points(points, least, most)
+    """Raises Wrong. A `reason` is asked for where a check has judged; an `answer` is one, and comments of the bank are.
+    Points may be left out where there is an answer, and where comments stand for points (`pointed`)."""
     written, answered = clean(comment), clean(answer)
+    value = None if (answered or pointed) and not points.strip() else _points(points, least, most)
     if (many := max(len(written), len(answered))) > COMMENT_CHARS:
         raise Wrong(f"At most {COMMENT_CHARS} characters, please: there are {many}.")
     if reason and not written and not comments and not answered:

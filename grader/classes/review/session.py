@@ -210,7 +210,7 @@ class ReviewSession:
         """Return how many criteria each marker decided, by name."""
         with suppress(RubricError):
             decided = self.overrides()
-            return Counter(one.author for found in decided.values() for one in found.values())
+            return Counter(one.author for found in decided.values() for one in found.values() if one.awards)
         return Counter()
 
     def save(self, item: Item, criterion: str, wanted: WrittenOverride | None, seen: str) -> str:

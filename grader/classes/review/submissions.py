@@ -15,6 +15,7 @@ from typing import Any
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch
 from grader.classes.gradebook import Row
 from grader.intake import safe_name
+from grader.judging.settle import awarded
 from grader.model.batch import MISSING, ROSTER, Entry
 from grader.model.result import GradingResult, Override
 from grader.model.verdict import Status
@@ -39,7 +40,8 @@ FILTERS_OF_ONE = {
     "all": "All",
 }
 """Those of a list of one criterion across the class."""
-ALL, ASKED = "all", "asked"
+ALL, ASKED, NOTED = "all", "asked", "noted"
+"""The last one is no filter: a person said something and left the points to the check."""
 Stamp = tuple[int, int, int] | None
 
 
@@ -131,11 +133,15 @@ class Item:
     def with_decisions(self, decided: Mapping[str, Override]) -> Item:
         """Return it as the list shows it with these decisions, which its result may not have yet."""
         changed = {}
-        for name in (self.decided ^ decided.keys()) & self.lines.keys():
-            one, now = self.lines[name], decided.get(name)
+        with_points = {name: one for name, one in decided.items() if one.awards}
+        for name in (self.decided ^ with_points.keys()) & self.lines.keys():
+            one, now = self.lines[name], with_points.get(name)
             kinds = one.kinds - {"open", "decided", "changed"} | ({"decided"} if now else set())
             kinds |= {"open"} if one.waits and not now else set()
             changed[name] = replace(one, kinds=kinds, author=now.author if now else "")
+        for name in (decided.keys() - with_points.keys()) & self.lines.keys():
+            one = changed.get(name, self.lines[name])
+            changed[name] = replace(one, kinds=one.kinds | {NOTED})
         return replace(self, lines={**self.lines, **changed}) if changed else self
 
     def fits(self, kind: str, words: str, criterion: str = "") -> bool:
@@ -226,7 +232,7 @@ def item_of(row: Row) -> Item:
         late=result.late is not None and result.late.late_s > 0,
         gradable=kind not in {MISSING, ROSTER},
         lines=_lines(result),
-        decided=frozenset(override.criterion for override in result.overrides),
+        decided=frozenset(awarded(result.overrides)),
     )
 
 
@@ -235,7 +241,7 @@ _diagnosis = lru_cache(maxsize=20_000)(reduced)
 
 def _lines(result: GradingResult) -> dict[str, Line]:
     """What is to be said of each criterion; of what could not be graded, only what a person has decided."""
-    decided = {override.criterion: override for override in result.overrides}
+    decided = awarded(result.overrides)
     found = {}
     for criterion in result.criteria:
         by = decided.get(criterion.id)
@@ -402,8 +408,8 @@ def across(items: Sequence[Item], criteria: Iterable[tuple[str, str]]) -> list[A
 
 
 def alike(items: Iterable[Item], criterion: str, to: Item) -> list[Item]:
-    """Return that submission, and all others whose check said the same of the criterion and that no one has decided.
-    None where the check itself awards the points."""
+    """Return that submission, and all others whose check said the same of the criterion and about which no person has
+    said anything. None where the check itself awards the points."""
     diagnosis = to.lines[criterion].diagnosis if criterion in to.lines else ""
     if not diagnosis:
         return []
@@ -411,5 +417,7 @@ def alike(items: Iterable[Item], criterion: str, to: Item) -> list[Item]:
     return [
         item
         for item, one in lines
-        if one and one.diagnosis == diagnosis and ("decided" not in one.kinds or item.key == to.key)
+        if one
+        and one.diagnosis == diagnosis
+        and (one.kinds.isdisjoint({"decided", NOTED}) or item.key == to.key)
     ]

@@ -229,15 +229,15 @@
     if (form) { form.hidden = false; }
   }
 
-  // What `overrides.yaml` takes (JSON is YAML): the comment, and the points as they are
+  // What `overrides.yaml` takes (JSON is YAML): the comment, and where people awarded points these too
   function commented(form) {
     const place = criteria.findIndex((one) => one.id === form.dataset.criterion);
     const comment = JSON.stringify(form.querySelector("textarea").value);
     return data.diagnoses[form.dataset.comment].map((member) => {
       const row = rows[member];
-      const points = short(earned(row, place));
+      const points = row.decided ? "points: " + short(earned(row, place)) + ", " : "";
       const key = JSON.stringify(form.dataset.criterion);
-      return JSON.stringify(row.id) + ":\n  " + key + ": {points: " + points + ", comment: " + comment + "}\n";
+      return JSON.stringify(row.id) + ":\n  " + key + ": {" + points + "comment: " + comment + "}\n";
     }).join("");
   }
 

@@ -107,7 +107,7 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
         caused=_caused(result, criteria),
         late_s=late.late_s if late else 0.0,
         late_lost=max(0.0, late.points_before - late.points) if late else 0.0,
-        decided=len(result.overrides),
+        decided=sum(override.awards for override in result.overrides),
         look_again=sum(override.changed for override in result.overrides),
         wall_s=result.timing.wall_s,
         unwalled=line(without_sandbox(result.environment.sandbox), MESSAGE_CHARS),

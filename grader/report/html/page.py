@@ -187,7 +187,7 @@ def _sections(result: GradingResult, page: Page) -> Iterator[tuple[str, str]]:
     if result.notes:
         yield "noticed", "Noticed"
     if sentences.decided_criteria(result):
-        yield "decided", "Decided by a person"
+        yield "decided", sentences.decided_title(result)
     yield "all", "All criteria"
     if page.ran:
         yield "ran", "What ran"
