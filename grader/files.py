@@ -1,7 +1,7 @@
 """Files: written whole or not at all, read with care where someone else wrote them, locked, and temporary folders.
 
 Each temporary folder holds a file that its grader keeps locked: if the lock is free, that grader was killed, and the
-next one removes the folder.
+next one removes the folder. So it is with files that were to take another one's place.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Literal, get_args
 
 from grader.errors import GraderError, HostError, OutputError
 from grader.portable import BINARY, CLOEXEC, DIRECTORY, NOFOLLOW, READ, user_id
@@ -51,20 +51,15 @@ def atomic_write(path: Path, data: bytes, *, public: bool = False) -> None:
     if path.exists() and not path.is_file():
         _write_into(path, data)
         return
-    beside = path.with_name(f".{path.name[:80]}.{secrets.token_hex(6)}")
     try:
         make_folder(path.parent, public=public)
-        with new_file(beside, public=public) as file:
+        with _new_beside(path, path.parent, public=public) as (beside, file):
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        beside.replace(path)
-    except BaseException as error:
-        with suppress(OSError):
-            beside.unlink()
-        if isinstance(error, OSError):
-            raise unwritable(path, error) from error
-        raise
+            _replace(beside, file, path)
+    except OSError as error:
+        raise unwritable(path, error) from error
 
 
 @contextmanager
@@ -78,27 +73,58 @@ def whole_file(target: Path) -> Iterator[Path]:
     target = target.resolve() if target.is_symlink() else target
     special = target.exists() and not target.is_file()
     folder = Path(tempfile.gettempdir()) if special else target.parent
-    beside = folder / f".{target.name[:80]}.{secrets.token_hex(6)}"
     try:
         make_folder(folder)
-        new_file(beside).close()
-        yield beside
-        _place(beside, target, special=special)
+        with _new_beside(target, folder) as (beside, file):
+            yield beside
+            if special:
+                with beside.open("rb") as source, target.open("wb") as place:
+                    shutil.copyfileobj(source, place)
+                return
+            with beside.open("rb") as written:
+                os.fsync(written.fileno())
+            _replace(beside, file, target)
     except OSError as error:
         raise unwritable(target, error) from error
+
+
+@contextmanager
+def _new_beside(target: Path, folder: Path, *, public: bool = False) -> Iterator[tuple[Path, BinaryIO]]:
+    """Make a file that is to take the target's place, and remove it in the end if it has not.
+
+    It is locked while its writer lives. What writers that were killed left for this target is removed.
+    """
+    prefix = f".{target.name[:80]}."
+    _sweep_beside(folder, prefix)
+    for _ in range(ATTEMPTS):
+        beside = folder / f"{prefix}{secrets.token_hex(6)}"
+        file = new_file(beside, public=public)
+        if _held(file.fileno()) and beside.exists():  # else another writer has swept it before it was locked
+            break
+        file.close()
+    try:
+        with file:
+            yield beside, file
     finally:
         with suppress(OSError):
             beside.unlink()
 
 
-def _place(beside: Path, target: Path, *, special: bool) -> None:
-    if special:
-        with beside.open("rb") as source, target.open("wb") as place:
-            shutil.copyfileobj(source, place)
-        return
-    with beside.open("rb") as written:
-        os.fsync(written.fileno())
+def _replace(beside: Path, file: BinaryIO, target: Path) -> None:
+    if not HAS_LOCKS:  # on Windows, what is open cannot be renamed
+        file.close()
     beside.replace(target)
+
+
+def _sweep_beside(folder: Path, prefix: str) -> None:
+    if not HAS_LOCKS:  # nothing tells which writers have ended
+        return
+    left = re.compile(rf"{re.escape(prefix)}[0-9a-f]{{12}}")
+    with suppress(OSError):  # housekeeping
+        for name in filter(left.fullmatch, os.listdir(folder)):  # noqa: PTH208 - it may hold thousands
+            with suppress(OSError), open_untrusted(folder / name) as file:
+                if os.fstat(file.fileno()).st_uid == user_id() and lock(file.fileno()):
+                    (folder / name).unlink()
 
 
 def new_file(path: Path, *, public: bool = False) -> BinaryIO:
@@ -238,12 +264,15 @@ def wait_for_lock(descriptor: int) -> None:
 
 
 MARK = ".grader"
-NAME = re.compile(r"grader-(source|fetch|run|check|new|mutants|tests)-[a-z0-9_]{8}")
+Kind = Literal[
+    "check", "download", "fetch", "gradebook", "lab", "mutants", "new", "repaired", "run", "source", "tests"
+]
+NAME = re.compile(rf"grader-({'|'.join(get_args(Kind))})-[a-z0-9_]{{8}}")
 ATTEMPTS = 10
 
 
 @contextmanager
-def temporary_folder(kind: str, base: Path | None = None) -> Iterator[Path]:
+def temporary_folder(kind: Kind, base: Path | None = None) -> Iterator[Path]:
     """Make a private folder `grader-<kind>-…` in `base` (by default where temporary files go), for the block.
 
     Raises HostError if it cannot be made.

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import signal
 import stat
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
 import pytest
 
 from grader.errors import OutputError
-from grader.files import atomic_write
+from grader.files import atomic_write, whole_file
 
 
 def test_a_pipe_is_written_to_and_stays_a_pipe(tmp_path: Path) -> None:
@@ -46,3 +49,46 @@ def test_a_folder_is_refused_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot write"):
         atomic_write(tmp_path, b"x")
     assert list(tmp_path.iterdir()) == []
+
+
+WRITING = """
+import sys
+from pathlib import Path
+from grader.files import whole_file
+with whole_file(Path(sys.argv[1])) as beside:
+    beside.write_bytes(b"half")
+    print("begun", flush=True)
+    sys.stdin.read()
+"""
+
+
+def _writer(target: Path) -> subprocess.Popen[str]:
+    """A process in the middle of writing a file."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", WRITING, str(target)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "begun\n"
+    return process
+
+
+@pytest.mark.parametrize("write", ["atomic_write", "whole_file"])
+def test_what_a_killed_writer_left_is_removed_by_the_next_one(tmp_path: Path, write: str) -> None:
+    target = tmp_path / "feedback (1).zip"
+    mine = tmp_path / ".feedback (1).zip.of-mine"
+    mine.write_bytes(b"not a writer's")
+    dead, alive = _writer(target), _writer(target)
+    dead.send_signal(signal.SIGKILL)
+    dead.communicate()
+    assert len(list(tmp_path.iterdir())) == 3
+    if write == "atomic_write":
+        atomic_write(target, b"new")
+    else:
+        with whole_file(target) as beside:
+            beside.write_bytes(b"new")
+    assert target.read_bytes() == b"new"
+    assert len(list(tmp_path.iterdir())) == 3, "the one that still writes has its file"
+    alive.communicate("")
+    assert alive.returncode == 0
+    assert sorted(tmp_path.iterdir()) == sorted([target, mine])
+    assert target.read_bytes() == b"half"

@@ -9,7 +9,6 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Literal
 
 from rich.console import Console
@@ -42,6 +41,7 @@ from grader.cli.class_display import open_class_display, print_batch
 from grader.cli.host_support import require_room, warn_without_sandbox
 from grader.cli.output import say, say_beside, say_json
 from grader.errors import ExitCode, GraderError, UsageError
+from grader.files import temporary_folder
 from grader.model.batch import BatchRun
 from grader.model.sandbox_mode import SandboxMode
 from grader.portable import cores
@@ -283,7 +283,7 @@ def write_gradebook_of(path: Path, wanted: Wanted) -> ExitCode:
     target = Path(wanted.out) if wanted.out else path.with_name(f"gradebook{suffix}")
     if wanted.template and wanted.out != STDOUT and target.exists() and target.samefile(wanted.template):
         raise UsageError(f"{target} is the template itself", hint="give another name with --out")
-    with TemporaryDirectory(prefix="gradebook-") as temporary:
+    with temporary_folder("gradebook") as temporary:
         place = Path(temporary, target.name) if wanted.out == STDOUT else target
         remarks = write_gradebook(
             book_of(course, marks),

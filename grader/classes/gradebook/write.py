@@ -6,14 +6,13 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from grader.classes.gradebook.platforms import Platform, marks_of, new_import_file, remarks_of, wanted_columns
 from grader.classes.gradebook.table import Book, Cell, Form, Row, cells, csv_line, header, visible_text
 from grader.classes.gradebook.template import fill_template
 from grader.errors import OutputError, UsageError
-from grader.files import atomic_write, whole_file
+from grader.files import atomic_write, temporary_folder, whole_file
 from grader.model.result import GradingResult
 from grader.untrusted_text import json_text, steers
 
@@ -121,7 +120,7 @@ def write_workbook(book: Book, rows: Iterable[Row], target: Path) -> None:
     import xlsxwriter  # noqa: PLC0415 - slow to load
     from xlsxwriter.exceptions import XlsxWriterException  # noqa: PLC0415 - as above
 
-    with whole_file(target) as path, TemporaryDirectory(prefix="gradebook-") as temporary:
+    with whole_file(target) as path, temporary_folder("gradebook") as temporary:
         workbook = xlsxwriter.Workbook(str(path), {**WORKBOOK, "tmpdir": temporary})
         sheets = [workbook.add_worksheet(name) for name in ("Gradebook", "Criteria")]
         try:

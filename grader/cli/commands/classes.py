@@ -5,7 +5,6 @@ import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated, Literal
 
 from grader.cli.declare import (
@@ -310,6 +309,7 @@ def gradebook(
         from grader.classes.feedback.publish import publication_remarks, published_rows, read_published
         from grader.classes.gradebook import write_gradebook
         from grader.cli.output import say, say_beside
+        from grader.files import temporary_folder
     batch = open_batch(folder)
     published = read_published(folder)
     by_drafts = drafts or not published.history
@@ -321,7 +321,7 @@ def gradebook(
     target = Path(out) if out else folder / name
     if template and out != STDOUT and target.exists() and target.samefile(template):
         raise UsageError(f"{target} is the template itself", hint="give another name with --out")
-    with TemporaryDirectory(prefix="gradebook-") as temporary:
+    with temporary_folder("gradebook") as temporary:
         place = Path(temporary, GRADEBOOKS[form]) if out == STDOUT else target
         remarks = write_gradebook(
             batch.book(),
