@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
+from grader.checks.support.clocks import time_between
 from grader.checks.support.counters import (
     LOST_GAP_SHARE,
     Count,
@@ -28,7 +29,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
-from grader.wording import join_words, plural, seconds, significant
+from grader.wording import join_words, plural, significant
 
 CONNECT_NS = 1_000_000_000
 LARGEST = 2.0**64
@@ -151,7 +152,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     found = wrong_steps(count, run, maximum=params.maximum, rate_hz=params.rate_hz)
     wrong, right = found.steps, sum(s.change == 1 for s in steps)
     verdict = (
-        _wrong(count, found, params)
+        _wrong(count, found, run, params)
         or _too_few(len(steps), run, package, params)
         or passed(f"the counter goes up by one, {plural(right, 'time')}")
     )
@@ -230,7 +231,7 @@ def _recorder_was_late(run: Run, topic: str, callerid: str) -> bool:
     return registered is not None and connected is not None and connected - registered > CONNECT_NS
 
 
-def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
+def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict | None:
     if not found.steps or found.excused:
         return None
     if found.flood:
@@ -240,7 +241,7 @@ def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
         message = f"{plural(missing, 'value')} of {params.topic} were lost on the way, with a gap in time"
         return inconclusive(message, hint="grade again when the machine is less busy")
     first, usual = found.own[0], count.usual_step()
-    after = seconds(first.to_ns - count.times_ns[0])
+    after = time_between(run, count.times_ns[0], first.to_ns)
     comes = f"after {significant(first.before)} comes {significant(first.after)}"
     place = f"{comes} (value {first.number + 1}, {after} after the first)"
     if usual not in {None, 1}:

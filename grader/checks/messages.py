@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from grader.checks.registry import check
-from grader.checks.support.clocks import ASK_AGAIN, WATCHED_S, clocks_at, wrong_growth
+from grader.checks.support.clocks import ASK_AGAIN, WATCHED_S, clocks_at, time_between, wrong_growth
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import (
     ROUNDING,
@@ -39,7 +39,7 @@ from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, partial, passed, unjudged
-from grader.wording import join_words, plural, seconds, significant
+from grader.wording import join_words, plural, significant
 
 ENOUGH = 3
 _LAST_NUMBER = re.compile(rf".*?({NUMBER})\D*", re.DOTALL)
@@ -278,7 +278,7 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
     elif not usable and missing:
         verdict = no_field(missing, channels)
     elif len(found) - len(outside) < params.share * len(found) - ROUNDING:
-        verdict = _outside(outside, found, params)
+        verdict = _outside(outside, found, run, params)
         if params.share < 1 and losses(run, params.topic):
             verdict = inconclusive(verdict.message, hint="grade again")
     else:
@@ -293,9 +293,11 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
     )
 
 
-def _outside(outside: Sequence[Reading], readings: Sequence[Reading], params: FieldBoundsParams) -> Verdict:
+def _outside(
+    outside: Sequence[Reading], readings: Sequence[Reading], run: Run, params: FieldBoundsParams
+) -> Verdict:
     first = outside[0]
-    after = seconds(first.time_ns - readings[0].time_ns)
+    after = time_between(run, readings[0].time_ns, first.time_ns)
     wrong = [value for value in first.values if not params.holds(value)]
     seen = f"is {significant(wrong[0])}" if wrong else f"is not there ({first.fault})"
     count = f"in {len(outside)} of {plural(len(readings), 'message')}"
@@ -396,7 +398,7 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     elif not any(r.values for r in found):
         verdict = no_field(found[0], channels)
     elif len(wrong) == len(asked) if params.when == "any" else wrong:
-        verdict = _other_value(wrong, found, params)
+        verdict = _other_value(wrong, found, run, params)
     else:
         count = f"all of {plural(len(found), 'message')}" if params.when == "every" else which
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {count}")
@@ -436,7 +438,9 @@ def _in_order(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> 
     )
 
 
-def _other_value(wrong: Sequence[Reading], found: Sequence[Reading], params: FieldEqualsParams) -> Verdict:
+def _other_value(
+    wrong: Sequence[Reading], found: Sequence[Reading], run: Run, params: FieldEqualsParams
+) -> Verdict:
     first = wrong[0]
     other = next((v for v in first.values if any(differences(v, params.value, params.tolerance))), None)
     why = next(map(str, differences(other, params.value, params.tolerance)), "")
@@ -448,7 +452,7 @@ def _other_value(wrong: Sequence[Reading], found: Sequence[Reading], params: Fie
         )
         return failed(f"{message}: at first {seen}", hint=hint).once()
     if params.when == "every":
-        after = seconds(first.time_ns - found[0].time_ns)
+        after = time_between(run, found[0].time_ns, first.time_ns)
         where = f"in {len(wrong)} of {plural(len(found), 'message')}: {seen}, {after} after the first"
         return failed(f"{params.field} of {params.topic} is wrong {where}", hint=hint)
     verdict = failed(

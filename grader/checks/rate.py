@@ -166,14 +166,16 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     slips = [s for s in package.slips if "sleep" in s.message and (not scripts or s.file in scripts)]
     if not slips and found.mean_hz < FLOOD_HZ and found.is_even:
         return None
-    where = f" ({slips[0].file}, line {slips[0].line}: {slips[0].message})" if slips else ""
+    why = slips[0].message.partition(": write ")[0] if slips else ""
+    where = f" ({slips[0].file}, line {slips[0].line}: {why})" if slips else ""
     hz = significant(params.rate_hz)
+    about = f"{float(f'{found.mean_hz:.2g}'):,.0f}"
     made = both(f"rate = rospy.Rate({hz})", f"ros::Rate rate({hz})")
     hint = f"call rate.sleep(), with parentheses, in every iteration; {made}"
     if slips and slips[0].kind == "sleep-outside":
         hint = "move it into that loop, as the last line of it"
     return failed(
-        f"{params.topic} is flooded with {hertz(found.mean_hz)}: the loop does not sleep{where}",
+        f"{params.topic} runs at about {about} Hz instead of {hz} Hz: the loop does not sleep{where}",
         hint=hint,
         citations=tuple(FileCitation(file=s.file, line=s.line) for s in slips[:3]),
     )

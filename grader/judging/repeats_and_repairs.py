@@ -284,7 +284,18 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         untold = [clause for clause in copy.message.split("; ") if clause not in said]
         words += [f"with that repaired, {'; '.join(untold)}"] if untold else []
         hints += [f"then {copy.hint}"] if copy.hint else []
-    return verdict.model_copy(update={"message": "; ".join(words), "hint": "; ".join(hints)})
+    cited = {(c.file, c.line) for c in verdict.citations if isinstance(c, FileCitation)}
+    lines = [
+        FileCitation(file=one.file, line=one.line)
+        for one in repairs
+        if one.line is not None and not any(one.file == file and line is not None for file, line in cited)
+    ]
+    update = {
+        "message": "; ".join(words),
+        "hint": "; ".join(hints),
+        "citations": (*lines, *verdict.citations),
+    }
+    return verdict.model_copy(update=update)
 
 
 def _is_told(repair: Repair, hint: str) -> bool:

@@ -20,10 +20,10 @@ class RateFigure(Record):
 
     `publisher` is one node, or all of the student's on the topic together (`/a and /b`): that is what is judged.
     `times_s` are the arrivals but for the first, `gaps_s` the time before each; where the publisher `ends_silent`, the
-    last of them is the silence at the end. `low_hz` and `high_hz` bound the mean that passes, `gap_low_s` and
-    `gap_high_s` a single gap. `mean_hz` is what was measured, of so many `messages`; of a flood of them some points
-    are shown. `late` are stretches in which the machine was late, `died` when a publisher's process ended by itself,
-    and how.
+    last of them is the silence at the end. Of a flood, `counts` say how many came in each `slice_s`. `low_hz` and
+    `high_hz` bound the mean that passes, `gap_low_s` and `gap_high_s` a single gap. `mean_hz` is what was measured, of
+    so many `messages`; of very many some points are shown. `late` are stretches in which the machine was late, `died`
+    when a publisher's process ended by itself, and how.
     """
 
     kind: Literal["rate"] = "rate"
@@ -41,13 +41,16 @@ class RateFigure(Record):
     died: tuple[tuple[float, str], ...] = ()
     messages: int = 0
     ends_silent: bool = False
+    counts: tuple[int, ...] = ()
+    slice_s: float = 0.1
 
 
 class CounterFigure(Record):
     """A counter's values over time. `wraps` and `wrong` are indexes into the points: steps to the first value after a
     wrap, and steps that are not as they should be; `texts` say what is wrong with each of `wrong`, and `more_wrong`
     steps are not named. `numbers` count each point's value from 0 on its publisher: where they jump, points are left
-    out. `died` says when the publisher's process ended by itself, and how."""
+    out. `died` says when the publisher's process ended by itself, and how. Where ROS's clock was `faster` than the wall
+    by this factor, times are the clock's."""
 
     kind: Literal["counter"] = "counter"
     topic: str
@@ -62,6 +65,7 @@ class CounterFigure(Record):
     more_wrong: int = 0
     died: tuple[tuple[float, str], ...] = ()
     messages: int = 0
+    faster: float = 1
 
 
 class Heard(Record):
@@ -98,6 +102,7 @@ class Edge(Record):
 class GraphFigure(Record):
     """Nodes and topics as `rqt_graph` draws them, all that were there during the run. `types` are the topics'.
 
+    `wrong` says of nodes and topics what is wrong with them; topics of these that are `missing` were not there.
     `left_out` nodes and topics are not shown.
     """
 
@@ -107,6 +112,8 @@ class GraphFigure(Record):
     topics: tuple[str, ...]
     types: dict[str, str] = Field(default_factory=dict)
     edges: tuple[Edge, ...]
+    wrong: dict[str, str] = Field(default_factory=dict)
+    missing: tuple[str, ...] = ()
     left_out: int = 0
 
 

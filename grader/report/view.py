@@ -285,11 +285,12 @@ COMMAND = re.compile(r"(?<!`)`([^`]+)`(?!`)")
 
 
 STARTS = re.compile(
-    r"""(a|add|after|all|an|another|at|both|bring|build|call|check|close|correct|create|declare|delete|do|does|drive
-    |each|every|fill|find|first|fix|from|give|hand|have|in|indent|install|it|its|keep|leave|let|line|look|loop|make|more
-    |move|negative|neither|no|nothing|on|once|one|only|open|order|pass|perhaps|print|publish|put|read|record|remove
-    |rename|replace|reset|run|save|send|set|something|start|steer|stop|subscribe|take|tell|the|there|this|too|try|turn
-    |twice|two|use|what|whether|which|while|with|wrap|write|wrong|your)[,:;]?(?=\ )""",
+    r"""(a|add|after|all|an|another|at|both|bring|build|call|check|close|correct|create|declare|delete|do
+    |does|drive|each|every|fill|find|first|fix|from(?!\ \S+\ import)|give|hand|have|in|indent|install|it
+    |its|keep|leave|let|line|look|loop|make|more|move|negative|neither|no|nothing|on|once|one|only|open
+    |order|pass|perhaps|print|publish|put|read|record|remove|rename|replace|reset|run|save|send|set
+    |something|start|steer|stop|subscribe|take|tell|the|there|this|too|try|turn|twice|two|use|what|whether
+    |which|while|with|wrap|write|wrong|your)[,:;]?(?=\ )""",
     re.VERBOSE,
 )
 """Words that a message or a hint begins with and that are no command, name or code."""

@@ -7,9 +7,19 @@ from typing import Any
 
 import pytest
 
+from grader.checks import CHECKS
 from grader.model.figure import ConsoleFigure, GraphFigure
-from grader.report.figures.runs import EDGES_MAX, LETTERS_MAX, NODES_MAX, TOPICS_MAX, console_of, graph_of
+from grader.report.figures.runs import (
+    EDGES_MAX,
+    LETTERS_MAX,
+    NODES_MAX,
+    TOPICS_MAX,
+    console_of,
+    graph_of,
+    with_faults,
+)
 from tests.checks.examples import runs_of
+from tests.figures.made import criterion, drawn, only
 
 OWN = ("/grader_recorder_0a1b2c3d", "/grader_actor_0a1b2c3d", "/grader_calibration_0a1b2c3d", "/rosout")
 
@@ -121,3 +131,49 @@ def test_long_lines_are_cut() -> None:
     many = console(*["y" * 10_000] * 500)
     assert many is not None
     assert sum(len(line.text) for line in many.lines) <= LETTERS_MAX
+
+
+NODES = {
+    "nodes": ["/talker", "/listener"],
+    "publishers": {"/chater": ["/talker"], "/count": ["/talker"]},
+    "subscribers": {"/chatter": ["/listener"]},
+    "topic_types": {"/chater": "std_msgs/String", "/count": "std_msgs/Int32"},
+}
+
+
+@pytest.mark.parametrize(
+    ("check", "params", "wrong", "missing"),
+    [
+        (
+            "topic-type",
+            {"topic": "/chatter", "type": "std_msgs/String"},
+            {"/chatter": "nobody publishes"},
+            (),
+        ),
+        ("topic-type", {"topic": "/count", "type": "std_msgs/Int8"}, {"/count": "not std_msgs/Int8"}, ()),
+        (
+            "topic-type",
+            {"topic": "/counts", "type": "std_msgs/Int8"},
+            {"/count": "not /counts", "/counts": "nobody publishes"},
+            ("/counts",),
+        ),
+        ("hears", {"topic": "/numbers"}, {"/numbers": "nobody subscribes"}, ("/numbers",)),
+        ("hears", {"topic": "/count"}, {"/count": "nobody subscribes"}, ()),
+        ("node-name", {"names": ["sender"]}, {"/talker": "not /sender", "/listener": "not /sender"}, ()),
+        ("node-name", {"names": ["talker"]}, {}, ()),
+    ],
+)
+def test_what_is_wrong_in_a_graph_is_named(check, params, wrong, missing) -> None:
+    found = graph(graph=[NODES])
+    assert found is not None
+    marked = with_faults(found, check, CHECKS[check].params.model_validate(params))
+    assert (marked.wrong, marked.missing) == (wrong, missing)
+    assert set(wrong) <= {*marked.nodes, *marked.topics}
+
+
+def test_a_loss_without_a_plot_has_the_graph_with_its_fault() -> None:
+    figures, results = drawn(
+        {"graph": [NODES]}, criterion("topic-type", topic="/chatter", type="std_msgs/String")
+    )
+    assert results["topic-type"].status.is_lost
+    assert only(figures, "topic-type", GraphFigure).wrong == {"/chatter": "nobody publishes"}

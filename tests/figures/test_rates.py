@@ -95,3 +95,23 @@ def test_a_choice_of_points_keeps_the_share_of_short_gaps() -> None:
 def test_nothing_is_drawn_where_no_rate_is_judged(run: dict[str, object]) -> None:
     figures, _ = drawn(run, RATE)
     assert "rate" not in figures.by_criterion
+
+
+def test_a_flood_is_counted_by_tenths_of_a_second() -> None:
+    figures, _ = drawn({"topics": [{"topic": "/chatter", "count": 2001, "rate_hz": 1000}]}, RATE)
+    figure = only(figures, "rate", RateFigure)
+    assert len(figure.counts) == 19
+    assert set(figure.counts) <= {99, 100, 101}
+    assert sum(figure.counts) <= figure.messages == 2001
+
+
+def test_no_other_rate_is_counted() -> None:
+    figures, _ = drawn({"topics": [CHATTER]}, RATE)
+    assert only(figures, "rate", RateFigure).counts == ()
+
+
+def test_a_lost_rate_says_nothing_of_a_late_machine() -> None:
+    host = [{"at_s": 2}, {"at_s": 3, "mean_ms": 6, "p95_ms": 30, "max_ms": 120}, {"at_s": 7}]
+    figures, results = drawn({"topics": [{**CHATTER, "count": 3000, "rate_hz": 500}], "host": host}, RATE)
+    assert results["rate"].status.is_lost
+    assert only(figures, "rate", RateFigure).late == ()

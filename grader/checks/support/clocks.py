@@ -18,7 +18,7 @@ from grader.checks.support.text import GET_TIME
 from grader.evidence.events import HostEvent
 from grader.evidence.run import Channel, Run
 from grader.model.verdict import Verdict, failed, inconclusive
-from grader.wording import plural
+from grader.wording import plural, seconds
 
 Seconds = tuple[float, ...]
 ToSeconds = Callable[[int], float]
@@ -53,6 +53,12 @@ def run_seconds(run: Run) -> ToSeconds | None:
         return lambda time_ns: (time_ns - run.start_ns) / 1e9
     ticks = _ticks(run)
     return _interpolated(ticks, ticks[0][1]) if ticks else None
+
+
+def time_between(run: Run, from_ns: int, to_ns: int) -> str:
+    """Return how much later `to_ns` was, by the run's clock: `2.5 s`."""
+    to_s = run_seconds(run)
+    return seconds(to_ns - from_ns) if to_s is None else f"{to_s(to_ns) - to_s(from_ns):.1f} s"
 
 
 def ros_seconds(run: Run) -> ToSeconds | None:

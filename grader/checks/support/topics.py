@@ -300,7 +300,8 @@ def all_lost(run: Run, topic: str) -> Verdict | None:
 def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> Verdict:
     """Return the verdict with what the recorder lost of its topics.
 
-    A lost mark becomes `inconclusive`, unless the check rests on what came whole (`heeds_losses`).
+    A lost mark becomes `inconclusive`, unless the check rests on what came whole (`heeds_losses`): then what was lost
+    only stands with what was measured.
     """
     run = facts.get("run")
     if not isinstance(run, Run):
@@ -308,9 +309,12 @@ def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdi
     found = [one for topic in _topics(check, facts.get("params")) if (one := losses(run, topic))]
     if not found:
         return verdict
-    message = "; ".join([verdict.message, *(one.words for one in found)])
-    update: dict[str, object] = {"message": message}
-    if verdict.status in TAKEN and not check.heeds_losses:
+    taken = verdict.status in TAKEN and not check.heeds_losses
+    if not taken and verdict.status is not Status.INCONCLUSIVE:
+        measured = "; ".join(filter(None, (verdict.measured, *(one.words for one in found))))
+        return verdict.model_copy(update={"measured": measured})
+    update: dict[str, object] = {"message": "; ".join([verdict.message, *(one.words for one in found)])}
+    if taken:
         update |= {"status": Status.INCONCLUSIVE, "score": 0.0, "unjudged": False, "hint": "grade again"}
     return verdict.model_copy(update=update)
 

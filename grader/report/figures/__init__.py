@@ -15,7 +15,7 @@ from grader.checks import CHECKS
 from grader.evidence.run import Run
 from grader.judging.facts import PACKAGE_RUN, Facts, try_facts
 from grader.judging.repeats_and_repairs import split_runs
-from grader.model.figure import Figure, Figures
+from grader.model.figure import Figure, Figures, RateFigure
 from grader.model.result import CriterionResult
 from grader.model.verdict import Verdict
 from grader.report.figures.measurements import (
@@ -28,7 +28,7 @@ from grader.report.figures.measurements import (
     step_figures,
     wrap_figures,
 )
-from grader.report.figures.runs import code_figures, console_of, graph_of, timeline_of
+from grader.report.figures.runs import code_figures, console_of, graph_of, timeline_of, with_faults
 from grader.rubric.made_up import with_recorded_values
 from grader.rubric.model import Criterion, Rubric
 
@@ -81,17 +81,22 @@ def _by_criterion(
 ) -> dict[str, tuple[Figure, ...]]:
     asked = {criterion.id: criterion for criterion in rubric.criteria}
     judged_by = {c.id: on_copy if c.repaired and not c.repaired.charged else first for c in criteria}
-    found = {
-        result.id: (*_drawn(judged_by[result.id], asked[result.id]), *_cited(judged_by[result.id], result))
-        for result in criteria
-        if result.id in asked
-    }
+    found = {c.id: _all_of(judged_by[c.id], asked[c.id], c) for c in criteria if c.id in asked}
     return {name: figures for name, figures in found.items() if figures}
 
 
-def _drawn(facts: Facts, criterion: Criterion) -> tuple[Figure, ...]:
-    """What shows the check's measurement; nothing where the check itself was given no run to judge."""
-    return _try_make(_from_facts, facts, criterion) or ()
+def _all_of(facts: Facts, criterion: Criterion, result: CriterionResult) -> tuple[Figure, ...]:
+    shown = _drawn(facts, criterion, result) or _graph(facts, criterion, result)
+    return (*shown, *_cited(facts, result))
+
+
+def _drawn(facts: Facts, criterion: Criterion, result: CriterionResult) -> tuple[Figure, ...]:
+    """What shows the check's measurement; nothing where the check itself was given no run to judge. Where it is lost
+    all the same, how late the machine was has decided nothing."""
+    found = _try_make(_from_facts, facts, criterion) or ()
+    if not result.status.is_lost:
+        return found
+    return tuple(one.model_copy(update={"late": ()}) if isinstance(one, RateFigure) else one for one in found)
 
 
 def _from_facts(facts: Facts, criterion: Criterion) -> tuple[Figure, ...]:
@@ -103,6 +108,18 @@ def _from_facts(facts: Facts, criterion: Criterion) -> tuple[Figure, ...]:
     if isinstance(given, Verdict):
         return ()
     return tuple(islice(draw(**{name: given[name] for name in signature(draw).parameters}), FIGURES_MAX))
+
+
+def _graph(facts: Facts, criterion: Criterion, result: CriterionResult) -> tuple[Figure, ...]:
+    """Of what was lost in a run and has no measurement that can be drawn: who was joined with whom, and what is wrong
+    with that, if anything is."""
+    run = facts.runs.get(criterion.scenario or "")
+    graph = _try_make(graph_of, run) if run and result.status.is_lost else None
+    if graph is None:
+        return ()
+    params = CHECKS[criterion.check].params.model_validate(criterion.parameters)
+    marked = _try_make(with_faults, graph, criterion.check, params)
+    return (marked,) if marked and marked.wrong else ()
 
 
 def _cited(facts: Facts, result: CriterionResult) -> tuple[Figure, ...]:

@@ -6,7 +6,9 @@ Values of a counter, a rate, what a listener heard, the path that a robot took a
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Iterator, Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from itertools import chain
 
 from grader.checks.counter import StartParams, StepParams, judge_start
@@ -22,7 +24,7 @@ from grader.checks.robot_places import (
     placed,
     stretch_to_judge,
 )
-from grader.checks.support.clocks import lateness
+from grader.checks.support.clocks import lateness, run_seconds
 from grader.checks.support.console_output import (
     Line,
     Probe,
@@ -142,28 +144,30 @@ def _counter_figure(
         i for i in kept or _shown_values(count, [i for i, _ in shown], turns) if _drawable(count.values[i])
     ]
     places = {number: place for place, number in enumerate(numbers)}
+    to_s = run_seconds(run) or partial(second, run)
     return CounterFigure(
         topic=short_name(topic),
         publisher=short_name(count.callerid or "an unnamed node"),
         scenario=short_name(run.scenario),
-        times_s=tuple(second(run, count.times_ns[i]) for i in numbers),
+        times_s=tuple(round(to_s(count.times_ns[i]), 6) for i in numbers),
         values=tuple(_whole(finite(count.values[i])) for i in numbers),
         numbers=tuple(numbers),
         wraps=tuple(places[s.number] for s in turns if s.number in places),
         wrong=tuple(places[i] for i, _ in shown),
         texts=tuple(short(text, TEXT_LETTERS) for _, text in shown),
         more_wrong=len(marks) - len(shown),
-        died=tuple(own_ends(run, [count.callerid])),
+        died=tuple(own_ends(run, [count.callerid], to_s)),
         messages=len(count.values),
+        faster=finite(run.warp) if run.clock == "warped" and run_seconds(run) else 1,
     )
 
 
-def own_ends(run: Run, nodes: Iterable[str]) -> Iterator[tuple[float, str]]:
+def own_ends(run: Run, nodes: Iterable[str], to_s: Callable[[int], float]) -> Iterator[tuple[float, str]]:
     """Yield when (s) the processes of these nodes ended by themselves, and how, in a few words."""
     ended = {one.name: one for one in (life_of(run, node) for node in nodes) if one and one.ended_early}
     for one in ended.values():
         if one.end_ns is not None and one.end is not None:
-            yield second(run, one.end_ns), short(f"{one.name} ended: {_how(run, one.name, one.end)}")
+            yield round(to_s(one.end_ns), 6), short(f"{one.name} ended: {_how(run, one.name, one.end)}")
 
 
 def _how(run: Run, name: str, end: ProcessEvent) -> str:
@@ -206,6 +210,9 @@ PUBLISHERS_MAX = 3
 EXTREMES = 20
 SLICE_NS = 500_000_000
 SLICES_MAX = 30
+FLOOD = 5
+"""So many times the highest rate that passes: then single messages cannot be told apart in a plot."""
+COUNTED_NS = 100_000_000
 
 
 def rate_figures(run: Run, params: RateParams) -> Iterator[RateFigure]:
@@ -237,10 +244,21 @@ def _rate_figure(run: Run, params: RateParams, found: Rhythm, channels: Sequence
         gap_low_s=finite(low_ns / 1e9),
         gap_high_s=finite(high_ns / 1e9),
         late=tuple((second(run, a), second(run, b)) for a, b in _late(run, params, found)),
-        died=tuple(own_ends(run, [c.callerid for c in channels])),
+        died=tuple(own_ends(run, [c.callerid for c in channels], partial(second, run))),
         messages=len(found.times_ns),
         ends_silent=bool(silent),
+        counts=tuple(_counts(found.times_ns)) if found.mean_hz > FLOOD * params.high_hz else (),
+        slice_s=COUNTED_NS / 1e9,
     )
+
+
+def _counts(times_ns: Sequence[int]) -> Iterator[int]:
+    """Yield how many came in each tenth of a second from the first; what is left of one at the end is left out."""
+    at = 0
+    for end_ns in range(times_ns[0] + COUNTED_NS, times_ns[-1], COUNTED_NS)[:POINTS_MAX]:
+        after = bisect_left(times_ns, end_ns)
+        yield after - at
+        at = after
 
 
 def _shown_gaps(gaps_ns: Sequence[int]) -> list[int]:

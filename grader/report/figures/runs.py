@@ -6,7 +6,9 @@ nodes, topics, what went to stderr, and what the grader did.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from typing import NamedTuple
 
 from grader.checks.support.processes import how_it_ended
@@ -32,6 +34,51 @@ TOPICS_MAX = 40
 EDGES_MAX = 200
 STATES_MAX = 400
 UNKNOWN = {"", "*"}
+
+
+HEARERS = frozenset({"hears", "launch-connects", "connected", "copies"})
+"""Checks that ask who subscribes to their topic; others with a topic ask who publishes on it."""
+
+
+def with_faults(graph: GraphFigure, check: str, params: object) -> GraphFigure:
+    """Return the graph with what is missing or wrong in it marked, as far as what the check asks for tells it."""
+    topic = getattr(params, "topic", None)
+    wrong = dict(_wrong_nodes(graph, check, params))
+    if not isinstance(topic, str):
+        return graph.model_copy(update={"wrong": wrong})
+    missing = () if topic in graph.topics else (short_name(topic),)
+    wrong |= dict(_wrong_topics(graph, check, params, topic))
+    return graph.model_copy(update={"topics": (*graph.topics, *missing), "missing": missing, "wrong": wrong})
+
+
+def _wrong_topics(graph: GraphFigure, check: str, params: object, topic: str) -> Iterator[tuple[str, str]]:
+    ends = {edge.publishes for edge in graph.edges if edge.topic == topic}
+    asked = getattr(params, "type", None)
+    if not ends:
+        yield from ((one, f"not {topic}") for one in get_close_matches(topic, graph.topics, 1, 0.8))
+    if True not in ends and check != "hears":  # there the grader publishes
+        yield topic, "nobody publishes"
+    elif False not in ends and check in HEARERS:
+        yield topic, "nobody subscribes"
+    elif isinstance(asked, str) and graph.types.get(topic, asked) != asked:
+        yield topic, f"not {asked}"
+    elif check == "latched":
+        yield topic, "not latched"
+
+
+def _wrong_nodes(graph: GraphFigure, check: str, params: object) -> Iterator[tuple[str, str]]:
+    if check == "copies":
+        topic = getattr(params, "topic", "")
+        senders = {edge.node for edge in graph.edges if edge.publishes and edge.topic == topic}
+        if len(senders) == 1:
+            yield senders.pop(), "the name of both"
+    if check not in {"node-name", "node-lives"}:
+        return
+    names = [f"/{name.strip('/')}" for name in getattr(params, "names", ())]
+    if names and not any(
+        re.fullmatch(rf"{re.escape(name)}(_\d+)*", node) for name in names for node in graph.nodes
+    ):
+        yield from ((node, f"not {names[0]}") for node in graph.nodes)
 
 
 class _Edge(NamedTuple):

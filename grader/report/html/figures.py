@@ -24,7 +24,7 @@ from grader.model.figure import (
     Stretch,
     TimelineFigure,
 )
-from grader.report.html.graph import graph_plot, graph_rows
+from grader.report.html.graph import graph_faults, graph_plot, graph_rows
 from grader.report.html.plots import (
     counter_plots,
     counter_words,
@@ -42,6 +42,7 @@ from grader.wording import number, plural
 CONSOLE_FIRST, CONSOLE_LAST = 35, 25
 LINE_CHARS = 500
 TITLE_CHARS = 200
+SHOWN_TAB = "⇥   "
 HEARD_MAX = 60
 GRAPH_ROWS_MAX = 100
 
@@ -133,7 +134,7 @@ def _rate(figure: RateFigure, name: str) -> Drawn:
         points=len(figure.gaps_s),
         plots=rate_plots(figure, name),
         second="How long the gaps are",
-        left_out=_thinned(len(figure.gaps_s), figure.messages - 1),
+        left_out="" if figure.counts else _thinned(len(figure.gaps_s), figure.messages - 1),
     )
 
 
@@ -187,6 +188,7 @@ def _graph(figure: GraphFigure, name: str) -> Drawn:
     alone = [node for node in figure.nodes if node not in {edge.node for edge in figure.edges}]
     words = f"{plural(len(figure.nodes), 'node')}, {plural(len(figure.topics), 'topic')}."
     words += f" Not connected to any topic: {', '.join(alone[:10])}." if alone else ""
+    faults = [f"In red: {'; '.join(graph_faults(figure))}."] if figure.wrong else []
     return Drawn(
         name=name,
         kind="graph",
@@ -195,6 +197,7 @@ def _graph(figure: GraphFigure, name: str) -> Drawn:
         points=len(figure.nodes) + len(figure.topics),
         plots=[plot] if plot else [],
         rows=rows[:GRAPH_ROWS_MAX],
+        notes=faults,
         left_out=f"{figure.left_out} more are not shown." if figure.left_out else "",
     )
 
@@ -210,7 +213,7 @@ def _code(figure: CodeFigure, name: str) -> Drawn:
             (
                 number,
                 number in figure.marked,
-                text[: len(text) - len(text.lstrip())],
+                text[: len(text) - len(text.lstrip())].replace("\t", SHOWN_TAB),
                 _parts(text, figure.columns.get(number), figure.ends.get(number)),
             )
             for number, text in enumerate(figure.lines, start=figure.first_line)

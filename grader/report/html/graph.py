@@ -23,7 +23,7 @@ Place = tuple[float, float, float]
 def graph_plot(figure: GraphFigure, name: str) -> Markup | None:
     """Return the drawing; None for one that no one could read: then the list beside it says all."""
     vertices = [f"n{node}" for node in figure.nodes] + [f"t{topic}" for topic in figure.topics]
-    if not vertices or len(vertices) > MOST or not figure.edges:
+    if not vertices or len(vertices) > MOST or not (figure.edges or figure.wrong):
         return None
     known = set(vertices)
     arrows = [arrow for arrow in map(_arrow, _edges(figure)) if known.issuperset(arrow)]
@@ -33,7 +33,13 @@ def graph_plot(figure: GraphFigure, name: str) -> Markup | None:
     children += [_drawn(arrow, layers, places, name) for arrow in layers.routes]
     children += [part for vertex in vertices for part in _shape(vertex, places[vertex], figure)]
     words = f"{len(figure.nodes)} nodes and {len(figure.topics)} topics; the table says who publishes and who listens."
+    words += "".join(f" {said}." for said in graph_faults(figure))
     return drawing(name, size, "Nodes (ellipses) and topics (boxes)", words, *children)
+
+
+def graph_faults(figure: GraphFigure) -> list[str]:
+    """Return what is wrong in the graph: `/chatter: nobody publishes`."""
+    return [f"{name}: {said}" for name, said in figure.wrong.items()]
 
 
 def graph_rows(figure: GraphFigure) -> Iterator[tuple[str, str, str, str]]:
@@ -67,9 +73,10 @@ def _width(vertex: str, figure: GraphFigure) -> float:
     if is_bend(vertex):
         return 0.0
     name = LETTER * len(_clipped(vertex[1:]))
+    said = SMALL_LETTER * len(_clipped(figure.wrong.get(vertex[1:], ""))) - 2 * EDGE
     if vertex[0] == "n":
-        return max(72.0, name * 1.15 + 34)
-    return max(72.0, name + 22, SMALL_LETTER * len(_clipped(figure.types.get(vertex[1:], ""))) + 22)
+        return max(72.0, name * 1.15 + 34, said)
+    return max(72.0, name + 22, said, SMALL_LETTER * len(_clipped(figure.types.get(vertex[1:], ""))) + 22)
 
 
 def _places(layers: Layers, figure: GraphFigure) -> tuple[dict[str, Place], tuple[float, float]]:
@@ -83,20 +90,31 @@ def _places(layers: Layers, figure: GraphFigure) -> tuple[dict[str, Place], tupl
         for row, vertex in enumerate(column):
             places[vertex] = (left + wide / 2, above + row * ROW, _width(vertex, figure))
         left += wide + COLUMN_GAP
-    return places, (left - COLUMN_GAP + EDGE, (tallest - 1) * ROW + HEIGHT + 2 * EDGE + 10)
+    return places, (left - COLUMN_GAP + EDGE, (tallest - 1) * ROW + HEIGHT + 2 * EDGE + 16)
 
 
 def _shape(vertex: str, place: Place, figure: GraphFigure) -> list[Markup]:
     x, y, width = place
-    name = text(x, y + 5, _clipped(vertex[1:]), class_="name", text_anchor="middle")
+    full = vertex[1:]
+    name = text(x, y + 5, _clipped(full), class_="name", text_anchor="middle")
+    said = _clipped(figure.wrong.get(full, ""))
+    below = [text(x, y + HEIGHT / 2 + 15, said, class_="alarm", text_anchor="middle")] if said else []
+    look = " wrong" if said else ""
     if vertex[0] == "n":
-        return [element("ellipse", cx=x, cy=y, rx=width / 2, ry=HEIGHT / 2, class_="node"), name]
-    box = element("rect", x=x - width / 2, y=y - HEIGHT / 2, width=width, height=HEIGHT, class_="topic")
-    kind = _clipped(figure.types.get(vertex[1:], ""))
+        return [
+            element("ellipse", cx=x, cy=y, rx=width / 2, ry=HEIGHT / 2, class_=f"node{look}"),
+            name,
+            *below,
+        ]
+    look += " missing" if full in figure.missing else ""
+    box = element(
+        "rect", x=x - width / 2, y=y - HEIGHT / 2, width=width, height=HEIGHT, class_=f"topic{look}"
+    )
+    kind = _clipped(figure.types.get(full, ""))
     if not kind:
-        return [box, name]
-    name = text(x, y - 1, _clipped(vertex[1:]), class_="name", text_anchor="middle")
-    return [box, name, text(x, y + 15, kind, text_anchor="middle")]
+        return [box, name, *below]
+    name = text(x, y - 1, _clipped(full), class_="name", text_anchor="middle")
+    return [box, name, text(x, y + 15, kind, text_anchor="middle"), *below]
 
 
 def _heads(name: str) -> Markup:

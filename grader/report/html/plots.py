@@ -22,7 +22,7 @@ from grader.report.html.svg import (
     text,
     to_log,
 )
-from grader.wording import number, plural
+from grader.wording import hertz, number, plural
 
 WHOLE = (760.0, 240.0)
 CLOSE = (460.0, 230.0)
@@ -108,7 +108,8 @@ def _plot(figure: CounterFigure, name: str, shown: range, size: tuple[float, flo
     at = dict(zip(shown, points, strict=True))
     few = len(points) <= MANY
     named = len(points) <= 2 * AROUND + 1
-    children = frame.axes("seconds since the run began", "value")
+    fast = f"seconds of ROS's clock, {number(figure.faster)} times as fast as real time"
+    children = frame.axes(fast if figure.faster != 1 else "seconds since the run began", "value")
     children += _wraps(figure, frame, at)
     children += _deaths(died, frame)
     children.append(element("path", d="".join(map(path, _whole(figure, at))), class_="line"))
@@ -291,9 +292,11 @@ FASTEST_S = 1e-5
 
 
 def rate_plots(figure: RateFigure, name: str) -> list[Markup]:
-    """Both plots; none where there is no gap."""
+    """How fast they came and how long the gaps are, or the messages of a flood; none where there is no gap."""
     if not figure.gaps_s:
         return []
+    if len(figure.counts) > 1:
+        return [_flood(figure, f"{name}-rate")]
     return [_over_time(figure, f"{name}-rate"), _histogram(figure, f"{name}-gaps")]
 
 
@@ -301,8 +304,12 @@ def rate_words(figure: RateFigure) -> str:
     """What the plots show, in words."""
     if not figure.gaps_s:
         return f"Too few messages on {figure.topic} to draw a rate."
+    if len(figure.counts) > 1:
+        least, most = (f"{count / figure.slice_s:,.0f}" for count in (min(figure.counts), max(figure.counts)))
+        words = f"{figure.topic}: {least} to {most} messages a second came, counted every {number(figure.slice_s)} s"
+        return f"{words}; {_allowed(figure)} (the green line) passes."
     gaps = figure.gaps_s
-    mean = f"{number(figure.mean_hz, 2)} Hz on average" if figure.mean_hz is not None else "no mean"
+    mean = f"{hertz(figure.mean_hz)} on average" if figure.mean_hz is not None else "no mean"
     words = f"{figure.topic}: {mean}; {_allowed(figure)} (the green band) passes. Each dot is a message. "
     words += f"The gaps between messages are {_ms(min(gaps))} to {_ms(max(gaps))} ms long"
     words += _outside(figure)
@@ -364,6 +371,39 @@ def _over_time(figure: RateFigure, name: str) -> Markup:
     return drawing(name, OVER_TIME, f"Rate of {figure.topic} over time", rate_words(figure), *children)
 
 
+def _flood(figure: RateFigure, name: str) -> Markup:
+    """A column for each tenth of a second, on a logarithmic axis: beside so many, the few that pass are a line."""
+    hz = [count / figure.slice_s for count in figure.counts]
+    begin = max(0.0, figure.times_s[0] - figure.gaps_s[0])
+    end = begin + figure.slice_s * len(hz)
+    frame = Frame(
+        width=OVER_TIME[0],
+        height=OVER_TIME[1],
+        x_low=begin,
+        x_high=end,
+        y_low=0,
+        y_high=4 * max(hz),
+        log_y=True,
+    )
+    children = frame.axes("seconds since the run began", "messages a second")
+    children += [
+        frame.box(
+            (begin + i * figure.slice_s, begin + (i + 0.85) * figure.slice_s), (0, one), class_="column"
+        )
+        for i, one in enumerate(hz)
+        if one
+    ]
+    y = (frame.y(figure.low_hz) + frame.y(figure.high_hz)) / 2
+    children += [
+        element("line", x1=LEFT, x2=frame.right, y1=y, y2=y, class_=look) for look in ("halo", "passes")
+    ]
+    above = frame.y(max(hz)) - 8
+    children.append(text(LEFT + 5, above, f"green: {_allowed(figure)} passes", class_="good"))
+    mean = f"mean {figure.mean_hz:,.0f} Hz" if figure.mean_hz else ""
+    children.append(text(frame.right - 4, above, mean, class_="strong", text_anchor="end"))
+    return drawing(name, OVER_TIME, f"Rate of {figure.topic} over time", rate_words(figure), *children)
+
+
 def _mean(frame: Frame, mean_hz: float | None) -> list[Markup]:
     if mean_hz is None:
         return []
@@ -373,7 +413,7 @@ def _mean(frame: Frame, mean_hz: float | None) -> list[Markup]:
         text(
             frame.right - 4,
             y - 7 if y > 2 * TOP else y + 17,
-            f"mean {number(mean_hz, 2)} Hz",
+            f"mean {hertz(mean_hz)}",
             class_="strong",
             text_anchor="end",
         ),

@@ -68,12 +68,12 @@ def test_a_rate_has_its_dots_band_mean_and_late_stretches():
     (late,) = classed(over_time, "late")
     assert late.get("fill") == "url(#f1-rate-late)"
     assert svg(over_time).xpath("//*[@id='f1-rate-late']")
-    assert "mean 5 Hz" in texts(over_time)
+    assert "mean 5.00 Hz" in texts(over_time)
     assert "9.5 to 10.5 Hz passes" in texts(over_time)
     assert len(classed(gaps, "column")) == 1
     assert len(classed(gaps, "bound")) == 2
     words = rate_words(rate())
-    assert "5 Hz on average; 9.5 to 10.5 Hz (the green band) passes" in words
+    assert "5.00 Hz on average; 9.5 to 10.5 Hz (the green band) passes" in words
     assert "30 of 30 lie outside 50 to 150 ms" in words
     assert "late 1 time" in words
 
@@ -183,6 +183,30 @@ def test_a_graph_has_ellipses_for_nodes_and_boxes_for_topics_from_left_to_right(
         ("/chatter", "std_msgs/String", "/talker", "/listener"),
         ("/numeric_chatter", "", "/talker", "none"),
     ]
+
+
+def test_what_is_wrong_in_a_graph_is_drawn_and_named():
+    figure = graph(
+        topics=(*graph().topics, "/numbers"),
+        missing=("/numbers",),
+        wrong={"/numbers": "nobody publishes", "/talker": "not /sender"},
+    )
+    plot = graph_plot(figure, "f")
+    assert len(classed(plot, "missing")) == 1
+    assert len(classed(plot, "wrong")) == 2
+    assert {"nobody publishes", "not /sender"} <= set(texts(plot))
+
+
+def test_a_flood_has_a_column_for_each_tenth_of_a_second_and_a_line_that_passes():
+    (plot,) = rate_plots(rate(counts=(560, 540, 0, 555), mean_hz=5500.0), "f")
+    assert len(classed(plot, "column")) == 3
+    assert len(classed(plot, "passes")) == 1
+    assert {"mean 5,500 Hz", "green: 9.5 to 10.5 Hz passes"} <= set(texts(plot))
+
+
+def test_a_counter_with_a_fast_clock_is_drawn_by_that_clock():
+    (whole, *_) = counter_plots(counter(faster=20.0), "f")
+    assert "seconds of ROS's clock, 20 times as fast as real time" in texts(whole)
 
 
 def test_a_graph_that_nobody_could_read_is_a_list():
