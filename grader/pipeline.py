@@ -43,6 +43,7 @@ from grader.recording import (
     Job,
     Judged,
     RecordingOptions,
+    import_later,
     judge_folder,
     judge_recorded,
     make_recorder,
@@ -52,6 +53,7 @@ from grader.recording import (
 from grader.report.files import write_reports
 from grader.report.view import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
+from grader.ros_env import find_ros
 from grader.rubric.load import LoadedRubric, files_of, needs_package, origin_of
 
 if TYPE_CHECKING:
@@ -162,6 +164,25 @@ def prepare(options: GradeOptions) -> None:
     if not options.static_only:
         with suppress(GraderError), wait_for_children():
             provide_base(options.sandbox)
+
+
+def warm_up() -> None:
+    """Do once what every grading needs, in the process that the workers of a batch are copies of (`workers.run_each`):
+    imports, what is asked of this machine, and the process that arenas are copies of."""
+    from grader import repaired_copy, submitted_recordings  # noqa: F401, PLC0415 - see recording.LATER
+    from grader.arena import recorder  # noqa: F401, PLC0415
+    from grader.arena.arena_process import template_of  # noqa: PLC0415
+    from grader.arena.sandbox_probe import choose  # noqa: PLC0415
+    from grader.arena.session import arena_command  # noqa: PLC0415
+    from grader.report import figures, junit, markdown  # noqa: F401, PLC0415
+    from grader.report.html.page import load_template  # noqa: PLC0415
+
+    import_later()
+    load_template()
+    ros = find_ros()
+    if ros is not None:
+        template_of(*arena_command(ros))
+        choose("auto")
 
 
 # --- Open -------------------------------------------------------------------------------------------------------------

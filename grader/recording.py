@@ -138,9 +138,11 @@ def record_all(job: Job, recorder: Recorder | StaticRecorder) -> None:
     copy_recordings(job.rubric.rubric, job.submission, job.evidence, job.progress)
 
 
-def import_later(rubric: LoadedRubric) -> None:
-    """Import modules before they are needed. Only what the grader sends needs ROS's own message types, hundreds."""
-    sends = any(s.probes or s.steps or s.serves for s in rubric.rubric.scenarios.values())
+def import_later(rubric: LoadedRubric | None = None) -> None:
+    """Import modules before they are needed, by this rubric or by any. Only what the grader sends needs ROS's own
+    message types, hundreds."""
+    scenarios = rubric.rubric.scenarios.values() if rubric else ()
+    sends = rubric is None or any(s.probes or s.steps or s.serves for s in scenarios)
     for name in (*LATER, *([ROS_TYPES] if sends else [])):
         import_module(name)
 

@@ -7,16 +7,22 @@ A job travels as a pickle: what the parent sends is the grader's own, and a subm
 travels as JSON, because a worker reads recordings and source files, and what is hostile in them may one day take a
 decoder over: a pickle would then run code in the parent. The parent reads an answer as the type that the job's function
 is declared to return, and an exception as one of the grader's or of Python's by its name, and calls nothing else.
+
+The workers of one `run_each` are copies of a template: a process that has imported what their jobs need, and has never
+seen a job.
 """
 
 from __future__ import annotations
 
 import builtins
+import gc
 import json
 import os
 import pickle
 import select
 import signal
+import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -25,7 +31,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from queue import LifoQueue
@@ -43,6 +50,13 @@ ANSWER_BYTES_MAX = 256 << 20
 LEAVE_S = 30.0
 """How long a worker may take to clean up once it is told to stop."""
 IDLE_CODE = 75
+COPY, STATUS = b"c", b"s"
+REQUEST_BYTES = 16
+QUICK = {"OPENBLAS_NUM_THREADS": "1", "PYDANTIC_DISABLE_PLUGINS": "__all__"}
+"""As in `grader/__main__.py`."""
+NUMBER = struct.Struct("<q")
+TEMPLATE_S = 60.0
+"""How long a template may take to answer: it begins by importing."""
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
@@ -69,15 +83,119 @@ class WorkerLimits:
     idle_s: float | None = None
 
 
+class Template:
+    """A process that imports modules and does no job: workers begin as copies of it (Linux only).
+
+    `warm_up` is a function without arguments, as `module:name`, that it calls before the first copy is made. It ends
+    with this object's socket, at the latest with its parent; its copies live on.
+    """
+
+    def __init__(self, warm_up: str, env: Mapping[str, str] | None = None) -> None:
+        self._lock = threading.Lock()
+        self._sock, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._sock.settimeout(TEMPLATE_S)
+        with theirs:
+            self._popen = subprocess.Popen(
+                [*module_command("grader.workers"), warm_up],
+                env=_environment(env),
+                stdin=theirs.fileno(),
+                stdout=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+
+    def copy(self) -> _Copy:
+        """Return a new worker process. Raises OSError where the template has ended, or the kernel is too old."""
+        jobs_r, jobs_w = os.pipe()
+        answers_r, answers_w = os.pipe()
+        stdin, stdout = os.fdopen(jobs_w, "wb"), os.fdopen(answers_r, "rb")
+        try:
+            pid = self._ask(COPY, [jobs_r, answers_w])
+            return _Copy(self, pid, os.pidfd_open(pid), stdin, stdout)
+        except OSError:
+            for stream in (stdin, stdout):
+                stream.close()
+            raise
+        finally:
+            os.close(jobs_r)
+            os.close(answers_w)
+
+    def status(self, pid: int) -> int:
+        """Return the exit code of a copy that has ended, as `subprocess` has it."""
+        try:
+            return os.waitstatus_to_exitcode(self._ask(STATUS + NUMBER.pack(pid)))
+        except OSError:  # the template was ended, and nobody else may ask
+            return -signal.SIGKILL
+
+    def close(self) -> None:
+        """End the template."""
+        self._sock.close()
+        self._popen.wait()
+
+    def _ask(self, request: bytes, descriptors: Iterable[int] = ()) -> int:
+        with self._lock:
+            try:
+                socket.send_fds(self._sock, [request], list(descriptors))
+                (answer,) = NUMBER.unpack(self._sock.recv(NUMBER.size))
+            except (OSError, struct.error) as error:
+                self._sock.close()  # a late answer would be taken for that to the next request
+                raise ConnectionResetError("the template has ended") from error
+        return int(answer)
+
+
+class _Copy:
+    """A copy of a template. Nothing but `status` waits for it, so its process id stays its own until then."""
+
+    def __init__(
+        self, template: Template, pid: int, handle: int, stdin: IO[bytes], stdout: IO[bytes]
+    ) -> None:
+        self._template, self._pid, self._handle = template, pid, handle
+        self.stdin, self.stdout = stdin, stdout
+        self._code: int | None = None
+        self._lock = threading.Lock()
+
+    def poll(self) -> int | None:
+        with suppress(subprocess.TimeoutExpired):
+            return self.wait(0)
+        return None
+
+    def wait(self, timeout: float | None = None) -> int:
+        poll = select.poll()
+        poll.register(self._handle, select.POLLIN)
+        if not poll.poll(None if timeout is None else timeout * 1000):
+            raise subprocess.TimeoutExpired(str(self._pid), timeout or 0.0)
+        with self._lock:
+            if self._code is None:
+                self._code = self._template.status(self._pid)
+            return self._code
+
+    def __del__(self) -> None:
+        os.close(self._handle)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)
+
+    def send_signal(self, number: int) -> None:
+        with suppress(ProcessLookupError):
+            signal.pidfd_send_signal(self._handle, number)
+
+
 class Worker:
     """A process that is started with its first job, and again after a job that ended it.
 
-    `env` is added to this process's environment. `stopped`: it was told to stop, and does no more jobs.
+    It is a copy of `template`, or else a Python of its own; `env` is added to this process's environment then.
+    `stopped`: it was told to stop, and does no more jobs.
     """
 
-    def __init__(self, limits: WorkerLimits | None = None, env: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        limits: WorkerLimits | None = None,
+        env: Mapping[str, str] | None = None,
+        template: Template | None = None,
+    ) -> None:
         self._limits, self._env = limits or WorkerLimits(), dict(env or {})
-        self._process: subprocess.Popen[bytes] | None = None
+        self._template = template
+        self._process: subprocess.Popen[bytes] | _Copy | None = None
+        self._function: tuple[object, bytes] = None, b""
         self.stopped = False
         self._lock = threading.Lock()
 
@@ -87,8 +205,10 @@ class Worker:
         Its declared type must survive JSON as pydantic writes it. Of an exception arrive the type, unless it is of
         another library (then RuntimeError), and the text.
         """
-        answer_type = _answer_type(function)
-        message = pickle.dumps((function, job, self._limits))
+        answer_type: TypeAdapter[Result] = _answer_type(_plain(function))
+        if self._function[0] is not function:
+            self._function = function, pickle.dumps(function)
+        message = pickle.dumps((self._function[1], job, self._limits))
         while True:
             with self._lock:
                 if self.stopped:
@@ -120,7 +240,7 @@ class Worker:
             self.stopped = True
             if self._process is not None and self._process.poll() is None:
                 if sys.platform == "win32":
-                    self._process.terminate()
+                    self._process.kill()
                 else:
                     self._process.send_signal(signal.SIGINT)
 
@@ -137,20 +257,24 @@ class Worker:
             process.kill()
             process.wait()
 
-    def _start(self) -> subprocess.Popen[bytes]:
+    def _start(self) -> subprocess.Popen[bytes] | _Copy:
         """Start it in a session of its own: its parent passes on a Ctrl-C from the terminal."""
         if self._process is not None:
             _close(self._process)
+        if self._template is not None:
+            with suppress(OSError):  # then without a template
+                self._process = self._template.copy()
+                return self._process
         self._process = subprocess.Popen(
             module_command("grader.workers"),
-            env={**with_absolute_paths(os.environ), **self._env},
+            env=_environment(self._env),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,
         )
         return self._process
 
-    def _exchange(self, process: subprocess.Popen[bytes], message: bytes) -> bytes:
+    def _exchange(self, process: subprocess.Popen[bytes] | _Copy, message: bytes) -> bytes:
         assert process.stdin is not None  # noqa: S101 - opened with PIPE
         assert process.stdout is not None  # noqa: S101 - opened with PIPE
         timer = threading.Timer(self._limits.wall_s or 0.0, process.kill)
@@ -173,15 +297,18 @@ def run_each(
     begun: Callable[[Job], None] = lambda _: None,
     limits: WorkerLimits | None = None,
     env: Mapping[str, str] | None = None,
+    warm_up: str = "",
 ) -> Iterator[Result]:
     """Yield each job's result as it comes, with up to `count` workers at a time.
 
     Jobs are taken when there is a worker for them; `begun` is then called with each. `ended` makes the result of a job
     whose worker ended. When the caller stops iterating, running jobs are interrupted and have cleaned up on return.
+    `warm_up` (`module:name`) is called once in the template, by default it only imports the function's module.
     """
     count = max(count, 1)
     waiting = iter(jobs)
-    workers = [Worker(limits, env) for _ in range(count)]
+    template = _template(count, warm_up or _plain(function).__module__, env)
+    workers = [Worker(limits, env, template) for _ in range(count)]
     idle: LifoQueue[Worker] = LifoQueue()
     for worker in workers:
         idle.put(worker)
@@ -211,11 +338,27 @@ def run_each(
             for worker in workers:
                 worker.interrupt()
             wait(running)
-            for worker in workers:
-                worker.close()
+            _end(workers, template)
 
 
-def _close(process: subprocess.Popen[bytes]) -> None:
+def _template(count: int, warm_up: str, env: Mapping[str, str] | None) -> Template | None:
+    """Return a template for so many workers, where they need one and this system can have one."""
+    return Template(warm_up, env) if count > 1 and hasattr(os, "pidfd_open") else None
+
+
+def _end(workers: Iterable[Worker], template: Template | None) -> None:
+    for worker in workers:
+        worker.close()
+    if template is not None:
+        template.close()
+
+
+def _environment(env: Mapping[str, str] | None) -> dict[str, str]:
+    """Return the variables of a process of the grader, with `env`."""
+    return {**with_absolute_paths(os.environ), **QUICK, **(env or {})}
+
+
+def _close(process: subprocess.Popen[bytes] | _Copy) -> None:
     for stream in (process.stdin, process.stdout):
         if stream is not None:
             with suppress(OSError):
@@ -246,10 +389,16 @@ def _read(stream: IO[bytes], size: int) -> bytes:
     return bytes(parts)
 
 
-def _answer_type(function: Callable[..., Result]) -> TypeAdapter[Result]:
-    """Return what reads and writes the type that a function is declared to return."""
+def _plain(function: Callable[..., Result]) -> Callable[..., Result]:
+    """Return the function that a partial one calls."""
     while isinstance(function, partial):
         function = function.func
+    return function
+
+
+@lru_cache(maxsize=8)
+def _answer_type(function: Callable[..., Result]) -> TypeAdapter[Result]:
+    """Return what reads and writes the type that a plain function is declared to return."""
     return TypeAdapter(get_type_hints(function, include_extras=True)["return"])
 
 
@@ -287,8 +436,46 @@ class _State:
 
 
 def main() -> None:
-    """Do the jobs that come on stdin until it ends. Whatever a job prints goes to stderr."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in grader.__main__
+    """Do the jobs that come on stdin until it ends; as a template (its argument is what that warms up with), first
+    stand by, until this is a copy that is to do jobs."""
+    if len(sys.argv) == 1 or _stand_by(sys.argv[1]):
+        _work()
+
+
+def _stand_by(warm_up: str) -> bool:
+    """Answer `Template`'s requests; False at their end, True in each copy."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it ends with its socket
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    module, _, name = warm_up.partition(":")
+    with suppress(Exception):  # then a job says what is wrong
+        found = import_module(module)
+        if name:
+            getattr(found, name)()
+    gc.collect()
+    gc.freeze()  # what is here is shared with every copy for as long as no one touches it
+    with socket.socket(fileno=os.dup(0)) as sock:
+        while True:
+            request, descriptors, _, _ = socket.recv_fds(sock, REQUEST_BYTES, 2)
+            if not request:
+                return False
+            if request[:1] == STATUS:
+                _, answer = os.waitpid(NUMBER.unpack(request[1:])[0], 0)
+            else:
+                answer = os.fork()
+            if answer == 0 and request == COPY:
+                break
+            for number in descriptors:
+                os.close(number)
+            sock.send(NUMBER.pack(answer))
+    os.setsid()
+    for target, number in enumerate(descriptors):
+        os.dup2(number, target)
+        os.close(number)
+    return True
+
+
+def _work() -> None:
+    """Do the jobs. Whatever one prints goes to stderr."""
     signal.signal(signal.SIGINT, _stop)
     signal.signal(signal.SIGTERM, _stop)
     jobs = os.fdopen(os.dup(0), "rb", buffering=0)
@@ -301,23 +488,29 @@ def main() -> None:
     with suppress(EOFError, BrokenPipeError, KeyboardInterrupt):
         while not _State.stopped:
             _wait_for_job(jobs.fileno(), limits)
-            function, job, now = pickle.loads(_receive(jobs))  # noqa: S301 - from the parent; see above
+            known, job, now = pickle.loads(_receive(jobs))  # noqa: S301 - from the parent; see above
             _State.busy = True
             try:
                 if _State.stopped:
                     break
                 _limit(now, is_first=limits is None)
-                answer = _answer(function, job)
+                answer = _answer(_function(known), job)
             finally:
                 _State.busy = False
             limits = now
             _send(answers, answer)
 
 
+@lru_cache(maxsize=1)
+def _function(pickled: bytes) -> Callable[[Any], object]:
+    """Return the function of a job: with what is bound to it (a rubric, say), it is the same for many jobs."""
+    return pickle.loads(pickled)  # type: ignore[no-any-return]  # noqa: S301 - from the parent; see above
+
+
 def _answer(function: Callable[[Any], object], job: object) -> bytes:
     """Return the job's result, or the exception that it raised, as JSON."""
     try:
-        result = _answer_type(function).dump_python(
+        result = _answer_type(_plain(function)).dump_python(
             function(job), mode="json", by_alias=True, warnings="error"
         )
         return json.dumps({"result": result}).encode()

@@ -63,8 +63,8 @@ ALLOWED = {
         "rubric", "submitted_recordings"
     },
     "pipeline": BASE | {
-        "arena", "evidence", "faults", "files", "intake", "judging", "package", "recording", "report", "results",
-        "rubric", "submitted_recordings"
+        "arena", "evidence", "faults", "files", "intake", "judging", "package", "recording", "repaired_copy", "report",
+        "results", "ros_env", "rubric", "submitted_recordings"
     },
     "api": {
         *BASE, "arena.interruption", "evidence", "files", "judging", "pipeline", "results", "rubric"

@@ -215,3 +215,41 @@ def test_a_process_whose_parent_was_killed_cleans_up(tmp_path: Path) -> None:
     parent.wait()
     until(lambda: not lives(child))
     assert not mark.exists()
+
+
+@pytest.mark.full
+def test_workers_are_copies_of_one_process_that_has_seen_no_job(tmp_path: Path) -> None:
+    """What the template did is there in each, what a job did in none but its own."""
+    found = list(run_each(_seen, [0.5, 0.5], 2, ended=lambda *_: (), warm_up="tests.test_workers:_warm_up"))
+    (template,) = {seen[0] for seen in found}
+    assert template not in {0, os.getpid()}
+    assert len({seen[1] for seen in found}) == 2
+    assert [seen[2] for seen in found] == [1, 1]
+    until(lambda: not lives(template))
+
+
+_made_by: list[int] = []
+_jobs: list[float] = []
+
+
+def _warm_up() -> None:
+    _made_by.append(os.getpid())
+
+
+def _seen(pause_s: float) -> tuple[int, ...]:
+    _jobs.append(pause_s)
+    time.sleep(pause_s)
+    return sum(_made_by), os.getpid(), len(_jobs)
+
+
+@pytest.mark.full
+def test_a_template_that_was_killed_costs_no_job(tmp_path: Path) -> None:
+    found = run_each(_kill_template, range(3), 2, ended=lambda *_: -1, warm_up="tests.test_workers:_warm_up")
+    assert sorted(found) == [0, 1, 2]
+
+
+def _kill_template(number: int) -> int:
+    for pid in _made_by:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+    return number

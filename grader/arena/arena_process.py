@@ -108,15 +108,16 @@ class ArenaProcess:
 
 class Template:
     """The process that has imported ROS already, of which arenas are copies (`stand_by` in `ros/__main__.py`): one for
-    each grader. It ends with this object's socket, at the latest with the grader.
+    each grader and the processes that are copies of it. It ends with the last socket to it, at the latest with them.
     """
 
     def __init__(self, argv: Sequence[str], env: Mapping[str, str]) -> None:
+        self.user = os.getpid()
         self._lock = threading.Lock()
         self._sock, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._sock.settimeout(ANSWER_S)
         with theirs:
-            self._popen = subprocess.Popen(
+            self._popen: subprocess.Popen[bytes] | None = subprocess.Popen(
                 argv,
                 stdin=theirs.fileno(),
                 stdout=subprocess.DEVNULL,
@@ -125,6 +126,15 @@ class Template:
                 cwd="/",
                 start_new_session=True,
             )
+
+    def take_over(self) -> None:
+        """Get a socket of this process's own, where it is a copy of the one that had this object."""
+        self.user, self._popen, self._lock = os.getpid(), None, threading.Lock()
+        own, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        own.settimeout(ANSWER_S)
+        with theirs, self._sock, suppress(OSError):  # it has ended, as the first request will show
+            socket.send_fds(self._sock, [b"c"], [theirs.fileno()])
+        self._sock = own
 
     def start(self, descriptors: Sequence[int]) -> tuple[int, float]:
         """Start an arena with these as stdin, stdout and stderr; return its process id and the CPU seconds that making
@@ -141,8 +151,10 @@ class Template:
             self._ask(b"e" + struct.pack("<i", pid))
 
     def close(self) -> None:
-        """End the template; the arenas that it made are not touched."""
+        """End the template, or leave it to its other users; the arenas that it made are not touched."""
         self._sock.close()
+        if self._popen is None:
+            return
         try:
             self._popen.wait(TEMPLATE_END_S)
         except subprocess.TimeoutExpired:
@@ -154,6 +166,8 @@ class Template:
     def last_words(self) -> str:
         """Return the last line that the template wrote before it ended."""
         self._sock.close()
+        if self._popen is None:
+            return "it said nothing"
         with suppress(subprocess.TimeoutExpired):
             self._popen.wait(TEMPLATE_END_S)
         self._popen.kill()
@@ -178,13 +192,15 @@ _making = threading.Lock()
 
 
 def template_of(argv: Sequence[str], env: Mapping[str, str]) -> Template:
-    """Return this process's template for that command and environment; start one where there is none yet."""
-    key = (os.getpid(), tuple(argv), tuple(sorted(env.items())))
+    """Return the template for that command and environment; start one where there is none yet."""
+    key = (tuple(argv), tuple(sorted(env.items())))
     with _making:
         if key not in _templates:
             if not _templates:
                 atexit.register(_close_all)
             _templates[key] = Template(argv, env)
+        if _templates[key].user != os.getpid():
+            _templates[key].take_over()
         return _templates[key]
 
 
@@ -213,6 +229,6 @@ def _drop(template: Template) -> None:
 
 
 def _close_all() -> None:
-    for key, template in list(_templates.items()):
-        if key[0] == os.getpid():
+    for template in list(_templates.values()):
+        if template.user == os.getpid():
             template.close()

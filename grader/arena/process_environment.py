@@ -231,10 +231,6 @@ class ProcessEnvironment:
         others = sorted(package.rglob(Path(script).name), key=lambda p: (len(p.parts), str(p)))
         return next((p.relative_to(package).as_posix() for p in others if p.is_file()), None)
 
-    def arena_env(self) -> dict[str, str]:
-        """Return the managed roscore's environment: ROS and nothing of the shell's."""
-        return {"LANG": "C.UTF-8", "ROS_IP": LOOPBACK, **self.ros.env, "PATH": _path(self.ros, "")}
-
     def spec(
         self,
         name: str,
@@ -357,10 +353,10 @@ class ProcessEnvironment:
             inside = COURSE if self.sandbox.bubblewrap else str(self.course)
             merged = with_course(merged, self.course, inside)
         merged = with_standins(merged, self.folder / "standins", self.standins)
-        return {**merged, "PATH": _path(self.ros, merged.get("PATH", ""), self.shims)}
+        return {**merged, "PATH": search_path(self.ros, merged.get("PATH", ""), self.shims)}
 
 
-def _path(ros: RosInstallation, path: str, *first: str) -> str:
+def search_path(ros: RosInstallation, path: str, *first: str) -> str:
     """What the package adds comes last: a program of its own never takes the place of the system's or of ROS's."""
     entries = [*first, *ros.env["PATH"].split(os.pathsep), *SYSTEM_PATH.split(":"), *path.split(os.pathsep)]
     return os.pathsep.join(dict.fromkeys(e for e in entries if e))

@@ -19,13 +19,14 @@ from grader.arena.admission import MEMINFO, read_numbers
 from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
 from grader.arena.left_files import LeftFiles
-from grader.arena.process_environment import ProcessEnvironment
+from grader.arena.process_environment import LOOPBACK, ProcessEnvironment, search_path
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.run_state import RunState
 from grader.errors import ArenaError
 from grader.evidence.events import TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
 from grader.evidence.run import is_grader_node
 from grader.evidence.writer import EvidenceChannel, EvidenceWriter
+from grader.ros_env import RosInstallation
 
 ARENA = Path(__file__).parent / "ros"
 CLOCK, ROSOUT_TOPIC = "/clock", "/rosout"
@@ -42,6 +43,12 @@ SHORT = 0.1
 """Where less than this part of the memory is available, helpers of the system (earlyoom, systemd-oomd) kill too."""
 BELOW = re.compile(r"Killed signal terminated program|process has died \[pid \d+, exit code -9,")
 """What the compiler's driver and roslaunch say of a process of theirs that SIGKILL ended."""
+
+
+def arena_command(ros: RosInstallation) -> tuple[list[str], dict[str, str]]:
+    """Return the managed roscore's command, and its environment: ROS and nothing of the shell's."""
+    env = {"LANG": "C.UTF-8", "ROS_IP": LOOPBACK, **ros.env, "PATH": search_path(ros, "")}
+    return [ros.python, "-s", "-B", str(ARENA)], env
 
 
 class _Channel(NamedTuple):
@@ -95,8 +102,7 @@ class ArenaSession:
         self.on_request = self.on_other_type = _ignore
 
     async def __aenter__(self) -> Self:
-        argv = [self.place.ros.python, "-s", "-B", str(ARENA)]
-        self._process = ArenaProcess(argv, self.place.arena_env(), self._read)
+        self._process = ArenaProcess(*arena_command(self.place.ros), self._read)
         self.cpu_s += self._process.cpu_s
         try:
             self.send(**self._config())

@@ -18,6 +18,7 @@ import importlib
 import json
 import os
 import resource
+import select
 import signal
 import socket
 import struct
@@ -315,32 +316,50 @@ def run_arena():
 
 
 def serve_requests(sock, live):
-    """Start arenas, each of which is `live()` in a session of its own, until the socket of packets closes; they live on
-    as long as their own stdin.
+    """Start arenas, each of which is `live()` in a session of its own, until all sockets of packets have closed; they
+    live on as long as their own stdin.
 
     `s` with three descriptors (an arena's stdin, stdout, stderr) starts an arena; the answer is its process id and the
     CPU seconds that this process took since the last answer. `e` with a process id waits for an arena that has ended,
-    or was killed; the answer has the same id. Until then no other process gets that id.
+    or was killed; the answer has the same id. Until then no other process gets that id. `c` with a descriptor is
+    another such socket, of a copy of the grader, and has no answer.
     """
+    gc.collect()
     gc.freeze()  # what is here is shared with every copy for as long as no one touches it
     told_s = 0.0
-    while True:
-        request, descriptors = _receive(sock)
-        if not request:
-            return
-        if request[:1] == b"s":
-            pid = _start(sock, descriptors, live)
-        else:
-            (pid,) = struct.unpack_from("<i", request, 1)
-            with contextlib.suppress(ChildProcessError):  # none of ours
-                os.waitpid(pid, 0)
-        used = resource.getrusage(resource.RUSAGE_SELF)
-        used_s = used.ru_utime + used.ru_stime
-        sock.send(ANSWER.pack(pid, used_s - told_s))
-        told_s = used_s
+    socks = {sock.fileno(): sock}
+    poll = select.poll()
+    poll.register(sock, select.POLLIN)
+    while socks:
+        for number, _ in poll.poll():
+            sock = socks[number]
+            try:
+                request, descriptors = _receive(sock)
+            except ConnectionError:
+                request = b""
+            if not request:
+                poll.unregister(number)
+                socks.pop(number).close()
+                continue
+            if request == b"c":
+                for descriptor in descriptors:
+                    socks[descriptor] = socket.socket(fileno=descriptor)
+                    poll.register(descriptor, select.POLLIN)
+                continue
+            if request[:1] == b"s":
+                pid = _start(socks.values(), descriptors, live)
+            else:
+                (pid,) = struct.unpack_from("<i", request, 1)
+                with contextlib.suppress(ChildProcessError):  # none of ours
+                    os.waitpid(pid, 0)
+            used = resource.getrusage(resource.RUSAGE_SELF)
+            used_s = used.ru_utime + used.ru_stime
+            with contextlib.suppress(ConnectionError):  # who asked has ended
+                sock.send(ANSWER.pack(pid, used_s - told_s))
+            told_s = used_s
 
 
-def _start(sock, descriptors, live):
+def _start(socks, descriptors, live):
     pid = os.fork()
     if pid:
         for number in descriptors:
@@ -348,7 +367,8 @@ def _start(sock, descriptors, live):
         return pid
     try:
         os.setsid()
-        sock.detach()
+        for sock in socks:
+            sock.detach()
         for target, number in enumerate(descriptors):
             os.dup2(number, target)
         os.closerange(DESCRIPTORS, OPEN_MAX)
@@ -383,8 +403,7 @@ def stand_by(live, modules):
     for name in modules:
         with contextlib.suppress(Exception):
             importlib.import_module(name)
-    with contextlib.suppress(ConnectionError), socket.socket(fileno=0) as sock:
-        serve_requests(sock, live)
+    serve_requests(socket.socket(fileno=os.dup(0)), live)
     os._exit(0)
 
 

@@ -35,6 +35,7 @@ from grader.rubric.load import LoadedRubric, load_rubric
 from grader.workers import WorkerEnded, run_each
 
 OutcomeStatus = Literal["graded", "inconclusive", "error"]
+WARM_UP = "grader.pipeline:warm_up"
 KILLED_HINT = "check whether this machine has too little memory, then grade it again with --only"
 
 
@@ -101,7 +102,12 @@ class LocalExecutor:
     def run(self, jobs: Iterable[Job], *, begun: Callable[[str], None]) -> Iterator[Outcome]:
         """See `Executor.run`."""
         return run_each(
-            grade_job, jobs, self.count, ended=outcome_of_ended, begun=lambda job: begun(job.entry.id)
+            grade_job,
+            jobs,
+            self.count,
+            ended=outcome_of_ended,
+            begun=lambda job: begun(job.entry.id),
+            warm_up=WARM_UP,
         )
 
 
@@ -265,7 +271,12 @@ def grade_all(jobs: Sequence[FolderJob], most: int, begun: Callable[[str], None]
     for sandbox in {job.sandbox for job in jobs}:
         prepare(GradeOptions(sandbox=sandbox))
     return run_each(
-        _grade_folder, jobs, min(most, len(jobs)), ended=_grading_ended, begun=lambda job: begun(job.name)
+        _grade_folder,
+        jobs,
+        min(most, len(jobs)),
+        ended=_grading_ended,
+        begun=lambda job: begun(job.name),
+        warm_up=WARM_UP,
     )
 
 

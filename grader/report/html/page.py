@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+from jinja2 import Template
 from markupsafe import Markup
 
 from grader.model.figure import Figure, Figures
@@ -104,24 +105,25 @@ def render_html(
     return page
 
 
+def load_template() -> Template:
+    """Return the page's template; to compile it takes longer than to fill it in."""
+    return environment().get_template("report.html")
+
+
 def _rendered(result: GradingResult, rubric: Rubric, head: Head, page: Page, limit: int) -> str:
     ours = script("report.js")
-    return (
-        environment()
-        .get_template("report.html")
-        .render(
-            result=result,
-            rubric=rubric,
-            head=head,
-            page=page,
-            sections=list(_sections(result, page)),
-            decided=sentences.decided_criteria(result),
-            sentences=sentences,
-            limit=limit,
-            policy=Markup(policy(ours)),  # noqa: S704 - no text of anybody's
-            script=ours,
-            style=style(),
-        )
+    return load_template().render(
+        result=result,
+        rubric=rubric,
+        head=head,
+        page=page,
+        sections=list(_sections(result, page)),
+        decided=sentences.decided_criteria(result),
+        sentences=sentences,
+        limit=limit,
+        policy=Markup(policy(ours)),  # noqa: S704 - no text of anybody's
+        script=ours,
+        style=style(),
     )
 
 
