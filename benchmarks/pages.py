@@ -81,6 +81,11 @@ def _class_page(page: Page, timing: Timing, path: Path) -> Taken:
 
 def _review(page: Page, timing: Timing, home: str) -> Taken:
     yield "list of the class", timing.opening(home)
+    page.locator("a.row").last.focus()
+    yield "next page of it, by key", timing.following(lambda: page.keyboard.press("j"), "keydown")
+    page.get_by_role("searchbox").fill("7")
+    yield "search in it", timing.following(lambda: page.keyboard.press("Enter"), "keydown")
+    page.goto(home)
     yield (
         "one filter of it",
         timing.following(page.get_by_role("link", name=re.compile("^Waiting for points")).click),

@@ -134,6 +134,7 @@ def test_too_much_is_refused(page, out) -> None:
 
 
 def test_pages_may_load_nothing_but_their_own(page) -> None:
+    assert page.client.get("/s/ada/report/report.html").headers["Cache-Control"] == "no-store"
     for path in ("/", "/s/ada/", "/nowhere"):
         headers = page.client.get(path).headers
         policy = headers["Content-Security-Policy"]
@@ -142,6 +143,16 @@ def test_pages_may_load_nothing_but_their_own(page) -> None:
         assert "unsafe" not in policy
         assert headers["X-Content-Type-Options"] == "nosniff"
         assert headers["Cache-Control"] == "no-store"
+
+
+def test_browsers_keep_what_does_not_change_and_no_page(page, app) -> None:
+    addresses = re.findall(r'"(/(?:look\.css|review\.js)\?v=\w{16})"', page.text("/"))
+    assert len(addresses) == 2
+    for address in addresses:
+        assert "immutable" in page.client.get(address).headers["Cache-Control"]
+    assert addresses == re.findall(r'"(/(?:look\.css|review\.js)\?v=\w{16})"', page.text("/s/ada/"))
+    other = create_app(app.extensions["review"], port=PORT, token=TOKEN, author="A. Miller")
+    assert addresses[0] not in Page(other).text("/")
 
 
 def test_a_report_is_shut_in(page) -> None:

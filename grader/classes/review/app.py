@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import datetime
@@ -87,7 +88,10 @@ def create_app(review: ReviewSession, *, port: int, token: str, author: str) -> 
     guard(app, port=port, token=token)
     app.jinja_env.filters.update(number=number, of_points=of_points, verbatim=escape)
     app.jinja_env.globals.update(SIGNS=SIGNS, points_words=points_words)
-    app.context_processor(lambda: {"csrf": session.get("csrf", ""), "author": _author(author)})
+    version = secrets.token_hex(8)  # of this review: what browsers keep is asked for by no other address
+    app.context_processor(
+        lambda: {"csrf": session.get("csrf", ""), "author": _author(author), "version": version}
+    )
     view = _Views(review, author)
     app.add_url_rule("/", view_func=view.listing)
     app.add_url_rule("/criteria", view_func=view.criteria)
@@ -178,7 +182,7 @@ class _Views:
         seen = request.form.get("seen", "")
         if do == "alike" and wanted is not None:
             return plural(session.save_together(item, criterion, wanted, seen), "submission")
-        return session.save(item, criterion, wanted, seen)
+        return session.save(item, criterion, wanted, seen, soon=do != "next")
 
     def comments(self) -> str:
         """All comments of the bank, each with a form, and one for a new one."""
@@ -262,11 +266,11 @@ class _Views:
 
     def look(self) -> Response:
         """Return the style of all pages."""
-        return Response(style() + _own("review.css"), mimetype="text/css")
+        return _kept(style() + _own("review.css"), "text/css")
 
     def script(self) -> Response:
         """Saves without a reload, and keys."""
-        return Response(_own("review.js"), mimetype="text/javascript")
+        return _kept(_own("review.js"), "text/javascript")
 
     def _item(self, key: str) -> Item:
         item = self._session.item(key)
@@ -432,6 +436,11 @@ def _draft(typed: Draft, *, error: str = "", conflict: bool = False) -> Draft:
 
 def _now() -> str:
     return f"{datetime.now():%H:%M:%S}"  # noqa: DTZ005 - the time on the wall
+
+
+def _kept(text: str, mimetype: str) -> Response:
+    """Return what does not change while a review runs: browsers need not ask again on each page."""
+    return Response(text, mimetype=mimetype, headers={"Cache-Control": "private, max-age=86400, immutable"})
 
 
 def _own(name: str) -> Markup:

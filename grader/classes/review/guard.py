@@ -87,8 +87,10 @@ def _check_form() -> None:
 
 
 def _with_headers(response: Response) -> Response:
+    kept = response.headers.get("Cache-Control", "") if response.cache_control.immutable else ""
     for name, value in HEADERS.items():
         response.headers[name] = value
+    response.headers["Cache-Control"] = kept or HEADERS["Cache-Control"]
     response.headers.setdefault("Content-Security-Policy", PAGE)
     return response
 

@@ -48,6 +48,7 @@ from grader.rubric.load import LoadedRubric, load_rubric, read_beside_rubric
 
 PATIENCE_S = 0.1
 FEW = 8
+FOLLOWS = "the report follows in a moment"
 OTHER_RUBRIC = "the class has been graded by another rubric since: end this review and start it again"
 
 OLDER_RESULT = (
@@ -213,10 +214,13 @@ class ReviewSession:
             return Counter(one.author for found in decided.values() for one in found.values() if one.awards)
         return Counter()
 
-    def save(self, item: Item, criterion: str, wanted: WrittenOverride | None, seen: str) -> str:
+    def save(
+        self, item: Item, criterion: str, wanted: WrittenOverride | None, seen: str, *, soon: bool = True
+    ) -> str:
         """Put a decision in place of the one that was `seen` (its `mark`), or take that out (None).
 
-        Gives in a line why the submission's files do not say so yet; empty where they do.
+        Return in a line why the submission's files do not say so yet; empty where they do. They are written at once,
+        or if not `soon` in the background: who goes on to another submission does not wait for the reports of this one.
 
         Raises Conflict where another one stands there by now, and what `write_override` raises; then nothing changed.
         """
@@ -232,7 +236,7 @@ class ReviewSession:
         with self._guard:
             self._pending.add(item.key)
             self._books_behind = True
-        waits = self._settled_soon(item)
+        waits = self._settled_soon(item) if soon else FOLLOWS
         self.background.changed()
         return waits
 
@@ -319,7 +323,7 @@ class ReviewSession:
         if not item.gradable:
             return "it counts as soon as the submission has a result"
         if not self._writing.acquire(timeout=PATIENCE_S):
-            return "the report follows in a moment"
+            return FOLLOWS
         try:
             with hold_folder(self.path):
                 return self._settle({item.key})
