@@ -30,7 +30,7 @@ from grader.files import temporary_folder
 from grader.intake import open_recorded, open_recording, open_submission
 from grader.intake.choose import Wanted
 from grader.intake.source import Source, local_path
-from grader.judging.file_verdicts import judge_files
+from grader.judging.judge import judge_files
 from grader.judging.summary import assemble_result, environment_info
 from grader.model.figure import Figures
 from grader.model.package import PackageFacts

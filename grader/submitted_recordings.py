@@ -9,8 +9,8 @@ from pathlib import Path
 
 from grader.errors import EvidenceError, SubmissionError
 from grader.evidence.events import RECORDING_MISSING, RECORDING_PROBLEM, ScenarioEvent
-from grader.evidence.memory_budget import LESS
 from grader.evidence.reader import SUFFIXES, load_evidence
+from grader.evidence.run import LESS
 from grader.evidence.writer import EvidenceWriter
 from grader.files import unwritable
 from grader.intake import IntakeLimits, find_recordings, safe_name

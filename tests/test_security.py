@@ -10,9 +10,10 @@ import pytest
 
 from grader import files
 from grader.arena import build, process_environment, scenario_inputs, static_recorder, steps, workspace
-from grader.arena.limits import SUBMISSION_MESSAGE_BYTES, RunLimits
+from grader.arena.sandbox import SUBMISSION_MESSAGE_BYTES, RunLimits
 from grader.checks.support import text
-from grader.evidence import container, decode, definitions, memory_budget
+from grader.evidence import container, decode, definitions
+from grader.evidence.run import DECODED_BYTES_MAX, FOREIGN_BYTES_MAX, HELD_BYTES_MAX
 from grader.intake import archive, git, gitdir
 from grader.intake.limits import IntakeLimits
 from grader.package import cmake, cmake_parse, launch, launch_loader, python, reading
@@ -114,10 +115,10 @@ BOUNDS = {
     "names that are compared": (text.NAMES_MAX, text.NAME_CHARS_MAX),
     "definitions and messages": (
         definitions.MAX_DEFINITION_BYTES, definitions.MAX_FIELDS, definitions.MAX_DEPTH,
-        memory_budget.HELD_BYTES_MAX // MB, memory_budget.DECODED_BYTES_MAX // MB,
+        HELD_BYTES_MAX // MB, DECODED_BYTES_MAX // MB,
     ),
     "MCAP files": (
-        memory_budget.FOREIGN_BYTES_MAX // MB, container.MAX_RECORDS, container.MAX_CHUNK_BYTES // MB,
+        FOREIGN_BYTES_MAX // MB, container.MAX_RECORDS, container.MAX_CHUNK_BYTES // MB,
         container.MAX_UNPACKED_BYTES // MB,
     ),
     "`package.xml`": (

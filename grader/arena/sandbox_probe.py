@@ -16,8 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from grader.arena.control_groups import find_cgroups
-from grader.arena.limits import RunLimits
-from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, Sandbox, system_call_filter
+from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, RunLimits, Sandbox, system_call_filter
 from grader.errors import HostError, SandboxMissing
 from grader.host_programs import HOST_ENV, find_host_program
 from grader.model.sandbox_mode import SandboxMode

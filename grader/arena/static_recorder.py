@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from typing_extensions import Self
 
 from grader import __version__
-from grader.arena.limits import RunLimits
+from grader.arena.sandbox import RunLimits
 from grader.evidence.events import ActorEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.files import read_untrusted

@@ -11,10 +11,9 @@ from pathlib import Path
 
 from grader import pipeline
 from grader.cli.display import open_progress
-from grader.cli.errors import report
 from grader.cli.host_support import warn_without_sandbox
 from grader.cli.outcome import exit_code, judged_criteria
-from grader.cli.output import say, say_beside
+from grader.cli.output import report, say, say_beside
 from grader.cli.select_rubric import Chosen, choose_all, only, package_prefix
 from grader.errors import ExitCode, GraderError, RubricError, UsageError
 from grader.faults import fault_of
@@ -29,8 +28,7 @@ from grader.integrations.ci_results import (
     describe_outcome,
     keep,
 )
-from grader.integrations.ci_settings import Settings, read_settings, with_pass_mark
-from grader.integrations.ci_systems import GitHub, GitLab
+from grader.integrations.ci_systems import GitHub, GitLab, Settings, read_settings, with_pass_mark
 from grader.judging.summary import overall_status, total_fields
 from grader.model.result import GradingResult
 from grader.report.sentences import rubric_words, without_sandbox

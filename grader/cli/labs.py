@@ -1,12 +1,20 @@
-"""What `grader labs` and `grader example` show and write: labs, correct packages, packages with a mistake."""
+"""What `grader labs`, `grader example` and `grader rubric test` show and write.
+
+`rubric test` grades a correct package, and mutants of it that must lose marks. `plan_test` says what is graded,
+`run_plan` grades it, and `print_test` shows it: a table comes first, then everything that did not go as declared, with
+its diff and its evidence. `write_mutants` writes what each mutant cost as a file.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
+from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -14,21 +22,182 @@ from grader.authoring.mutation.faulty_packages import (
     Planned,
     load_mutants,
     mutants_file,
+    mutants_text,
     plan_all,
     plan_declared,
+    refuse_unfit,
+    select_mutants,
 )
 from grader.authoring.mutation.package_tree import Tree, write_tree
-from grader.authoring.mutation.solution import Solution, find_reference, load_solution
+from grader.authoring.mutation.rubric_test import Plan, run_test
+from grader.authoring.mutation.solution import Solution, find_reference, load_solution, reference_at
+from grader.cli.display import open_progress
 from grader.cli.output import say
 from grader.errors import UsageError
-from grader.files import check_writable
+from grader.files import atomic_write, check_writable
+from grader.model.mutants import LostCriterion, MutantResult, RubricTest
+from grader.model.sandbox_mode import SandboxMode
 from grader.report.terminal import emit, open_console
-from grader.report.text import visible
+from grader.report.text import line, visible
 from grader.rubric.find import BUILT_IN, EXAMPLE
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import Rubric
 from grader.rubric.scenario import NAME_PATTERN
 from grader.wording import did_you_mean, number
+
+MARKS = {
+    "killed": ("✓", "green"),
+    "survived": ("✗", "red"),
+    "differs": ("✗", "red"),
+    "inconclusive": ("?", "yellow"),
+    "error": ("!", "red"),
+}
+TEXT_CHARS = 500
+DIFF_STYLES = {"+": "green", "-": "red", "@": "cyan"}
+
+
+def plan_test(
+    rubric: str,
+    solution: Path | None,
+    *,
+    only: Sequence[str],
+    jobs: int,
+    out: Path | None,
+    everything: Path | None,
+    sandbox: SandboxMode,
+) -> Plan:
+    """Return what is to be graded, and where. `everything` is the file that what every operator costs is written to,
+    None to try the declared mutants. Raises UsageError."""
+    loaded = load_rubric(rubric)
+    reference = reference_at(solution) if solution else find_reference(loaded)
+    correct = load_solution(reference, loaded.rubric.package)
+    mutants, unfit = _plan_mutants(
+        loaded, correct, own=solution is not None, everything=everything is not None
+    )
+    picked = select_mutants(mutants, only)
+    for place in filter(None, (out, everything and everything.absolute().parent)):
+        check_writable(place)
+    folder = out or Path(tempfile.mkdtemp(prefix="grader-mutants-"))
+    return Plan(
+        rubric=loaded,
+        solution=correct,
+        given=str(reference.folder),
+        mutants=picked,
+        unfit=unfit,
+        partial=bool(only),
+        jobs=jobs,
+        out=folder.absolute(),
+        keep_all=out is not None,
+        sandbox=sandbox,
+    )
+
+
+def _plan_mutants(
+    loaded: LoadedRubric, solution: Solution, *, own: bool, everything: bool
+) -> tuple[list[Planned], list[str]]:
+    """Return the mutants, and the declared ones that do not fit a solution of the user's `own`."""
+    file = None if everything else mutants_file(loaded)
+    if file is None:
+        return plan_all(solution), []
+    mutants, unfit = plan_declared(load_mutants(file, loaded.rubric), solution)
+    if not own:
+        refuse_unfit(unfit)
+    return mutants, unfit
+
+
+def run_plan(plan: Plan, *, temporary: bool) -> RubricTest:
+    """Grade everything. A temporary folder is kept only if it holds evidence for a person to look at."""
+    kept = False
+    try:
+        with open_progress() as progress:
+            test = run_test(plan, progress)
+        kept = any(mutant.evidence for mutant in test.mutants) or test.reference.evidence is not None
+        return test
+    finally:
+        if temporary and not kept:
+            shutil.rmtree(plan.out, ignore_errors=True)
+
+
+def write_mutants(plan: Plan, test: RubricTest, file: Path) -> None:
+    """Write a mutants file with what each mutant cost."""
+    text = mutants_text(plan.rubric.rubric.id, {m.name: m.mutant for m in plan.mutants}, test.mutants)
+    atomic_write(file, text.encode(), public=True)
+
+
+def print_test(test: RubricTest, stream: IO[str]) -> None:
+    """Print the whole test on a terminal or to a file."""
+    parts: list[RenderableType] = [_table(test)] if test.mutants else []
+    parts += list(_reference(test))
+    for mutant in test.mutants:
+        if mutant.state != "killed":
+            parts += [Text(), *_open(mutant)]
+    parts += [Text(), *_summary(test)]
+    emit(open_console(stream), parts)
+
+
+def _table(test: RubricTest) -> Table:
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="dim")
+    for heading in ("", "mutant", "lost"):
+        table.add_column(heading, no_wrap=heading == "")
+    for mutant in test.mutants:
+        mark, style = MARKS[mutant.state]
+        state = Text(f"{mark} {mutant.state}", style)
+        table.add_row(state, Text(visible(mutant.label)), Text(_lost(mutant)))
+    return table
+
+
+def _lost(mutant: MutantResult) -> str:
+    """`chatter fail, chatter-rate blocked`."""
+    return ", ".join(f"{c.id} {c.status}" for c in mutant.lost) or line(mutant.error, TEXT_CHARS) or "nothing"
+
+
+def _reference(test: RubricTest) -> Iterator[Text]:
+    if test.reference.lost:
+        reached = f"{number(test.reference.points)} of {number(test.reference.max_points)} points"
+        yield Text(f"The reference solution does not get everything: {reached}", "bold red")
+        yield Text(f"  {visible(test.solution)}")
+        yield from _criteria(test.reference.lost)
+        yield from _evidence(test.reference.evidence)
+
+
+def _open(mutant: MutantResult) -> Iterator[Text]:
+    """A mutant that was not killed."""
+    yield Text(f"{mutant.state}: {visible(mutant.label)}", "bold red")
+    yield Text(f"  {visible(mutant.mistake)}")
+    if mutant.error:
+        yield Text(f"  not graded: {line(mutant.error, TEXT_CHARS)}")
+    for words, names in (
+        ("should cost, and does not", mutant.missing),
+        ("should not cost, and does", mutant.surplus),
+        ("has another status", mutant.differing),
+    ):
+        if names:
+            yield Text(f"  {words}: {visible(', '.join(names))}", "yellow")
+    yield from _criteria(mutant.lost)
+    for row in mutant.diff.rstrip("\n").split("\n"):
+        yield Text(f"    {line(row, TEXT_CHARS)}", DIFF_STYLES.get(row[:1], ""))
+    yield from _evidence(mutant.evidence)
+
+
+def _criteria(lost: tuple[LostCriterion, ...]) -> Iterator[Text]:
+    for criterion in lost:
+        yield Text(f"  {criterion.id} {criterion.status}: {line(criterion.message, TEXT_CHARS)}")
+
+
+def _evidence(folder: str | None) -> Iterator[Text]:
+    if folder is not None:
+        yield Text(f"  evidence: {visible(folder)}")
+
+
+def _summary(test: RubricTest) -> Iterator[Text]:
+    for fault in test.unfit:
+        yield Text(f"not tried: {visible(fault)}", "yellow")
+    if test.uncosted:
+        names = ", ".join(test.uncosted)
+        yield Text(f"No mutant costs {names}: add mutants that do, to show that these criteria work", "red")
+    killed = sum(mutant.state == "killed" for mutant in test.mutants)
+    text = f"{test.rubric.id}: {killed} of {len(test.mutants)} mutants killed, {test.wall_s:.0f} s"
+    yield Text(text, "bold green" if test.passed else "bold red")
 
 
 def print_labs(rubrics: Sequence[tuple[Rubric, str]], stream: IO[str]) -> None:

@@ -32,7 +32,7 @@ from grader.cli.declare import (
     add_arguments,
     loading,
 )
-from grader.cli.errors import guarded
+from grader.cli.output import guarded
 from grader.errors import ExitCode, UsageError
 from grader.wording import did_you_mean
 

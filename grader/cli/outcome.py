@@ -8,8 +8,7 @@ from pathlib import Path
 
 from rich.console import RenderableType
 
-from grader.cli.errors import report
-from grader.cli.output import say, say_document
+from grader.cli.output import report, say, say_document
 from grader.errors import ExitCode, GraderError
 from grader.judging.summary import overall_status, reached_pass_mark
 from grader.model.result import CriterionResult, GradingResult

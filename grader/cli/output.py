@@ -1,11 +1,20 @@
-"""How commands print: what a student wrote is shown on one line, and never obeyed by a terminal."""
+"""How commands print, and the one place that prints errors and picks exit codes.
+
+What a student wrote is shown on one line, and never obeyed by a terminal.
+"""
 
 from __future__ import annotations
 
+import os
+import shutil
 import sys
+import textwrap
+import traceback
 from collections.abc import Callable
+from contextlib import suppress
 
-from grader.untrusted_text import json_text, line
+from grader.errors import ExitCode, GraderError, RubricError
+from grader.untrusted_text import json_text, line, visible
 
 LINE_CHARS = 4000
 
@@ -30,3 +39,81 @@ def say_document(made: Callable[[bool], str]) -> None:
     encoding lacks needs an escape of the document's own format."""
     encoding = (sys.stdout.encoding or "ascii").lower().replace("-", "")
     sys.stdout.write(made(encoding != "utf8"))
+
+
+ERROR_CHARS, NARROWEST = 2000, 40
+SIGPIPE_CODE = 141  # what a shell reports for a program that a closed pipe ended
+
+
+def guarded(command: Callable[[], int], *, debug: bool) -> int:
+    """Run the command and turn what it raises into lines on stderr and an exit code."""
+    try:
+        code = int(command())
+        flush()
+    except BrokenPipeError:
+        _drop_stdout()
+        return SIGPIPE_CODE
+    except KeyboardInterrupt:
+        _say("grader: interrupted")
+        return ExitCode.INTERRUPTED
+    except GraderError as error:
+        _trace(debug)
+        report(error)
+        return error.exit_code
+    except Exception as error:  # noqa: BLE001 - the last place: no caller could show it in one line
+        _trace(debug)
+        _say(f"grader: internal error: {type(error).__name__}: {_line(error)}{'' if debug else DEBUG_HINT}")
+        return ExitCode.NOT_GRADED
+    return code
+
+
+DEBUG_HINT = " (run with --debug for the traceback)"
+
+
+def report(error: GraderError) -> None:
+    """Print a line that says what is wrong, one that says what to do, and one that says what became of the result. Each
+    fault of a rubric has its own line."""
+    faults = error.faults if isinstance(error, RubricError) else [error.message]
+    for fault in faults:
+        _say(_fitted(f"grader: error: {_line(fault)}"))
+    if error.hint:
+        _say(_fitted(f"  hint: {_line(error.hint)}"))
+    if error.note:
+        _say(_fitted(f"  note: {_line(error.note)}"))
+
+
+def _fitted(text: str) -> str:
+    """The line as it is, or on a terminal in lines that end between words."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        return text
+    width = max(shutil.get_terminal_size().columns, NARROWEST)
+    return textwrap.fill(
+        text, width, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+    )
+
+
+def flush() -> None:
+    """Send what was printed, so that a closed pipe is noticed here and not at the interpreter's exit."""
+    if sys.stdout is not None:
+        sys.stdout.flush()
+
+
+def _line(text: object) -> str:
+    return line(str(text), ERROR_CHARS)
+
+
+def _say(text: str) -> None:
+    with suppress(OSError, ValueError):  # a closed stderr leaves nowhere to complain to
+        print(text, file=sys.stderr, flush=True)
+
+
+def _trace(debug: bool) -> None:
+    if debug:
+        with suppress(OSError, ValueError):
+            sys.stderr.write(visible(traceback.format_exc(), lines=True))
+
+
+def _drop_stdout() -> None:
+    """Let the interpreter's own flush at its end go nowhere."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

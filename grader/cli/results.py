@@ -26,12 +26,11 @@ from grader.classes.batch.renew_results import (
     write_one,
 )
 from grader.classes.batch.run import INDEX
-from grader.cli.errors import report
 from grader.cli.outcome import exit_code
-from grader.cli.output import say, say_beside, say_document
+from grader.cli.output import report, say, say_beside, say_document
 from grader.cli.select_rubric import package_prefix
 from grader.errors import EvidenceError, ExitCode, UsageError
-from grader.evidence.export import export_bag
+from grader.evidence.bag import export_bag
 from grader.evidence.inspect import ChannelSummary, Inspection, ProcessSummary
 from grader.evidence.reader import load_evidence
 from grader.evidence.run import Run

@@ -16,7 +16,7 @@ from grader.classes.batch.folder import RUN, open_batch
 from grader.classes.similarity.comparison import percent, stretches
 from grader.classes.similarity.sources import PLACE
 from grader.errors import GraderError, UsageError
-from grader.model.similarity import NotCompared, Pair, Similarity
+from grader.model.batch import NotCompared, Pair, Similarity
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
 from grader.rubric.load import load_rubric

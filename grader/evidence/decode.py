@@ -29,7 +29,7 @@ from grader.evidence.definitions import (
     canonical,
     parse,
 )
-from grader.evidence.memory_budget import DECODED_BYTES_MAX
+from grader.evidence.run import DECODED_BYTES_MAX
 from grader.model.message_definitions import RULE
 
 Value: TypeAlias = Any

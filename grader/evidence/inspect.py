@@ -10,9 +10,8 @@ from pathlib import Path
 from statistics import median, pstdev, stdev
 from typing import Literal
 
-from grader.evidence.memory_budget import BudgetExceeded, MemoryBudget
 from grader.evidence.reader import load_run
-from grader.evidence.run import Channel, Run, is_grader_node
+from grader.evidence.run import BudgetExceeded, Channel, MemoryBudget, Run, is_grader_node
 from grader.model.record import Record
 
 BATCHES = 10

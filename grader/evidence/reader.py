@@ -20,8 +20,16 @@ from zstandard import ZstdError
 from grader.errors import EvidenceError
 from grader.evidence.container import MAX_FILE_BYTES, ContainerError, records
 from grader.evidence.events import FIELDS, METADATA_NAME, PACKAGE_TOPIC, TOPICS
-from grader.evidence.memory_budget import LESS, BudgetExceeded, MemoryBudget
-from grader.evidence.run import OTHER_RUNS, Channel, Message, Run, merge_channels
+from grader.evidence.run import (
+    LESS,
+    OTHER_RUNS,
+    BudgetExceeded,
+    Channel,
+    MemoryBudget,
+    Message,
+    Run,
+    merge_channels,
+)
 from grader.model.package import PackageFacts
 from grader.model.version import EVIDENCE, UPDATE
 

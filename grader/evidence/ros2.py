@@ -16,8 +16,7 @@ from typing import NamedTuple
 
 from grader.errors import EvidenceError
 from grader.evidence.definitions import DefinitionError, sections_of
-from grader.evidence.memory_budget import BudgetExceeded, MemoryBudget
-from grader.evidence.run import Channel, Message, Run, merge_channels
+from grader.evidence.run import BudgetExceeded, Channel, MemoryBudget, Message, Run, merge_channels
 
 OWN_TYPES = {
     "byte": "uint8",

@@ -1,5 +1,7 @@
-"""The submissions of a class (a roster), and `run.json`, schema `grader.run/1`: what a batch does, and its progress.
+"""The records of a class: its submissions (a roster), what a batch does, what was published and sent, what is alike.
 
+They are `run.json` (schema `grader.run/1`), the lines of `published.jsonl` and `sent.jsonl`, and `similarity.json`
+(schema `grader.similarity/1`), on which no mark depends.
 The docstring of a field says what its key means: the reference and the JSON schemas are made of them.
 """
 
@@ -9,7 +11,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Literal
 
-from pydantic import Field
+from pydantic import AwareDatetime, Field
 
 from grader.model.record import Record
 from grader.model.result import RubricInfo
@@ -160,3 +162,121 @@ class BatchRun(Record):
     """Rows of the roster that cannot be graded."""
     entries: tuple[Entry, ...] = ()
     """The submissions, in the roster's order."""
+
+
+SentState = Literal["sending", "sent", "failed"]
+
+
+class Publication(Record):
+    """One result that was published, as it was then. The last line of a submission counts."""
+
+    schema_: Literal["grader.published/1"] = Field(default="grader.published/1", alias="schema")
+    """Which format this is, and its version."""
+    id: str
+    """The student's id."""
+    at: AwareDatetime
+    """When it was published."""
+    by: str = ""
+    """Who published it."""
+    status: Literal["graded", "inconclusive", "error"]
+    """The result's status."""
+    points: float
+    """The result's points."""
+    max_points: float
+    """The most points that can be reached."""
+    digest: str
+    """sha256 of the `result.json` that was published: `.published/<id>/<its first 16 digits>/` holds it."""
+    changes: tuple[str, ...] = ()
+    """What changed since the publication before, as the student reads it; empty for the first one."""
+
+
+class Sent(Record):
+    """One step of sending feedback to one student. The last line of a student, a form and a digest counts."""
+
+    schema_: Literal["grader.sent/1"] = Field(default="grader.sent/1", alias="schema")
+    """Which format this is, and its version."""
+    id: str
+    """The student's id."""
+    form: str
+    """How it was sent: the value of `--form`."""
+    digest: str
+    """The `digest` of the publication that was sent."""
+    at: AwareDatetime
+    """When."""
+    state: SentState
+    """`sending`: it was begun; if no line follows, nobody knows how it ended. `sent`; `failed`: it was not sent."""
+    place: str = ""
+    """Where it went: a file, an address, a commit, a comment."""
+    message: str = ""
+    """Why it failed."""
+
+
+Lines = tuple[tuple[int, int], ...]
+"""First and last lines of stretches, counted from 1."""
+
+
+class FileMatch(Record):
+    """What of one file of the first submission is in a file of the second, the one that has most of it."""
+
+    file_a: str
+    file_b: str
+    lines_a: Lines
+    lines_b: Lines
+
+
+class Pair(Record):
+    """Two submissions, `a` before `b`.
+
+    `similarity_a` is the share (0 to 1) of a's own code that is in b too; a's own code is what is left when everything
+    in `TakenOut` is taken out. `lines_a` is the number of a's lines that hold it.
+    """
+
+    a: str
+    b: str
+    similarity_a: float
+    similarity_b: float
+    lines_a: int
+    lines_b: int
+    files: tuple[FileMatch, ...]
+
+
+class TakenOut(Record):
+    """What is no one's own.
+
+    `starter` are the files of the starter code, `tutorials` those that the grader knows. `common` is the number of
+    fingerprints that are in more than half of the submissions, None where the class is too small to say so.
+    """
+
+    starter: tuple[str, ...] = ()
+    tutorials: tuple[str, ...] = ()
+    common: int | None = None
+
+
+class NotCompared(Record):
+    """A submission, or one file of it, that could not be compared, and why."""
+
+    id: str
+    file: str = ""
+    reason: str
+
+
+class Similarity(Record):
+    """`threshold` is the share from which a pair is named, `min_lines` the least number of matching lines of each.
+
+    `clusters` are the submissions that hang together by pairs. `too_little` have too little code of their own to tell
+    anything. `same_group` counts the pairs that were left out because both are of one group.
+    """
+
+    schema_: Literal["grader.similarity/1"] = Field(default="grader.similarity/1", alias="schema")
+    library: str
+    library_version: str
+    threshold: float
+    min_lines: int
+    compared: int
+    pairs: tuple[Pair, ...] = ()
+    clusters: tuple[tuple[str, ...], ...] = ()
+    taken_out: TakenOut = TakenOut()
+    too_little: tuple[str, ...] = ()
+    not_compared: tuple[NotCompared, ...] = ()
+    same_group: int = 0
+    notes: tuple[str, ...] = ()

@@ -17,14 +17,12 @@ from typing import Any, Literal
 
 from grader.evidence import events
 from grader.evidence.events import PACKAGE_TOPIC, TOPICS
-from grader.model import batch, publication, result, verdict, version
-from grader.model.batch import BatchRun
+from grader.model import batch, result, verdict, version
+from grader.model.batch import BatchRun, Publication, Sent, Similarity
 from grader.model.mutants import MutantsFile, RubricTest
 from grader.model.package import PackageFacts
-from grader.model.publication import Publication, Sent
 from grader.model.record import Record, field_docstrings
 from grader.model.result import BankComment, GradingResult, WrittenOverride
-from grader.model.similarity import Similarity
 from grader.model.version import Versioned
 from grader.rubric import course
 from grader.rubric.course import Course
@@ -294,7 +292,7 @@ def _two_levels(name: str, says: str, one: Schema) -> Schema:
 
 _RECORDS: dict[str, type[Record]] = {
     kind.__name__: kind
-    for module in (batch, course, events, publication, result, verdict)
+    for module in (batch, course, events, result, verdict)
     for kind in vars(module).values()
     if inspect.isclass(kind) and issubclass(kind, Record)
 }

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from grader.arena.limits import RunLimits
+from grader.arena.sandbox import RunLimits
 from grader.checks.support.build_errors import first_error
 from grader.checks.support.console_output import console_log, printed_lines, printed_times
 from grader.checks.support.exit_causes import _refused_name, tracebacks

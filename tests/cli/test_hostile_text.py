@@ -17,9 +17,8 @@ from rich.console import Console
 import grader
 from grader.cli.commands.grading import inspect
 from grader.cli.display import LiveSteps, PlainSteps
-from grader.cli.errors import guarded, report
-from grader.cli.output import say, say_json
-from grader.cli.rubric_test import print_test
+from grader.cli.labs import print_test
+from grader.cli.output import guarded, report, say, say_json
 from grader.errors import RubricError, SubmissionError
 from grader.evidence.events import ActorEvent
 from grader.evidence.inspect import inspect_run
@@ -32,7 +31,6 @@ from tests.report.test_shown import TO_A_CI
 GRADER = Path(grader.__file__).parent
 MAY_PRINT = {
     "cli/output.py",
-    "cli/errors.py",
     "cli/display.py",
     "cli/class_display.py",
     "cli/main.py",  # the list of commands, which is its own

@@ -23,7 +23,7 @@ COMMANDS = {
     "batch": (["batch", "roster.csv", "--rubric", LAB, "--out", "o"], "grader.cli.classes.run_batch"),
     "record": (["record", SOLUTION, "--rubric", LAB, "--out", "o"], "grader.pipeline.record"),
     "rubric new": (["rubric", "new", "--from", SOLUTION], "grader.authoring.propose.propose_rubric"),
-    "rubric test": (["rubric", "test", LAB], "grader.cli.rubric_test.run_test"),
+    "rubric test": (["rubric", "test", LAB], "grader.cli.labs.run_test"),
 }
 
 
@@ -33,7 +33,7 @@ def _begins(tmp_path: Path, monkeypatch) -> None:
 
     What takes these functions' names at its import is imported before, or it would keep the stand-ins for later tests.
     """
-    for module in ("grader.cli.classes", "grader.cli.rubric_test", "grader.authoring.propose"):
+    for module in ("grader.cli.classes", "grader.cli.labs", "grader.authoring.propose"):
         importlib.import_module(module)
 
     def begin(*_args: object, **_more: object) -> None:

@@ -10,8 +10,8 @@ import pytest
 
 from grader.cli.main import run as grader
 from grader.errors import EvidenceError, OutputError
-from grader.evidence import export
-from grader.evidence.export import export_bag
+from grader.evidence import bag
+from grader.evidence.bag import export_bag
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from tests.evidence.bags import CHATTER, COUNT, Topic, mcap_bytes, write_bag
@@ -89,7 +89,7 @@ def test_a_failure_leaves_what_was_there(tmp_path, monkeypatch):
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(export, "_write", full)
+    monkeypatch.setattr(bag, "_write", full)
     with pytest.raises(OutputError, match="No space left"):
         export_bag(run, tmp_path / "b.bag")
     assert (tmp_path / "b.bag").read_text() == "old"

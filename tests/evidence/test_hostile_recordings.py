@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 from mcap.writer import CompressionType, Writer
 
-from grader.arena.limits import SUBMISSION_MESSAGE_BYTES
+from grader.arena.sandbox import SUBMISSION_MESSAGE_BYTES
 from grader.cli.main import run as grader
 from grader.errors import EvidenceError
-from grader.evidence import memory_budget
 from grader.evidence.decode import Decoder
 from grader.evidence.events import EVIDENCE_VERSION, METADATA_NAME, ActorEvent
 from grader.evidence.inspect import inspect_run
 from grader.evidence.reader import load_evidence, load_run
+from grader.evidence.run import HELD_BYTES_MAX, BudgetExceeded, MemoryBudget
 from grader.evidence.writer import EvidenceStream
 from grader.judging import judge
 from grader.model.verdict import Status
@@ -166,7 +166,7 @@ def test_a_topic_that_is_too_much_to_decode_costs_no_mark_and_earns_none(tmp_pat
     (tmp_path / "lab.mcap").write_bytes(recording("float32[] x\n", *many, topic="/chatter").getvalue())
     run = load_run(tmp_path / "lab.mcap")
     assert len(run.channels[0].values) == 2000
-    tight = load_run(tmp_path / "lab.mcap", memory_budget.MemoryBudget(decoded_bytes=1 << 20))
+    tight = load_run(tmp_path / "lab.mcap", MemoryBudget(decoded_bytes=1 << 20))
     with pytest.raises(EvidenceError, match=r"/chatter: its messages come to more than 1 MiB"):
         _ = tight.channels[0].values
     loaded = load_rubric(LAB)
@@ -181,11 +181,11 @@ def test_zeros_that_pack_well_do_not_fill_the_memory():
 
 
 def test_what_the_arena_may_record_of_one_submission_can_be_read_again():
-    assert memory_budget.HELD_BYTES_MAX > SUBMISSION_MESSAGE_BYTES
-    shared = memory_budget.MemoryBudget()
+    assert HELD_BYTES_MAX > SUBMISSION_MESSAGE_BYTES
+    shared = MemoryBudget()
     for _ in range(10):
         shared.hold(SUBMISSION_MESSAGE_BYTES // 10, foreign=False)
-    with pytest.raises(memory_budget.BudgetExceeded):
+    with pytest.raises(BudgetExceeded):
         shared.hold(SUBMISSION_MESSAGE_BYTES // 10, foreign=True)
 
 

@@ -12,7 +12,7 @@ from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides.write import write_override
 from grader.cli.main import run
 from grader.intake import safe_name
-from grader.model.publication import Sent
+from grader.model.batch import Sent
 from grader.model.result import GradingResult, Override
 from grader.report.files import result_bytes
 from grader.rubric.load import load_rubric

@@ -17,7 +17,7 @@ from grader.classes.feedback.files import Folder
 from grader.classes.feedback.forms import FORMS, Feedback
 from grader.classes.feedback.publish import read_published
 from grader.cli.main import run
-from grader.model.publication import Publication
+from grader.model.batch import Publication
 from tests.feedback.a_class import award, feedback, publish, sent
 
 pytestmark = pytest.mark.usefixtures("without_processes")

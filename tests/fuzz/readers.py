@@ -24,8 +24,8 @@ from grader.classes.gradebook import write_gradebook
 from grader.classes.gradebook.template import read_sheet
 from grader.classes.roster import read_roster
 from grader.errors import EvidenceError, GraderError, OutputError, RubricError, SubmissionError, UsageError
+from grader.evidence.bag import export_bag
 from grader.evidence.decode import Decoder
-from grader.evidence.export import export_bag
 from grader.evidence.inspect import inspect_run
 from grader.evidence.message_values import ServiceTypes
 from grader.evidence.reader import load_run, package_facts

@@ -14,7 +14,7 @@ from grader.integrations.bundle import Bundle, add_lab
 from grader.judging import judge
 from grader.judging.annotate import LINE_CHARS, add_advice, choose_hint_language, show_lines
 from grader.judging.facts import Facts
-from grader.judging.file_verdicts import judge_files
+from grader.judging.judge import judge_files
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status, failed, passed

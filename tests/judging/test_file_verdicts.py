@@ -7,7 +7,7 @@ import pytest
 
 from grader.checks.registry import collecting
 from grader.intake import open_submission
-from grader.judging.file_verdicts import judge_files
+from grader.judging.judge import judge_files
 from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts, PythonSlip
 from grader.model.result import EarlyVerdict
 from grader.model.submission import SourcePackage

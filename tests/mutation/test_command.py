@@ -65,7 +65,7 @@ def judge(tmp_path, monkeypatch):
         made.declared = {m.name: dict(m.costs or {}) for m in plan.mutants}
         return original(plan, progress)
 
-    monkeypatch.setattr("grader.cli.rubric_test.run_test", noting)
+    monkeypatch.setattr("grader.cli.labs.run_test", noting)
     return made
 
 

@@ -17,7 +17,7 @@ from grader.authoring.mutation.solution import Solution
 from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, advice_of
 from grader.model.submission import chmod_hint
 from grader.package.repairs import NotRepairable, Repair, Wanted, apply_repair, find_repairs, wanted_of
-from grader.package.repairs.wanted import is_near, is_one_edit
+from grader.package.repairs.names import is_near, is_one_edit
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import load_rubric
 from tests.package.trees import facts_of, plain

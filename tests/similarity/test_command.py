@@ -13,9 +13,8 @@ import pytest
 from grader.classes.similarity import comparison
 from grader.cli.main import run as grader
 from grader.cli.similarity import starter_of
-from grader.model.batch import BatchRun, Entry
+from grader.model.batch import BatchRun, Entry, Similarity
 from grader.model.result import RubricInfo
-from grader.model.similarity import Similarity
 from tests.rubric.samples import spoiled
 from tests.similarity.classes import class_of, renamed, solution
 

@@ -8,7 +8,7 @@ import pytest
 
 from grader.classes.similarity.comparison import Request
 from grader.classes.similarity.matching import compare_class
-from grader.model.similarity import Similarity
+from grader.model.batch import Similarity
 from tests.similarity.classes import (
     DISGUISES,
     class_of,

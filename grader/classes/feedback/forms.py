@@ -19,8 +19,7 @@ from grader.untrusted_text import line
 if TYPE_CHECKING:  # the parser of the command line reads the names of forms, and must start fast
     from typing_extensions import Self
 
-    from grader.model.batch import Entry
-    from grader.model.publication import Publication
+    from grader.model.batch import Entry, Publication
 
 WhenUnsure = Literal["again", "look", "ask"]
 TEXT, PAGE = "report.md", "report.html"

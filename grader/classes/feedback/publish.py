@@ -24,8 +24,7 @@ from grader.classes.gradebook import Row
 from grader.errors import EvidenceError, GraderError, UsageError
 from grader.files import atomic_write, make_folder
 from grader.intake import safe_name
-from grader.model.batch import UNPUBLISHED, Entry
-from grader.model.publication import Publication
+from grader.model.batch import UNPUBLISHED, Entry, Publication
 from grader.model.result import AppliedOverride, GradingResult
 from grader.model.version import PUBLISHED as FORMAT
 from grader.model.version import UPDATE

@@ -11,8 +11,8 @@ from grader.files import atomic_write, temporary_folder
 from grader.installable import install_extra
 from grader.intake import IntakeLimits
 from grader.intake.archive import unpack
+from grader.model.batch import Lines, Pair, Similarity
 from grader.model.record import Record
-from grader.model.similarity import Lines, Pair, Similarity
 from grader.report.text import csv_text, json_text
 from grader.workers import Worker, WorkerEnded, WorkerLimits
 

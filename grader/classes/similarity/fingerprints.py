@@ -25,7 +25,7 @@ from pygments.lexers import get_lexer_by_name
 
 from grader.classes.similarity.sources import Language, Source, read_starter, read_submission
 from grader.errors import GraderError
-from grader.model.similarity import NotCompared
+from grader.model.batch import NotCompared
 from grader.workers import WorkerEnded, WorkerLimits
 
 FILE_S = 5.0

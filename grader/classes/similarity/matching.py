@@ -23,7 +23,7 @@ from grader.classes.similarity.fingerprints import (
     read_place,
     reading_ended,
 )
-from grader.model.similarity import FileMatch, Lines, NotCompared, Pair, Similarity, TakenOut
+from grader.model.batch import FileMatch, Lines, NotCompared, Pair, Similarity, TakenOut
 from grader.workers import run_each
 
 LIBRARY = "copydetect"

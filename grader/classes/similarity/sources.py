@@ -16,7 +16,7 @@ from typing import Literal
 from grader.errors import EvidenceError
 from grader.evidence.reader import load_run
 from grader.files import open_untrusted
-from grader.model.similarity import NotCompared
+from grader.model.batch import NotCompared
 
 Language = Literal["python", "cpp"]
 

@@ -226,21 +226,19 @@ def run_rubric_test(
 ) -> ExitCode:
     """Grade a correct package, then mutants of it that must lose marks."""
     with loading():
-        from grader.cli import rubric_test
+        from grader.cli import labs as shown
         from grader.cli.host_support import require_room, warn_without_sandbox
         from grader.cli.output import say_json
     require_room(gradings=jobs)
-    plan = rubric_test.plan_test(
-        rubric, solution, only=only, jobs=jobs, out=out, everything=write, sandbox=sandbox
-    )
+    plan = shown.plan_test(rubric, solution, only=only, jobs=jobs, out=out, everything=write, sandbox=sandbox)
     warn_without_sandbox(sandbox, plan.rubric)
-    tested = rubric_test.run_plan(plan, temporary=out is None)
+    tested = shown.run_plan(plan, temporary=out is None)
     if write is not None and not tested.reference.lost:
-        rubric_test.write_mutants(plan, tested, write)
+        shown.write_mutants(plan, tested, write)
     if as_json:
         say_json(tested.model_dump(mode="json", by_alias=True))
     else:
-        rubric_test.print_test(tested, sys.stdout)
+        shown.print_test(tested, sys.stdout)
     return ExitCode.PASSED if tested.passed else ExitCode.BELOW_PASS_MARK
 
 

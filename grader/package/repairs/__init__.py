@@ -25,9 +25,15 @@ from grader.package.repairs.editing import (
     write_data,
 )
 from grader.package.repairs.files import find_renames, is_own, rename_files, repair_files, to_utf8
-from grader.package.repairs.names import repair_launch_names, repair_script_names, repair_yaml_names
+from grader.package.repairs.names import (
+    Wanted,
+    is_near,
+    repair_launch_names,
+    repair_script_names,
+    repair_yaml_names,
+    wanted_of,
+)
 from grader.package.repairs.python import repair_python
-from grader.package.repairs.wanted import Wanted, is_near, wanted_of
 
 __all__ = [
     "DEFAULT_SHARES",

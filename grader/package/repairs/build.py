@@ -15,7 +15,7 @@ from grader.package.cmake_parse import commands_of
 from grader.package.manifest import parse_manifest
 from grader.package.repairs.editing import CMAKE, MANIFEST, Files, naming_files, rename_word
 from grader.package.repairs.files import is_own
-from grader.package.repairs.wanted import Wanted, is_near
+from grader.package.repairs.names import Wanted, is_near
 from grader.package.xml import parse_xml
 from grader.wording import join_words
 

@@ -22,7 +22,7 @@ from grader.package.repairs.editing import (
     read_data,
     rename_word,
 )
-from grader.package.repairs.wanted import Wanted, is_near
+from grader.package.repairs.names import Wanted, is_near
 from grader.portable import MODES_ON_DISK
 from grader.wording import join_words
 

@@ -64,7 +64,7 @@ from grader.model.figure import (
 from grader.model.message_rate import Rhythm
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status
-from grader.report.figures.bounds import finite, second, short, short_name, thin_out
+from grader.report.figures.runs import finite, second, short, short_name, thin_out
 from grader.wording import join_words, significant
 
 FIRST_VALUES = 40

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from grader.report.class_page.page import todos
 from grader.report.class_page.statistics import costs, most_first, span, spread_of, timing
 from grader.report.class_page.submissions import Line, line_of
-from grader.report.class_page.todo import todos
 from tests.report.class_page.made_up import made_up_rows, made_up_run
 
 

@@ -1,15 +1,18 @@
-"""Mistakes in launch files, and in the shell scripts that they start."""
+"""Mistakes in launch files, in the shell scripts that they start, and with the parameters that they load."""
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterator
 
+import yaml
 from pydantic import Field
 
 from grader.authoring.mutation.registry import Finder, operator
+from grader.authoring.mutation.rospy_code import argument, calls, script_place, text_literal
 from grader.authoring.mutation.solution import CodePlace, Solution
-from grader.authoring.mutation.source_edits import Document, Edit, Element, misspelt_name, whole_lines
+from grader.authoring.mutation.source_edits import Document, Edit, Element, Script, misspelt_name, whole_lines
 from grader.model.record import Record
 
 URL = re.compile(r"""https?://[^\s"'<>]+""")
@@ -184,3 +187,205 @@ def command_dropped(text: str, match: re.Match[str]) -> list[Edit]:
     Fits every shell script with a line that runs firefox.
     """
     return [Edit(*whole_lines(text, *match.span()), "")]
+
+
+Leaf = tuple[str, yaml.ScalarNode, yaml.ScalarNode]
+YAML = (".yaml", ".yml")
+
+# ---- YAML files
+
+
+def leaves(text: str) -> list[Leaf]:
+    """Every value that is no map and no list: its key's path (`details/name/first`), the key, the value."""
+    try:
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.YAMLError:
+        return []
+    return list(_leaves(node, "")) if node is not None else []
+
+
+def _leaves(node: yaml.Node, path: str) -> Iterator[Leaf]:
+    if not isinstance(node, yaml.MappingNode):
+        return
+    for key, value in node.value:
+        name = f"{path}/{key.value}" if path else str(key.value)
+        if isinstance(key, yaml.ScalarNode) and isinstance(value, yaml.ScalarNode):
+            yield name, key, value
+        else:
+            yield from _leaves(value, name)
+
+
+def own_lines(text: str) -> list[Leaf]:
+    """Those that have a line for themselves, in block style."""
+    return [leaf for leaf in leaves(text) if _has_line(text, *leaf[1:])]
+
+
+def _has_line(text: str, key: yaml.ScalarNode, value: yaml.ScalarNode) -> bool:
+    start = key.start_mark.index - key.start_mark.column
+    after = text[value.end_mark.index : _line_end(text, value)].strip()
+    return not text[start : key.start_mark.index].strip() and (not after or after.startswith("#"))
+
+
+def _line_end(text: str, value: yaml.ScalarNode) -> int:
+    end = text.find("\n", value.end_mark.index)
+    return end if end >= 0 else len(text)
+
+
+def _yaml_files(solution: Solution) -> Iterator[tuple[CodePlace, list[Leaf]]]:
+    for path in solution.files:
+        if path.endswith(YAML):
+            yield CodePlace(path=path, at={"file": path}), own_lines(solution.text(path))
+
+
+def _yaml_keys(solution: Solution) -> Iterator[tuple[CodePlace, str, yaml.ScalarNode, yaml.ScalarNode]]:
+    for path in solution.files:
+        text = solution.text(path)
+        for name, key, value in own_lines(text) if path.endswith(YAML) else ():
+            place = CodePlace(path=path, at={"file": path, "key": name}, line=key.start_mark.line + 1)
+            yield place, text, key, value
+
+
+@operator("yaml-tabs", each=_yaml_files)
+def yaml_tabs(values: list[Leaf]) -> list[Edit]:
+    """Indents the YAML file with a tab.
+
+    Fits every YAML file with an indented key in a line of its own.
+    """
+    marks = [key.start_mark for name, key, _ in values if "/" in name and key.start_mark.column]
+    return [Edit(mark.index - mark.column, mark.index, "\t") for mark in marks[:1]]
+
+
+@operator("yaml-malformed", each=_yaml_files)
+def yaml_malformed(values: list[Leaf]) -> list[Edit]:
+    """Leaves a quotation mark open in the YAML file.
+
+    Fits every YAML file with a value in a line of its own.
+    """
+    return [Edit(v.start_mark.index, v.end_mark.index, f'"{v.value}') for _, _, v in values[:1]]
+
+
+@operator("yaml-key-missing", each=_yaml_keys)
+def yaml_key_missing(text: str, key: yaml.ScalarNode, value: yaml.ScalarNode) -> list[Edit]:
+    """Forgets a key of the YAML file.
+
+    Fits every value of a YAML file that has a line of its own.
+    """
+    return [Edit(*whole_lines(text, key.start_mark.index, _line_end(text, value)), "")]
+
+
+@operator("yaml-key-misspelt", each=_yaml_keys)
+def yaml_key_misspelt(_text: str, key: yaml.ScalarNode, _value: yaml.ScalarNode) -> list[Edit]:
+    """Misspells a key of the YAML file.
+
+    Fits every value of a YAML file that has a line of its own.
+    """
+    return [Edit(key.start_mark.index, key.end_mark.index, misspelt_name(str(key.value)))]
+
+
+# ---- scripts
+
+
+def _accesses(function: str) -> Finder:
+    """Return a finder of calls of `get_param` or `set_param` whose parameter is written out."""
+
+    def find(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Call, ast.Constant]]:
+        for script in solution.scripts:
+            for call in calls(script, function):
+                name = text_literal(script, argument(call, 0, "param_name"))
+                if name is not None:
+                    yield script_place(script, call, param=str(name.value).strip("/")), script, call, name
+
+    return find
+
+
+def _reads(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.expr, yaml.Node]]:
+    """Find the expressions that read a value of the package's YAML files."""
+    values = {n: v for f in solution.files if f.endswith(YAML) for n, _, v in leaves(solution.text(f))}
+    for script in solution.scripts:
+        for node in script.of(ast.expr):
+            reads = _is_deeper(node) and not isinstance(getattr(node, "ctx", None), ast.Store | ast.Del)
+            name = param_path(script, node) if reads else ""
+            if name in values:
+                yield script_place(script, node, param=name), script, node, values[name]
+
+
+def param_path(script: Script, node: ast.AST) -> str:
+    """The parameter that an expression reads, by calls, subscripts and variables; empty where it is none."""
+    if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
+        base = param_path(script, node.value)
+        return f"{base}/{node.slice.value!s}" if base else ""
+    if isinstance(node, ast.Call):
+        read = [call for call in calls(script, "get_param") if call is node]
+        name = text_literal(script, argument(read[0], 0, "param_name")) if read else None
+        return str(name.value).strip("/") if name is not None else ""
+    if isinstance(node, ast.Name | ast.Attribute):
+        variable = ast.unparse(node)
+        values = [a.value for a in script.of(ast.Assign) if variable in {ast.unparse(t) for t in a.targets}]
+        is_itself = len(values) == 1 and node not in set(ast.walk(values[0]))
+        return param_path(script, values[0]) if is_itself and _is_deeper(values[0]) else ""
+    return ""
+
+
+def _is_deeper(value: ast.AST) -> bool:
+    return isinstance(value, ast.Call | ast.Subscript)
+
+
+@operator("parameter-not-read", each=_reads)
+def parameter_not_read(script: Script, node: ast.expr, value: yaml.Node) -> list[Edit]:
+    """Writes the value of the YAML file into the script, and does not read the parameter.
+
+    Fits every expression that reads a value of the package's YAML files.
+    """
+    return [script.replace(node, repr(yaml.safe_load(yaml.serialize(value))))]
+
+
+@operator("parameter-misspelt", each=_accesses("get_param"))
+def parameter_misspelt(script: Script, _call: ast.Call, name: ast.Constant) -> list[Edit]:
+    """Misspells the parameter that it reads.
+
+    Fits every rospy.get_param() whose parameter is written out.
+    """
+    return [script.replace(name, repr(misspelt_name(str(name.value))))]
+
+
+@operator("parameter-not-set", each=_accesses("set_param"))
+def parameter_not_set(script: Script, call: ast.Call, _name: ast.Constant) -> list[Edit]:
+    """Does not set the parameter.
+
+    Fits every statement rospy.set_param() whose parameter is written out.
+    """
+    statement = script.statement(call)
+    return [script.replace(statement, "pass")] if isinstance(statement, ast.Expr) else []
+
+
+@operator("parameter-other-value", each=_accesses("set_param"))
+def parameter_other_value(script: Script, call: ast.Call, _name: ast.Constant) -> list[Edit]:
+    """Sets the parameter to another value.
+
+    Fits every rospy.set_param() whose parameter is written out.
+    """
+    value = argument(call, 1, "param_value")
+    return [script.replace(value, "12345")] if value is not None else []
+
+
+@operator("parameter-clobbered", each=_accesses("set_param"))
+def parameter_clobbered(script: Script, call: ast.Call, name: ast.Constant) -> list[Edit]:
+    """Sets a whole branch of parameters where one was meant, so that its neighbours are gone.
+
+    Fits every rospy.set_param() of a parameter below another, written out.
+    """
+    head, _, tail = str(name.value).rpartition("/")
+    value = argument(call, 1, "param_value")
+    if not head.strip("/~") or value is None or name not in call.args:
+        return []
+    start, end = script.span(call.args[0])[0], script.span(value)[1]
+    return [Edit(start, end, f"{head!r}, {{{tail!r}: {script.source(value)}}}")]
+
+
+@operator("parameter-set-elsewhere", each=_accesses("set_param"))
+def parameter_set_elsewhere(script: Script, _call: ast.Call, name: ast.Constant) -> list[Edit]:
+    """Sets a parameter of another name.
+
+    Fits every rospy.set_param() whose parameter is written out.
+    """
+    return [script.replace(name, repr(misspelt_name(str(name.value))))]
