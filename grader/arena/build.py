@@ -77,15 +77,7 @@ async def build(
     wants_base = place.sandbox.bubblewrap and not has_base(place) and len(os.sched_getaffinity(0)) > 1
     (place.folder / "bin" / "python-files.json").write_text(json.dumps(list(python_files)))
     async with ArenaSession(place, writer, master=False, last_run=last_run) as arena:
-        arena.course(ScenarioEvent(event="begin"))
-        arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True, collect=ARCHIVE))
-        arena.start(_syntax_spec(place))
-        if wants_base:  # beside the build, on another core
-            arena.start(base_spec(place))
-        ended = await arena.wait(lambda: "catkin_make" in arena.exit_codes, BUILD_S)
-        if not ended:
-            await arena.interrupt("catkin_make", int_s=2.0, term_s=1.0)
-        await arena.wait(lambda: "syntax" in arena.exit_codes, STEP_S)
+        ended = await _run_catkin_make(place, arena, with_base=wants_base)
         ok = arena.exit_codes.get("catkin_make") == 0
         built = await _with_setup(place, arena) if ok else place.from_source()
         for package, scripts in ((None, answers), *answers_of.items()):
@@ -94,10 +86,8 @@ async def build(
                 await _answer(own or built, arena, script)
         if wants_base and ended:
             await arena.wait(lambda: BASE_NAME in arena.exit_codes, BASE_S)
-        outcome = "complete" if ended else "timeout"
-        arena.course(
-            ScenarioEvent(event="end", outcome=outcome, detail="" if ended else f"build over {BUILD_S:g} s")
-        )
+        outcome, detail = ("complete", "") if ended else ("timeout", f"build over {BUILD_S:g} s")
+        arena.course(ScenarioEvent(event="end", outcome=outcome, detail=detail))
         await arena.finish()
     if wants_base:
         keep_base(place, arena.exit_codes.get(BASE_NAME))
@@ -117,6 +107,20 @@ async def build(
         cpu_s=arena.cpu_s,
         student_cpu_s=arena.student_cpu_s,
     )
+
+
+async def _run_catkin_make(place: ProcessEnvironment, arena: ArenaSession, *, with_base: bool) -> bool:
+    """Build the workspace, and beside it read the Python files; return whether the build ended by itself."""
+    arena.course(ScenarioEvent(event="begin"))
+    arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True, collect=ARCHIVE))
+    arena.start(_syntax_spec(place))
+    if with_base:  # beside the build, on another core
+        arena.start(base_spec(place))
+    ended = await arena.wait(lambda: "catkin_make" in arena.exit_codes, BUILD_S)
+    if not ended:
+        await arena.interrupt("catkin_make", int_s=2.0, term_s=1.0)
+    await arena.wait(lambda: "syntax" in arena.exit_codes, STEP_S)
+    return ended
 
 
 def _catkin_make(place: ProcessEnvironment) -> list[str]:

@@ -252,8 +252,12 @@ class ProcessEnvironment:
         arguments of bubblewrap's."""
         boxed = self.sandbox.bubblewrap
         limits = self._limits(copy=copy)
-        kept = None if collect is None else str(self.workspace.kept / collect)
         filtered = system_call_filter() if boxed else None
+        first = self._words(copy=copy and boxed, build=build, number=number if boxed else 0)
+        collected = None
+        if collect is not None and boxed:
+            room = collect_bytes or self.limits.built_bytes
+            collected = {"file": str(self.workspace.kept / collect), "bytes": room}
         return {
             "name": name,
             "role": role,
@@ -269,15 +273,8 @@ class ProcessEnvironment:
                 net=role != "grader" or not as_handed_in,
             ),
             "filter": base64.b64encode(filtered).decode() if filtered else None,
-            "shell": [
-                "/bin/bash",
-                "-c",
-                self._words(copy=copy and boxed, build=build, number=number if boxed else 0),
-                "bash",
-            ],
-            "collect": {"file": kept, "bytes": collect_bytes or self.limits.built_bytes}
-            if kept and boxed
-            else None,
+            "shell": ["/bin/bash", "-c", first, "bash"],
+            "collect": collected,
             "script": None,
             "repairs": [],
             "stdin": False,

@@ -99,8 +99,7 @@ def say_choice(chosen: Chosen) -> None:
 def check_package(chosen: Chosen, check: Check) -> ExitCode:
     """Grade one package and print its report."""
     say_choice(chosen)
-    options, rubric = check.options, chosen.rubric.rubric
-    static = options.static_only
+    options = check.options
     if check.several and chosen.package is not None:
         options = replace(options, submission_id=safe_name(chosen.package.resolve().name))
         say("")
@@ -110,6 +109,7 @@ def check_package(chosen: Chosen, check: Check) -> ExitCode:
             package = _package(chosen)
             source = str(write_staged(package, own / "index", index=os.environ.get("GIT_INDEX_FILE", "")))
             options = replace(options, submission_id=safe_name(package.resolve().name))
+        static = options.static_only
         unrun = "--static" if static else why_nothing_runs() if needs_ros(chosen.rubric) else ""
         report = None if check.as_json or check.staged or static or check.out else report_place(chosen)
         options = replace(options, files=options.files or report is not None)
@@ -118,36 +118,48 @@ def check_package(chosen: Chosen, check: Check) -> ExitCode:
         early = not (check.as_json or unrun)
         with nullcontext(Silence()) if check.staged else open_progress(early=early) as progress:
             result = pipeline.grade(source, chosen.rubric, folder, options, progress)
-        shown = without_hidden(result, rubric)
-        kept = folder / result.submission.id if check.out is not None else None
+        kept = folder / result.submission.id
+        if report is not None and (kept / REPORT).is_file():
+            keep_report(kept / REPORT, report)
         found = inquiry.result() if inquiry is not None else GitStatus()
-        if check.as_json:
-            shown = shown.model_copy(update={"standing": found})
-        written = folder / result.submission.id / REPORT if report is not None else None
-        if written is not None and report is not None and written.is_file():
-            keep_report(written, report)
-        code = show(
-            shown,
-            rubric,
-            kept,
-            hidden=len(hidden_ids(rubric)),
-            as_json=check.as_json,
-            static=static,
-            unrun=unrun,
-            remarks=() if check.as_json else list(_remarks(found, check)),
-            full=check.full,
-        )
-        for words in () if static or not unrun else how_to_run_nodes():
-            (say_beside if check.as_json else say)(words)
-        for point in found.points if check.as_json else ():
-            say_beside(point.text)
-        if not (check.as_json or check.staged):
-            for words in _what_next(
-                shown, chosen, report if report is not None and report.is_file() else None
-            ):
-                say(words)
-        graded = shown.status != "error"
-        return staged_code(shown.criteria, rubric) if check.staged and graded else code
+        return _print_check(result, chosen, check, found, unrun=unrun, folder=kept, report=report)
+
+
+def _print_check(
+    result: GradingResult,
+    chosen: Chosen,
+    check: Check,
+    found: GitStatus,
+    *,
+    unrun: str,
+    folder: Path,
+    report: Path | None,
+) -> ExitCode:
+    """Print the report, what git lacks and what to do next."""
+    rubric, static = chosen.rubric.rubric, check.options.static_only
+    shown = without_hidden(result, rubric)
+    if check.as_json:
+        shown = shown.model_copy(update={"standing": found})
+    code = show(
+        shown,
+        rubric,
+        folder if check.out is not None else None,
+        hidden=len(hidden_ids(rubric)),
+        as_json=check.as_json,
+        static=static,
+        unrun=unrun,
+        remarks=() if check.as_json else list(_remarks(found, check)),
+        full=check.full,
+    )
+    for words in () if static or not unrun else how_to_run_nodes():
+        (say_beside if check.as_json else say)(words)
+    for point in found.points if check.as_json else ():
+        say_beside(point.text)
+    if not (check.as_json or check.staged):
+        for words in _what_next(shown, chosen, report if report is not None and report.is_file() else None):
+            say(words)
+    graded = shown.status != "error"
+    return staged_code(shown.criteria, rubric) if check.staged and graded else code
 
 
 def _package(chosen: Chosen) -> Path:

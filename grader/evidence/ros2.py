@@ -98,7 +98,7 @@ def is_latched(qos_profiles: str) -> bool:
 
 TOPICS_MAX = 4_096
 STEPS_MAX = 100_000_000
-"""Of SQLite's machine. A message takes about ten, and a bag has at most 700,000 of them (`memory_budget.py`)."""
+"""Of SQLite's machine. A message takes about ten, and a bag has at most 700,000 of them (`run.py`)."""
 VALUE_BYTES_MAX = 96 << 20
 _LESS = "record the lab's topics only: `ros2 bag record /topic …`"
 _AGAIN = "record it again and end it with Ctrl-C, or copy it again"

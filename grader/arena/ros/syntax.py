@@ -201,15 +201,9 @@ def slips(tree):
         if name:
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             found.append({"line": node.lineno, "kind": "input", "message": message})
-    found += misspelt(tree)
-    found += loop_rates(tree)
-    found += resets(tree)
-    found += never_run(tree)
-    found += never_reached(tree)
-    found += stopped_loops(tree)
-    found += sleepless_loops(tree)
-    found += callbacks(tree)
-    found += graph_names(tree)
+    finders = (misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops)
+    for find in (*finders, callbacks, graph_names):
+        found += find(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
     if published is not None and counts(tree) and (not knows_time(tree) or sends_no_time(tree)):
         message = "the script counts, and reads no clock"
@@ -256,13 +250,11 @@ NAMED = {"init_node": "node-name", "Publisher": "publisher", "Subscriber": "subs
 def graph_names(tree):
     """Where a script names its node, and the topics that it publishes and subscribes to, as written."""
     for node in ast.walk(tree):
-        if not isinstance(node, ast.Call):
+        kind = NAMED.get(called_name(node))
+        if not kind:
             continue
-        kind = NAMED.get(
-            node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-        )
         names = node.args[:1] or [k.value for k in node.keywords if k.arg == "name"]
-        if kind and names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
+        if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
             yield {"line": names[0].lineno, "kind": kind, "message": names[0].value[:TEXT_LIMIT]}
 
 
@@ -306,7 +298,7 @@ def never_reached(tree):
     }
 
     def word(node):
-        name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", None)
+        name = called_name(node)
         return name if name in own or (is_call(node, name) and name in ("publish", *MAKES)) else None
 
     for node in ast.walk(tree):
@@ -322,11 +314,8 @@ def never_reached(tree):
                 behind = [n for n in behind if word(n) and word(n) not in within]
                 if behind and "publish" not in within:
                     what = "spin()" if spins else "loop"
-                    message = "the %s in line %d never ends" % (what, loop.lineno)
-                    message += ", so the %s(…) in line %d is never reached" % (
-                        word(behind[0]),
-                        behind[0].lineno,
-                    )
+                    message = "the %s in line %d never ends, so the %s(…) in line %d is never reached"
+                    message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
                     yield {"line": loop.lineno, "kind": "never-reached", "message": message}
 
 
@@ -390,9 +379,7 @@ def callbacks(tree):
     """
     functions = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
     for node in ast.walk(tree):
-        if not isinstance(node, ast.Call):
-            continue
-        name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        name = called_name(node)
         if name not in CALLBACKS:
             continue
         keyword, place, values = CALLBACKS[name]
@@ -404,20 +391,12 @@ def callbacks(tree):
             own = functions.get(dotted(meant).rpartition(".")[2])
             least, most = takes(own, isinstance(meant, ast.Attribute)) if own else (values, values)
             if own and called and least:
-                message = "`%s()` is called here: write `%s`, without brackets" % (
-                    dotted(meant),
-                    dotted(meant),
-                )
+                message = "`{0}()` is called here: write `{0}`, without brackets".format(dotted(meant))
                 yield {"line": one.lineno, "kind": "callback-called", "message": message}
             elif own and not called and not least <= values <= most:
-                what = (
-                    "the request" if name == "Service" else "the event" if name == "Timer" else "the message"
-                )
-                message = "`%s` takes %d arguments, but ROS passes it %s" % (
-                    own.name[:TEXT_LIMIT],
-                    least,
-                    what,
-                )
+                what = {"Service": "the request", "Timer": "the event"}.get(name, "the message")
+                message = "`%s` takes %d arguments, but ROS passes it %s"
+                message %= (own.name[:TEXT_LIMIT], least, what)
                 yield {"line": own.lineno, "kind": "callback-values", "message": message}
 
 
@@ -512,13 +491,8 @@ def misspelt(tree):
 
 def counts(tree):
     return any(
-        (isinstance(n, ast.AugAssign) and isinstance(n.op, ast.Add))
-        or (
-            isinstance(n, ast.Call)
-            and isinstance(n.func, ast.Name)
-            and n.func.id in ("next", "range", "count")
-        )
-        or (isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add))
+        (isinstance(n, (ast.AugAssign, ast.BinOp)) and isinstance(n.op, ast.Add))
+        or (isinstance(n, ast.Call) and getattr(n.func, "id", "") in ("next", "range", "count"))
         or is_call(n, "count")
         for n in ast.walk(tree)
     )
@@ -542,19 +516,8 @@ def knows_time(tree):
 
 
 PLAIN_CALLS = {
-    "str",
-    "int",
-    "float",
-    "repr",
-    "round",
-    "format",
-    "next",
-    "count",
-    "iter",
-    "len",
-    "String",
-    "join",
-}
+    "str", "int", "float", "repr", "round", "format", "next", "count", "iter", "len", "String", "join",
+}  # fmt: skip
 
 
 def sends_no_time(tree):
@@ -576,7 +539,7 @@ def sends_no_time(tree):
             name = dotted(node.func if isinstance(node, ast.Call) else node)
             if name.rpartition(".")[2] in CLOCKS and name != "time":
                 return False
-            last = node.func.attr if is_any_method(node) else name
+            last = called_name(node) or name
             if isinstance(node, ast.Call) and last not in PLAIN_CALLS and name not in functions:
                 return False
             counted = counted or (isinstance(node, ast.Call) and last in ("next", "count"))
@@ -587,16 +550,19 @@ def sends_no_time(tree):
     return counted
 
 
-def is_any_method(node):
-    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
-
-
 def is_plain(module):
     return module in PLAIN_MODULES or module.endswith((".msg", ".srv", "_msgs"))
 
 
 def is_call(node, name):
     return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == name
+
+
+def called_name(node):
+    """Return `b` of the calls `a.b()` and `b()`, "" of all else."""
+    if not isinstance(node, ast.Call):
+        return ""
+    return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
 
 
 def uncalled(node, functions):

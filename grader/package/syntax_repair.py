@@ -1,0 +1,242 @@
+"""Repairs of Python sources that do not parse, step by step: tabs, Python 2, braces, a token that is missing.
+
+A text comes in, and the steps go out after which it parses; what one line could mean is known to `syntax_fixes.py`. It
+runs in a child process as `source_repair.py` does: the standard library and fissix only, and nothing is executed.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from grader.package.syntax_fixes import PLAIN, cause_of_line, corrections, without_brace
+
+STEPS_MAX = 60
+STATEMENT_LINES_MAX = 12
+FIXERS = ("print", "except", "exec", "raise", "repr", "ne", "numliterals", "long", "unicode")
+OLD_PRINT = re.compile(r"\bprint\b(?!\s*\()")
+CONTINUES = re.compile(r"(elif|else|except|finally)\b")
+
+Step = dict[str, Any]
+"""`cause`, `line`, the `text` that comes out, and for what does not parse the `error`."""
+Error = dict[str, Any]
+
+
+def syntax_error(text: str) -> Error | None:
+    """Return what keeps the text from being compiled, and where; None where nothing does."""
+    try:
+        compile(text, "script", "exec", dont_inherit=True)
+    except SyntaxError as error:
+        line = error.lineno or 1
+        faulty = "".join(text.split("\n")[line - 1 : line])[:300]
+        place = {"line": line, "column": error.offset, "text": faulty}
+        return {"kind": type(error).__name__, "message": str(error.msg)[:500], **place}
+    except (ValueError, OverflowError, RecursionError, MemoryError):
+        return {"kind": "ValueError", "message": "", "line": 1, "column": None, "text": ""}
+    return None
+
+
+def make_readable(text: str) -> list[Step]:
+    """Return the steps after which it parses; none where no such repair does it."""
+    steps: list[Step] = []
+    error = syntax_error(text)
+    while error is not None and len(steps) < STEPS_MAX:
+        step = _one_step(text, error)
+        if step is None:
+            return []
+        steps.append(step)
+        text = step["text"]
+        error = syntax_error(text)
+    return steps if error is None else []
+
+
+def _one_step(text: str, error: Error) -> Step | None:
+    for cause, candidate in _candidates(text, error):
+        if candidate == text:
+            continue
+        left = syntax_error(candidate)
+        further = left is not None and (left["line"] > error["line"] or _is_next(error, left))
+        if left is None or further:
+            word = re.match(r"name '(\w+)'", error["message"])
+            line = _first_changed(text, candidate) if cause == "braces" else error["line"]
+            found = {"cause": cause, "line": line, "error": error, "text": candidate}
+            return {**found, "word": word[1] if word else ""}
+    return None
+
+
+def _first_changed(before: str, after: str) -> int:
+    pairs = zip(before.split("\n"), after.split("\n"), strict=False)
+    return next((number for number, (old, new) in enumerate(pairs, start=1) if old != new), 1)
+
+
+def _all_expanded(text: str, width: int) -> str:
+    return "\n".join(_expanded(line, width) for line in text.split("\n"))
+
+
+def _like_the_line_before(text: str, number: int, *, tabs: bool = True) -> str:
+    """The line with that number begins where the one before it does, which an editor showed below each other."""
+    lines = text.split("\n")
+    before = next((line for line in reversed(lines[: number - 1]) if line.strip()), "")
+    if number <= len(lines) and tabs == ("\t" in lines[number - 1]) and not before.rstrip().endswith(":"):
+        indentation = before[: len(before) - len(before.lstrip())]
+        lines[number - 1] = indentation + lines[number - 1].lstrip()
+    return "\n".join(lines)
+
+
+def _is_next(error: Error, left: Error) -> bool:
+    """Tabs are told before all else, wherever they are, and of open brackets the last one."""
+    spaces = ("TabError", "IndentationError")
+    if error["kind"] in spaces:
+        return left["kind"] not in spaces
+    return all("never closed" in one["message"] for one in (error, left)) and left["line"] < error["line"]
+
+
+def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
+    if error["kind"] in {"TabError", "IndentationError"}:
+        yield "tabs", _all_expanded(text, 8)
+        yield "tabs", _like_the_line_before(text, error["line"])
+        yield "tabs", _all_expanded(text, 4)
+    lines = text.split("\n")
+    at = error["line"] - 1
+    if not 0 <= at < len(lines):
+        return
+    if "global declaration" in error["message"]:
+        yield from _with_global_first(text, error["line"])
+    if error["message"].startswith("expected an indented block"):
+        yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
+    yield from (("python2", candidate) for candidate in as_python3(lines, at))
+    if error["message"] == "unexpected indent":
+        yield "outdent", _like_the_line_before(text, error["line"], tabs=False)
+    if any(map(without_brace, lines[: at + 1])):
+        yield "braces", _without_braces(lines)
+    for line in dict.fromkeys((at, max(at - 1, 0))):
+        told = (error["message"], error["column"]) if line == at else ()
+        for changed in corrections(lines[line], *told):
+            cause = "characters" if changed == lines[line].translate(PLAIN) else "token"
+            yield cause, with_line(lines, line, changed)
+    if cause_of_line(lines[at]).endswith("delete this line"):
+        yield "token", "\n".join([*lines[:at], *lines[at + 1 :]])
+
+
+def _without_braces(lines: list[str]) -> str:
+    """Return the text with `:` where a block begins with `{`, and without the `}` of these blocks."""
+    opened, kept = 0, []
+    for line in lines:
+        if head := without_brace(line):
+            opened += 1 - line.strip().startswith("}")
+            kept.append(head)
+        elif opened and line.strip() in ("}", "};"):
+            opened -= 1
+        else:
+            kept.append(line)
+    return "\n".join(kept)
+
+
+def _with_body_indented(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with the line indented, where it alone can be the body of the block that begins above it."""
+
+    def indentation(line: str) -> str:
+        return line[: len(line) - len(line.lstrip())]
+
+    head = next((line for line in reversed(lines[:at]) if _code(line).strip()), "")
+    after = next((line for line in lines[at + 1 :] if _code(line).strip()), "")
+    own = indentation(lines[at])
+    ends = len(indentation(after)) < len(own) or not after or CONTINUES.match(after.strip())
+    if lines[at].strip() and own == indentation(head) and ends:
+        yield with_line(lines, at, "    " + lines[at])
+
+
+def _with_global_first(text: str, number: int) -> Iterator[tuple[str, str]]:
+    """Yield the text with that line's `global` as the first line of its function; without it outside of a function."""
+    nodes, lines = list(ast.walk(ast.parse(text))), text.split("\n")
+    found = next((n for n in nodes if isinstance(n, ast.Global) and n.lineno == number), None)
+    line = lines[number - 1]
+    if found is None or line.strip() != ast.unparse(found):
+        return
+    blocks = (getattr(node, part, None) for node in nodes for part in ("body", "orelse", "finalbody"))
+    alone = any(block == [found] for block in blocks)
+    lines[number - 1 : number] = [line.replace(line.strip(), "pass")] if alone else []
+    around = [n for n in nodes if isinstance(n, ast.FunctionDef) and found in ast.walk(n)]
+    if not around:
+        yield "outside", "\n".join(lines)
+        return
+    function = max(around, key=lambda n: n.lineno)
+    first = next((s for s in function.body if not is_docstring(s)), function.body[-1])
+    at, names = first.lineno - 1, found.names
+    indentation = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
+    if isinstance(first, ast.Global) and first is not found:
+        names = list(dict.fromkeys([*first.names, *names]))
+        del lines[at]
+    lines.insert(at, f"{indentation}global {', '.join(names)}")
+    yield "global", "\n".join(lines)
+
+
+def _expanded(line: str, width: int) -> str:
+    code = line.lstrip(" \t")
+    return line[: len(line) - len(code)].expandtabs(width) + code
+
+
+def with_line(lines: list[str], at: int, line: str) -> str:
+    """Return the text with another line at index `at`."""
+    return "\n".join([*lines[:at], line, *lines[at + 1 :]])
+
+
+def as_python3(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with the statement at the line read as Python 2."""
+    for start in range(at, max(-1, at - STATEMENT_LINES_MAX), -1):
+        for end in range(at + 1, min(len(lines), start + STATEMENT_LINES_MAX) + 1):
+            fixed = _fixed_statement(lines[start:end])
+            if fixed is not None:
+                yield "\n".join([*lines[:start], *fixed, *lines[end:]])
+                return
+
+
+def _fixed_statement(lines: list[str]) -> list[str] | None:
+    """The same as Python 3; None where it is no statement by itself, or nothing of it is Python 2."""
+    indentation = lines[0][: len(lines[0]) - len(lines[0].lstrip())]
+    first = lines[0].strip()
+    keyword = re.match(r"\w*", first)
+    head = {"elif": "if x:\n    pass\n", "else": "if x:\n    pass\n", "except": "try:\n    pass\n"}
+    before = head.get(keyword[0] if keyword else "", "")
+    after = "    pass\n" if _code(lines[-1]).endswith(":") else ""
+    source = before + "\n".join([first, *lines[1:]]) + "\n" + after
+    tools = _tools()[::-1] if OLD_PRINT.search(source) else _tools()
+    fixed = next((f for tool in tools if (f := _refactored(tool, source)) not in (None, source)), None)
+    if fixed is None:
+        return None
+    body = fixed.removeprefix(before).removesuffix("\n" + after if after else "\n").split("\n")
+    return [indentation + body[0], *body[1:]]
+
+
+_TOOLS: list[Any] = []
+
+
+def _tools() -> list[Any]:
+    """First for a file whose `print` is Python 3 already."""
+    if not _TOOLS:
+        from fissix.refactor import RefactoringTool  # noqa: PLC0415 - found once `site` is in the path
+
+        names = [f"fissix.fixes.fix_{name}" for name in FIXERS]
+        _TOOLS.append(RefactoringTool([n for n in names if "print" not in n], {"print_function": True}))
+        _TOOLS.append(RefactoringTool(names))
+    return _TOOLS
+
+
+def _refactored(tool: Any, source: str) -> str | None:  # noqa: ANN401 - a library without types
+    try:
+        return str(tool.refactor_string(source, "script"))
+    except Exception:  # noqa: BLE001 - the library raises whatever its parser and tokenizer do
+        return None
+
+
+def _code(line: str) -> str:
+    """The line without its comment and its texts' contents."""
+    emptied = re.sub(r"""("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|#.*""", lambda m: '""' if m[1] else "", line)
+    return emptied.rstrip()
+
+
+def is_docstring(statement: ast.stmt) -> bool:
+    """Return whether the statement is a constant by itself, as a docstring is."""
+    return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
