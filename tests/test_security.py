@@ -105,9 +105,9 @@ BOUNDS = {
     "a service's answer": (("ros/tcpros:ANSWER_BYTES_MAX", MB), "ros/tcpros:WORDS_CHARS_MAX", steps.ANSWER_S),
     "names of nodes": ("ros/guard:NAME_CHARS_MAX", "ros/guard:NAMES_MAX", ("ros/guard:NAME_BYTES_MAX", KB)),
     "parameters": (
-        ("ros/registry_log:PROCESS_BYTES_MAX", MB), ("ros/registry_log:RUN_BYTES_MAX", MB),
-        "ros/registry_log:LEVELS_MAX", ("ros/registry_log:VALUE_BYTES_MAX", KB), "ros/registry_log:EVENTS_MAX",
-        ("ros/registry_log:EVENTS_BYTES_MAX", MB),
+        ("ros/master:PROCESS_BYTES_MAX", MB), ("ros/master:RUN_BYTES_MAX", MB),
+        "ros/master:LEVELS_MAX", ("ros/master:VALUE_BYTES_MAX", KB), "ros/master:EVENTS_MAX",
+        ("ros/master:EVENTS_BYTES_MAX", MB),
     ),
     "`/proc`": ("ros/process_tree:PROCESSES_MAX", "ros/sockets:FILES_MAX"),
     "the kernel's tables": ("ros/sockets:SOCKETS_MAX", "ros/sockets:TABLE_ROWS_MAX"),

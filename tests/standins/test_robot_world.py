@@ -33,25 +33,15 @@ MAP = {
 
 
 @pytest.fixture(scope="module")
-def modules() -> Iterator[tuple[ModuleType, ModuleType]]:
+def world() -> Iterator[ModuleType]:
     folder = str(STANDIN_SOURCES / "robot_world")
     sys.path.insert(0, folder)
-    yield importlib.import_module("floor_plan"), importlib.import_module("robot")
+    yield importlib.import_module("world")
     sys.path.remove(folder)
 
 
-@pytest.fixture(scope="module")
-def plan(modules) -> Any:
-    return modules[0]
-
-
-@pytest.fixture(scope="module")
-def robot(modules) -> Any:
-    return modules[1]
-
-
-def test_walls_are_lines_and_boxes(plan) -> None:
-    walls = plan.walls_of([[[0, 0], [1, 0], [1, 2]]], [[3, 4, 5, 6]])
+def test_walls_are_lines_and_boxes(world) -> None:
+    walls = world.walls_of([[[0, 0], [1, 0], [1, 2]]], [[3, 4, 5, 6]])
     assert walls[:2] == [((0, 0), (1, 0)), ((1, 0), (1, 2))]
     assert {point for wall in walls[2:] for point in wall} == {(3, 4), (5, 4), (5, 6), (3, 6)}
 
@@ -63,9 +53,9 @@ def test_walls_are_lines_and_boxes(plan) -> None:
         ([[[0, math.nan], [1, 1]]], []), ([[[0, True], [1, 1]]], []), ([[[i, i] for i in range(6000)]], []),
     ],
 )  # fmt: skip
-def test_what_is_no_wall_is_refused(plan, lines: Any, boxes: Any) -> None:
+def test_what_is_no_wall_is_refused(world, lines: Any, boxes: Any) -> None:
     with pytest.raises(ValueError, match=r"list|number|walls"):
-        plan.walls_of(lines, boxes)
+        world.walls_of(lines, boxes)
 
 
 @pytest.mark.parametrize(
@@ -75,10 +65,10 @@ def test_what_is_no_wall_is_refused(plan, lines: Any, boxes: Any) -> None:
         b"P5 4 3 255\n" + bytes([0] * 5 + [254] * 2 + [0] * 5),
     ],
 )
-def test_a_map_is_the_border_of_what_is_occupied(plan, tmp_path: Path, picture: bytes) -> None:
+def test_a_map_is_the_border_of_what_is_occupied(world, tmp_path: Path, picture: bytes) -> None:
     (tmp_path / "map.pgm").write_bytes(picture)
     (tmp_path / "map.yaml").write_text(yaml.safe_dump(MAP))
-    walls = plan.read_plan(tmp_path / "map.yaml", yaml.safe_load)
+    walls = world.read_plan(tmp_path / "map.yaml", yaml.safe_load)
     sides = {frozenset(wall) for wall in walls}
     outer, inner = [(-1, 0), (1, 0), (1, 1.5), (-1, 1.5)], [(-0.5, 0.5), (0.5, 0.5), (0.5, 1), (-0.5, 1)]
     assert sides == {frozenset((c[i - 1], c[i])) for c in (outer, inner) for i in range(4)}
@@ -87,9 +77,9 @@ def test_a_map_is_the_border_of_what_is_occupied(plan, tmp_path: Path, picture: 
 @pytest.mark.parametrize(
     "picture", [b"", b"P6 1 1 255\n000", b"P5 4 3 255\n0", b"P5 9999 9999 255\n0", b"P5 a 3 255\n"]
 )
-def test_what_is_no_map_is_refused(plan, picture: bytes) -> None:
+def test_what_is_no_map_is_refused(world, picture: bytes) -> None:
     with pytest.raises(ValueError):  # noqa: PT011 - int()'s own words among them
-        plan.read_pgm(picture)
+        world.read_pgm(picture)
 
 
 def drive(robot: Any, seconds: float) -> None:
@@ -97,8 +87,8 @@ def drive(robot: Any, seconds: float) -> None:
         robot.step()
 
 
-def test_the_robot_drives_arcs_within_its_limits(robot) -> None:
-    one = robot.Robot([], 0.1, (1.0, 2.0, 0.0), (0.22, 2.84))
+def test_the_robot_drives_arcs_within_its_limits(world) -> None:
+    one = world.Robot([], 0.1, (1.0, 2.0, 0.0), (0.22, 2.84))
     one.command(5.0, 0.22)
     drive(one, math.pi / 0.22)
     assert (one.x, one.y) == (pytest.approx(1, abs=0.01), pytest.approx(4, abs=0.01))
@@ -107,16 +97,16 @@ def test_the_robot_drives_arcs_within_its_limits(robot) -> None:
         one.command(math.nan, 0.0)
 
 
-def test_a_velocity_that_times_out(robot) -> None:
-    one = robot.Robot([], 0.1, (0.0, 0.0, 0.0), timeout_s=0.5)
+def test_a_velocity_that_times_out(world) -> None:
+    one = world.Robot([], 0.1, (0.0, 0.0, 0.0), timeout_s=0.5)
     one.command(1.0, 0.0)
     drive(one, 2)
     assert one.x == pytest.approx(0.5)
     assert one.forward == 0
 
 
-def test_a_wall_stops_the_robot_until_it_drives_away(plan, robot) -> None:
-    one = robot.Robot(plan.walls_of([[[1, -1], [1, 1]]], []), 0.1, (0.0, 0.0, 0.0))
+def test_a_wall_stops_the_robot_until_it_drives_away(world) -> None:
+    one = world.Robot(world.walls_of([[[1, -1], [1, 1]]], []), 0.1, (0.0, 0.0, 0.0))
     one.command(0.2, 0.0)
     drive(one, 10)
     assert one.hits
@@ -129,11 +119,11 @@ def test_a_wall_stops_the_robot_until_it_drives_away(plan, robot) -> None:
     assert one.x == pytest.approx(0.5, abs=0.01)
 
 
-def test_the_laser_sees_what_each_ray_meets_first(plan, robot) -> None:
-    walls = plan.walls_of(ROOM, BOXES)
+def test_the_laser_sees_what_each_ray_meets_first(world) -> None:
+    walls = world.walls_of(ROOM, BOXES)
     chance = random.Random(1)  # noqa: S311 - places, the same each time
     for low, high, samples in ((0.0, math.tau, 360), (-2.356, 2.356, 271), (-math.pi, math.pi, 100)):
-        laser = robot.Laser(walls, (low, high, samples), (0.12, 3.5))
+        laser = world.Laser(walls, (low, high, samples), (0.12, 3.5))
         for _ in range(10):
             place = (chance.uniform(0.05, 5.95), chance.uniform(0.05, 3.95), chance.uniform(-4, 4))
             seen = laser.scan(*place)
@@ -157,11 +147,11 @@ def _first(walls: Any, x: float, y: float, angle: float) -> float:
     return found
 
 
-def test_noise_is_the_same_for_the_same_seed(plan, robot) -> None:
-    walls = plan.walls_of(ROOM, [])
-    plain = robot.Laser(walls, (0.0, 6.0, 60), (0.1, 10.0)).scan(1, 1, 0)
+def test_noise_is_the_same_for_the_same_seed(world) -> None:
+    walls = world.walls_of(ROOM, [])
+    plain = world.Laser(walls, (0.0, 6.0, 60), (0.1, 10.0)).scan(1, 1, 0)
     laser = [((0.0, 6.0, 60), (0.1, 10.0), 0.01, random.Random(7)) for _ in range(2)]  # noqa: S311 - noise
-    first, again = (robot.Laser(walls, *one).scan(1, 1, 0) for one in laser)
+    first, again = (world.Laser(walls, *one).scan(1, 1, 0) for one in laser)
     assert first == again != plain
     assert first == pytest.approx(plain, abs=0.06)
 

@@ -1,4 +1,4 @@
 """A class's results as one page (`index.html`): a table, what cost most, who shares a fault, what to run again.
 
-(Entry, GradingResult), pair by pair → `gather` → counted and drawn (`statistics`), what is left to do (`todo`) → `page`
+(Entry, GradingResult), pair by pair → `gather` → counted and drawn (`statistics`) → `page`, with what is left to do
 """

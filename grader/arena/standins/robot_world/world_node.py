@@ -7,14 +7,13 @@ import time
 
 import rospy
 import yaml
-from floor_plan import read_plan, walls_of
 from genpy.dynamic import generate_dynamic
 from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Twist, Vector3
 from nav_msgs.msg import Odometry
-from robot import STEP_S, Laser, Robot
 from rospkg import ResourceNotFound, RosPack
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool, ColorRGBA, Header
+from world import STEP_S, Laser, Robot, read_plan, walls_of
 
 QUEUE = 10
 RULE = "\n" + 80 * "=" + "\nMSG: "
