@@ -31,9 +31,9 @@ from grader.errors import EvidenceError, UsageError
 from grader.evidence.run import Run
 from grader.files import check_writable
 from grader.judging.facts import PACKAGE_RUN
+from grader.model import SandboxMode
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.result import NO_TIME, GradingResult, SubmissionInfo
-from grader.model.sandbox_mode import SandboxMode
 from grader.portable import wait_for_children
 from grader.results import RESULT, read_result_file
 from grader.rubric.load import LoadedRubric

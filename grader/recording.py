@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from grader.arena.interruption import Stop
     from grader.arena.recorder import Recorder
     from grader.arena.static_recorder import Recording, StaticRecorder
-    from grader.model.sandbox_mode import SandboxMode
+    from grader.model import SandboxMode
 
 LATER = ("grader.evidence.decode", "grader.evidence.reader")
 """Slow to import, and needed by no verdict that the files alone decide: imported while the build runs. The arena is

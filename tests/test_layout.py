@@ -42,8 +42,9 @@ ALLOWED = {
     "workers": {"errors", "host_programs"},
     "files": {"errors", "portable"},
     "results": BASE | {"files"},
-    "signing": {"errors", "files", "host_programs", "results"},
-    "verification": BASE | {"evidence", "intake", "judging", "report", "results", "rubric", "signing"},
+    "verification": BASE | {
+        "evidence", "files", "host_programs", "intake", "judging", "report", "results", "rubric"
+    },
     "faults": BASE | {"files", "intake", "judging", "report", "results", "rubric"},
     "evidence": BASE | {"files", "installable"},
     "package": BASE | {"files", "host_programs", "limited_child", "rubric.model", "rubric.scenario"},
@@ -84,7 +85,7 @@ ALLOWED = {
     "cli": {
         *BASE, "arena", "authoring", "checks", "classes", "evidence", "faults", "files", "integrations", "intake",
         "host_programs", "installable", "judging", "package", "pipeline", "report", "results", "ros_env",
-        "ros_packages", "rubric", "signing", "student", "verification"
+        "ros_packages", "rubric", "student", "verification"
     },
     "__main__": {"cli"},
 }  # fmt: skip

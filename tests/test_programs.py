@@ -73,7 +73,7 @@ STARTS = {
         None,
         "what it submitted, as text in jobs that come through a pipe",
     ),
-    "signing.py:_ssh_keygen": Start(
+    "verification.py:_ssh_keygen": Start(
         "{**with_absolute_paths(os.environ), 'LC_ALL': 'C', 'SSH_ASKPASS_REQUIRE': 'never'}",
         "'/'",
         "the signature and the sums beside a result, which a student's CI job may have written",

@@ -18,7 +18,7 @@ from grader.model.result import GradingResult, Override
 from grader.report.files import write_reports
 from grader.results import SIGNATURE, SUMS, Results
 from grader.rubric.load import load_rubric
-from grader.signing import read_signature
+from grader.verification import read_signature
 from tests.support.a_class import judged_result
 
 RECORDINGS = Path(__file__).parent / "data" / "recordings"

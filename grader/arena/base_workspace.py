@@ -36,7 +36,7 @@ from grader.arena.workspace import Workspace, give_to, read_member
 from grader.errors import ArenaError, GraderError
 from grader.evidence.writer import EvidenceWriter
 from grader.files import atomic_write, open_untrusted, temporary_folder
-from grader.model.sandbox_mode import SandboxMode
+from grader.model import SandboxMode
 from grader.ros_env import find_ros
 from grader.rubric.course_packages import SCRIPT, folder_files
 

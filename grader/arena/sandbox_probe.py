@@ -19,7 +19,7 @@ from grader.arena.control_groups import find_cgroups
 from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, RunLimits, Sandbox, system_call_filter
 from grader.errors import HostError, SandboxMissing
 from grader.host_programs import HOST_ENV, find_host_program
-from grader.model.sandbox_mode import SandboxMode
+from grader.model import SandboxMode
 
 UID_MAP = Path("/proc/self/uid_map")
 UNUSED_UIDS = (1_900_000_000, 2_000_000_000)

@@ -42,8 +42,8 @@ from grader.cli.host_support import require_room, warn_without_sandbox
 from grader.cli.output import say, say_beside, say_json
 from grader.errors import ExitCode, GraderError, UsageError
 from grader.files import temporary_folder
+from grader.model import SandboxMode
 from grader.model.batch import BatchRun
-from grader.model.sandbox_mode import SandboxMode
 from grader.portable import cores
 from grader.rubric.course import CourseFile, load_course, split_name
 from grader.rubric.load import PIN, LoadedRubric, load_rubric, needs_ros, split_pin

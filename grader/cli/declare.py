@@ -24,7 +24,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args
 
 from grader.errors import ExitCode
 from grader.intake.names import brief, is_package_name
-from grader.model.sandbox_mode import SandboxMode
+from grader.model import SandboxMode
 
 STUDENTS, INSTRUCTORS, REST = "For students", "For instructors", "More"
 EXIT_CODES = """exit codes:

@@ -20,8 +20,8 @@ from grader.arena.sandbox_probe import ULIMIT_HINT, choose, refused_limits
 from grader.cli.output import say_beside
 from grader.errors import GraderError, HostError, RosMissing
 from grader.host_programs import HOST_ENV, find_host_program
+from grader.model import SandboxMode
 from grader.model.record import Record
-from grader.model.sandbox_mode import SandboxMode
 from grader.portable import system, user_id
 from grader.report.sentences import without_sandbox
 from grader.ros_env import why_nodes_cannot_run

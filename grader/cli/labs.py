@@ -35,8 +35,8 @@ from grader.cli.display import open_progress
 from grader.cli.output import say
 from grader.errors import UsageError
 from grader.files import atomic_write, check_writable
+from grader.model import SandboxMode
 from grader.model.mutants import LostCriterion, MutantResult, RubricTest
-from grader.model.sandbox_mode import SandboxMode
 from grader.report.terminal import emit, open_console
 from grader.report.text import line, visible
 from grader.rubric.find import BUILT_IN, EXAMPLE

@@ -23,9 +23,9 @@ from pydantic import ValidationError
 
 from grader.errors import GraderError, InternalError, UsageError
 from grader.files import atomic_write
+from grader.model import SandboxMode
 from grader.model.record import Record
 from grader.model.result import GradingResult
-from grader.model.sandbox_mode import SandboxMode
 from grader.rubric.load import LoadedRubric, read_beside_rubric
 
 if sys.version_info >= (3, 11):

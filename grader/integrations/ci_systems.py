@@ -20,7 +20,7 @@ from grader.errors import GraderError, OutputError, SubmissionError, UsageError
 from grader.files import atomic_write
 from grader.intake.names import is_package_name
 from grader.integrations.ci_results import TITLES, Graded, Outcome, outcome_of_error, summarize
-from grader.model.sandbox_mode import SandboxMode
+from grader.model import SandboxMode
 from grader.report.classroom import render_classroom
 from grader.report.findings import EACH_MAX, Severity, github_annotation, render_annotations
 from grader.report.text import line, markdown

@@ -1,18 +1,265 @@
-"""Package facts: everything that a package's files say, read once; nothing of the student's is executed."""
+"""Package facts: everything that a package's files say, read once; nothing of the student's is executed.
+
+Of every file: size, digest, mode, links, encoding, and what the system makes of its first line (`#!`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import hashlib
+import io
+import os
+import posixpath
+import re
+import shlex
+import shutil
+import stat
+import tokenize
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path, PurePosixPath
+from typing import Any, NamedTuple
 
 from grader.model.message_definitions import PARTS, parse_interface
-from grader.model.package import Fault, Interface, PackageFacts, PythonSlip, SourceFile
+from grader.model.package import Fault, Interface, PackageFacts, PythonSlip, Shebang, SourceFile
 from grader.model.submission import SourcePackage, Submission
-from grader.package.files import Entry, Interpreters, read_files
 from grader.package.python import check_syntax
-from grader.package.reading import SOURCE_LIMIT_BYTES, read_markup
+from grader.package.reading import (
+    LEFT_OUT,
+    SOURCE_LIMIT_BYTES,
+    Unreadable,
+    printable,
+    read_markup,
+    regular_file,
+)
+from grader.portable import system
+
+_CHUNK_BYTES = 1 << 20
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+_SCRIPTS = frozenset({".py", ".sh", ".bash"})
+
+Interpreters = Callable[[str], bool]
+SYSTEM_PATH = "/usr/local/bin:/usr/bin:/bin"
+_LENGTH_LIMIT_BYTES = 255
+_LOOKED_AT_BYTES = 1 << 14
+_BOM = b"\xef\xbb\xbf"
+_EVERYWHERE = frozenset({"awk", "bash", "dash", "env", "perl", "rbash", "sed", "sh"})
+_ENV = frozenset({"/usr/bin/env", "/bin/env"})
+_SPLIT_STRING = re.compile(r"^(-[iv0]*S|--split-string[= ])\s*")
+_ADVICE = "write `#!/usr/bin/env python3`"
+_NO_SHEBANG = re.compile(r"#\s*!?\s*(/usr)?/bin/|#\s+!|!\s*#|/usr/bin/env ")
+
+# The arena provides these names wherever the system keeps its programs.
+_PYTHONS = frozenset(
+    {"python", "python3"}
+    | {f"{place}/{name}" for place in SYSTEM_PATH.split(":") for name in ("python", "python3")},
+)
+
+
+class Entry(NamedTuple):
+    """A file of the package: the record, and its path on disk below the package (perhaps no Unicode)."""
+
+    file: SourceFile
+    path: str
+
+
+def read_files(package: SourcePackage, interpreters: Interpreters | None = None) -> tuple[Entry, ...]:
+    """Return all regular files and links of the package, by path; no link is followed out of it.
+
+    What catkin and git leave behind (`build/`, `devel/`, `install/`, `.git/`, …), pipes and devices are left
+    out.
+    """
+    paths = sorted(_paths(package.folder))
+    return tuple(Entry(_source_file(package, path, interpreters), path) for path in paths)
+
+
+def _paths(folder: Path) -> Iterator[str]:
+    for place, folders, names in os.walk(folder):
+        links = [name for name in folders if os.path.islink(os.path.join(place, name))]  # noqa: PTH114, PTH118 - names of any bytes, many of them
+        folders[:] = [name for name in folders if name not in LEFT_OUT]
+        for name in (*names, *(n for n in links if n not in LEFT_OUT)):
+            path = Path(place, name)
+            mode = path.lstat().st_mode
+            if stat.S_ISREG(mode) or stat.S_ISLNK(mode):
+                yield path.relative_to(folder).as_posix()
+
+
+def _source_file(package: SourcePackage, path: str, interpreters: Interpreters | None) -> SourceFile:
+    common: dict[str, Any] = {"path": printable(path), "mode_source": package.mode_source}
+    file = package.folder / path
+    if file.is_symlink():
+        target = str(file.readlink())
+        common["link"] = printable(target)
+        try:
+            file = regular_file(package.folder, path)
+        except Unreadable as error:
+            digest = hashlib.sha256(os.fsencode(target)).hexdigest()
+            return SourceFile(
+                **common,
+                size_bytes=0,
+                sha256=digest,
+                executable=None,
+                link_problem=f"`{common['path']}` {error}",
+            )
+        path = file.relative_to(os.path.realpath(package.folder)).as_posix()
+    executable = _executable(package, path, file)
+    if printable(path) in package.left_out:
+        return SourceFile(**common, size_bytes=file.lstat().st_size, sha256="", executable=executable)
+    try:
+        size, digest, head = _contents(file)
+    except OSError:
+        return SourceFile(**common, size_bytes=0, sha256="", executable=executable)
+    if path in package.right_in_git:
+        head = head.replace(b"\r\n", b"\n")
+    text = _text_facts(head, path, executable=executable, interpreters=interpreters)
+    return SourceFile(**common, size_bytes=size, sha256=digest, executable=executable, **text)
+
+
+def _executable(package: SourcePackage, path: str, file: Path) -> bool | None:
+    """As the source says; a file that it does not know has its mode on disk, if modes come from there."""
+    if path in package.executable:
+        return package.executable[path]
+    if package.mode_source != "disk":
+        return None
+    return bool(file.stat().st_mode & stat.S_IXUSR)
+
+
+def _contents(file: Path) -> tuple[int, str, bytes]:
+    """Return size, sha256 and the first 2 MB."""
+    digest, size, head = hashlib.sha256(), 0, b""
+    with file.open("rb") as stream:
+        while chunk := stream.read(_CHUNK_BYTES):
+            digest.update(chunk)
+            size += len(chunk)
+            head += chunk[: max(0, SOURCE_LIMIT_BYTES - len(head))]
+    return size, digest.hexdigest(), head
+
+
+def _text_facts(
+    data: bytes, path: str, *, executable: bool | None, interpreters: Interpreters | None
+) -> dict[str, Any]:
+    utf16 = data.startswith(_UTF16)
+    binary = b"\0" in data and not utf16
+    suffix = PurePosixPath(path).suffix.lower()
+    python = suffix == ".py" or is_near_python(data)
+    shebang, problem = read_shebang(data, interpreters)
+    script = suffix in _SCRIPTS or bool(executable) or shebang is not None or python
+    return {
+        "shebang": shebang,
+        "shebang_problem": problem if script and (not binary or suffix in _SCRIPTS) else "",
+        "crlf": b"\r\n" in data and not binary,
+        "bom": data.startswith(b"\xef\xbb\xbf") or utf16,
+        "encoding": _encoding(data, python=python),
+        "binary": binary,
+        "python": python,
+    }
+
+
+def _encoding(data: bytes, *, python: bool) -> str:
+    """Return the encoding that a reader would use: of Python by PEP 263, `unknown-8bit` for what is not UTF-8."""
+    if data.startswith(_UTF16):
+        return "utf-16"
+    name = "utf-8-sig" if data.startswith(b"\xef\xbb\xbf") else "utf-8"
+    try:
+        if python:
+            name, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
+        data.decode(name)
+    except (SyntaxError, LookupError, ValueError):
+        # the first 2 MB of a larger file may end within a character
+        cut = len(data) >= SOURCE_LIMIT_BYTES and data[:-4].decode("utf-8", "replace").count("\ufffd") == 0
+        return "utf-8" if cut else "unknown-8bit"
+    return name
+
+
+def on_system(program: str) -> bool:
+    """Whether a program, by absolute path or by name on the system's own PATH, is on this machine. Of a machine that is
+    not Linux: whether it is among those that every Linux has."""
+    if system():
+        place, _, name = program.rpartition("/")
+        return name in _EVERYWHERE and place in ("", "/bin", "/usr/bin")
+    return shutil.which(program, path=SYSTEM_PATH) is not None
+
+
+def read_shebang(
+    data: bytes, interpreters: Callable[[str], bool] | None = None
+) -> tuple[Shebang | None, str]:
+    """Return the shebang of a file that begins with `data`, and why the system cannot use it ("" where it can).
+
+    `interpreters` is asked for absolute paths and names behind `env`; `python` and `python3` are always
+    there.
+    """
+    if not data.startswith(b"#!"):
+        return None, _near(data)
+    line = data[: data.find(b"\n")] if b"\n" in data else data
+    crlf = line.endswith(b"\r")
+    text = line[2 : _LENGTH_LIMIT_BYTES + 1].decode("utf-8", "replace").rstrip("\r").strip(" \t")
+    interpreter, program, problem = resolve(text)
+    found = not problem and (program in _PYTHONS or (interpreters or on_system)(program))
+    if crlf:
+        problem = (
+            f"line 1 ends with Windows' CRLF, and there is no `{interpreter}\\r`: save with LF line endings"
+        )
+    elif not problem and not found:
+        problem = f"there is no `{program}` on a ROS machine: {_ADVICE}"
+    return Shebang(text=text, interpreter=interpreter, crlf=crlf, found=found), problem
+
+
+def resolve(text: str) -> tuple[str, str, str]:
+    """Return what `#!text` comes down to: the interpreter's name, the program to look for, and what is wrong."""
+    if not text:
+        return "", "", f"nothing follows `#!`: {_ADVICE}"
+    program, *rest = text.split(None, 1)
+    if not program.startswith("/"):
+        return posixpath.basename(program), "", f"`{program}` is not an absolute path: {_ADVICE}"
+    if program not in _ENV:
+        return posixpath.basename(program), posixpath.normpath(program), ""
+    return _behind_env(rest[0] if rest else "")
+
+
+def _behind_env(argument: str) -> tuple[str, str, str]:
+    """The kernel hands `env` all that follows as one argument; only `-S` takes it apart."""
+    split = _SPLIT_STRING.match(argument)
+    words = _words(argument[split.end() :]) if split else argument.split()
+    while split and words and (words[0].startswith("-") or "=" in words[0]):
+        words = words[1:]
+    if not words:
+        return "", "", f"`env` is given no program: {_ADVICE}"
+    name = posixpath.basename(words[0])
+    if not split and len(words) > 1:
+        return name, "", f"`env` looks for one program called `{argument}`: keep only `{words[0]}`"
+    return name, words[0], ""
+
+
+def _words(text: str) -> list[str]:
+    try:
+        return shlex.split(text)
+    except ValueError:
+        return text.split()
+
+
+def _near(data: bytes) -> str:
+    """Return why a file that does not begin with `#!` has no usable shebang."""
+    lines = data[:_LOOKED_AT_BYTES].splitlines()[:50]
+    first = lines[0][:_LENGTH_LIMIT_BYTES].decode("utf-8", "replace").strip() if lines else ""
+    later = next((n for n, line in enumerate(lines, 1) if line.strip().startswith(b"#!")), None)
+    if not data.strip():
+        return "the file is empty"
+    if data.startswith(_BOM + b"#!"):
+        return "an invisible byte order mark (BOM) comes before `#!`: save as UTF-8 without BOM"
+    if later == 1:
+        return "a space comes before `#!`: it must be the very first thing in the file"
+    if _NO_SHEBANG.match(first):
+        return f"line 1 is `{first[:60]}`, which is not a shebang: {_ADVICE}"
+    if later is None:
+        return f"there is no `#!` line at the top: {_ADVICE}"
+    before = f"line 1 is `{first[:40]}`" if first else "line 1 is blank"
+    return f"{before} and `#!` comes in line {later}: it must be line 1"
+
+
+def is_near_python(data: bytes) -> bool:
+    """Return whether a file begins with a shebang of Python, usable or spoilt by a BOM, a blank or a blank line."""
+    return re.match(rb"(\xef\xbb\xbf)?\s*#\s*![^\n]*\bpython", data[:512]) is not None
+
 
 INTERFACES_MAX = 200
 INTERFACE_LIMIT_BYTES = 64_000

@@ -30,7 +30,7 @@ from grader.intake.source import identify
 from grader.model.package import SourceFile
 from grader.model.progress import Progress
 from grader.model.result import GradingResult, SubmissionInfo
-from grader.package.files import read_files
+from grader.package.facts import read_files
 from grader.package.reading import LEFT_OUT
 from grader.report.view import without_hidden
 from grader.rubric.load import LoadedRubric

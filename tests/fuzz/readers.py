@@ -39,7 +39,7 @@ from grader.model.message_definitions import parse_interface
 from grader.model.package import CMakeFacts
 from grader.model.record import Record
 from grader.package.cmake import read_cmake, refine_cmake
-from grader.package.files import _text_facts
+from grader.package.facts import _text_facts
 from grader.package.launch import parse_launch, parse_launch_files
 from grader.package.manifest import parse_manifest, read_manifest
 from grader.package.python import cause_of, read_syntax_report

@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from grader.package.files import on_system, read_files, read_shebang
+from grader.package.facts import on_system, read_files, read_shebang
 from tests.package.trees import NODE, make_package
 
 

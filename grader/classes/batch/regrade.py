@@ -27,9 +27,9 @@ from grader.classes.overrides import read_overrides
 from grader.errors import GraderError
 from grader.files import atomic_write
 from grader.judging.summary import overall_status, total_fields
+from grader.model import SandboxMode
 from grader.model.batch import Entry, Roster
 from grader.model.result import CriterionResult, GradingResult
-from grader.model.sandbox_mode import SandboxMode
 from grader.report.text import csv_text
 from grader.results import EVIDENCE
 from grader.rubric.load import LoadedRubric

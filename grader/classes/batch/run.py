@@ -26,9 +26,9 @@ from grader.errors import Busy, GraderError, UsageError
 from grader.files import check_writable, keep_private, lock, make_folder
 from grader.intake import safe_name, without_password
 from grader.judging.summary import passed
+from grader.model import SandboxMode
 from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, Entry, Roster, RosterFault, State
 from grader.model.result import GradingResult, RubricInfo
-from grader.model.sandbox_mode import SandboxMode
 from grader.pipeline import GradeOptions, prepare
 from grader.report.class_page.page import write_class_page
 from grader.results import finish_killed

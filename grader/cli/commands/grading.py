@@ -201,8 +201,8 @@ def sign(
     """Sign results and their evidence with an SSH key."""
     with loading():
         from grader.cli.output import say
-        from grader.signing import sign as sign_folder
         from grader.verification import read_whole, result_folders
+        from grader.verification import sign as sign_folder
     for folder in result_folders(list(results)):
         read_whole(folder)
         sign_folder(folder, key)
