@@ -172,7 +172,7 @@ def warm_up() -> None:
     from grader import repaired_copy, submitted_recordings  # noqa: F401, PLC0415 - see recording.LATER
     from grader.arena import recorder  # noqa: F401, PLC0415
     from grader.arena.arena_process import template_of  # noqa: PLC0415
-    from grader.arena.sandbox_probe import choose  # noqa: PLC0415
+    from grader.arena.sandbox import choose  # noqa: PLC0415
     from grader.arena.session import arena_command  # noqa: PLC0415
     from grader.report import figures, junit, markdown  # noqa: F401, PLC0415
     from grader.report.html.page import load_template  # noqa: PLC0415

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import inherited_limits, sandbox_probe
+from grader.arena import inherited_limits, sandbox
 from grader.arena.inherited_limits import MB, NEEDS, group, limits, make_room, tasks_of
 from grader.arena.sandbox import RunLimits
 from grader.errors import ExitCode, HostError
@@ -156,10 +156,10 @@ def test_a_control_group_without_room_is_named(tmp_path: Path, monkeypatch) -> N
     assert found[0].command == f"echo {60 + 768} > {inner.parent}/pids.max"
     monkeypatch.setattr(inherited_limits, "limits", lambda _: iter(()))
     with pytest.raises(HostError, match=r"pids\.max .* is 200, with 60 in use"):
-        sandbox_probe.choose("none")
+        sandbox.choose("none")
     make_room(begin=True)
     (inner.parent / "pids.max").write_text("100000\n")
-    sandbox_probe.choose("none")
+    sandbox.choose("none")
 
 
 @pytest.fixture

@@ -34,7 +34,7 @@ class Start(NamedTuple):
 
 
 STARTS = {
-    "arena/sandbox_probe.py:_said": Start("HOST_ENV", "'/'", "nothing"),
+    "arena/sandbox.py:_said": Start("HOST_ENV", "'/'", "nothing"),
     "arena/ros/launching.py:launch": Start(
         "HOST_ENV",
         "stage.folder if gate is not None else NOWHERE",
@@ -44,7 +44,7 @@ STARTS = {
     "arena/arena_process.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
     "cli/doctor.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
     "cli/doctor.py:_modules": Start("ros.env", "'/'", "nothing"),
-    "cli/systemd_scope.py:_moved": Start(
+    "arena/control_groups.py:_moved": Start(
         "_environment()", "'/'", "nothing: systemd is asked for this process's number"
     ),
     "ros_packages.py:_prints": Start("HOST_ENV", "'/'", "nothing: names that the rubric gives"),
@@ -80,7 +80,7 @@ STARTS = {
     ),
     "classes/review/serve.py:git_user": Start("with_absolute_paths(os.environ)", "'/'", "nothing"),
 }
-REPLACED = {"arena/ros/namespaces.py:<module>": "becomes the program of the probe: arena/sandbox_probe.py"}
+REPLACED = {"arena/ros/namespaces.py:<module>": "becomes the program of the probe: arena/sandbox.py"}
 MAKERS = {"Popen", "run", "call", "check_call", "check_output", "getoutput", "getstatusoutput"}
 STARTER = re.compile(
     r"\b(os|subprocess|Popen|create_subprocess_\w+)\b"

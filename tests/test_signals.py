@@ -18,7 +18,7 @@ import pytest
 
 from grader import grade
 from grader.arena import arena_process
-from grader.arena.sandbox_probe import why_no_sandbox
+from grader.arena.sandbox import why_no_sandbox
 from grader.errors import HostError
 from grader.portable import wait_for_children
 from tests.arena.support import printed, run_script

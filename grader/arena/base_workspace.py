@@ -28,9 +28,8 @@ from typing import Any
 from grader import __version__
 from grader.arena.interruption import run_until_signal
 from grader.arena.process_environment import BASE, ProcessEnvironment
-from grader.arena.sandbox import RunLimits, Word, copy_of, scratch, temporary_base
+from grader.arena.sandbox import RunLimits, Word, choose, copy_of, scratch, temporary_base
 from grader.arena.sandbox_files import ANSWERS, COURSE, INSIDE_WORKSPACE, QUESTIONS, SOURCES, prepare
-from grader.arena.sandbox_probe import choose
 from grader.arena.session import ArenaSession
 from grader.arena.workspace import Workspace, give_to, read_member
 from grader.errors import ArenaError, GraderError

@@ -22,9 +22,8 @@ from grader.arena.base_workspace import copy_course, provide_course
 from grader.arena.build import BUILD_EXPECTED_S, CMakeTrace, build
 from grader.arena.interruption import Stop, run_together, run_until_signal
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.sandbox import RunLimits, temporary_base
+from grader.arena.sandbox import RunLimits, choose, temporary_base
 from grader.arena.sandbox_files import prepare
-from grader.arena.sandbox_probe import choose
 from grader.arena.scenario import expected_s, run_scenario
 from grader.arena.static_recorder import (
     PACKAGE,

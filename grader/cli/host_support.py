@@ -15,8 +15,7 @@ from typing import Literal
 from pydantic import AliasChoices, Field
 
 from grader.arena.control_groups import describe, find_cgroups, has_memory
-from grader.arena.sandbox import NAMESPACES
-from grader.arena.sandbox_probe import ULIMIT_HINT, choose, refused_limits
+from grader.arena.sandbox import NAMESPACES, ULIMIT_HINT, choose, refused_limits
 from grader.cli.output import say_beside
 from grader.errors import GraderError, HostError, RosMissing
 from grader.host_programs import HOST_ENV, find_host_program

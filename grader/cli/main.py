@@ -64,7 +64,7 @@ def _dispatch(argv: Sequence[str]) -> int:
                 begin=True
             )  # before more is loaded: short limits would end that without a word
         if runs_code or command.looks_at_host:
-            scope = import_module("grader.cli.systemd_scope")
+            scope = import_module("grader.arena.control_groups")
     if runs_code or command.looks_at_host:
         scope.enter_scope()
     return int(command.run(**options))

@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.sandbox import RunLimits
+from grader.arena.sandbox import RunLimits, choose, why_no_sandbox
 from grader.arena.sandbox_files import prepare
-from grader.arena.sandbox_probe import choose, why_no_sandbox
 from grader.arena.scenario import run_scenario
 from grader.arena.workspace import make_workspace, run_in_place
 from grader.evidence.reader import load_run

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.sandbox_probe import why_no_sandbox
+from grader.arena.sandbox import why_no_sandbox
 
 pytestmark = pytest.mark.ros
 ROOT = Path(__file__).resolve().parents[2]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import sandbox_probe
+from grader.arena import sandbox
 from grader.arena.sandbox import system_call_filter
 from grader.errors import ExitCode, HostError, SandboxMissing
 from grader.host_programs import HOST_ENV, find_host_program
@@ -56,9 +56,9 @@ UNKNOWN = (
 
 @pytest.fixture(autouse=True)
 def _asked_again():
-    sandbox_probe._walls.cache_clear()
+    sandbox._walls.cache_clear()
     yield
-    sandbox_probe._walls.cache_clear()
+    sandbox._walls.cache_clear()
 
 
 def bwrap(folder: Path, monkeypatch, script: str) -> None:
@@ -66,61 +66,61 @@ def bwrap(folder: Path, monkeypatch, script: str) -> None:
     path = folder / "bwrap"
     path.write_text(f"#!/bin/sh\n{script}\n")
     path.chmod(path.stat().st_mode | stat.S_IXUSR | stat.S_IXGRP | stat.S_IXOTH)
-    found = {**{name: find_host_program(name) for name in sandbox_probe.PROGRAMS}, "bwrap": str(path)}
-    monkeypatch.setattr(sandbox_probe, "find_host_program", found.get)
-    monkeypatch.setattr(sandbox_probe, "NAMESPACES", Path(__file__).parent / "no_network.py")
-    monkeypatch.setattr(sandbox_probe, "_drop", list)
+    found = {**{name: find_host_program(name) for name in sandbox.PROGRAMS}, "bwrap": str(path)}
+    monkeypatch.setattr(sandbox, "find_host_program", found.get)
+    monkeypatch.setattr(sandbox, "NAMESPACES", Path(__file__).parent / "no_network.py")
+    monkeypatch.setattr(sandbox, "_drop", list)
 
 
 @pytest.mark.parametrize("said", FORBIDDEN)
 def test_where_the_kernel_forbids_it_grading_goes_without(monkeypatch, said: str) -> None:
-    monkeypatch.setattr(sandbox_probe, "_refusal", lambda *_: said)
-    assert sandbox_probe.why_no_sandbox() == said
-    assert (sandbox_probe.choose("auto").bubblewrap, sandbox_probe.choose("auto").reason) == (False, said)
+    monkeypatch.setattr(sandbox, "_refusal", lambda *_: said)
+    assert sandbox.why_no_sandbox() == said
+    assert (sandbox.choose("auto").bubblewrap, sandbox.choose("auto").reason) == (False, said)
     with pytest.raises(SandboxMissing):
-        sandbox_probe.choose("require")
+        sandbox.choose("require")
 
 
 @pytest.mark.parametrize("said", UNKNOWN)
 @pytest.mark.parametrize("mode", ["auto", "require"])
 def test_an_answer_that_is_not_known_stops_the_grading(monkeypatch, said: str, mode) -> None:
-    monkeypatch.setattr(sandbox_probe, "_refusal", lambda *_: said)
+    monkeypatch.setattr(sandbox, "_refusal", lambda *_: said)
     with pytest.raises(SandboxMissing) as caught:
-        sandbox_probe.choose(mode)
+        sandbox.choose(mode)
     assert caught.value.exit_code == ExitCode.NOT_GRADED
     assert said in caught.value.message
     assert "--sandbox none" in caught.value.hint
-    assert not sandbox_probe.choose("none").bubblewrap
+    assert not sandbox.choose("none").bubblewrap
 
 
 def test_a_bubblewrap_that_does_not_answer_stops_the_grading(tmp_path, monkeypatch) -> None:
     bwrap(tmp_path, monkeypatch, "exec sleep 60")
-    monkeypatch.setattr(sandbox_probe, "PROBE_S", 0.5)
+    monkeypatch.setattr(sandbox, "PROBE_S", 0.5)
     with pytest.raises(SandboxMissing, match=r"no answer within 0\.5 s"):
-        sandbox_probe.choose("auto")
+        sandbox.choose("auto")
 
 
 def test_what_did_not_answer_is_asked_again(monkeypatch) -> None:
-    monkeypatch.setattr(sandbox_probe, "_refusal", lambda *_: "no answer within 20 s")
+    monkeypatch.setattr(sandbox, "_refusal", lambda *_: "no answer within 20 s")
     with pytest.raises(SandboxMissing):
-        sandbox_probe.why_no_sandbox()
-    monkeypatch.setattr(sandbox_probe, "_refusal", lambda *_: "")
-    assert sandbox_probe.why_no_sandbox() == ""
+        sandbox.why_no_sandbox()
+    monkeypatch.setattr(sandbox, "_refusal", lambda *_: "")
+    assert sandbox.why_no_sandbox() == ""
 
 
-@pytest.mark.parametrize("name", sandbox_probe.PROGRAMS)
+@pytest.mark.parametrize("name", sandbox.PROGRAMS)
 def test_where_a_program_is_not_installed_grading_goes_without(monkeypatch, name: str) -> None:
     monkeypatch.setattr(
-        sandbox_probe, "find_host_program", lambda asked: None if asked == name else f"/usr/bin/{asked}"
+        sandbox, "find_host_program", lambda asked: None if asked == name else f"/usr/bin/{asked}"
     )
-    assert sandbox_probe.why_no_sandbox() == f"{name} is not installed"
+    assert sandbox.why_no_sandbox() == f"{name} is not installed"
 
 
 def test_a_program_that_cannot_be_started_stops_the_grading(tmp_path, monkeypatch) -> None:
     bwrap(tmp_path, monkeypatch, "exit 0")
-    monkeypatch.setattr(sandbox_probe.sys, "executable", str(tmp_path / "no-python"))
+    monkeypatch.setattr(sandbox.sys, "executable", str(tmp_path / "no-python"))
     with pytest.raises(SandboxMissing, match="No such file"):
-        sandbox_probe.choose("auto")
+        sandbox.choose("auto")
 
 
 @pytest.mark.parametrize(
@@ -136,23 +136,23 @@ def test_a_program_that_cannot_be_started_stops_the_grading(tmp_path, monkeypatc
 def test_namespaces_in_the_sandbox_are_allowed_only_where_they_cannot_be_forbidden(
     monkeypatch, first: str, nesting: bool
 ) -> None:
-    monkeypatch.setattr(sandbox_probe, "_refusal", lambda *more: first if more else "")
-    assert sandbox_probe.choose("auto").bubblewrap
-    assert sandbox_probe.choose("auto").nesting is nesting
+    monkeypatch.setattr(sandbox, "_refusal", lambda *more: first if more else "")
+    assert sandbox.choose("auto").bubblewrap
+    assert sandbox.choose("auto").nesting is nesting
 
 
 def test_a_probe_that_fails_only_now_allows_no_namespaces_in_the_sandbox(monkeypatch) -> None:
     busy = "bwrap: Creating new namespace failed: Resource temporarily unavailable"
-    monkeypatch.setattr(sandbox_probe, "_refusal", lambda *more: busy if more else "")
+    monkeypatch.setattr(sandbox, "_refusal", lambda *more: busy if more else "")
     with pytest.raises(SandboxMissing, match="Resource temporarily unavailable"):
-        sandbox_probe.choose("auto")
+        sandbox.choose("auto")
 
 
 def test_the_probe_sees_nothing_of_whoever_grades(tmp_path, monkeypatch) -> None:
     bwrap(tmp_path, monkeypatch, f"{{ pwd; env; }} >{tmp_path}/seen; cat >{tmp_path}/input")
     for name in ("PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "BASH_ENV", "LC_ALL"):
         monkeypatch.setenv(name, str(tmp_path))
-    assert sandbox_probe.why_no_sandbox() == ""
+    assert sandbox.why_no_sandbox() == ""
     lines = (tmp_path / "seen").read_text().splitlines()
     assert lines[0] == "/"
     assert (tmp_path / "input").read_bytes() == (system_call_filter() or b"")
@@ -163,23 +163,23 @@ def test_the_probe_sees_nothing_of_whoever_grades(tmp_path, monkeypatch) -> None
 
 def test_root_who_may_not_become_a_student_is_told_so(monkeypatch) -> None:
     monkeypatch.setattr(
-        sandbox_probe, "refused_limits", lambda: "setpriv: setresuid failed: Operation not permitted"
+        sandbox, "refused_limits", lambda: "setpriv: setresuid failed: Operation not permitted"
     )
     with pytest.raises(HostError) as caught:
-        sandbox_probe.choose("auto")
+        sandbox.choose("auto")
     assert "CAP_SETUID" in caught.value.hint
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="root gives up what it may do")
 def test_limits_are_asked_for_as_the_user_who_gets_them(monkeypatch) -> None:
     """Root may raise a limit that its student's user may not."""
-    command = sandbox_probe._drop()
+    command = sandbox._drop()
     assert Path(command[0]).name == "setpriv"
     asked: list[list[str]] = []
-    monkeypatch.setattr(sandbox_probe, "_said", lambda argv: asked.append(argv) or "")
-    sandbox_probe.refused_limits.cache_clear()
+    monkeypatch.setattr(sandbox, "_said", lambda argv: asked.append(argv) or "")
+    sandbox.refused_limits.cache_clear()
     try:
-        assert sandbox_probe.refused_limits() == ""
+        assert sandbox.refused_limits() == ""
     finally:
-        sandbox_probe.refused_limits.cache_clear()
+        sandbox.refused_limits.cache_clear()
     assert asked[0][: len(command)] == command

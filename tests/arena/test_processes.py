@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.sandbox import RunLimits
-from grader.arena.sandbox_probe import why_no_sandbox
+from grader.arena.sandbox import RunLimits, why_no_sandbox
 from tests.arena.support import exit_of, printed, run_script
 
 pytestmark = pytest.mark.ros

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import control_groups, sandbox, sandbox_probe
+from grader.arena import control_groups, sandbox
 from grader.arena.build import build
 from grader.arena.control_groups import Cgroup, Cgroups
-from grader.arena.sandbox import SUBMISSION_MESSAGE_BYTES, RunLimits
-from grader.arena.sandbox_probe import why_no_sandbox
+from grader.arena.sandbox import SUBMISSION_MESSAGE_BYTES, RunLimits, why_no_sandbox
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter
@@ -117,7 +116,7 @@ time.sleep(60)
 def test_without_cgroups_a_watchdog_holds_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    monkeypatch.setattr(sandbox_probe, "find_cgroups", Cgroups)
+    monkeypatch.setattr(sandbox, "find_cgroups", Cgroups)
     code = "import time\nblocks = []\nwhile True:\n    blocks.append(bytearray(20 << 20))\n    time.sleep(0.05)\n"
     run = run_script(tmp_path, code, limit_s=20, limits=RunLimits(memory_bytes=200 << 20), sandbox=kind)
     assert exit_of(run).stopped_by == "KILL"
@@ -224,7 +223,7 @@ def test_memory_that_no_process_counts(
 ) -> None:
     code, limits, words = attack
     if not groups:
-        monkeypatch.setattr(sandbox_probe, "find_cgroups", Cgroups)
+        monkeypatch.setattr(sandbox, "find_cgroups", Cgroups)
     run = run_script(tmp_path, code, limit_s=20, limits=limits)
     assert exit_of(run).stopped_by == "KILL"
     memory = f"more than {limits.memory_bytes >> 20} MB of memory"  # the kernel may be first, or be there too

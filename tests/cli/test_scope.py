@@ -12,7 +12,7 @@ import pytest
 from grader import host_programs
 from grader.arena import control_groups
 from grader.arena.control_groups import LEAF
-from grader.cli import main, systemd_scope
+from grader.cli import main
 from tests.arena.fake_groups import FakeGroups
 
 SYSTEMD = """#!/bin/sh
@@ -41,9 +41,9 @@ class Machine:
         for name in ("bin", "runtime", "linger", "systemd"):
             (folder / name).mkdir()
         monkeypatch.setattr(control_groups, "SYSTEMD", folder / "systemd")
-        monkeypatch.setattr(systemd_scope, "SYSTEMD", folder / "systemd")
-        monkeypatch.setattr(systemd_scope, "LINGER", folder / "linger")
-        monkeypatch.setattr(systemd_scope, "RUNTIME", folder / "runtime")
+        monkeypatch.setattr(control_groups, "SYSTEMD", folder / "systemd")
+        monkeypatch.setattr(control_groups, "LINGER", folder / "linger")
+        monkeypatch.setattr(control_groups, "RUNTIME", folder / "runtime")
         monkeypatch.setattr(control_groups, "MOUNTINFO", folder / "mountinfo")
         monkeypatch.setattr(control_groups, "MEMBERSHIP", folder / "cgroup")
         monkeypatch.setattr(pwd, "getpwuid", self._account)
@@ -87,7 +87,7 @@ def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 def test_memory_is_held_by_a_scope_of_its_own_afterwards(machine: Machine) -> None:
     assert control_groups.find_cgroups().memory is None
-    systemd_scope.enter_scope()
+    control_groups.enter_scope()
     found = control_groups.find_cgroups().memory
     assert found is not None
     own = Path(found.folder)
@@ -96,7 +96,7 @@ def test_memory_is_held_by_a_scope_of_its_own_afterwards(machine: Machine) -> No
 
 
 def test_what_systemd_is_asked_for(machine: Machine) -> None:
-    systemd_scope.enter_scope()
+    control_groups.enter_scope()
     asked = machine.noted("asked")
     name = next(word for word in asked if word.endswith(".scope"))
     assert asked == [
@@ -111,7 +111,7 @@ def test_nothing_of_whoever_grades_reaches_it(machine: Machine, monkeypatch) -> 
     monkeypatch.setenv("LD_LIBRARY_PATH", "/students")
     monkeypatch.setenv("DBUS_SESSION_BUS_ADDRESS", "unix:path=/students")
     monkeypatch.setenv("XDG_RUNTIME_DIR", "/students")
-    systemd_scope.enter_scope()
+    control_groups.enter_scope()
     assert machine.noted("cwd") == ["/"]
     env = dict(line.split("=", 1) for line in machine.noted("env"))
     shells = {"PWD", "OLDPWD", "SHLVL", "_"}
@@ -122,8 +122,8 @@ def test_nothing_of_whoever_grades_reaches_it(machine: Machine, monkeypatch) -> 
 
 
 def test_it_happens_once(machine: Machine) -> None:
-    systemd_scope.enter_scope()
-    systemd_scope.enter_scope()
+    control_groups.enter_scope()
+    control_groups.enter_scope()
     assert len(machine.noted("times")) == 1
 
 
@@ -148,7 +148,7 @@ def test_only_logins_are_left_for_a_scope(
     machine.user(user)
     if lingers:
         (machine.folder / "linger" / "lecturer").touch()
-    systemd_scope.enter_scope()
+    control_groups.enter_scope()
     assert machine.noted("asked")[:1] == ([] if asked is None else [asked])
 
 
@@ -157,9 +157,9 @@ def test_only_logins_are_left_for_a_scope(
     "script", ["#!/bin/sh\nexit 1\n", "#!/bin/sh\nexec sleep 60\n", "#!/bin/sh\n", "\x7f"]
 )
 def test_where_systemd_gives_none_all_stays_as_it_was(machine: Machine, monkeypatch, script: str) -> None:
-    monkeypatch.setattr(systemd_scope, "ANSWER_S", 0.2)
+    monkeypatch.setattr(control_groups, "ANSWER_S", 0.2)
     (machine.folder / "bin" / "busctl").write_text(script)
-    systemd_scope.enter_scope()
+    control_groups.enter_scope()
     assert control_groups.find_cgroups().memory is None
     assert control_groups.own_group() == f"/{LOGIN}"
 
@@ -170,7 +170,7 @@ def test_where_it_cannot_be_had_nothing_is_asked(machine: Machine, missing: str)
         (machine.folder / "groups" / "cgroup.controllers").unlink()
     else:
         (machine.folder / missing).rename(machine.folder / "gone")
-    systemd_scope.enter_scope()
+    control_groups.enter_scope()
     assert machine.noted("asked") == []
 
 
@@ -186,6 +186,6 @@ def test_where_it_cannot_be_had_nothing_is_asked(machine: Machine, missing: str)
 )
 def test_only_commands_that_run_students_code_ask(monkeypatch, argv: list[str], enters: bool) -> None:
     entered: list[bool] = []
-    monkeypatch.setattr(systemd_scope, "enter_scope", lambda: entered.append(True))
+    monkeypatch.setattr(control_groups, "enter_scope", lambda: entered.append(True))
     main.run(argv)
     assert bool(entered) == enters

@@ -35,7 +35,7 @@ PROGRAM = """
 import os, subprocess, sys, time
 from pathlib import Path
 from grader.arena import control_groups
-from grader.cli import systemd_scope as scope
+from grader.arena import control_groups as scope
 asks = ["busctl", "--user", "--timeout=1", "--acquired", "--no-pager", "list"]
 until = time.monotonic() + float(os.environ["READY_S"])
 while b"org.freedesktop.systemd1 " not in subprocess.run(asks, capture_output=True).stdout and time.monotonic() < until:

@@ -8,7 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
 
-from grader.arena.sandbox_probe import why_no_sandbox
+from grader.arena.sandbox import why_no_sandbox
 from grader.rubric.load import load_rubric
 from tests.hostile.form import PROMISES, Run, attack_names, load_attack, rubric_path
 from tests.hostile.harness import ROOT, Graded, faults, grade_in_room, why_no_groups, why_no_room
