@@ -17,8 +17,8 @@ from grader.errors import GraderError, InternalError, SubmissionError
 from grader.faults import fault_of
 from grader.files import atomic_write, make_folder
 from grader.intake.source import Source, parse_source
-from grader.integrations import gradescope, prairielearn
 from grader.integrations.bundle import LostModes, Platform, Settings, read_settings
+from grader.integrations.platforms import GRADESCOPE, PRAIRIELEARN
 from grader.model.progress import Silence
 from grader.model.result import GradingResult
 from grader.report.terminal import open_console, print_report
@@ -26,7 +26,7 @@ from grader.report.text import json_text, line
 from grader.results import read_result
 from grader.rubric.load import LoadedRubric, load_rubric
 
-PLATFORMS = {"gradescope": gradescope.PLATFORM, "prairielearn": prairielearn.PLATFORM}
+PLATFORMS = {"gradescope": GRADESCOPE, "prairielearn": PRAIRIELEARN}
 LIMIT = 1000
 ID = "submission"
 REPORTS = "grader"

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from grader.errors import HostError
-from grader.integrations import gradescope, prairielearn
 from grader.integrations.autograde import ID, PLATFORMS, REPORTS, grade_upload
 from grader.integrations.bundle import SETTINGS_FILE, Platform, Settings
+from grader.integrations.platforms import GRADESCOPE, PRAIRIELEARN
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
 from grader.results import read_result
@@ -32,7 +32,7 @@ SOUND = (
 
 def test_prairielearn_gives_a_share_and_a_test_for_each_criterion_but_the_hidden() -> None:
     result = worst(criteria=SOUND, points=7, max_points=20, late=None, overrides=(), status="graded")
-    document = prairielearn.graded(result, RUBRIC)
+    document = PRAIRIELEARN.graded(result, RUBRIC)
     assert (document["gradable"], document["score"]) == (True, 0.35)
     assert [(t["points"], t["max_points"]) for t in document["tests"]] == [(6, 6), (1, 4), (0, 10)]
     assert "secret" not in json.dumps(document)
@@ -42,13 +42,13 @@ def test_prairielearn_gives_a_share_and_a_test_for_each_criterion_but_the_hidden
 def test_prairielearn_says_what_is_open() -> None:
     waiting = criterion("waiting", Status.INCONCLUSIVE, 0, 5)
     result = worst(criteria=(*SOUND, waiting), points=7, max_points=25, late=None, overrides=())
-    document = prairielearn.graded(result, RUBRIC)
+    document = PRAIRIELEARN.graded(result, RUBRIC)
     assert document["message"].startswith("A PERSON MUST LOOK: 5 points")
     assert document["tests"][2]["name"].startswith("A PERSON MUST LOOK")
 
 
 def test_prairielearn_is_given_nothing_that_steers_and_less_than_it_takes() -> None:
-    document = prairielearn.graded(worst(error=None), RUBRIC)
+    document = PRAIRIELEARN.graded(worst(error=None), RUBRIC)
     text = json.dumps(document, ensure_ascii=False)
     assert STEERING.search(text) is None
     assert len(text.encode()) < 1_000_000
@@ -57,7 +57,7 @@ def test_prairielearn_is_given_nothing_that_steers_and_less_than_it_takes() -> N
 @pytest.mark.parametrize("kind", ["host", "submission"])
 def test_prairielearn_takes_no_attempt_for_what_was_not_graded(kind) -> None:
     error = ErrorInfo(kind=kind, message=LONG, hint=MERMAID)
-    document = prairielearn.graded(worst(error=error, status="error"), RUBRIC)
+    document = PRAIRIELEARN.graded(worst(error=error, status="error"), RUBRIC)
     assert document["gradable"] is False
     assert STEERING.search(json.dumps(document, ensure_ascii=False)) is None
 
@@ -130,7 +130,7 @@ def test_an_interrupted_grading_says_that_it_took_too_long(name, tmp_path, monke
 
 
 def test_gradescope_hears_of_a_fault_in_plain_text_and_without_a_score() -> None:
-    document = gradescope.not_graded(HostError(LONG, hint=MERMAID))
+    document = GRADESCOPE.not_graded(HostError(LONG, hint=MERMAID))
     text = json.dumps(document, ensure_ascii=False)
     assert "score" not in text
     assert document["output_format"] == "text"
@@ -139,6 +139,6 @@ def test_gradescope_hears_of_a_fault_in_plain_text_and_without_a_score() -> None
 
 
 def test_gradescope_is_told_by_what_it_was_graded() -> None:
-    document = gradescope.graded(worst(error=None, status="graded"), RUBRIC)
+    document = GRADESCOPE.graded(worst(error=None, status="graded"), RUBRIC)
     assert set(document["extra_data"]) == {"grader", "sandbox", "rubric", "submission"}
     assert "secret" not in json.dumps(document["extra_data"])

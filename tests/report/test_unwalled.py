@@ -10,7 +10,7 @@ import pytest
 
 from grader.arena.control_groups import Cgroups
 from grader.arena.sandbox import Sandbox
-from grader.integrations import gradescope
+from grader.integrations.platforms import GRADESCOPE
 from grader.judging.summary import NOTHING_RUN
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
@@ -104,6 +104,6 @@ def test_the_page_of_a_class_says_how_many(tmp_path: Path) -> None:
 
 def test_gradescope_tells_the_staff() -> None:
     loaded = LoadedRubric(rubric=rubric(), path=Path(), digest="")
-    document = gradescope.graded(graded(label("bwrap is not installed")), loaded)
+    document = GRADESCOPE.graded(graded(label("bwrap is not installed")), loaded)
     assert document["extra_data"]["without_sandbox"] == MISSING
-    assert "without_sandbox" not in gradescope.graded(graded("bubblewrap"), loaded)["extra_data"]
+    assert "without_sandbox" not in GRADESCOPE.graded(graded("bubblewrap"), loaded)["extra_data"]

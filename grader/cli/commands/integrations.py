@@ -67,12 +67,12 @@ def export_gradescope(
         from grader.cli.output import say
         from grader.files import atomic_write
         from grader.integrations.bundle import Settings
-        from grader.integrations.gradescope import autograder
+        from grader.integrations.platforms import gradescope_autograder
         from grader.rubric.load import load_rubric
     rubric = load_rubric(lab)
     modes: Literal["lost", "granted"] = "granted" if assume_executable else "lost"
     settings = Settings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes, package=package or "")
-    data = autograder(rubric, settings)
+    data = gradescope_autograder(rubric, settings)
     if str(out) == STDOUT:
         sys.stdout.buffer.write(data)
         return ExitCode.PASSED
@@ -105,13 +105,13 @@ def export_prairielearn(
     with loading():
         from grader.cli.output import say
         from grader.integrations.bundle import Settings
-        from grader.integrations.prairielearn import question, write_question
+        from grader.integrations.platforms import prairielearn_question, write_question
         from grader.rubric.load import load_rubric
     rubric = load_rubric(lab)
     modes: Literal["lost", "granted"] = "granted" if assume_executable else "lost"
     settings = Settings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes, package=package or "")
     target = out or Path(f"{rubric.rubric.id}-prairielearn")
-    write_question(question(rubric, settings, image), target)
+    write_question(prairielearn_question(rubric, settings, image), target)
     say(f"{target}: add question/ to your course's questions, and build {image} from image/")
     return ExitCode.PASSED
 

@@ -1,4 +1,4 @@
-"""PrairieLearn: the export of a question with an external grader and its image, and the results of a grading."""
+"""Gradescope and PrairieLearn: what is exported for each, and how a result or a fault is written for it."""
 
 from __future__ import annotations
 
@@ -21,18 +21,65 @@ from grader.integrations.bundle import (
     wheel,
 )
 from grader.model.result import CriterionResult, GradingResult
-from grader.report.sentences import score_words
+from grader.report.gradescope import LIMIT, LOOK, render_gradescope
+from grader.report.sentences import score_words, without_sandbox
 from grader.report.text import html, line, text_limit
 from grader.report.view import hidden_ids
 from grader.rubric.load import LoadedRubric
 from grader.wording import number
 
 ENTRYPOINT = "/usr/local/bin/grade-question"
-LIMIT = 1000
-LOOK = "A PERSON MUST LOOK"
 
 
-def question(rubric: LoadedRubric, settings: Settings, image: str) -> Bundle:
+def gradescope_autograder(rubric: LoadedRubric, settings: Settings) -> bytes:
+    """Return the zip to upload. Raises UsageError if the grader is not installed."""
+    bundle = Bundle()
+    name, data = wheel()
+    bundle.add(name, data)
+    bundle.add("system.sh", system_script(), executable=True)
+    bundle.add("setup.sh", template("gradescope-setup.sh"), executable=True)
+    run = template("run_autograder").replace(b"@SECONDS@", str(settings.grading_s).encode())
+    bundle.add("run_autograder", run, executable=True)
+    path = add_lab(bundle, rubric, "rubric")
+    bundle.add(SETTINGS_FILE, settings.model_copy(update={"rubric": path}).to_json())
+    return bundle.zipped()
+
+
+def _gradescope_results(result: GradingResult, rubric: LoadedRubric) -> dict[str, Any]:
+    """Return the points and tests. Raises GraderError if nothing was graded because of the machine."""
+    document: dict[str, Any] = json.loads(render_gradescope(result, rubric.rubric))
+    about = result.environment
+    unwalled = line(without_sandbox(about.sandbox), LIMIT)
+    document["extra_data"] = {
+        "grader": about.grader,
+        "sandbox": about.sandbox,
+        **({"without_sandbox": unwalled} if unwalled else {}),
+        "rubric": result.rubric.model_dump(),
+        "submission": result.submission.digest,
+    }
+    return document
+
+
+def _gradescope_fault(fault: GraderError) -> dict[str, Any]:
+    """Return a document without a score: Gradescope then stores none, and the staff can run it again."""
+    why = f"NOT GRADED, {LOOK}: {line(fault.message, LIMIT)}"
+    test = {"name": "NOT GRADED", "status": "failed", "output": why, "visibility": "visible"}
+    return {
+        "output": f"{why}\n{line(fault.hint, LIMIT)}\nThis is no mark: nothing was counted against you.",
+        "output_format": "text",
+        "visibility": "visible",
+        "stdout_visibility": "hidden",
+        "tests": [test],
+    }
+
+
+GRADESCOPE = Platform(
+    lab="source", upload="submission", graded=_gradescope_results, not_graded=_gradescope_fault
+)
+"""Its folders lie below /autograder."""
+
+
+def prairielearn_question(rubric: LoadedRubric, settings: Settings, image: str) -> Bundle:
     """Return the folder `question/` for a course, and `image/`, the files of a Docker image that suits every lab."""
     bundle = Bundle()
     name, data = wheel()
@@ -90,7 +137,7 @@ def _page(rubric: LoadedRubric, settings: Settings) -> bytes:
     return text.replace("@TITLE@", html(rubric.rubric.title)).replace("@PACKAGE@", package).encode()
 
 
-def graded(result: GradingResult, rubric: LoadedRubric) -> dict[str, Any]:
+def _prairielearn_results(result: GradingResult, rubric: LoadedRubric) -> dict[str, Any]:
     """Return the points, or that the submission cannot be graded: then no attempt is used up."""
     if result.error is not None:
         return _invalid(result.error.message, result.error.hint)
@@ -111,12 +158,14 @@ def graded(result: GradingResult, rubric: LoadedRubric) -> dict[str, Any]:
     }
 
 
-def not_graded(fault: GraderError) -> dict[str, Any]:
+def _prairielearn_fault(fault: GraderError) -> dict[str, Any]:
     """Return a document that costs neither points nor an attempt."""
     return _invalid(fault.message, fault.hint)
 
 
-PLATFORM = Platform(lab="tests", upload="student", graded=graded, not_graded=not_graded)
+PRAIRIELEARN = Platform(
+    lab="tests", upload="student", graded=_prairielearn_results, not_graded=_prairielearn_fault
+)
 """Its folders lie below /grade."""
 
 
