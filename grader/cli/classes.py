@@ -1,22 +1,22 @@
-"""What `grader batch` and the commands of `grader course` do: their options, what is graded, and their exit codes."""
+"""What the commands for a class and for a course do: grade, review, write gradebooks."""
 
 from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
 from grader.classes.batch.folder import BatchFolder, open_batch
 from grader.classes.batch.job import Executor, LocalExecutor
-from grader.classes.batch.run import BatchOptions, run_batch
+from grader.classes.batch.run import RESULTS, BatchOptions, run_batch
 from grader.classes.course import (
     LabStatus,
     Marks,
@@ -30,9 +30,10 @@ from grader.classes.course import (
     with_late_days,
 )
 from grader.classes.feedback.forms import FORMS, Settings
+from grader.classes.feedback.publish import publication_remarks, published_rows, read_published
 from grader.classes.feedback.send import Wanted as WantedFeedback
 from grader.classes.gradebook import write_gradebook
-from grader.classes.gradebook.table import Form
+from grader.classes.gradebook.table import Book, Form, Row
 from grader.classes.roster import Local, Roster, read_roster
 from grader.classes.roster.entries import parse_time
 from grader.classes.roster.platforms import is_download, unpack_download
@@ -49,6 +50,9 @@ from grader.rubric.course import CourseFile, load_course, split_name
 from grader.rubric.load import PIN, LoadedRubric, load_rubric, needs_ros, split_pin
 from grader.untrusted_text import line
 from grader.wording import plural
+
+if TYPE_CHECKING:
+    from grader.classes.review.session import ReviewSession
 
 JOBS_PER_CORE = 4
 """Most of a grading's time is spent waiting for what the student's nodes send."""
@@ -180,14 +184,15 @@ class Asked:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wanted:
-    """What the command line of `grader course gradebook` says."""
+class WantedBook:
+    """What the command line says of a gradebook. `wide`: with a column for each criterion of a class, or each lab of a
+    course."""
 
-    form: Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"]
+    form: Form
     out: str
     template: Path | None
     column: str
-    per_lab: bool
+    wide: bool
     drafts: bool
 
 
@@ -271,7 +276,7 @@ def _cells(one: LabStatus) -> Iterator[str]:
     yield from (str(one.error + one.missing), f"{one.published}{changed}", str(one.sent))
 
 
-def write_gradebook_of(path: Path, wanted: Wanted) -> ExitCode:
+def write_course_gradebook(path: Path, wanted: WantedBook) -> ExitCode:
     """Write the course's gradebook; what a person has to know about it goes to stderr."""
     course = load_course(path)
     marks = marks_of(course, drafts=wanted.drafts)
@@ -280,21 +285,49 @@ def write_gradebook_of(path: Path, wanted: Wanted) -> ExitCode:
             f"{path}: no lab of it is graded so far", hint=f"grader course status {path} lists them"
         )
     suffix = wanted.template.suffix if wanted.template else ENDINGS.get(wanted.form, f"-{wanted.form}.csv")
-    target = Path(wanted.out) if wanted.out else path.with_name(f"gradebook{suffix}")
+    usual = path.with_name(f"gradebook{suffix}")
+    more = _drafts(course, marks, drafts=wanted.drafts)
+    return _write_book(book_of(course, marks), rows_of(course, marks), usual, wanted, more)
+
+
+def write_class_gradebook(folder: Path, wanted: WantedBook) -> ExitCode:
+    """Write the gradebook of what is published; of a class of which nothing is published, of results as they are now.
+
+    What a person has to know about it goes to stderr.
+    """
+    batch, published = open_batch(folder), read_published(folder)
+    by_drafts = wanted.drafts or not published.history
+    name = Path(
+        RESULTS if wanted.form == "jsonl" else f"gradebook{ENDINGS.get(wanted.form, f'-{wanted.form}.csv')}"
+    )
+    if not by_drafts and wanted.form in {"csv", "jsonl"}:  # the batch writes its own, of drafts
+        name = name.with_stem(f"{name.stem}-published")
+    if wanted.template:  # Blackboard's tab-separated tables end in .xls
+        name = name.with_suffix(wanted.template.suffix)
+    rows = batch.rows() if by_drafts else published_rows(batch, published)
+    more = () if wanted.drafts else publication_remarks(batch, published)
+    return _write_book(batch.book(), rows, folder / name, wanted, more)
+
+
+def _write_book(
+    book: Book, rows: Iterable[Row], usual: Path, wanted: WantedBook, more: Iterable[str]
+) -> ExitCode:
+    """Write a gradebook to `--out`, else to its usual place, and print its remarks and `more` on stderr."""
+    target = Path(wanted.out) if wanted.out else usual
     if wanted.template and wanted.out != STDOUT and target.exists() and target.samefile(wanted.template):
         raise UsageError(f"{target} is the template itself", hint="give another name with --out")
     with temporary_folder("gradebook") as temporary:
-        place = Path(temporary, target.name) if wanted.out == STDOUT else target
+        place = Path(temporary, usual.name) if wanted.out == STDOUT else target
         remarks = write_gradebook(
-            book_of(course, marks),
-            rows_of(course, marks),
+            book,
+            rows,
             place,
             wanted.form,
-            per_criterion=wanted.per_lab,
+            per_criterion=wanted.wide,
             template=wanted.template,
             column=wanted.column,
         )
-        for remark in (*remarks, *_drafts(course, marks, drafts=wanted.drafts)):
+        for remark in (*remarks, *more):
             say_beside(f"{wanted.form}: {remark}")
         if wanted.out == STDOUT:
             with place.open("rb") as written:
@@ -309,3 +342,45 @@ def _drafts(course: CourseFile, marks: Sequence[Marks], *, drafts: bool) -> Iter
         if one.drafts and not drafts:
             command = f"grader course publish {course.path} {one.name}"
             yield f"{one.name}: these are drafts: nothing of it is published yet ({command})"
+
+
+def reviewer(named: str | None) -> str:
+    """Return who reviews: the name given, else git's. Raises UsageError for what is no name."""
+    from grader.classes.review.cards import Wrong, author_of  # noqa: PLC0415 - only `grader review` has its library
+    from grader.classes.review.serve import git_user  # noqa: PLC0415
+
+    try:
+        return author_of(git_user() if named is None else named)
+    except Wrong as error:
+        raise UsageError(f"--author: {error}") from error
+
+
+def serve_review(review: ReviewSession, *, port: int, author: str, no_browser: bool) -> ExitCode:
+    """Serve the review's page until Ctrl-C. Raises UsageError where the share has no submission."""
+    from grader.classes.review.serve import browser, serve  # noqa: PLC0415 - as above
+
+    folder = review.path
+    if not review.items():
+        raise UsageError(f"{folder}: no submission is in this share", hint="see --group, --marker and --of")
+    with ExitStack() as stack:
+
+        def opened(address: str) -> None:
+            tried = stack.enter_context(browser(address, wanted=not no_browser))
+            say(f"{'Opening' if tried else 'Open'} {address}")
+            say("Only this machine can reach it, and only at this address. Press Ctrl-C to end it.")
+            sys.stdout.flush()  # a program that reads it from a pipe needs the address now
+
+        def ending(left: int) -> None:
+            if left:
+                reports = plural(left, "report")
+                say(f"Writing {reports}. Decisions are kept: Ctrl-C again leaves it to the next review.")
+                sys.stdout.flush()
+
+        done = serve(review, port=port, author=author, opened=opened, ending=ending)
+    if done:
+        say("Ended. Everything is saved and written.")
+        return ExitCode.PASSED
+    trouble = review.background.trouble
+    say(f"Ended. Your decisions are in overrides.yaml, but the gradebook is not written: {trouble}")
+    say(f"  hint: once that is fixed, grader regrade {folder} writes it")
+    return ExitCode.NOT_GRADED

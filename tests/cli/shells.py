@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pexpect
@@ -59,14 +60,16 @@ class Typed:
             self.child.sendline(command)
         self.child.expect_exact(PROMPT)
 
-    def shows(self, line: str, *words: str) -> None:
-        """Type the line and TAB; each of the words has to appear behind it, in any order."""
+    def missing(self, line: str, *words: str) -> list[str]:
+        """Type the line and TAB; return the words that do not appear behind it."""
         self.child.send(line + TAB)
         text = ""
-        while not all(word in text for word in words):
-            text += CONTROLS.sub("", self.child.read_nonblocking(4096, timeout=SECONDS))
+        with suppress(pexpect.TIMEOUT, pexpect.EOF):
+            while any(word not in text for word in words):
+                text += CONTROLS.sub("", self.child.read_nonblocking(4096, timeout=SECONDS))
         self.child.sendline(CLEAR)
         self.child.expect_exact(PROMPT)
+        return [word for word in words if word not in text]
 
     def close(self) -> None:
         """End it."""
@@ -80,8 +83,8 @@ class Asked:
         self.program = need("fish")
         self.folder = folder
 
-    def shows(self, line: str, *words: str) -> None:
-        """Each of the words has to be an offer, or to begin one."""
+    def missing(self, line: str, *words: str) -> list[str]:
+        """Return the words that are no offer."""
         script = "grader completion fish | source; complete --do-complete $argv[1]"
         done = subprocess.run(
             [self.program, "--no-config", "-c", script, line],
@@ -93,7 +96,7 @@ class Asked:
             timeout=SECONDS,
         )
         offers = [offer.partition("\t")[0] for offer in done.stdout.splitlines()]
-        assert [word for word in words if word.strip() not in offers] == [], offers
+        return [word for word in words if word.strip() not in offers]
 
     def close(self) -> None:
         """There is nothing to end."""

@@ -130,6 +130,11 @@ def _run(clone: Path, *words: str, limit_s: int = 250, **environment: str) -> st
     return done.stdout
 
 
+def _ruff(clone: Path, *paths: str) -> list[str]:
+    """Return what ruff prints as it checks these paths, and as it looks whether they are formatted."""
+    return [_run(clone, "-m", "ruff", *words, *paths) for words in STYLE]
+
+
 def _changed(clone: Path) -> set[str]:
     """Return every file that differs from the commit or is new."""
     command = [GIT, "ls-files", "--modified", "--others", "--exclude-standard"]
@@ -154,8 +159,9 @@ def test_its_code_is_in_shape(guide: str, followed: Callable[[str], Path]) -> No
     """And its diffs apply to the files as they are."""
     clone = followed(guide)
     python = sorted(name for name in _changed(clone) if name.startswith("grader/"))
-    for words in STYLE:
-        _run(clone, "-m", "ruff", *words, *(python or ["."]))
+    checked, formatted = _ruff(clone, *(python or ["."]))
+    assert checked == "All checks passed!\n"
+    assert re.fullmatch(r"\d+ files? already formatted\n", formatted)
 
 
 @pytest.mark.full
@@ -190,8 +196,10 @@ def test_the_rubric_is_valid_and_the_check_explains_itself(clones: Callable[[str
 @each_guide
 def test_everything_that_needs_no_ros_accepts_it(guide: str, clones: Callable[[str], Path]) -> None:
     clone = clones(guide)
-    for words in STYLE:
-        _run(clone, "-m", "ruff", *words, ".", "fixtures/make.py")
-    _run(clone, "-m", "mypy", f"--cache-dir={os.devnull}", limit_s=600)
+    assert _ruff(clone, ".", "fixtures/make.py")[0] == "All checks passed!\n"
+    assert "no issues found" in _run(clone, "-m", "mypy", f"--cache-dir={os.devnull}", limit_s=600)
     own = f"--ignore={Path(__file__).relative_to(ROOT)}"
-    _run(clone, "-m", "pytest", "-q", "-n", "2", "-m", "not ros and not full", own, limit_s=1700)
+    said = _run(clone, "-m", "pytest", "-q", "-n", "2", "-m", "not ros and not full", own, limit_s=1700)
+    passed = re.search(r"(\d+) passed", said)
+    assert passed, said
+    assert int(passed[1]) > 2000

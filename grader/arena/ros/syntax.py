@@ -105,7 +105,7 @@ def check(root, name):
         return report
     with contextlib.suppress(
         RecursionError, MemoryError
-    ):  # it compiles, and is nested too deep to be looked at
+    ):  # what compiles can be nested too deep to be looked at
         report["slips"] = slips(ast.parse(data))
     return report
 
@@ -176,12 +176,7 @@ def never_closed(data, line):
         for token in tokenize.tokenize(io.BytesIO(data).readline):
             if token.type == tokenize.OP and token.string in "([{":
                 stack.append((token.string, token.start[0]))
-            elif (
-                token.type == tokenize.OP
-                and token.string in PAIRS
-                and stack
-                and stack[-1][0] == PAIRS[token.string]
-            ):
+            elif token.type == tokenize.OP and stack and stack[-1][0] == PAIRS.get(token.string):
                 stack.pop()
     except (tokenize.TokenError, SyntaxError):  # the end of the file, or where the tokens end
         pass
@@ -578,9 +573,7 @@ def uncalled(node, functions):
 
 
 def is_shutdown(node):
-    return (isinstance(node, ast.Attribute) and node.attr == "is_shutdown") or (
-        isinstance(node, ast.Name) and node.id == "is_shutdown"
-    )
+    return getattr(node, "attr", getattr(node, "id", "")) == "is_shutdown"
 
 
 def asked(node, functions):

@@ -1,9 +1,7 @@
 """The commands for a whole class: grade it, and work on the results."""
 
-import shutil
 import sys
 from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -33,15 +31,6 @@ from grader.report.forms import FORMS
 DEFAULT_OUT = Path("grader-results")
 STDOUT = "-"
 CLASS = Argument("DIR", BATCH_FOLDER)
-GRADEBOOKS = {
-    "csv": "gradebook.csv",
-    "jsonl": "results.jsonl",
-    "xlsx": "gradebook.xlsx",
-    "canvas": "gradebook-canvas.csv",
-    "moodle": "gradebook-moodle.csv",
-    "blackboard": "gradebook-blackboard.csv",
-}
-BATCH_FORMS = ("csv", "jsonl")
 
 
 @command("batch", group=INSTRUCTORS, exit_codes=CLASS_EXIT_CODES, runs_code=True)
@@ -205,48 +194,16 @@ def review(
     """
     with loading():
         from grader.classes.review import require_library
-        from grader.cli.output import say
     require_library()
     with loading():
-        from grader.classes.review.cards import Wrong, author_of
         from grader.classes.review.markers import share_of
-        from grader.classes.review.serve import browser, git_user, serve
         from grader.classes.review.session import open_session
-        from grader.wording import plural
-    given = marker if author is None else author
-    try:
-        name = author_of(git_user() if given is None else given)
-    except Wrong as error:
-        raise UsageError(f"--author: {error}") from error
+        from grader.cli import classes
+    name = classes.reviewer(marker if author is None else author)
     review = open_session(folder)
     review.blind = blind
     review.share = share_of(folder, marker, of, group)
-    if not review.items():
-        raise UsageError(f"{folder}: no submission is in this share", hint="see --group, --marker and --of")
-    with ExitStack() as stack:
-
-        def opened(address: str) -> None:
-            tried = stack.enter_context(browser(address, wanted=not no_browser))
-            say(f"{'Opening' if tried else 'Open'} {address}")
-            say("Only this machine can reach it, and only at this address. Press Ctrl-C to end it.")
-            sys.stdout.flush()  # a program that reads it from a pipe needs the address now
-
-        def ending(left: int) -> None:
-            if left:
-                say(
-                    f"Writing {plural(left, 'report')}. Decisions are kept: Ctrl-C again leaves it to the next review."
-                )
-                sys.stdout.flush()
-
-        done = serve(review, port=port, author=name, opened=opened, ending=ending)
-    if done:
-        say("Ended. Everything is saved and written.")
-        return ExitCode.PASSED
-    say(
-        f"Ended. Your decisions are in overrides.yaml, but the gradebook is not written: {review.background.trouble}"
-    )
-    say(f"  hint: once that is fixed, grader regrade {folder} writes it")
-    return ExitCode.NOT_GRADED
+    return classes.serve_review(review, port=port, author=name, no_browser=no_browser)
 
 
 @command("overrides merge", group=INSTRUCTORS, exit_codes=MERGE_EXIT_CODES)
@@ -305,41 +262,11 @@ def gradebook(
     What a person has to know about it goes to stderr. Raises UsageError if the template would be overwritten.
     """
     with loading():
-        from grader.classes.batch.folder import open_batch
-        from grader.classes.feedback.publish import publication_remarks, published_rows, read_published
-        from grader.classes.gradebook import write_gradebook
-        from grader.cli.output import say, say_beside
-        from grader.files import temporary_folder
-    batch = open_batch(folder)
-    published = read_published(folder)
-    by_drafts = drafts or not published.history
-    name = Path(GRADEBOOKS[form])
-    if not by_drafts and form in BATCH_FORMS:  # the batch writes its own, of drafts
-        name = name.with_stem(f"{name.stem}-published")
-    if template:  # Blackboard's tab-separated tables end in .xls
-        name = name.with_suffix(template.suffix)
-    target = Path(out) if out else folder / name
-    if template and out != STDOUT and target.exists() and target.samefile(template):
-        raise UsageError(f"{target} is the template itself", hint="give another name with --out")
-    with temporary_folder("gradebook") as temporary:
-        place = Path(temporary, GRADEBOOKS[form]) if out == STDOUT else target
-        remarks = write_gradebook(
-            batch.book(),
-            batch.rows() if by_drafts else published_rows(batch, published),
-            place,
-            form,
-            per_criterion=per_criterion,
-            template=template,
-            column=column,
-        )
-        for remark in (*remarks, *(() if drafts else publication_remarks(batch, published))):
-            say_beside(f"{form}: {remark}")
-        if out == STDOUT:
-            with place.open("rb") as written:
-                shutil.copyfileobj(written, sys.stdout.buffer)
-        else:
-            say(str(target))
-    return ExitCode.PASSED
+        from grader.cli import classes
+    wanted = classes.WantedBook(
+        form=form, out=out, template=template, column=column, wide=per_criterion, drafts=drafts
+    )
+    return classes.write_class_gradebook(folder, wanted)
 
 
 @command("report", group=INSTRUCTORS, exit_codes=REPORT_EXIT_CODES)

@@ -118,7 +118,7 @@ def gradebook(
     """
     with loading():
         from grader.cli import classes
-    return classes.write_gradebook_of(
-        course,
-        classes.Wanted(form=form, out=out, template=template, column=column, per_lab=per_lab, drafts=drafts),
+    wanted = classes.WantedBook(
+        form=form, out=out, template=template, column=column, wide=per_lab, drafts=drafts
     )
+    return classes.write_course_gradebook(course, wanted)
