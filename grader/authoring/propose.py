@@ -170,7 +170,7 @@ class Proposal(Sheet):
         needs: Entry = {"scenario": name, "requires": [kind, node]}
         if topic.rate_hz:
             parameters: Entry = {"topic": topic.name, "rate_hz": format_number(topic.rate_hz)}
-            hz = f"{topic.name} has {topic.rate_hz:g} Hz"
+            hz = f"{topic.name} runs at {topic.rate_hz:g} Hz"
             self.add(f"{label}-rate", hz, "rate", parameters, **needs, reproduce=f"rostopic hz {topic.name}")
         if topic.latched:
             self.add(

@@ -44,7 +44,7 @@ class ActionResultParams(Record):
     feedback: Annotated[int, Field(ge=0)] = 0
     """So many messages of feedback have to come at least."""
     within_s: Annotated[float, Field(gt=0)] | None = None
-    """How long after the goal, or after its cancelling, the result may come; null: as long as the step waits."""
+    """How long after the goal, or after it was cancelled, the result may come; null: as long as the step waits."""
 
     @property
     def words(self) -> str:
@@ -78,7 +78,7 @@ def action_result(package: PackageFacts, run: Run, params: ActionResultParams) -
 
     Why it matters on a robot
         A program that sends the robot somewhere has to be told whether it arrived, and be able to stop it. A server
-        that does not heed its cancelling drives on.
+        that ignores being cancelled drives on.
 
     How it is measured
         The grader sends the goals one after the other once the server listens, and reads result and feedback as
@@ -174,7 +174,7 @@ def _too_late(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | Non
     took_s = to_s(goal.ended_ns) - to_s(from_ns)
     if took_s <= params.within_s:
         return None
-    since = "its cancelling" if goal.cancelled_ns else "it was sent"
+    since = "it was cancelled" if goal.cancelled_ns else "it was sent"
     message = f"the result of {goal.name} of {params.action} comes {took_s:.2f} s after {since}"
     hint = (
         "check is_preempt_requested() each time around the loop"

@@ -71,7 +71,16 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
     """
     found = find_script(package, params.path)
     verdict = _missing(package, params.path) if found is None else _judged(package, build, found, params)
-    return verdict.about(expected=f"{params.path}, executable, beginning with {RIGHT_SHEBANG}")
+    whole = ", all of it valid Python" if found is not None and _syntax_fault(found) else ""
+    return verdict.about(
+        expected=f"{params.path}, executable, beginning with {_asked_first_line(found)}{whole}"
+    )
+
+
+def _asked_first_line(found: SourceFile | None) -> str:
+    """Return the file's own first line where that is right: of several that are, it is no fault to have another one."""
+    own = found is not None and found.shebang is not None and not any(shebang_obstacles(found))
+    return f"#!{found.shebang.text}" if found and found.shebang and own else RIGHT_SHEBANG
 
 
 def _judged(package: PackageFacts, build: Run, found: SourceFile, params: ExecutableParams) -> Verdict:

@@ -230,7 +230,7 @@ def _misnamed(package: PackageFacts, found: Manifest, name: str) -> Verdict | No
         return None
     slip = " (a typo in the name)" if near_names(name, [found.name]) else ""
     return failed(
-        f"{found.file} names the package {found.name!r}, the handout calls it {name!r}{slip}",
+        f"{found.file} names the package {found.name!r} instead of {name!r}{slip}",
         measured=f"name {found.name}",
         hint=_rename(package, found, name),
         citations=(FileCitation(file=found.file, line=found.name_line),),

@@ -129,7 +129,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         _flood(found, run, package, params)
         or _short(found, run, package, params)
         or _excused(_uneven(found, run, package, params), found, run, params)
-        or passed(f"{params.topic} has {hertz(found.mean_hz)}, evenly")
+        or passed(f"{params.topic} runs at {hertz(found.mean_hz)}, evenly")
     )
     citations = (*verdict.citations, cite(run, params.topic, found.times_ns[0], found.times_ns[-1]))
     measured = described(found, *params.bounds_ns)

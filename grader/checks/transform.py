@@ -230,7 +230,8 @@ def _other_value(seen: Sequence[Seen], params: TransformParams) -> Verdict | Non
     count = f"in {len(wrong)} of {plural(len(seen), 'message')}"
     hint = "the translation is in metres, and the angles of quaternion_from_euler in radians"
     why = _why(value, wanted, params)
-    return failed(f"{params.name} is {_text(value)}, not {_text(wanted)}, {count}{why}", hint=hint)
+    message = f"{params.name} is wrong {count}{why}; it is {_text(value)}, not {_text(wanted)}"
+    return failed(message, hint=hint)
 
 
 def _why(value: Transform, wanted: Transform, params: TransformParams) -> str:
@@ -308,10 +309,13 @@ def _wrong_pose(
     if value is None:
         return failed(f"{params.name} is no transform {count}", hint=hint)
     old = [t for t, p in poses if _fits(value, p, params) and t <= first.time_ns]
-    says = f"{params.name} is {_text(value)} while {params.pose_of} says {_text(pose)}, {count}"
+    what, says = (
+        f"{params.name} is wrong {count}",
+        f"it is {_text(value)} while {params.pose_of} says {_text(pose)}",
+    )
     if not old:
-        return failed(f"{says}{_why(value, pose, params)}", hint=hint)
-    verdict = failed(f"{says}: it is that of an older pose", hint=hint)
+        return failed(f"{what}{_why(value, pose, params)}; {says}", hint=hint)
+    verdict = failed(f"{what}: it is that of an older pose; {says}", hint=hint)
     if len(judged) > FEW and len({_text(one.value) for one in judged if one.value}) == 1:
         return verdict
     verdict = verdict.once()

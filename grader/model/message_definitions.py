@@ -79,9 +79,9 @@ def _no_field(text: str, path: str, line: int) -> Fault:
 
 def _other_parts(path: str, number: int, parts: tuple[str, ...]) -> Fault:
     lines = "one line" if len(parts) == 2 else "two lines" if parts[1:] else "no line"
-    message = f"there are {number} lines `---`, and there has to be {lines}"
+    message = f"there must be {lines} `---`, not {number}"
     if parts[1:]:
-        message += f" between {', '.join(parts[:-1])} and {parts[-1]}"
+        message += f", between {', '.join(parts[:-1])} and {parts[-1]}"
     return Fault(file=path, line=None, kind="OtherParts", message=message, cause=message)
 
 

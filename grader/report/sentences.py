@@ -229,14 +229,14 @@ COSTS_NOTHING = "None of this cost any points."
 
 
 def note_place(note: Note) -> str:
-    """`build`, or the scenario's name; with the process or node, where it is known."""
+    """`build`, or the scenario's name; with the process or node, where it is known and has another name."""
     run = "build" if note.scenario == "package" else note.scenario
-    return f"{run}, {note.actor}" if note.actor else run
+    return f"{run}, {note.actor}" if note.actor and note.actor.strip("/") != run else run
 
 
 def note_text(note: Note) -> str:
     """`asked the master to shut down (refused)`."""
-    return f"{note.text} ({'refused' if note.kind == 'refused' else 'limited'})"
+    return f"{note.text} ({'refused' if note.kind == 'refused' else 'over the limit'})"
 
 
 LABEL = re.compile(

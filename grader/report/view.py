@@ -220,6 +220,8 @@ def without_place(text: str, place: str) -> str:
 
 HEADLINE_CHARS = 110
 STOPS = re.compile(r"; |(?<!Error)(?<!Exception)(?<!failed): (?!')")
+PLACE_LAST = re.compile(r"(\bline \d+|:\d+)$")
+"""A place says nothing by itself: what is wrong there belongs to it."""
 LAST_BRACKET = re.compile(r" \((?=[a-z]+ [^()]*\)$)")
 """Where a message may go on with what is less important."""
 
@@ -229,7 +231,11 @@ def headline(text: str, chars: int = HEADLINE_CHARS) -> tuple[str, str]:
     `chars`. A message without one is a headline as a whole."""
     if len(text) <= chars:
         return text, ""
-    stops = [at for at in _outside(text, STOPS) if HEADLINE_LEAST <= at.start() <= chars]
+    stops = [
+        at
+        for at in _outside(text, STOPS)
+        if HEADLINE_LEAST <= at.start() <= chars and not PLACE_LAST.search(text, 0, at.start())
+    ]
     if text.endswith(")"):
         stops += [at for at in _outside(text, LAST_BRACKET) if HEADLINE_LEAST <= at.start() <= chars]
     best = max(stops, key=lambda at: (at[0] == "; ", at.start()), default=None)

@@ -39,7 +39,7 @@ def test_markdown_has_a_section():
         f"<summary>Noticed while it ran (2)</summary>\n\n{COSTS_NOTHING}\n\n- `real, talker.py`: asked the master"
         in text
     )
-    assert "- `build`: had more than 400 processes (limited)" in text
+    assert "- `build`: had more than 400 processes (over the limit)" in text
     assert "Noticed" not in render_markdown(result(), rubric())
 
 
@@ -57,6 +57,6 @@ def test_junit_has_it_as_output_of_the_suite():
     assert suite[-1].text.splitlines() == [
         f"Noticed while it ran. {COSTS_NOTHING}",
         "real, talker.py: asked the master to shut down (refused)",
-        "build: had more than 400 processes (limited)",
+        "build: had more than 400 processes (over the limit)",
     ]
     assert etree.fromstring(render_junit(result())).find("testsuite/system-out") is None

@@ -306,8 +306,8 @@ def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], pa
     slip = next((s for s in written if s.kind == kind and abs(int(s.message) - number) <= apart), None)
     if slip is None or turn.change > 0 or verdict.status is not Status.FAIL:
         return verdict
-    does = f"sets it to {slip.message}" if wrong_value else f"compares it with {slip.message}"
-    message = f"{verdict.message}; {slip.file}, line {slip.line} {does}"
+    does = "" if wrong_value else f" compares it with {slip.message}"
+    message = f"{verdict.message} ({slip.file}, line {slip.line}{does})"
     cited = (FileCitation(file=slip.file, line=slip.line),)
     right = params.minimum if wrong_value else params.maximum
     hint = f"in line {slip.line}, write {right} instead of {slip.message}"
@@ -340,7 +340,7 @@ def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
     if step.after == -(high + 1):
         return f"the counter overflows to {after}, as a signed integer of this size does: {comes}"
     if step.before >= high - 1:
-        return f"the counter resets to {after}, not to {low}: {comes}"
+        return f"after {before} the counter resets to {after}, not to {low}"
     if step.after == low:
         return f"the counter resets too early: {comes}"
     return f"the counter goes back before it has reached {high}: {comes}"
