@@ -9,6 +9,7 @@ other values. The evidence has those that a run was recorded with.
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -53,7 +54,8 @@ _IN_TEXT = re.compile(r"\{made_up: ?([\w-]+)\}")
 
 
 class MadeUp(Record):
-    """A value that is made up for each submission. Give `from` and `to`, `one_of`, `letters`, `sum` or `product`.
+    """A value that is made up for each submission. Give `from` and `to`, `one_of`, `letters`, `sum`, `product`,
+    `quotient` or `mean`.
 
     It stands wherever a scenario, or a criterion's `with`, `hint` or `reproduce`, has `{made_up: NAME}`, in a text too:
     `args: ["_rate:={made_up: rate}"]`.
@@ -73,11 +75,23 @@ class MadeUp(Record):
     """It is the sum of these, numbers and names of values above it: `[a, b]`."""
     product: tuple[str | int | float, ...] = ()
     """It is the product of these: `[rate, 2]`."""
+    quotient: Annotated[tuple[str | int | float, ...], Field(max_length=2)] = ()
+    """It is the first of these two divided by the second: `[1, rate]`."""
+    mean: tuple[str | int | float, ...] = ()
+    """It is the mean of these: `[a, b, c]`."""
 
     @property
     def is_number(self) -> bool:
         """Whether it can be counted with."""
         return self.letters is None and not any(isinstance(value, bool | str) for value in self.one_of)
+
+    @property
+    def may_be_zero(self) -> bool:
+        """Whether it can be 0, as far as that is known: a range and a choice say it, what follows from others may."""
+        if self.from_ is not None:
+            low, step = Decimal(repr(self.from_)), Decimal(repr(self.step))
+            return low <= 0 <= low + (self.count - 1) * step and low % step == 0
+        return 0 in self.one_of if self.one_of else True
 
     @property
     def count(self) -> int:
@@ -93,11 +107,18 @@ class MadeUp(Record):
             return self.one_of[choose(len(self.one_of))]
         if self.from_ is not None:
             return _number(Decimal(repr(self.from_)) + choose(self.count) * Decimal(repr(self.step)))
-        parts = [above[p] if isinstance(p, str) else p for p in self.sum or self.product]
-        total = Decimal(0 if self.sum else 1)
-        for part in (Decimal(repr(part)) for part in parts):
-            total = total + part if self.sum else total * part
-        return _number(total)
+        kind = next(kind for kind in COUNTED if getattr(self, kind))
+        parts = [above[p] if isinstance(p, str) else p for p in getattr(self, kind)]
+        return _number(COUNTED[kind]([Decimal(repr(part)) for part in parts]))
+
+
+COUNTED: Mapping[str, Callable[[list[Decimal]], Decimal]] = {
+    "sum": lambda parts: sum(parts, Decimal(0)),
+    "product": lambda parts: math.prod(parts, start=Decimal(1)),
+    "quotient": lambda parts: parts[0] / parts[1],
+    "mean": lambda parts: sum(parts, Decimal(0)) / len(parts),
+}
+"""What follows from other values, and how."""
 
 
 def _number(exact: Decimal) -> int | float:
@@ -241,11 +262,11 @@ def names_in(part: object) -> set[str]:
 
 
 def operands_of(name: str, declared: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the names of the values that a sum or a product is made of."""
+    """Yield the names of the values that a value follows from."""
     above: dict[str, Any] = {}
     for other, one in declared.items():
         if other == name:
-            parts = [part for key in ("sum", "product") for _, part in as_texts(as_map(one).get(key))]
+            parts = [part for key in COUNTED for _, part in as_texts(as_map(one).get(key))]
             yield from (found for part in parts for found in (part, *operands_of(part, above)))
         above[other] = one
 
@@ -268,7 +289,7 @@ def inputs_with_values(
     return list(dict.fromkeys(found))
 
 
-KINDS = ("from", "one_of", "letters", "sum", "product")
+KINDS = ("from", "one_of", "letters", *COUNTED)
 COUNT_MAX = 10**9
 _PLACE = re.compile(
     r"scenarios\.[^.]*\.(?!title$|recording$|start\[\d+\]\.tests$|steps\[\d+\]\.play\.bag$)"
@@ -369,11 +390,24 @@ def _faults_of(one: dict[str, Any], above: Mapping[str, MadeUp]) -> Iterator[tup
         yield from _range_faults(one)
     if kind == "one_of" and isinstance(one[kind], list) and len({json.dumps(v) for v in one[kind]}) < 2:
         yield (kind,), "needs two different values"
-    for _, name in as_texts(one[kind]) if kind in {"sum", "product"} else ():
+    parts = one[kind] if kind in COUNTED and isinstance(one[kind], list) else []
+    for _, name in as_texts(parts):
         if name not in above:
             yield (kind,), f'no value "{name}" is declared above it{did_you_mean(name, above)}'
         elif not above[name].is_number:
             yield (kind,), f'"{name}" is not a number'
+    if kind == "quotient":
+        yield from (((kind,), fault) for fault in _division_faults(parts, above))
+
+
+def _division_faults(parts: list[Any], above: Mapping[str, MadeUp]) -> Iterator[str]:
+    if len(parts) != 2:
+        yield f"needs two numbers, the one and what it is divided by: {len(parts)} are there"
+    elif isinstance(parts[1], str):
+        if parts[1] in above and above[parts[1]].may_be_zero:
+            yield f'"{parts[1]}" may be 0: divide by a number, or a value with from or one_of that is never 0'
+    elif parts[1] == 0:
+        yield "divides by 0"
 
 
 def _range_faults(one: dict[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:

@@ -62,6 +62,11 @@ def with_rate(folder: Path) -> LoadedRubric:
         ({"letters": 8}, lambda v: len(v) == 8 and v.isalpha() and not set(v) & set("aeiou")),
         ({"sum": ["a", "b", 0.5]}, lambda v: v == 10.5),
         ({"product": ["a", "b", -2]}, lambda v: v == -42 and type(v) is int),
+        ({"quotient": ["b", 2]}, lambda v: v == 3.5),
+        ({"quotient": [1, "a"]}, lambda v: v == pytest.approx(1 / 3)),
+        ({"quotient": ["a", 3]}, lambda v: v == 1 and type(v) is int),
+        ({"mean": ["a", "b"]}, lambda v: v == 5),
+        ({"mean": ["a", "b", 0.5]}, lambda v: v == 3.5),
     ],
 )
 def test_values_of_each_kind(declared: dict[str, Any], fits: Any) -> None:
@@ -114,10 +119,13 @@ def test_values_stand_in_texts_keys_and_words(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("declared", "fault"),
     [
-        ("{}", "made_up.rate: give one of from, one_of, letters, sum and product: none is there"),
+        (
+            "{}",
+            "made_up.rate: give one of from, one_of, letters, sum, product, quotient and mean: none is there",
+        ),
         (
             "{from: 1, to: 3, letters: 4}",
-            "made_up.rate: give one of from, one_of, letters, sum and product: from",
+            "made_up.rate: give one of from, one_of, letters, sum, product, quotient and mean: from",
         ),
         ("{from: 1}", "made_up.rate.to: is missing"),
         ("{from: 9, to: 3}", "made_up.rate.to: there are no two values from 9 to 3 in steps of 1"),
@@ -129,6 +137,11 @@ def test_values_stand_in_texts_keys_and_words(tmp_path: Path) -> None:
         ("{letters: 2}", "made_up.rate.letters: must be at least 3, not 2"),
         ("{one_of: [7, 7]}", "made_up.rate.one_of: needs two different values"),
         ("{sum: [rat, 1]}", 'made_up.rate.sum: no value "rat" is declared above it'),
+        (
+            "{quotient: [1]}",
+            "made_up.rate.quotient: needs two numbers, the one and what it is divided by: 1 are",
+        ),
+        ("{quotient: [1, 0]}", "made_up.rate.quotient: divides by 0"),
         ("{frm: 3}", 'made_up.rate.frm: is not known here (did you mean "from"?)'),
     ],
 )
@@ -136,6 +149,28 @@ def test_faulty_declarations(declared: str, fault: str, tmp_path: Path) -> None:
     found = faults(making_up(tmp_path, f"{{rate: {declared}}}"))
     assert f"lab.yaml:6: {fault}" in "\n".join(found)
     assert all("made_up" in one for one in found), "what has no value yet has no other fault"
+
+
+@pytest.mark.parametrize(
+    ("divisor", "sound"),
+    [
+        ("{from: 1, to: 5}", True),
+        ("{from: -1, to: 1}", False),
+        ("{from: -1, to: 2, step: 3}", True),
+        ("{one_of: [2, 4]}", True),
+        ("{one_of: [0, 4]}", False),
+        ("{sum: [1, 2]}", False),
+    ],
+)
+def test_nothing_is_divided_by_what_may_be_zero(divisor: str, sound: bool, tmp_path: Path) -> None:
+    path = making_up(tmp_path, f"{{by: {divisor}, rate: {{quotient: [1, by]}}}}")
+    if sound:
+        assert load_rubric(str(path)).rubric.made_up["rate"].quotient == (1, "by")
+    else:
+        (fault,) = faults(path)
+        assert fault.startswith(
+            'lab.yaml:6: made_up.rate.quotient: "by" may be 0: divide by a number, or a value'
+        )
 
 
 def test_only_numbers_above_are_counted_with(tmp_path: Path) -> None:
