@@ -5,16 +5,19 @@ An instructor's slip (a process, a topic, a type that is nowhere) would else cos
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import PurePosixPath
 from typing import Any
 
+from pydantic import ValidationError
+
 from grader.checks.registry import Check, Reference
-from grader.checks.support.topics import SYSTEM_TOPICS
+from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
 from grader.ros_packages import TypeKind, ros_packages
-from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
+from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Scenario, Step, Until
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import closest, did_you_mean, join_words
 
@@ -47,6 +50,7 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
             yield from _unknown_expected(("criteria", index), criterion, judged or {})
     yield from _unused(rubric, scenarios, checks)
     yield from _unknown_topics(rubric, scenarios, checks)
+    yield from _too_many(rubric, scenarios, checks)
     yield from _unknown_causes(rubric, scenarios, checks)
     yield from _misspelt_nodes(rubric, scenarios)
     yield from _own_types(rubric)
@@ -62,6 +66,12 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
                 (*path, "start", index, "launch"),
                 f'roslaunch takes the file\'s whole name: "{launch}.launch"',
             )
+        for key in ("script", "load"):
+            file = start.get(key)
+            if isinstance(file, str) and (file.startswith(("/", "~")) or ".." in PurePosixPath(file).parts):
+                name = PurePosixPath(file).name
+                fault = f"is a path in the student's package, from its folder: scripts/{name}, not {file}"
+                yield (*path, "start", index, key), fault
         yield from _of_machine((*path, "start", index, "program"), "program", start.get("program"), rubric)
     for key in ("calls", "serves"):
         for index, one in as_maps(scenario.get(key)):
@@ -171,11 +181,35 @@ def _too_short(one: Reference, check: Check, scenario: dict[str, Any]) -> Iterat
         return
     if not isinstance(one.value, int | float) or len(known) <= len(lasting):
         return
+    steps_s = _steps_s(scenario)
     waits = any(until.get(key) for key in OTHER_CONDITIONS)
-    longest_s = min(max(lasting), limit_s) if lasting and not waits else limit_s
-    if one.value > longest_s:
+    if steps_s is None or not isinstance(limit_s, int | float):
+        return
+    if steps_s and not lasting and not waits:
+        longest_s, key = steps_s, "its steps"
+    else:
+        longest_s = min(max(lasting), limit_s) if lasting and not waits else limit_s
         key = "limit_s" if longest_s == limit_s else "window_s" if "window_s" in until else "alive_s"
+        longest_s, key = longest_s + steps_s, f"its steps and {key}" if steps_s else key
+    if one.value > longest_s:
         yield f"{one.value:g} s is more than the scenario lasts: {key}, {longest_s:g} s"
+
+
+def _steps_s(scenario: dict[str, Any]) -> float | None:
+    """Return how long a scenario's steps last; None where something of theirs has to come first."""
+    total_s = 0.0
+    for _, written in as_maps(scenario.get("steps")):
+        try:
+            step = Step.model_validate_json(json.dumps(written), strict=True)
+        except (ValidationError, TypeError):
+            return None
+        wait = step.wait
+        if step.call or step.action or step.play or (wait is not None and wait.seconds is None):
+            return None
+        if (sent := step.published) is not None and sent.background:
+            return None
+        total_s += step.lasts_s
+    return total_s
 
 
 def _unused(
@@ -202,6 +236,7 @@ def _unknown_topics(
     """
     criteria = [criterion for _, criterion in as_maps(rubric.get("criteria"))]
     named = {topic for criterion in criteria for topic in _topics_in(criterion.get("with"))}
+    named |= {topic for criterion in criteria for topic in READ_TOO.get(str(criterion.get("check")), ())}
     own = any(c.get("check") not in checks or checks[c["check"]].source or "evidence" in checks[c["check"]].facts
               for c in criteria)  # fmt: skip
     for name, scenario in scenarios.items():
@@ -214,6 +249,35 @@ def _unknown_topics(
             if topic.startswith("/") and topic not in known and (near or not open_):
                 meant = f' (did you mean "{near}"?)' if near else ""
                 yield ("scenarios", name, "until", *at), f"no criterion and no probe names {topic}{meant}"
+
+
+def _too_many(
+    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
+) -> Iterator[Fault]:
+    """Yield counts of messages that cannot come before the run's limit, at the rate that a criterion asks for."""
+    rates: dict[str, float] = {}
+    for _, criterion in as_maps(rubric.get("criteria")):
+        given, check = as_map(criterion.get("with")), checks.get(str(criterion.get("check")))
+        topic, rate_hz = given.get("topic"), given.get("rate_hz")
+        if (
+            check
+            and hasattr(check.params, "rate_bounds")
+            and isinstance(rate_hz, int | float)
+            and rate_hz > 0
+        ):
+            rates[str(topic)] = float(rate_hz)
+    for name, scenario in scenarios.items():
+        until = as_map(scenario.get("until"))
+        limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
+        warp = scenario.get("warp", Scenario.model_fields["warp"].default)
+        warp = warp if scenario.get("clock") == "warped" else 1
+        for topic, count in as_map(until.get("messages")).items():
+            if not all(isinstance(n, int | float) for n in (limit_s, warp, count)) or topic not in rates:
+                continue
+            takes_s = count / rates[topic] / warp
+            if takes_s > limit_s:
+                fault = f"{count} messages at {rates[topic]:g} Hz take {takes_s:.3g} s, and limit_s is {limit_s:g} s"
+                yield ("scenarios", name, "until", "messages", topic), fault
 
 
 def _unknown_causes(

@@ -58,7 +58,7 @@ SOUND = (
     ("logs", "{text: a}", "launch"),
 )
 
-FOLLOWED = {"window_s: 5", "launch: lab1.launch}\n"}
+FOLLOWED = {"window_s: 5", "launch: lab1.launch}\n", "until: {window_s: 5, topics: [/chatter]}"}
 """Slips that two criteria notice, or the scenario and a criterion."""
 
 
@@ -156,6 +156,24 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
             id="min_window_s-by-default",
         ),
         pytest.param(
+            "until: {window_s: 5, topics: [/chatter]}",
+            "steps: [{wait: {seconds: 4.95}}]",
+            "31: criteria[1].with.min_window_s: 5 s is more than the scenario lasts: its steps, 4.95 s",
+            id="min_window_s-of-steps",
+        ),
+        pytest.param(
+            "until: {window_s: 5, topics: [/chatter]}",
+            "until: {topics: [/chatter], window_s: 3}\n    steps: [{wait: {seconds: 4}}]",
+            "",
+            id="steps-and-window",
+        ),
+        pytest.param(
+            "until: {window_s: 5, topics: [/chatter]}",
+            "steps: [{wait: {node: /talker}}, {wait: {seconds: 1}}]",
+            "",
+            id="steps-that-wait",
+        ),
+        pytest.param(
             "{heard: true}",
             "{heard: true, limit_s: 0.5}",
             "",
@@ -172,6 +190,25 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
             "topics: [/chatter, /cheater]",
             '11: scenarios.real.until.topics[1]: no criterion and no probe names /cheater (did you mean "/chatter"?)',
             id="until-topics",
+        ),
+        pytest.param(
+            "script: src/listener.py",
+            "script: /home/me/src/listener.py",
+            "17: scenarios.listener.start[0].script: is a path in the student's package, from its folder: "
+            "scripts/listener.py, not /home/me/src/listener.py",
+            id="absolute-script",
+        ),
+        pytest.param(
+            "window_s: 5, topics: [/chatter]",
+            "messages: {/chatter: 700}",
+            "11: scenarios.real.until.messages./chatter: 700 messages at 10 Hz take 70 s, and limit_s is 60 s",
+            id="count-that-never-comes",
+        ),
+        pytest.param(
+            "topics: [/chatter]",
+            "topics: [/chatter, /tf]",
+            "11: scenarios.real.until.topics[1]: no criterion and no probe names /tf",
+            id="until-tf-that-nobody-judges",
         ),
         pytest.param(
             "window_s: 5, topics: [/chatter]",
