@@ -139,6 +139,17 @@ class Need(NamedTuple):
     install: str
 
 
+FIND_MODULE = """
+import importlib.metadata, importlib.util, sys
+try:
+    importlib.metadata.version(sys.argv[1])
+except importlib.metadata.PackageNotFoundError:
+    if importlib.util.find_spec(sys.argv[1].replace("-", "_")) is None:
+        sys.exit()
+print("here")
+"""
+
+
 @lru_cache(maxsize=16)
 def look_for(ros: tuple[str, ...], apt: tuple[str, ...], pip: tuple[str, ...]) -> tuple[Need, ...]:
     """Return which of these packages are here. What this machine has no way to tell (no dpkg) counts as here."""
@@ -159,9 +170,8 @@ def _is_installed(package: str) -> bool:
 
 
 def _has_module(python: str, name: str) -> bool:
-    """Return whether ROS's Python has a distribution of that name, where every user has it."""
-    script = "import importlib.metadata, sys; importlib.metadata.version(sys.argv[1]); print('here')"
-    return not python or _prints([python, "-I", "-c", script, name]) == "here"
+    """Return whether ROS's Python has a distribution or a module of that name, where every user has it."""
+    return not python or _prints([python, "-I", "-c", FIND_MODULE, name]) == "here"
 
 
 def _prints(command: list[str]) -> str:

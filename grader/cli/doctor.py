@@ -70,11 +70,11 @@ def diagnose() -> tuple[Row, ...]:
 
 def diagnose_rubric(loaded: LoadedRubric) -> tuple[Row, ...]:
     """Return a row for each ROS package that the rubric's programs and types come from, and for what it `needs`."""
-    packages, own = ros_packages(), loaded.rubric.packages
+    packages, own, needs = ros_packages(), loaded.rubric.packages, loaded.rubric.needs
     needed = _needed(loaded)
     rows = [_package(name, needed[name], packages) for name in sorted(needed) if name not in own]
     brought = [Row(name=n, state="ok", detail="beside the rubric; built when the lab is graded") for n in own]
-    return (*rows, *brought, *map(_need, look_for(**loaded.rubric.needs.model_dump())))
+    return (*rows, *brought, *map(_need, look_for(ros=(), apt=needs.apt, pip=needs.pip)))
 
 
 def _need(need: Need) -> Row:
@@ -84,12 +84,15 @@ def _need(need: Need) -> Row:
 
 
 def _needed(loaded: LoadedRubric) -> dict[str, list[str]]:
-    """Return by package what the rubric asks of it, the student's own left out."""
+    """Return by package what the rubric asks of it, nothing where it only needs it; the student's own left out."""
     rubric = loaded.rubric
     names = [start.program for s in rubric.scenarios.values() for start in s.start if start.program]
     names += [probe.type for s in rubric.scenarios.values() for probe in s.probes]
     names += [call.type for s in rubric.scenarios.values() for call in s.calls]
-    names += [served.type for s in rubric.scenarios.values() for served in s.serves if served.service]
+    names += [served.type for s in rubric.scenarios.values() for served in s.serves]
+    steps = [step for s in rubric.scenarios.values() for step in s.steps]
+    names += [sent.type for step in steps if (sent := step.published) is not None]
+    names += [asked.type for step in steps if (asked := step.call or step.action) is not None]
     names += [
         str(one.value)
         for criterion in rubric.criteria
@@ -101,11 +104,14 @@ def _needed(loaded: LoadedRubric) -> dict[str, list[str]]:
     for package, _, name in (one.partition("/") for one in dict.fromkeys(names)):
         if package not in rubric.package_names:
             found.setdefault(package, []).append(name)
+    for package in rubric.needs.ros:
+        found.setdefault(package, [])
     return found
 
 
 def _package(name: str, asked: Sequence[str], packages: RosPackages) -> Row:
-    folder, wanted = packages.folders.get(name), f"for {join_words(asked)}"
+    folder = packages.folders.get(name)
+    wanted = f"for {join_words(asked)}" if asked else "which the rubric needs"
     if folder is None:
         return Row(
             name=name,

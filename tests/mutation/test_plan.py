@@ -152,14 +152,20 @@ def test_every_kind_of_edit():
         ),
         (
             {"replace": {"file": "src/x.py", "old": "rospy", "new": ""}},
-            "replace: there is no file 'src/x.py'",
+            "replace: there is no file 'src/x.py' (did you mean \"src/b.py\"?)",
         ),
         (
             {"replace": {"file": "lab/src/a.py", "old": "rospy", "new": ""}},
             "replace: there is no file 'lab/src/a.py' (did you mean \"src/a.py\"?)",
         ),
-        ({"move": {"old": "lab/", "new": ""}}, "move: there is no file 'lab/'"),
-        ({"delete": {"file": "lab"}}, "delete: there is no file 'lab'"),
+        (
+            {"move": {"old": "lab/", "new": ""}},
+            "move: there is no file 'lab/'; the solution has src/a.py, src/b.py",
+        ),
+        (
+            {"delete": {"file": "manifest"}},
+            "delete: there is no file 'manifest'; the solution has src/a.py, src/b.py",
+        ),
     ],
 )
 def test_an_edit_that_does_not_fit(edit, fault):

@@ -41,8 +41,9 @@ from grader.rubric.load import LoadedRubric, refuse_newer
 from grader.rubric.model import Rubric
 from grader.rubric.yaml_lines import Fault, KeyPath, Source, as_map, as_maps, read_source
 from grader.untrusted_text import visible
-from grader.wording import did_you_mean
+from grader.wording import did_you_mean, first_few
 
+FILES_SHOWN = 8
 HEADER = """\
 # Faulty packages for {rubric}: the reference solution with edits, and the criteria that each package must not reach.
 # Written by a test: keep those that say something, and correct what a package should cost.
@@ -269,7 +270,8 @@ def build_tree(solution: Solution, mutant: Mutant) -> Tree:
         except KeyError as error:
             name = str(error.args[0])
             there = [path for path in solution.tree if PurePosixPath(path).name == PurePosixPath(name).name]
-            meant = f' (did you mean "{there[0]}"?)' if len(there) == 1 else ""
+            meant = f' (did you mean "{there[0]}"?)' if len(there) == 1 else did_you_mean(name, solution.tree)
+            meant = meant or f"; the solution has {first_few(sorted(solution.tree), FILES_SHOWN)}"
             raise DoesNotFitError(f"{kind}: there is no file {name!r}{meant}") from error
         solution = solution.then(tree)
     return solution.tree
