@@ -81,6 +81,7 @@ OWN_VARIABLES = (
 )
 """The arena's to set: what a package's environment hooks say of them would lead its nodes elsewhere."""
 SERVICE_TYPES_MAX = 500
+SOURCE_ENDINGS = frozenset({"", ".py", ".cpp", ".cc", ".cxx", ".h", ".hpp"})
 SOURCES_MAX, SOURCE_BYTES_MAX = 200, 256 << 10
 
 
@@ -211,9 +212,10 @@ class ProcessEnvironment:
         return tuple(dict.fromkeys(found))
 
     def has_line(self, pattern: re.Pattern[bytes]) -> bool:
-        """Return whether a Python file of the lab's packages has it."""
+        """Return whether a script or a source file of the lab's packages has it."""
         packages = (self.workspace, *self.workspace.others.values())
-        paths = (path for one in packages for path in (one.repaired / one.folder).rglob("*.py"))
+        found = (path for one in packages for path in (one.repaired / one.folder).rglob("*"))
+        paths = (path for path in found if path.suffix in SOURCE_ENDINGS)
         files = [path for path in islice(paths, SOURCES_MAX) if path.is_file()]
         return any(pattern.search(read_untrusted(path, SOURCE_BYTES_MAX) or b"") for path in files)
 

@@ -14,6 +14,7 @@ from grader.rubric.scenario import Until
 
 Outcome = tuple[str, str]
 ARRIVALS_MAX = 2000
+FIRST_MESSAGE_S = Until.model_fields["first_message_s"].default
 HEARD_S, HEARD_LOST_S_MAX = 2.0, 6.0
 CONNECTED_S = 1.0
 """So long after the last probe and the last line, a value that is not printed will not be."""
@@ -25,6 +26,14 @@ HEARD_AT_MOST_S = 8.0
 SPINNING_S, TALKING_S, LOOPING_S = 1.5, 2.5, 4.0
 """So long after the last change, nothing more is registered by programs that only wait for callbacks, by those that
 publish already, and by others that loop."""
+COMPUTING_S, IN_VAIN_S = 0.5, 1.0
+LATE_MOST = 0.25
+"""A program at rest gets the processor when it wants it: that others fill the machine makes the wait longer by this
+share of it at most."""
+STREAM, GAPS = 3, 5.0
+"""A topic with so many messages is one that goes on, and has stopped when it is silent for so many of its gaps."""
+SLOW_START = 1.2
+"""A program that loops and has not published yet is given so many times as long as a right one is watched."""
 
 
 @dataclass
@@ -40,27 +49,34 @@ class TopicSeen:
 
 @dataclass
 class Rest:
-    """A process whose programs have all come to rest (`grader/arena/ros/process_tree.py`); times as in `RunState`."""
+    """A process whose programs have all come to rest, and how (`KINDS` in `grader/arena/ros/process_tree.py`); times
+    as in `RunState`."""
 
     since_s: float
     lost_before_s: float
     programs: int
-    spins: bool
+    kind: str
 
 
 @dataclass
 class RunState:
     """The state that conditions look at. `running` and `ended` are the student's processes, `helpers` the grader's own
     programs that run beside them, `registered` the processes of which a node has registered, `here` the nodes that
-    are registered now, `published` their topics, `talking` when each first sent a message, `owners` the processes of
-    all nodes so far. `lost_s` is what others took of the run's time while they filled the machine: so much longer a
-    node is waited for. Of that, `lost_before_s` was gone at `started_s`, `lost_before_last_s` at `last_start_s`.
-    `waited_s`: how long steps had waited by `started_s` for what never came. `least_s` is how long nodes are
-    watched, even where nothing more is to come. `naps`: the package's programs sleep for times of
-    their own, which may look like `spin()` from outside."""
+    are registered now, `published` their topics, `listened` those that they subscribe to, `talking` when each first
+    sent a message, `owners` the processes of all nodes so far. `lost_s` is what others took of the run's time while
+    they filled the machine: so much longer a node is waited for. Of that, `lost_before_s` was gone at `started_s`,
+    `lost_before_last_s` at `last_start_s`.
+    `serves` are the services and actions that the grader offers, `sought` the services that nodes looked for,
+    `refused` topics of the grader's to which a node wanted to subscribe with another type. Until `answers_s`, the
+    grader works on what they asked for.
+    `sent_s`: when the grader last sent a message, `last_sent_s` one that is to be printed. `waited_s`: how long steps
+    had waited by `started_s` for what never came. `least_s` is how long nodes are watched, even where nothing more is
+    to come. `naps`: the package's programs sleep for times of their own or have timers, which may look like `spin()`
+    from outside. `endless`: one of them has a loop that does nothing and never ends."""
 
     least_s: float = 0.0
     naps: bool = False
+    endless: bool = False
     started_s: float = 0.0
     topics: dict[str, TopicSeen] = field(default_factory=lambda: defaultdict(TopicSeen))
     running: set[str] = field(default_factory=set)
@@ -76,6 +92,11 @@ class RunState:
     first_node_s: float = 0.0
     services: set[str] = field(default_factory=set)
     published: set[str] = field(default_factory=set)
+    listened: set[str] = field(default_factory=set)
+    serves: frozenset[str] = frozenset()
+    sought: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+    refused: set[str] = field(default_factory=set)
+    answers_s: float = 0.0
     talking: dict[str, float] = field(default_factory=dict)
     at_rest: dict[str, Rest] = field(default_factory=dict)
     opened: set[str] = field(default_factory=set)
@@ -84,6 +105,7 @@ class RunState:
     subscribers: dict[str, set[str]] = field(default_factory=dict)
     connected_s: dict[str, float] = field(default_factory=dict)
     unheard: dict[str, re.Pattern[str]] = field(default_factory=dict)
+    sent_s: float = 0.0
     last_sent_s: float = 0.0
     last_heard_s: float = 0.0
     graph_changed_s: float = 0.0
@@ -156,13 +178,13 @@ class RunState:
         self.nodes |= own
 
     def note_rest(self, process: str, rest: str | None, programs: int, now_s: float) -> None:
-        """Take note that a process with so many programs has come to rest (`spins` or `loops`), or moves again
-        (None)."""
+        """Take note that a process with so many programs has come to rest, of one kind or another, or moves again
+        (None). One that computes is at rest where it can have nothing else to do."""
         known = self.at_rest.pop(process, None)
-        if rest is not None:
+        if rest is not None and (rest != "computes" or self.endless):
             same = known is not None and known.programs == programs
             since_s, lost_s = (known.since_s, known.lost_before_s) if known and same else (now_s, self.lost_s)
-            self.at_rest[process] = Rest(since_s, lost_s, programs, rest == "spins")
+            self.at_rest[process] = Rest(since_s, lost_s, programs, rest)
 
     @property
     def subscribed(self) -> AbstractSet[str]:
@@ -219,27 +241,100 @@ def is_settled(live: RunState, now_s: float) -> bool:
     Every process is there with as many nodes as it has programs, all of these have come to rest, and nothing in the
     graph has changed for a while.
     """
+    since_s = _at_rest_since(live, now_s)
+    return since_s is not None and now_s > since_s + _longer(live, _patience_s(live))
+
+
+def computes(live: RunState) -> bool:
+    """Return whether each of the student's processes works on and on, and changes nothing."""
+    return bool(live.running) and all(_computes(live, process) for process in live.running)
+
+
+def is_silent(live: RunState, topics: tuple[str, ...], until: Until, now_s: float) -> bool:
+    """Return whether no message is to come on these topics any more: no node has them, or those that have them do
+    nothing but wait for callbacks, loop without publishing on them, or have stopped."""
+    if not is_settled(live, now_s):
+        return False
+    seen = [live.topics[topic] for topic in topics if topic in live.topics]
+    count = sum(one.count for one in seen)
+    if not count and live.published.isdisjoint(topics):
+        return True
+    last_s = max([live.sent_s, live.last_line_s, *(one.last_s for one in seen)])
+    if until.first_message_s > FIRST_MESSAGE_S or _is_fed(live, now_s):
+        return False  # the rubric knows that it takes long, or a node may work on what it hears
+    patience_s = _patience_s(live)
+    if live.naps or any(live.at_rest[process].kind == "loops" for process in live.running):
+        patience_s = max(until.silent_s, 0.0 if count else SLOW_START * live.least_s)
+        if count >= STREAM:
+            gap_s = (last_s - min(one.first_s for one in seen if one.count)) / (count - 1)
+            patience_s = min(patience_s, max(TALKING_S, GAPS * gap_s))
+    return now_s > max(_at_rest_since(live, now_s) or 0.0, last_s) + _longer(live, patience_s)
+
+
+def _is_fed(live: RunState, now_s: float) -> bool:
+    """Return whether messages come to the student's nodes, or are to come of a simulator that has not begun yet."""
+    if live.helper_nodes and not live.helper_nodes & live.talking.keys():
+        return True
+    last_s = max((live.topics[topic].last_s for topic in live.listened & live.topics.keys()), default=0.0)
+    return last_s > 0 and now_s < last_s + SPINNING_S
+
+
+def _at_rest_since(live: RunState, now_s: float) -> float | None:
+    """Return since when all programs have been nodes at rest and nothing has changed; None where that is not so."""
     rests = [live.at_rest.get(process) for process in live.running]
     if not rests or not live.helpers <= live.registered:
-        return False
+        return None
     owners = [live.owners.get(node) for node in live.here]
     for process, rest in zip(live.running, rests, strict=True):
-        if rest is None or owners.count(process) < rest.programs:
-            return False
+        if rest is None or (owners.count(process) < rest.programs and not _computes(live, process)):
+            return None
     first_s = max([live.first_node_s, *(live.talking[node] for node in live.nodes & live.talking.keys())])
     if now_s < first_s + live.least_s:
-        return False
+        return None
     found = [rest for rest in rests if rest is not None]
-    since_s = max(live.graph_changed_s, live.last_start_s, live.last_sent_s, *(r.since_s for r in found))
-    lost_s = live.lost_s - min(rest.lost_before_s for rest in found)
-    talking = {live.owners.get(node) for node in live.talking}
-    if not talking:
+    since_s = max(live.graph_changed_s, live.last_start_s, live.last_sent_s, live.answers_s)
+    since_s = max(since_s, *(rest.since_s for rest in found))
+    if not live.talking:
         since_s = max(since_s, live.last_line_s)  # who counts down aloud has something to come
-    patience_s = max(
-        SPINNING_S if rest.spins and not live.naps else TALKING_S if process in talking else LOOPING_S
-        for process, rest in zip(live.running, found, strict=True)
-    )
-    return now_s > since_s + patience_s + lost_s
+    return since_s
+
+
+def _computes(live: RunState, process: str) -> bool:
+    """Return whether a process works on and on, and changes nothing."""
+    rest = live.at_rest.get(process)
+    return rest is not None and rest.kind in {"computes", "stuck"}
+
+
+def _waits_in_vain(live: RunState, process: str) -> bool:
+    """Return whether a process looks for a service or an action, and for none of those that the grader offers."""
+    nodes = {node for node in live.here if live.owners.get(node) == process}
+    asked = {service for node in nodes & live.sought.keys() for service in live.sought[node]}
+    goals = {t.removesuffix("/goal") for t in live.published if t.endswith("/goal")}
+    goals = {action for action in goals if f"{action}/cancel" in live.published}
+    known = live.serves | live.services
+    return bool(live.serves) and bool(asked | goals) and known.isdisjoint(asked | goals)
+
+
+def _patience_s(live: RunState) -> float:
+    """Return how long after the last change the programs, which are at rest, may yet register something."""
+    talking = {live.owners.get(node) for node in live.talking}
+    patience = {
+        "spins": LOOPING_S if live.naps else SPINNING_S,
+        "computes": COMPUTING_S,
+        "stuck": COMPUTING_S,
+    }
+    found = []
+    for process in live.running:
+        own_s = patience.get(live.at_rest[process].kind, LOOPING_S)
+        own_s = IN_VAIN_S if _waits_in_vain(live, process) else own_s
+        found.append(min(TALKING_S if process in talking else LOOPING_S, own_s))
+    return max(found)
+
+
+def _longer(live: RunState, patience_s: float) -> float:
+    """Return a patience that heeds what others have taken of the machine since all programs came to rest."""
+    lost_s = live.lost_s - min(live.at_rest[process].lost_before_s for process in live.running)
+    return patience_s + min(lost_s, LATE_MOST * patience_s)
 
 
 def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
@@ -247,7 +342,7 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
 
     `silent`: what was waited for stopped coming, or never came though the nodes were up.
     """
-    until = _patient(live, until)
+    given, until = until, _patient(live, until)
     starting = _is_starting(live, until, now_s)
     enough = (not starting, *_enough(live, until, now_s))
     if live.ended and not live.running:
@@ -257,7 +352,7 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
             return "complete", ""
     elif now_s - live.started_s > until.limit_s:
         return "complete", f"watched for {until.limit_s:g} s"
-    silent = "" if starting else _silent(live, until, now_s) or _never(live, until, now_s)
+    silent = "" if starting else _silent(live, until, now_s) or _never(live, until, given, now_s)
     silent = silent or _in_namespaces(live, until, now_s)
     if silent:
         return "silent", silent
@@ -394,7 +489,7 @@ def _quiet(live: RunState, until: Until, now_s: float) -> bool:
 
 
 def _heard(live: RunState, until: Until, now_s: float) -> bool:
-    if not until.heard or not live.unheard:
+    if not until.heard or not live.unheard or is_settled(live, now_s):
         return True
     lost_s = min(live.lost_s, HEARD_LOST_S_MAX)
     news_s = max(live.last_sent_s, live.last_heard_s)
@@ -403,7 +498,8 @@ def _heard(live: RunState, until: Until, now_s: float) -> bool:
 
 def _is_starting(live: RunState, until: Until, now_s: float) -> bool:
     """Return whether a process may yet become a node: on a busy machine, its imports alone can take many seconds."""
-    return bool(live.running - live.registered) and now_s <= _starts_until_s(live, until)
+    waited_for = {p for p in live.running - live.registered if not _computes(live, p)}
+    return bool(waited_for) and now_s <= _starts_until_s(live, until)
 
 
 def _starts_until_s(live: RunState, until: Until) -> float:
@@ -430,12 +526,14 @@ def _silent(live: RunState, until: Until, now_s: float) -> str:
     return _standstill(live, until, now_s)
 
 
-def _never(live: RunState, until: Until, now_s: float) -> str:
-    """Return what is waited for and cannot come, since no node is there for it and all the rest has been seen;
-    else ""."""
+def _never(live: RunState, until: Until, given: Until, now_s: float) -> str:
+    """Return what is waited for and cannot come, and all the rest has been seen; else "". `given` is `until` as the
+    rubric has it."""
     if not is_settled(live, now_s):
         return ""
-    absent = {t for t in (*until.topics, *until.messages) if not live.topics[t].count} - live.published
+    waited = [t for t in until.topics if not live.topics[t].count]
+    waited += [t for t, wanted in until.messages.items() if live.topics[t].count < wanted]
+    absent = {topic for topic in waited if is_silent(live, (topic,), given, now_s)}
     absent |= {topic for topic in until.connected if topic not in live.connected_s}
     topics = tuple(topic for topic in until.topics if topic not in absent)
     possible = {
@@ -444,11 +542,21 @@ def _never(live: RunState, until: Until, now_s: float) -> str:
         "messages": {topic: count for topic, count in until.messages.items() if topic not in absent},
         "connected": tuple(topic for topic in until.connected if topic not in absent),
         "nodes": min(until.nodes, len(live.nodes)),
+        "ended": tuple(process for process in until.ended if not _goes_on(live, process, now_s)),
     }
     if all(_enough(live, until.model_copy(update=possible), now_s)):
         missing = min(absent, default="")
         return f"the graph has settled, without {missing}" if missing else "the graph has settled"
     return ""
+
+
+def _goes_on(live: RunState, process: str, now_s: float) -> bool:
+    """Return whether a process that is at rest will not end by itself: it only waits for callbacks, or works or waits
+    without end."""
+    rest = live.at_rest.get(process)
+    spins = rest is not None and rest.kind == "spins" and not live.naps
+    endless = (spins or _computes(live, process)) and not _is_fed(live, now_s)
+    return endless or _waits_in_vain(live, process)
 
 
 def _in_namespaces(live: RunState, until: Until, now_s: float) -> str:

@@ -26,8 +26,10 @@ from grader.model.message_rate import RateBounds
 from grader.rubric.course_packages import LAUNCH_ENDINGS
 from grader.rubric.scenario import Param, Scenario, Start
 
-NAPS = re.compile(rb"\bsleep\(\s*[^)\s]")
-"""A sleep of so many seconds: `rospy.sleep(0.5)`, and not `rate.sleep()`."""
+NAPS = re.compile(rb"\bsleep\(\s*[^)\s]|Timer\(")
+"""A sleep of so many seconds, `rospy.sleep(0.5)` and not `rate.sleep()`, or a timer."""
+IDLE = re.compile(rb"^[ \t]*while\b[^\n]*:\s*(?:#[^\n]*\n\s*)*(?:pass|continue)\b", re.MULTILINE)
+"""A loop that does nothing: `while True: pass`."""
 CLOCK_STEP_S = 0.05
 UNFOLLOWED_S = 2.0
 UNFOLLOWED_HZ = 15.0
@@ -96,7 +98,8 @@ async def run_scenario(
             return RunCost(cpu_s=0, student_cpu_s=0)
         try:
             session.live.watch_rates(rates)
-            session.live.naps = place.has_line(NAPS)
+            session.live.serves = frozenset(one.service or one.action or "" for one in scenario.serves)
+            session.live.naps, session.live.endless = place.has_line(NAPS), place.has_line(IDLE)
             session.live.least_s = max(watched_s + WATCHED_MORE_S, expected_s(scenario) - STARTING_S)
             async with admission.start() as leave, session as arena:
                 arena.course(ScenarioEvent(event="begin"))

@@ -10,6 +10,8 @@ own node, one goal after the other.
 from __future__ import annotations
 
 import base64
+import math
+import time
 from typing import TYPE_CHECKING, Any
 
 from grader.arena.session import ArenaSession
@@ -75,7 +77,8 @@ class ServedServices:
         self._arena.note(ActorEvent(action="note", actor="grader", **about, detail=f"{MISFIT}{error}"))
 
     def _note_request(self, time_ns: int, fields: dict[str, Any]) -> None:
-        one = self._served[fields["service"]]
+        one, live = self._served[fields["service"]], self._arena.live
+        live.answers_s = max(live.answers_s, time.monotonic() + one.delay_s)
         request = self._types[one.name].request.decode(base64.b64decode(fields["data"]))
         response = None if one.fails else one.in_turn[fields["answer"]]
         detail = f"the request is no {one.type}" if request is None else FAILS if one.fails else ""
@@ -162,7 +165,9 @@ class ServedAction:
                 return
             goal = self._types["goal"].decode(self._goals.popleft())
             if goal is not None:
+                self._arena.live.answers_s = math.inf
                 await self._pursue(goal["goal_id"], goal["goal"])
+                self._arena.live.answers_s = time.monotonic()
 
     async def _pursue(self, goal_id: dict[str, Any], goal: dict[str, Any]) -> None:
         """Report on the goal, end it, and note it."""

@@ -21,9 +21,9 @@ from grader.arena.control_groups import remove_groups
 from grader.arena.left_files import LeftFiles
 from grader.arena.process_environment import LOOPBACK, ProcessEnvironment, search_path
 from grader.arena.ros.wire import Frame, FrameReader
-from grader.arena.run_state import RunState
+from grader.arena.run_state import RunState, computes
 from grader.errors import ArenaError
-from grader.evidence.events import TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
+from grader.evidence.events import OTHER_TYPE, TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
 from grader.evidence.run import is_grader_node
 from grader.evidence.writer import EvidenceChannel, EvidenceWriter
 from grader.ros_env import RosInstallation
@@ -36,6 +36,8 @@ NS = 1_000_000_000
 READY_S = 15.0
 END_S = 5.0
 GROUPS_S, LOOK_S = 2.0, 0.02
+STUCK_S = 1.0
+"""So long a call is waited for at least, though the programs only compute."""
 PORT = 11311
 STOPPED = "stopped by the grader"
 """Begins the details of limits for which a process is ended (`ros/processes.py`)."""
@@ -167,8 +169,15 @@ class ArenaSession:
         self._calls += 1
         number = self._calls
         self.send(do="call", id=number, timeout_s=timeout_s, **command)
-        if not await self.wait(lambda: number in self._answers, timeout_s + END_S):
-            return {"error": f"no answer within {timeout_s:g} s"}
+        begun_s = time.monotonic()
+
+        def is_over() -> bool:
+            stuck = time.monotonic() > begun_s + STUCK_S and computes(self.live)
+            return number in self._answers or stuck
+
+        if not await self.wait(is_over, timeout_s + END_S) or number not in self._answers:
+            after_s = min(timeout_s, time.monotonic() - begun_s)
+            return {"error": f"no answer within {after_s:.3g} s"}
         return self._answers.pop(number)
 
     async def wait(self, condition: Callable[[], bool], timeout_s: float) -> bool:
@@ -269,6 +278,7 @@ class ArenaSession:
             self.live.note_graph(nodes, record["processes"], time.monotonic(), picture=picture)
             self.live.services = set(record["services"])
             self.live.published = {t for t, by in record["publishers"].items() if set(by) & set(nodes)}
+            self.live.listened = {t for t, by in record["subscribers"].items() if set(by) & set(nodes)}
         elif topic == "/grader/console":
             self._print(**record)
         elif topic == "/grader/process" and record["event"] == "exit":
@@ -278,10 +288,19 @@ class ArenaSession:
             self.live.note_machine(record["busy"], record["own_busy"], time.monotonic())
         elif topic == "/grader/param" and not is_grader_node(record["caller_id"]):
             self.live.note_activity(time.monotonic())
-        elif topic == "/grader/actor" and record["action"] == "limit":
+        elif topic == "/grader/actor":
+            self._acted(record)
+
+    def _acted(self, record: dict[str, Any]) -> None:
+        """Take note of what the arena says that a process or a node did, or was refused."""
+        if record["action"] == "limit":
             if record["detail"].startswith(STOPPED):
                 self._killed.limited(record["actor"])
-        elif topic == "/grader/actor" and record["action"] == "open":
+        elif record["action"] == "lookup":
+            self.live.sought[record["actor"]].add(record["topic"])
+        elif record["action"] == "note" and record.get("detail") == OTHER_TYPE:
+            self.live.refused.add(record["topic"])
+        elif record["action"] == "open":
             self.live.opened.add(record["actor"])
             self.live.note_activity(time.monotonic())
 

@@ -10,6 +10,7 @@ import asyncio
 import base64
 import time
 from collections.abc import Callable, Coroutine
+from collections.abc import Set as AbstractSet
 from contextlib import suppress
 from dataclasses import replace
 from itertools import count
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from typing_extensions import Self
 
 from grader.arena.function_calls import call_functions
-from grader.arena.run_state import is_settled
+from grader.arena.run_state import is_settled, is_silent
 from grader.arena.scenario_inputs import make_shots
 from grader.arena.served import ServedAction, ServedServices
 from grader.arena.session import NS, ArenaSession
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 Tell = Callable[[str], None]
 ANSWER_S = 10.0
 SUBSCRIBE_S = 6.0
+REFUSED_S = 1.0
+"""So long a node that asks for a topic of the grader's by another type may yet do something else."""
 CTRL_C_S = 5.0
 LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
 TERM_S = 2.0
@@ -200,6 +203,7 @@ class StepRunner:
         """Send one message, and note it as `deed`. Raises ValueError where the value does not fit."""
         from grader.evidence.message_values import Moment  # noqa: PLC0415 - as above
 
+        self._live.sent_s = time.monotonic()
         type_, moment = self._types[topic], Moment(index, total, self._arena.ros_now_ns())
         data, shown = type_.encode(value, moment), type_.shown(value, moment)
         if isinstance(shown, str | int) and not isinstance(shown, bool):
@@ -213,7 +217,7 @@ class StepRunner:
         live, topics = self._live, {probe.topic for probe in self._scenario.probes}
         self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
         patience_s = self._scenario.until.first_message_s
-        await self._come(lambda: bool(live.subscribed & topics), patience_s)
+        await self._come(lambda: bool(live.subscribed & topics), patience_s, topics=topics)
         patience_s = SUBSCRIBE_S if live.subscribed & topics else 0.0
         await self._arena.wait(lambda: topics <= live.subscribed or not live.running, patience_s)
         self._tell("sending it messages")
@@ -269,7 +273,7 @@ class StepRunner:
             self._tell(f"waiting for a subscriber on {topic}")
             settled = live.subscribed & self._types.keys() and live.running <= live.registered
             patience_s = SUBSCRIBE_S if settled else self._scenario.until.first_message_s
-            await self._come(lambda: topic in live.subscribed, patience_s)
+            await self._come(lambda: topic in live.subscribed, patience_s, topics={topic})
         if topic in live.subscribed:
             self._deaf.discard(topic)
             return True
@@ -278,12 +282,21 @@ class StepRunner:
         return False
 
     async def _come(
-        self, has_come: Callable[[], bool], patience_s: float, is_over: Callable[[], bool] | None = None
+        self,
+        has_come: Callable[[], bool],
+        patience_s: float,
+        is_over: Callable[[], bool] | None = None,
+        topics: AbstractSet[str] = frozenset(),
     ) -> None:
-        """Wait for what a node registers, for as long as one may still do so."""
+        """Wait for what a node registers, for as long as one may still do so. A node that wants one of these topics by
+        another type tries again and again."""
         live, is_over = self._live, is_over or (lambda: not self._live.running)
+
+        def is_refused() -> bool:
+            return live.refused >= topics > set() and time.monotonic() > live.graph_changed_s + REFUSED_S
+
         await self._arena.wait(
-            lambda: has_come() or is_over() or is_settled(live, time.monotonic()), patience_s
+            lambda: has_come() or is_over() or is_refused() or is_settled(live, time.monotonic()), patience_s
         )
 
     async def _begin(
@@ -339,6 +352,7 @@ class StepRunner:
             await self._until(begun_ns + round((time_ns - messages[0][0]) / play.speed))
             if not self._live.running:
                 return
+            self._live.sent_s = time.monotonic()
             self._arena.send(do="publish", topic=topic, data=base64.b64encode(data).decode(), record=None)
 
     # --- Waiting -----------------------------------------------------------------------------------------------------
@@ -359,14 +373,18 @@ class StepRunner:
         name = wait.topic or wait.node or ""
         self._tell(f"waiting for {name}")
         limit_s = wait.limit_s or (min(SUBSCRIBE_S, patience_s) if name in self._in_vain else patience_s)
+        if self._deaf and self._deaf <= live.refused and not live.topics[name].count:
+            limit_s = min(
+                limit_s, REFUSED_S
+            )  # the node's type is another, so it hears nothing that it could answer
         wanted = wait.messages + (live.topics[name].count if wait.new else 0)
 
         def is_there() -> bool:
             return live.topics[name].count >= wanted if wait.topic else name in live.here
 
         def is_never() -> bool:
-            known = live.published if wait.topic else live.here
-            return name not in known and is_settled(live, time.monotonic())
+            now_s, until = time.monotonic(), self._scenario.until
+            return is_silent(live, (name,), until, now_s) if wait.topic else is_settled(live, now_s)
 
         begun_s = time.monotonic()
         await self._arena.wait(lambda: is_there() or is_never() or self._is_over(), limit_s)
@@ -510,7 +528,12 @@ class StepRunner:
             values = (type_.decode(data) for data in came)
             return next((v for v in values if v and v["status"]["goal_id"]["id"] == name), None)
 
-        await self._arena.wait(lambda: own() is not None or self._is_over(), limit_s)
+        topics = tuple(f"{action.name}/{part}" for part in ("result", "feedback"))
+
+        def is_never() -> bool:
+            return self._is_over() or is_silent(self._live, topics, self._scenario.until, time.monotonic())
+
+        await self._arena.wait(lambda: own() is not None or is_never(), limit_s)
         found = own()
         if found is None:
             return None

@@ -379,10 +379,11 @@ class Step(Record):
 class Until(Record):
     """When a run has seen enough. All conditions that are given must hold; with none, it is watched for `limit_s`.
 
-    What no node is there for is given up sooner: once all processes are nodes that only wait or loop, and nothing in
-    the graph has changed for 1.5 to 4 s. `alive_s`, silence and `quiet_s` do not count while a process may still
-    become a node: until it is one, or `silent_s` after its start. Where others fill the machine, this,
-    `first_message_s` and `limit_s` are longer by what they take.
+    What cannot come is given up sooner: once all processes are nodes that only wait, loop or compute, and nothing in
+    the graph has changed for 1.5 to 4 s. A topic on which a node only waits for callbacks stays silent then, and after
+    `silent_s` one of a node that loops, unless `first_message_s` is more than 20. `alive_s`, silence and `quiet_s` do
+    not count while a process may still become a node: until it is one, or `silent_s` after its start. Where others
+    fill the machine, this, `first_message_s` and `limit_s` are longer by what they take.
     """
 
     window_s: Seconds | None = None

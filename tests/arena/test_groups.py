@@ -7,6 +7,7 @@ import secrets
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import pytest
 from grader.arena.control_groups import find_cgroups
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "grader" / "arena" / "ros"))
-from process_tree import Groups, TreeRest, descendants
+from process_tree import LOOK_S, Groups, TreeRest, descendants, read_stat
 
 FOUND = find_cgroups().memory
 MB = 1 << 20
@@ -92,6 +93,33 @@ def test_only_programs_that_start_no_other_count_as_last() -> None:
         assert descendants(upper.pid) == [lower]
         os.kill(lower, signal.SIGKILL)
         upper.kill()
+
+
+@pytest.mark.parametrize(
+    ("program", "kinds"),
+    [
+        ("while True: pass", {"computes", "stuck"}),
+        ("x = 0\nwhile True: x += 1", {"computes", "stuck"}),
+        (
+            "x = []\nwhile True: x += [bytes(50000), sum(range(100000))]",
+            {None},
+        ),  # it may be loading something
+        ("import time\nwhile True: time.sleep(0.1)", {"loops"}),
+    ],
+)
+def test_who_works_in_the_same_memory_computes(program: str, kinds: set[str | None]) -> None:
+    with subprocess.Popen([sys.executable, "-c", program]) as process:
+        try:
+            rest, begun_s = TreeRest(), time.monotonic()
+            found: list[str | None] = []
+            while time.monotonic() < begun_s + 60 and read_stat(process.pid)[1] < 1.6:
+                if found[-5:] == ["loops"] * 5:
+                    break
+                time.sleep(LOOK_S)
+                found.append(rest.look([process.pid], time.monotonic())[0])
+            assert found[-1] in kinds, found
+        finally:
+            process.kill()
 
 
 NOT_WAITED_FOR = """

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from itertools import accumulate
 
 import pytest
 
-from grader.arena.run_state import RunState, describe_wait, find_outcome, is_settled, next_look_s
+from grader.arena.run_state import (
+    RunState,
+    computes,
+    describe_wait,
+    find_outcome,
+    is_settled,
+    is_silent,
+    next_look_s,
+)
 from grader.model.message_rate import RateBounds
 from grader.rubric.scenario import Until
 
@@ -283,8 +292,9 @@ def test_what_changes_or_works_or_starts_is_not_settled() -> None:
     live.note_graph(["/node", "/new"], {"/node": "node", "/new": "node"}, 3.0)
     assert not is_settled(live, 4.4)
     assert is_settled(live, 4.6)
-    live.lost_s = 5.0  # others filled the machine
-    assert not is_settled(live, 9.4)
+    live.lost_s = 5.0  # others filled the machine, but who is at rest gets the processor
+    assert not is_settled(live, 4.8)
+    assert is_settled(live, 4.9)
     live.note_rest("node", None, 1, 5.0)
     assert not is_settled(live, 60.0)
     live.note_rest("node", "spins", 1, 60.0)
@@ -314,12 +324,14 @@ def test_nodes_that_talk_already_settle_sooner_than_those_that_only_loop() -> No
     ("until", "published", "outcome"),
     [
         (Until(messages={"/a": 10}), set(), "the graph has settled, without /a"),
-        (Until(messages={"/a": 10}), {"/a"}, None),  # it may yet send
+        (Until(messages={"/a": 10}, first_message_s=30), {"/a"}, None),  # it may yet send
+        (Until(messages={"/a": 10}), {"/a"}, "the graph has settled, without /a"),  # spin() sends nothing
         (Until(connected=("/a",)), {"/a"}, "the graph has settled, without /a"),
         (Until(nodes=2), set(), "the graph has settled"),
         (Until(window_s=6, topics=("/a",)), set(), "the graph has settled, without /a"),
         (Until(messages={"/a": 10}, alive_s=20), set(), None),
-        (Until(messages={"/a": 10}, ended=("node",)), set(), None),
+        (Until(messages={"/a": 10}, ended=("node",)), set(), "the graph has settled, without /a"),
+        (Until(messages={"/a": 10}, ended=("other",)), set(), None),
     ],
 )
 def test_what_never_comes_ends_the_wait_once_the_graph_has_settled(
@@ -371,3 +383,112 @@ def test_who_naps_or_counts_aloud_is_waited_for_longer() -> None:
     assert not is_settled(live, 9.9)
     live.talking["/node"] = 6.0  # who publishes may go on printing
     assert is_settled(live, 9.9)
+
+
+def test_who_works_on_and_on_is_at_rest_once_it_can_do_nothing_else() -> None:
+    live = _resting(node=("stuck", 1))
+    assert not is_settled(live, 2.4)
+    assert is_settled(live, 2.6)
+    live.note_rest("node", "computes", 1, 3.0)  # it may yet come to an end
+    assert not is_settled(live, 60.0)
+    live.endless = True
+    live.note_rest("node", "computes", 1, 3.0)
+    assert is_settled(live, 3.6)
+
+
+def test_who_computes_before_it_is_a_node_is_no_longer_starting() -> None:
+    live, until = RunState(endless=True), Until(messages={"/a": 10})
+    live.note_start("node", 0.0, helper=False)
+    assert find_outcome(live, until, 3.0) is None
+    live.note_rest("node", "computes", 1, 2.0)
+    assert find_outcome(live, until, 3.0) == ("silent", "the graph has settled, without /a")
+
+
+@pytest.mark.parametrize(
+    ("rest", "messages", "until", "silent_s"),
+    [
+        ("spins", 0, Until(messages={"/a": 10}), 3.5),
+        ("loops", 0, Until(messages={"/a": 10}), 8.0),  # as long as a topic may be silent
+        (
+            "loops",
+            0,
+            Until(messages={"/a": 10}, first_message_s=30),
+            None,
+        ),  # the rubric knows that it takes long
+        ("loops", 1, Until(messages={"/a": 10}), 8.0),  # the next may be seconds away
+        ("loops", 5, Until(messages={"/a": 10}), 4.5),  # five in 0.4 s
+        ("stuck", 0, Until(messages={"/a": 10}), 2.5),
+    ],
+)
+def test_a_topic_stays_silent_when_its_programs_do_nothing_for_it(
+    rest: str, messages: int, until: Until, silent_s: float | None
+) -> None:
+    live = _resting(node=(rest, 1))
+    live.published = {"/a"}
+    if messages:
+        seen = live.topics["/a"]
+        seen.count, seen.first_s, seen.last_s = messages, 1.6, 1.6 + 0.1 * (messages - 1)
+        live.talking["/node"] = 1.6
+    assert not is_silent(live, ("/a",), until, (silent_s or 19.0) - 0.1)
+    assert is_silent(live, ("/a",), until, silent_s or 19.0) is False
+    assert is_silent(live, ("/a",), until, (silent_s or 19.0) + 0.1) is (silent_s is not None)
+
+
+def test_who_hears_messages_may_yet_answer() -> None:
+    live, until = _resting(node=("spins", 1)), Until(messages={"/a": 10})
+    live.published, live.listened = {"/a"}, {"/pose"}
+    live.note_messages("/pose", 1, 20.0, active=False)
+    assert not is_silent(live, ("/a",), until, 21.4)
+    ends = Until(ended=("node",), silent_s=60)
+    assert find_outcome(live, ends, 21.4) is None
+    assert find_outcome(live, ends, 21.6) == ("silent", "the graph has settled")
+    live.sent_s = 21.0  # the grader's own
+    assert not is_silent(live, ("/a",), until, 22.4)
+    assert is_silent(live, ("/a",), until, 22.6)
+
+
+def test_a_simulator_that_has_not_begun_is_waited_for() -> None:
+    live, until = _resting(node=("spins", 1)), Until(messages={"/a": 10})
+    live.published = {"/a"}
+    live.note_start("world", 0.0, helper=True)
+    live.note_graph(["/node", "/world"], {"/node": "node", "/world": "world"}, 2.0)
+    assert not is_silent(live, ("/a",), until, 19.0)
+    live.talking["/world"] = 19.0
+    assert is_silent(live, ("/a",), until, 19.1)
+
+
+@pytest.mark.parametrize(
+    ("sought", "goal", "in_vain"),
+    [
+        ({"/addd"}, "", True),
+        ({"/add"}, "", False),
+        ({"/addd", "/add"}, "", False),
+        (set(), "/counter", True),
+        (set(), "/count", False),
+        (set(), "", False),
+    ],
+)
+def test_who_looks_for_what_nobody_offers_is_not_waited_for(
+    sought: set[str], goal: str, in_vain: bool
+) -> None:
+    live, until = _resting(node=("loops", 1)), Until(ended=("node",))
+    live.serves = frozenset({"/add", "/count"})
+    live.sought["/node"] = sought
+    live.published = {f"{goal}/goal", f"{goal}/cancel"} if goal else {"/goal"}
+    assert find_outcome(live, until, 2.9) is None
+    assert find_outcome(live, until, 3.1) == (("silent", "the graph has settled") if in_vain else None)
+
+
+def test_nothing_is_settled_while_the_grader_works_on_an_answer() -> None:
+    live = _resting(node=("spins", 1))
+    live.answers_s = math.inf
+    assert not is_settled(live, 60.0)
+    live.answers_s = 60.0
+    assert not is_settled(live, 61.4)
+    assert is_settled(live, 61.6)
+
+
+def test_a_call_is_given_up_where_all_programs_compute() -> None:
+    assert computes(_resting(node=("stuck", 1)))
+    assert not computes(_resting(node=("stuck", 1), other=("spins", 1)))
+    assert not computes(RunState())

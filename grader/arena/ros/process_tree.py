@@ -55,17 +55,18 @@ def _children_of_thread(pid, thread):
 
 def cpu_s(pid):
     """Of a process and of the children that it waited for."""
-    return parent_and_cpu_s(pid)[1]
+    return read_stat(pid)[1]
 
 
-def parent_and_cpu_s(pid):
-    """Return a process's parent, 0 where it has ended, and its CPU seconds with those of waited-for children."""
+def read_stat(pid):
+    """Return a process's parent, 0 where it has ended, its CPU seconds with those of waited-for children, and how often
+    it has touched memory that was new to it."""
     try:
         with open("/proc/{}/stat".format(pid), "rb") as file:  # with a name that it gave itself, in any bytes
             fields = file.read().rpartition(b")")[2].split()
-        return int(fields[1]), sum(map(int, fields[11:15])) / TICKS_HZ
+        return int(fields[1]), sum(map(int, fields[11:15])) / TICKS_HZ, int(fields[7])
     except (OSError, IndexError, ValueError):
-        return 0, 0.0
+        return 0, 0.0, 0
 
 
 def descriptors(pid):
@@ -95,10 +96,10 @@ def _wakes(pid, thread):
         return 0
 
 
-def _late_s(pid):
-    """Return how long the main thread has waited for a processor so far."""
+def _late_s(pid, thread):
+    """Return how long a thread has waited for a processor so far."""
     try:
-        with open("/proc/{}/schedstat".format(pid)) as file:
+        with open("/proc/{}/task/{}/schedstat".format(pid, thread)) as file:
             return int(file.read().split()[1]) / 1e9
     except (OSError, IndexError, ValueError):
         return 0.0
@@ -137,6 +138,10 @@ ASLEEP_S = 0.8
 """`rospy.spin()` wakes every 0.5 s."""
 WORKING = 0.4
 SPIN_HZ = 3.2
+COMPUTES_S, STUCK_S = 1.0, 5.0
+"""CPU seconds in one stretch, without new memory: so many, and a program computes; so many, and it does only that."""
+GROWS = 25
+"""A program that touches more pages of new memory than these from look to look imports or loads something."""
 
 
 class Rest:
@@ -144,24 +149,32 @@ class Rest:
 
     A long sleep is no rest, since no one knows what comes after it. `since_s` is when the rest began, or None. It
     `spins` while its main thread wakes about twice a second (rospy), or waits for callbacks alone (roscpp).
+    `computed_s` are the CPU seconds of its last stretch of work in the same memory, as `while True: pass` does.
     """
 
     def __init__(self, pid, now_s):
         self._pid = pid
         self.since_s = None
         self.spins = False
+        self.computed_s = 0.0
         self._wakes = self._wakes_before = 0
         self._woke_s = self._looked_s = now_s
-        self._work_s = None
+        self._late_s = {}
+        self._used_s, self._pages = 0.0, 0
         self._naps = {}
 
-    def look(self, now_s, used_s):
-        """`used_s` are the CPU seconds that the program has used so far."""
-        wakes, work_s = _wakes(self._pid, self._pid), used_s + _late_s(self._pid)
+    def look(self, now_s, used_s, pages):
+        """`used_s` are the CPU seconds that the program has used so far, `pages` those of its memory that it
+        touched."""
+        wakes = _wakes(self._pid, self._pid)
         if wakes != self._wakes:
             self._woke_s = now_s
-        napping, asleep = self._others(now_s)
-        working = self._work_s is None or work_s - self._work_s > WORKING * (now_s - self._looked_s)
+        threads = _threads(self._pid)
+        napping, asleep = self._others(threads, now_s)
+        late_s = {thread: _late_s(self._pid, thread) for thread in threads[:THREADS_MAX]}
+        waited_s = max((late_s[thread] - self._late_s.get(thread, 0.0) for thread in late_s), default=0.0)
+        work_s = used_s - self._used_s + waited_s
+        working = self._late_s == {} or work_s > WORKING * (now_s - self._looked_s)
         if working or asleep or now_s - self._woke_s > ASLEEP_S:
             self.since_s = None
         elif self.since_s is None:
@@ -172,11 +185,23 @@ class Rest:
             self._napping = self._napping or napping
             rarely = wakes - self._wakes_before <= SPIN_HZ * (now_s - self.since_s) + 1
             self.spins = not self._napping and (rarely or self._only_callbacks)
-        self._wakes, self._work_s, self._looked_s = wakes, work_s, now_s
+        grows = pages - self._pages > GROWS
+        self.computed_s = self.computed_s + used_s - self._used_s if working and not grows else 0.0
+        self._used_s, self._pages, self._late_s = used_s, pages, late_s
+        self._wakes, self._looked_s = wakes, now_s
 
-    def _others(self, now_s):
+    @property
+    def kind(self):
+        """Return `spins`, `loops`, `computes`, `stuck` (it has computed for long), or None where it is not at rest."""
+        if self.since_s is not None:
+            return "spins" if self.spins else "loops"
+        return (
+            "stuck" if self.computed_s >= STUCK_S else "computes" if self.computed_s >= COMPUTES_S else None
+        )
+
+    def _others(self, threads, now_s):
         """Whether one of the other threads sleeps for a time, and whether for long (a timer, say)."""
-        naps, threads = {}, _threads(self._pid)
+        naps = {}
         if len(threads) > THREADS_MAX:
             return True, True
         for thread in threads:
@@ -188,6 +213,10 @@ class Rest:
         return bool(naps), any(now_s - since_s > ASLEEP_S for _, since_s in naps.values())
 
 
+KINDS = (None, "computes", "stuck", "loops", "spins")
+"""The kinds of rest: a tree's is the first of these that one of its programs has."""
+
+
 class TreeRest:
     """The same of a tree: of all its programs. Shells that wait for the program that they started do not count."""
 
@@ -195,19 +224,20 @@ class TreeRest:
         self._programs = {}
 
     def look(self, pids, now_s):
-        """Return (rest, programs): `spins`, `loops` or None, and how many programs have no others below them."""
+        """Return (rest, programs): one of `KINDS`, and how many programs have no others below them."""
         if len(pids) > PROGRAMS_MAX:
             return None, PROGRAMS_MAX
         pids = [pid for pid in pids if not waits_in(pid, pid).startswith("do_wait")]
-        seen = {pid: parent_and_cpu_s(pid) for pid in pids}
+        seen = {pid: read_stat(pid) for pid in pids}
         self._programs = {pid: self._programs.get(pid) or Rest(pid, now_s) for pid in pids}
         for pid, program in self._programs.items():
-            program.look(now_s, seen[pid][1])
-        parents = {parent for parent, _ in seen.values()}
+            program.look(now_s, *seen[pid][1:])
+        parents = {parent for parent, _, _ in seen.values()}
         last = [pid for pid in pids if pid not in parents]
-        if not last or any(program.since_s is None for program in self._programs.values()):
+        above = [p for pid, p in self._programs.items() if pid in parents]
+        if not last or any(program.kind is None for program in above):
             return None, len(last)
-        return "spins" if all(self._programs[pid].spins for pid in last) else "loops", len(last)
+        return min((self._programs[pid].kind for pid in last), key=KINDS.index), len(last)
 
 
 class Groups:

@@ -74,6 +74,7 @@ class Process:
         if not self.alive:
             return
         self._stopped_by = "INT"
+        self._rest = TreeRest()
         self._signal_group(signal.SIGINT)
         self.loop.call_later(int_s, lambda: self._escalate("TERM", signal.SIGTERM))
         self.loop.call_later(int_s + term_s, self.kill)
@@ -185,6 +186,7 @@ class Process:
     def _escalate(self, name, number):
         if self.alive and self._stopped_by != "KILL":
             self._stopped_by = name
+            self._rest = TreeRest()
             for pid in self._tree():
                 _kill(pid, number)
 
@@ -227,11 +229,17 @@ class Process:
             self.stop_for(excess)
 
     def _look(self):
-        """Tell the grader when the tree comes to rest, and when it moves again."""
+        """Tell the grader when the tree comes to rest, and when it moves again. One that computes on behind a signal
+        will not end by it."""
         if not self.alive:
             return
         tree = self._tree() if self._entered else []
         found = self._rest.look(tree, time.monotonic())
+        if self._stopped_by is not None and found[0] in ("computes", "stuck"):
+            if self._stopped_by == "INT":
+                self._escalate("TERM", signal.SIGTERM)
+            else:
+                self.kill()
         if found != self._rest_told:
             self._rest_told = found
             rest, programs = found
