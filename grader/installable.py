@@ -50,7 +50,10 @@ def noetic_messages() -> dict[str, dict[str, tuple[str, ...]]]:
 def install_hint(name: str, lines: Iterable[str] = ()) -> str:
     """Return what the grading machine needs, by the distribution of ROS that these lines of output name."""
     ros = next((found[1] for found in map(_PREFIX.search, lines) if found), "")
-    return f"{ON_THE_MACHINE}{install_command(name, ros)}, then grade again"
+    own = (
+        "" if name in known_packages() else "; a package of the student's own has to be pushed with this one"
+    )
+    return f"{ON_THE_MACHINE}{install_command(name, ros)}, then grade again{own}"
 
 
 def install_command(name: str, ros: str = "") -> str:

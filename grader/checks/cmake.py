@@ -271,7 +271,7 @@ def _unnamed(
         return Lack(f"{why}, so nothing installs {{}}", fix, FileCitation(file=slip.file, line=line))
     if not of_python:
         return _without_call(all_named, path)
-    names = {PurePosixPath(one.path).name: one for one in of_python}
+    names = {PurePosixPath(one.path).name: one for one in of_python if not _is_there(package, one)}
     wanted = PurePosixPath(path).name
     near = [wanted] if wanted in names else list(near_names(wanted, names))
     if near:
@@ -282,6 +282,11 @@ def _unnamed(
     if any(one.kind == "PROGRAMS" and is_bin(one.destination or "", package) for one in of_python):
         return Lack(why, "write {} into it, after PROGRAMS", None, path)
     return Lack(why, f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN})", None, path)
+
+
+def _is_there(package: PackageFacts, one: Installed) -> bool:
+    """Return whether the call names a file of the package."""
+    return any(names_script(one, file.path) for file in package.files)
 
 
 def _without_call(all_named: Sequence[Installed], path: str) -> Lack:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import PurePosixPath
 
-from grader.checks.build import CATKIN_MAKE
+from grader.checks.build import CATKIN_MAKE, judge_build
 from grader.checks.registry import check
 from grader.checks.support.exit_causes import SYNTAX, syntax_hint
 from grader.checks.support.scripts import (
@@ -97,6 +97,10 @@ def _judged(package: PackageFacts, build: Run, found: SourceFile, params: Execut
     elif has_wrapper(package, build, found.path):
         advice = f" (without it: {obstacles[0].why})" if obstacles else ""
         verdict = passed(f"the build makes an executable wrapper of {found.path}{advice}", hint=hint)
+    elif obstacles and (undecided := _undecided_wrapper(package, build, found.path)):
+        why = "; it also ".join(o.why for o in obstacles)
+        message = f"{found.path} {why}; the build makes a wrapper of it, but {undecided.message}"
+        verdict = inconclusive(message, hint=undecided.hint, citations=undecided.citations)
     elif obstacles:
         why = "; it also ".join(o.why for o in obstacles)
         message = f"{found.path} {why}{_rosrun_answer(build, found.path)}"
@@ -147,8 +151,19 @@ def _cite_shebang(file: SourceFile) -> FileCitation:
 def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:
     """Return whether the build worked, and `catkin_install_python` put this script where `rosrun` looks."""
     built = any(e.event == "exit" and e.name == CATKIN_MAKE and e.exit_code == 0 for _, e in build.processes)
+    return built and _asks_for_wrapper(package, path)
+
+
+def _asks_for_wrapper(package: PackageFacts, path: str) -> bool:
     named = (i for i in installed(package) if i.call.name == PYTHON and i.kind == "PROGRAMS")
-    return built and any(names_script(i, path) and is_found(i.destination or "", package) for i in named)
+    return any(names_script(i, path) and is_found(i.destination or "", package) for i in named)
+
+
+def _undecided_wrapper(package: PackageFacts, build: Run, path: str) -> Verdict | None:
+    """Return why the build did not come to the wrapper that the package asks for, where the machine is the reason."""
+    tried = any(e.event == "exit" and e.name == CATKIN_MAKE for _, e in build.processes)
+    built = judge_build(package, build) if tried and _asks_for_wrapper(package, path) else None
+    return built if built is not None and built.status.is_open else None
 
 
 def _missing(package: PackageFacts, path: str) -> Verdict:
@@ -159,10 +174,14 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     movable = [p for p in near if can_be_moved(p, path)]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
     seen = f"; there is {join_words(near)}" if near else ""
+    hint = f"git mv {movable[0]} {path}" if movable else add_hint(path)
+    if not movable and (elsewhere := package.hints_on(wanted.name)):
+        where, _, hint = elsewhere[0].partition(": ")
+        seen = f"; {where}"
     return unjudged(
         f"{path} is not in the package{seen}",
         measured=f"scripts: {join_words(sorted(scripts))}" if scripts else "no Python script in the package",
-        hint=f"git mv {movable[0]} {path}" if movable else add_hint(path),
+        hint=hint,
         citations=tuple(FileCitation(file=p) for p in near[:3]),
     )
 

@@ -272,14 +272,17 @@ def _wrong_value(
         cited = tuple(FileCitation(file=p.file, line=p.line) for p in again)
         return failed(message, hint=hint, citations=cited)
     name = next(name for name, value in wanted.items() if not _fits(before[place + name], value))
+    read = [p for p in file.params if p.name in {place + one for one in wanted}]
+    cited = tuple(FileCitation(file=p.file, line=p.line) for p in read)
     found, value = before[place + name], wanted[name]
     if isinstance(found, str) and found.strip() == str(value):
         message = f'{place}{name} is the text "{found}", which the node does not read as a number'
-        return failed(message, hint=f'write <param name="{name}" type="int" value="{value}"/>')
+        hint = f'write <param name="{name}" type="int" value="{value}"/>'
+        return failed(message, hint=hint, citations=cited)
     seen = ", ".join(_shown(before[place + n]) for n in wanted)
     right = ", ".join(map(_shown, wanted.values()))
     message = f"{place}{name} is {_shown(found)}, not {_shown(value)}: {join_words(wanted)} are {seen}"
-    return failed(message, hint=f"{join_words(wanted)} have to be {right}")
+    return failed(message, hint=f"{join_words(wanted)} have to be {right}", citations=cited)
 
 
 def _elsewhere(before: Mapping[str, Any], node: str, wanted: Wanted) -> Verdict:

@@ -357,7 +357,7 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
 
 def _unreadable(fault: Fault | None) -> Verdict:
     if fault is None or fault.kind == "Missing":
-        hint = "every catkin package has a package.xml beside its CMakeLists.txt"
+        hint = "write package.xml beside CMakeLists.txt, as catkin_create_pkg makes it, and push it"
         return failed("there is no package.xml", measured="no file", hint=hint)
     line = f", line {fault.line}" if fault.line else ""
     return failed(

@@ -27,6 +27,7 @@ from grader.cli.select_rubric import Chosen, only
 from grader.errors import ExitCode, HostError, OutputError, UsageError
 from grader.files import atomic_write, check_writable, temporary_folder
 from grader.intake import safe_name
+from grader.intake.gitdir import write_staged
 from grader.model.progress import Progress, Silence
 from grader.model.result import GitStatus, GradingResult, Point
 from grader.report.terminal import open_console
@@ -35,7 +36,6 @@ from grader.report.view import arrange, hidden_ids, without_hidden
 from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, needs_ros
 from grader.student.git_status import advise, read_environment
-from grader.student.git_view import write_staged
 
 TITLE = "Only pushed work is marked. These changes aren't pushed yet:"
 REMARKS = "Before you submit"

@@ -15,11 +15,11 @@ from grader.model.record import Record
 from grader.model.repair import BY_HAND, RepairKind
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
-from grader.rubric.check_parameters import REQUIRED, inner_records, parameters
 from grader.rubric.find import known_labs
 from grader.rubric.load import LoadedRubric, all_rubrics, load_rubric
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.own_checks import known_checks
+from grader.rubric.schema import REQUIRED, inner_records, parameters
 from grader.wording import did_you_mean, number
 
 Line = tuple[str, int]

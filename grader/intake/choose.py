@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -123,6 +124,7 @@ def _best(matches: list[Candidate], wanted: Wanted) -> Choice:
         rest = listing([c.path for c in others])
         name = printable(wanted.asked or wanted.name)
         hints.append(f"{name} is there more than once: {printable(chosen.path)} is graded, {rest} is not")
+        hints += _left_behind(chosen, others, wanted)
     return Choice(package=chosen, hints=tuple(hints))
 
 
@@ -141,14 +143,29 @@ def _in_workspace(candidate: Candidate) -> bool:
     return False
 
 
+def _left_behind(chosen: Candidate, others: list[Candidate], wanted: Wanted) -> Iterator[str]:
+    """Yield the lab's files that another copy has, and the one that is graded has not; each begins with its name."""
+    missing = wanted.files - _files_of(chosen.folder, wanted.files)
+    for other in others if missing else ():
+        for name in sorted(missing & _files_of(other.folder, missing)):
+            missing -= {name}
+            where = f"{printable(other.path)}, which is not graded"
+            yield f"{printable(name)} is in {where}: move it to {printable(chosen.path)}, into the same folder there"
+
+
 def _count_files(folder: Path, names: frozenset[str]) -> int:
     """Return how many of the lab's files are there by name, in whatever folder of the package."""
+    return len(_files_of(folder, names))
+
+
+def _files_of(folder: Path, names: frozenset[str]) -> frozenset[str]:
+    """Return which of the lab's files are there by name, in whatever folder of the package."""
     found: set[str] = set()
     if names:
         for below in islice(walk(folder, tolerant=True), FOLDERS_OF_A_COPY):
             below.folders[:] = [name for name in below.folders if name not in NO_CONTENT]
             found |= names & {entry.name for entry in below.others}
-    return len(found)
+    return frozenset(found)
 
 
 def _name_hint(chosen: Candidate, lab: Wanted) -> str:

@@ -8,11 +8,18 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 
 from grader.checks.support.exit_causes import SYNTAX, syntax_hint
-from grader.checks.support.launch import node_slip, not_executable, own_script
+from grader.checks.support.launch import (
+    find_launch,
+    node_slip,
+    not_executable,
+    own_script,
+    refusal,
+    refusals,
+)
 from grader.checks.support.scripts import (
     BACKUPS,
     PYTHON,
@@ -25,15 +32,17 @@ from grader.checks.support.scripts import (
 from grader.checks.support.text import Language, in_language, texts_in
 from grader.evidence.run import Run
 from grader.judging.facts import Facts
-from grader.model.package import LaunchFile, PackageFacts
+from grader.model.package import LaunchFile, PackageFacts, PythonSlip
 from grader.model.result import CriterionResult
 from grader.model.verdict import Citation, FileCitation, Status, Verdict
 from grader.rubric.load import names_in
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Scenario
-from grader.wording import join_words
+from grader.wording import join_words, significant
 
 POINTS_MAX = 3
+RATE_SHARE = 0.05
+"""By so much a rate that a script asks for may differ from the right one."""
 OF_FILES = ("build", "cmake", "manifest")
 """Checks whose criterion takes the advice: it is of the package as a whole."""
 
@@ -57,8 +66,17 @@ def _points(package: PackageFacts) -> Iterator[tuple[FileCitation, str]]:
         fault = None if file.path.endswith(BACKUPS) else file.python_fault
         if fault is not None and fault.kind in SYNTAX and not is_product(file.path):
             why = fault.cause or fault.message
-            text = f"{file.path} does not parse: {why}; {syntax_hint(fault)}"
+            hint = syntax_hint(fault)
+            text = f"{file.path} does not parse: {why}" + (
+                "" if why.endswith(hint.partition(": ")[2]) else f"; {hint}"
+            )
             yield FileCitation(file=file.path), text
+    for slip in package.slips:
+        if slip.kind == "misspelt" and not is_product(slip.file):
+            yield (
+                FileCitation(file=slip.file, line=slip.line),
+                f"{slip.file}, line {slip.line}: {slip.message}",
+            )
     for launch in package.launch_files:
         if launch.fault is not None:
             why = launch.fault.cause or launch.fault.message
@@ -94,6 +112,87 @@ def _is_told(place: FileCitation, results: Sequence[CriterionResult]) -> bool:
 def _cites(criterion: CriterionResult, place: FileCitation) -> bool:
     cited = (one for one in criterion.citations if isinstance(one, FileCitation))
     return any(one.file == place.file and place.line in {None, one.line} for one in cited)
+
+
+def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Facts) -> dict[str, Verdict]:
+    """Return the verdicts; where a node ended of an error, the hint goes on with what its script shows of the criteria
+    that were not reached."""
+    later: dict[str, list[str]] = {}
+    for criterion in rubric.criteria:
+        verdict = verdicts[criterion.id]
+        ended = verdict.status.is_lost and verdict.unjudged and bool(verdict.cause)
+        package = facts.package_of(criterion)
+        if package is None or criterion.visibility != "visible":
+            continue
+        told = later.setdefault(verdict.blocked_by or criterion.id, [])
+        if verdict.blocked_by and criterion.check == "launch-runs":
+            told += _later_in_launch(criterion, package, facts)
+        elif ended:
+            told += [one for one in _later_faults(criterion, rubric, package) if one not in told]
+    return {
+        name: verdict.model_copy(update={"hint": f"{verdict.hint}; then {join_words(later[name])}"})
+        if later.get(name) and verdict.status.is_lost and verdict.hint
+        else verdict
+        for name, verdict in verdicts.items()
+    }
+
+
+def _later_faults(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> Iterator[str]:
+    """Yield what the criterion would be lost by next, as far as its scripts say so in plain values."""
+    wanted, scripts = criterion.parameters, _scripts(criterion, rubric, package)
+    found = [slip for slip in package.slips if slip.file in scripts]
+    topic, of_kind = (
+        str(wanted.get("topic", "")),
+        {s.kind: [one for one in found if one.kind == s.kind] for s in found},
+    )
+    published = of_kind.get("publisher", [])
+    lines = [one.line for one in published if f"/{one.message.lstrip('/')}" == topic]
+    if criterion.check == "rate":
+        hz, numbers = float(str(wanted["rate_hz"])), of_kind.get("rate-number", [])
+        if len(numbers) == 1 and abs(float(numbers[0].message) - hz) > RATE_SHARE * hz:
+            yield f"make it {significant(hz)} Hz in {_line(numbers[0])}, which asks for {numbers[0].message} Hz"
+    elif criterion.check == "node-name":
+        own, names = of_kind.get("node-name", []), [str(name) for name in _listed(wanted.get("names"))]
+        if len(own) == 1 and names and own[0].message.lstrip("/") not in names:
+            yield f"name the node {names[0]} in {_line(own[0])}, not {own[0].message}"
+    elif criterion.check == "topic-type":
+        kind = str(wanted.get("type", ""))
+        if len(published) == 1 and not lines:
+            yield f"publish on {topic} in {_line(published[0])}, not on {published[0].message}"
+        types = [one for one in of_kind.get("publisher-type", []) if one.line in lines or len(published) == 1]
+        if len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
+            yield f"publish {kind} in {_line(types[0])}, not {types[0].message}"
+
+
+def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) -> Iterator[str]:
+    """Yield what a launch file would be lost by next: what roslaunch said of it, and namespaces of the lab's nodes."""
+    wanted, run = criterion.parameters, facts.runs.get(criterion.scenario or "")
+    file = find_launch(package, str(wanted.get("launch", "")))
+    names = {PurePosixPath(str(script)).name for script in _listed(wanted.get("scripts"))}
+    if file is None or file.fault is not None:
+        return
+    if isinstance(run, Run) and (refused := refusal(run)) and not any(refusals(package, file)):
+        yield f"{refused.hint}: {refused.why}"
+    spaces = {one.namespace.strip("/"): one for one in reversed(file.brings) if one.type in names}
+    spaces.pop("", None)
+    for space, node in spaces.items() if wanted.get("topic") else ():
+        where = f"line {node.line} of {node.file or file.path}"
+        yield f'remove ns="{space}", in which {where} stands: in it, topics have other names'
+
+
+def _line(slip: PythonSlip) -> str:
+    return f"line {slip.line} of {slip.file}"
+
+
+def _listed(value: object) -> Sequence[object]:
+    return value if isinstance(value, list | tuple) else ()
+
+
+def _scripts(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set[str]:
+    """Return the paths of the scripts that the criterion's scenario starts."""
+    scenario = rubric.scenarios.get(criterion.scenario or "")
+    named = [start.script for start in scenario.start if start.script] if scenario is not None else []
+    return {file.path for path in named if (file := find_script(package, path)) is not None}
 
 
 SOURCES = {".c", ".cc", ".cpp", ".cxx"}

@@ -22,7 +22,13 @@ from grader.checks.support.text import texts_in
 from grader.checks.support.topics import account_for_losses, explain_by_unheard_topic
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
-from grader.judging.annotate import add_advice, choose_hint_language, name_unchanged_files, show_lines
+from grader.judging.annotate import (
+    add_advice,
+    add_later_faults,
+    choose_hint_language,
+    name_unchanged_files,
+    show_lines,
+)
 from grader.judging.facts import NOT_RUN, PACKAGE_RUN, Facts, try_facts, views_of
 from grader.judging.repeats_and_repairs import (
     apply_repaired_copy,
@@ -87,6 +93,7 @@ def judge_all_runs(
         needed = needs_build(of_copy.package)
         built = not needed or was_built(first) or not was_built(repaired)
         verdicts, uses = apply_repaired_copy(rubric, verdicts, on_copy, repairs, built=built)
+    verdicts = add_later_faults(verdicts, rubric, facts)
     build = first.get(PACKAGE_RUN)
     shown = {name: show_lines(verdict, build) for name, verdict in verdicts.items()} if build else verdicts
     results = tuple(

@@ -255,7 +255,9 @@ SlipKind = Literal[
     "callback-values",
     "node-name",
     "publisher",
+    "publisher-type",
     "subscriber",
+    "outside-method",
 ]
 
 
@@ -272,8 +274,9 @@ class PythonSlip(Record):
     first `publish(…)`; `spin-in-loop`: a loop that publishes and waits in `spin()`; `loop-left`: one that ends in its
     first turn; `sleep-outside`: the `sleep()` that one lacks stands after it or around it. `callback-called`,
     `callback-values`: a callback that is called where it is to be named, or that takes another number of values than
-    ROS has for it. `node-name`, `publisher` and `subscriber`: no slips, but where the
-    script names its node, or a topic; `message` is the name as written.
+    ROS has for it. `outside-method`: a call in a class that stands in none of its methods and uses a name
+    that is not there. `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a
+    topic; `message` is the name as written. `publisher-type`: the message type in the line of a `publisher`.
     """
 
     file: str

@@ -14,6 +14,7 @@ from typing import Protocol
 from lxml import etree
 from pydantic import Field
 
+from grader.installable import known_packages
 from grader.model.package import Fault, LaunchLoad, LaunchNode, LaunchParam
 from grader.model.record import Record
 from grader.package.xml import line_of
@@ -178,7 +179,7 @@ class _Loader:
     def _include(self, element: etree._Element, scope: Scope, depth: int) -> None:
         path = scope.own_path(scope.get(element, "file") or "")
         if path is None:
-            if slip := scope.misspelt_package(scope.get(element, "file") or ""):
+            if slip := self._misnamed_package(scope, scope.get(element, "file") or ""):
                 message = f"it includes a file of the package {slip}, which is called {scope.own[0]}"
                 self.loaded.faults.append(_fault(element, scope, message))
             return
@@ -197,6 +198,15 @@ class _Loader:
             self.loaded.faults.append(_fault(element, scope, f"it includes {path}, and {reason}"))
         elif wanted(root, scope):
             self.walk(root, _included(element, scope, path), depth + 1)
+
+    def _misnamed_package(self, scope: Scope, path: str) -> str:
+        """Return the package that `$(find …)/…` names for this one: a slip of its name, or one that nobody knows where
+        this package has the file."""
+        found = _FOUND.fullmatch(path.strip())
+        unknown = found is not None and found[1] not in known_packages()
+        inside = _plain(found[2]) if found is not None and unknown else None
+        is_here = inside is not None and self._find(inside)[0] is not None
+        return found[1] if found is not None and is_here else scope.misspelt_package(path)
 
 
 def _included(element: etree._Element, scope: Scope, path: str) -> Scope:

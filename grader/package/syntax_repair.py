@@ -17,6 +17,7 @@ STEPS_MAX = 60
 STATEMENT_LINES_MAX = 12
 FIXERS = ("print", "except", "exec", "raise", "repr", "ne", "numliterals", "long", "unicode")
 OLD_PRINT = re.compile(r"\bprint\b(?!\s*\()")
+OUTERMOST = re.compile(r"(import|from)\s|if\s+__name__\b")
 CONTINUES = re.compile(r"(elif|else|except|finally)\b")
 
 Step = dict[str, Any]
@@ -75,11 +76,11 @@ def _all_expanded(text: str, width: int) -> str:
     return "\n".join(_expanded(line, width) for line in text.split("\n"))
 
 
-def _like_the_line_before(text: str, number: int, *, tabs: bool = True) -> str:
+def _like_the_line_before(text: str, number: int) -> str:
     """The line with that number begins where the one before it does, which an editor showed below each other."""
     lines = text.split("\n")
     before = next((line for line in reversed(lines[: number - 1]) if line.strip()), "")
-    if number <= len(lines) and tabs == ("\t" in lines[number - 1]) and not before.rstrip().endswith(":"):
+    if number <= len(lines) and "\t" in lines[number - 1] and not before.rstrip().endswith(":"):
         indentation = before[: len(before) - len(before.lstrip())]
         lines[number - 1] = indentation + lines[number - 1].lstrip()
     return "\n".join(lines)
@@ -104,11 +105,11 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
         return
     if "global declaration" in error["message"]:
         yield from _with_global_first(text, error["line"])
+    if error["message"].startswith(("unexpected indent", "unindent does not match")):
+        yield from (("level", candidate) for candidate in _with_block_moved(lines, at))
     if error["message"].startswith("expected an indented block"):
         yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
     yield from (("python2", candidate) for candidate in as_python3(lines, at))
-    if error["message"] == "unexpected indent":
-        yield "outdent", _like_the_line_before(text, error["line"], tabs=False)
     if any(map(without_brace, lines[: at + 1])):
         yield "braces", _without_braces(lines)
     for line in dict.fromkeys((at, max(at - 1, 0))):
@@ -137,15 +138,42 @@ def _without_braces(lines: list[str]) -> str:
 def _with_body_indented(lines: list[str], at: int) -> Iterator[str]:
     """Yield the text with the line indented, where it alone can be the body of the block that begins above it."""
 
-    def indentation(line: str) -> str:
-        return line[: len(line) - len(line.lstrip())]
-
     head = next((line for line in reversed(lines[:at]) if _code(line).strip()), "")
     after = next((line for line in lines[at + 1 :] if _code(line).strip()), "")
-    own = indentation(lines[at])
-    ends = len(indentation(after)) < len(own) or not after or CONTINUES.match(after.strip())
-    if lines[at].strip() and own == indentation(head) and ends:
+    own = _indentation(lines[at])
+    ends = len(_indentation(after)) < len(own) or not after or CONTINUES.match(after.strip())
+    if lines[at].strip() and own == _indentation(head) and ends:
         yield with_line(lines, at, "    " + lines[at])
+
+
+def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with the line, and what stands below it as far in, at the level of the line before it; or, where
+    it is further out than that, at the one level above that is nearest."""
+    own = _width(lines[at])
+    above = [_width(line) for line in lines[:at] if _code(line).strip()] or [0]
+    if OUTERMOST.match(lines[at].strip()):
+        level = 0
+    elif own > above[-1]:
+        level = above[-1]
+    else:
+        distance, level = min((abs(width - own), width) for width in above)
+        if {own - distance, own + distance} <= set(above):
+            return  # as near to one as to the other
+    below = range(at + 1, len(lines))
+    end = next((i for i in below if lines[i].strip() and _width(lines[i]) < own), len(lines))
+    moved = [
+        " " * (_width(line) - own + level) + line.lstrip() if line.strip() else line for line in lines[at:end]
+    ]
+    yield "\n".join([*lines[:at], *moved, *lines[end:]])
+
+
+def _width(line: str) -> int:
+    """Return how far in the line begins."""
+    return len(_indentation(line).expandtabs(8))
+
+
+def _indentation(line: str) -> str:
+    return line[: len(line) - len(line.lstrip())]
 
 
 def _with_global_first(text: str, number: int) -> Iterator[tuple[str, str]]:

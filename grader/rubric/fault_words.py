@@ -11,11 +11,12 @@ from typing import Annotated, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from grader.rubric.check_parameters import UNITS
 from grader.rubric.scenario import NAME_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
 from grader.rubric.yaml_lines import Fault, KeyPath
 from grader.wording import did_you_mean, shorten
 
+UNITS = {"hz": "Hz", "s": "seconds", "m": "metres", "deg": "degrees", "rad": "radians"}
+"""By what a parameter's name ends in."""
 PATTERN_RULES = {
     NAME_PATTERN: "must be lower-case letters, digits and hyphens, beginning with a letter",
     TYPE_PATTERN: "must be a type like std_msgs/String",

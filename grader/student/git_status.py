@@ -2,7 +2,7 @@
 
 A package's folder comes in, `model.result.GitStatus` goes out, with commands that can be typed as they are printed.
 The network is not asked: what the server has is known from the last fetch or push. What a hostile repository must not
-do through git is the business of `git_view`.
+do through git is the business of `intake.gitdir`.
 """
 
 from __future__ import annotations
@@ -18,13 +18,12 @@ from pathlib import Path
 from grader.errors import GraderError, SubmissionError
 from grader.intake.find import BUILD_SPACES
 from grader.intake.git import Git, GitFailed, GitMissing, GitTimeout, GitTooMuch
-from grader.intake.gitdir import Unfit, repository_around
+from grader.intake.gitdir import Unfit, View, open_view, repository_around
 from grader.intake.names import brief, encodable, listing, printable
 from grader.intake.package_files import is_script
 from grader.intake.tree import list_entries
 from grader.model.result import GitStatus, Point
 from grader.portable import MODES_ON_DISK
-from grader.student.git_view import View, open_view
 
 SECONDS = 5.0
 NAMED_AT_MOST = 4

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from grader.checks import CHECKS, HEADINGS, Check
 from grader.model.record import Record
-from grader.rubric.check_parameters import about, inner_records, parameters
+from grader.rubric.schema import about, inner_records, parameters
 from scripts.reference.table import table
 
 INTRODUCTION = """# Checks

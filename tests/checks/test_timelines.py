@@ -13,7 +13,7 @@ import yaml
 from grader.checks import CHECKS, HEADINGS, Check
 from grader.checks.support.text import in_language
 from grader.model.verdict import Status
-from grader.rubric.check_parameters import inner_records, parameters
+from grader.rubric.schema import inner_records, parameters
 from scripts.reference.checks import checks_page
 from tests.checks.examples import LOADER, Example, differences, examples
 

@@ -150,6 +150,16 @@ def test_what_has_the_labs_files_is_named(files, message, hint, tmp_path):
     assert hint in caught.value.hint
 
 
+def test_what_another_copy_has_and_the_graded_one_has_not_is_named(tmp_path):
+    files = {**tree("src/lab1", "lab1"), "lab1/scripts/talker.py": "", "src/lab1/scripts/listener.py": ""}
+    wanted = Wanted(name="lab1", files=frozenset({"talker.py", "listener.py"}))
+    found = opened(write(tmp_path / "repo", files), tmp_path, package=wanted)
+    assert found.package.path == "src/lab1"
+    assert found.hints[-1] == (
+        "talker.py is in lab1, which is not graded: move it to src/lab1, into the same folder there"
+    )
+
+
 @pytest.mark.parametrize(
     "text",
     [

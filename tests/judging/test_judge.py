@@ -241,6 +241,45 @@ def test_what_else_is_wrong_with_a_node_is_no_reason_for_its_end() -> None:
     assert found["rate"].message.count("EOFError") == 1
 
 
+def test_a_node_that_ended_tells_what_its_script_would_lose_next() -> None:
+    """As far as it is plain in the source: rates, topics, types and names behind the error that came first."""
+    script = "src/numeric_talker.py"
+    slips = [
+        {"file": script, "line": 5, "kind": "publisher", "message": "position"},
+        {"file": script, "line": 5, "kind": "publisher-type", "message": "Twist"},
+        {"file": script, "line": 6, "kind": "node-name", "message": "talker"},
+        {"file": script, "line": 7, "kind": "rate-number", "message": "0.5"},
+    ]
+    lines = [
+        "Traceback (most recent call last):",
+        f'  File "/ws/src/lab1/{script}", line 3, in <module>',
+        "EOFError: EOF when reading a line",
+    ]
+    run = {
+        "processes": [{"name": "talker", "script": script, "exit_s": 0.5, "exit_code": 1}],
+        "console": [{"process": "talker", "stream": "stderr", "at_s": 0.4, "every_s": 0.001, "lines": lines}],
+        "outcome": "ended",
+    }
+    right = [
+        {"file": script, "line": 5, "kind": "publisher", "message": "/chatter"},
+        {"file": script, "line": 5, "kind": "publisher-type", "message": "String"},
+        {"file": script, "line": 7, "kind": "rate-number", "message": "10"},
+    ]
+    hints = []
+    for found in (slips, right):
+        package = {**PACKAGE, "slips": found}
+        runs = build_runs({"runs": {"talker": run}, "package": package})
+        judged = {c.id: c for c in judge(rubric(NODE | {"requires": []}, CHATTER, RATE), runs)}
+        assert {c.status.value for c in judged.values()} == {"fail", "blocked"}
+        hints.append(judged["node"].hint)
+    assert hints[0] == (
+        f"{hints[1]}; then publish on /chatter in line 5 of {script}, not on position, "
+        f"publish std_msgs/String in line 5 of {script}, not Twist and "
+        f"make it 10 Hz in line 7 of {script}, which asks for 0.5 Hz"
+    )
+    assert "then" not in hints[1]
+
+
 def test_what_is_named_as_absent_explains_more_than_another_loss() -> None:
     asked = rubric(
         EXECUTABLE,

@@ -187,7 +187,16 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
 )  # fmt: skip
 def test_what_never_runs_is_known(tmp_path, text, found):
     (tmp_path / "a.py").write_text(text)
-    others = ("rate-number", "no-clock", "misspelt", "not-called", "node-name", "publisher", "subscriber")
+    others = (
+        "rate-number",
+        "no-clock",
+        "misspelt",
+        "not-called",
+        "node-name",
+        "publisher",
+        "publisher-type",
+        "subscriber",
+    )
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind not in others]
     assert [(s.kind, s.line) for s in slips] == [one[:2] for one in found]
     assert all(words in slip.message for slip, (_, _, words) in zip(slips, found, strict=True))
@@ -202,6 +211,7 @@ def test_where_names_of_the_graph_are_written_is_known(tmp_path):
     assert [(s.kind, s.line, s.message) for s in slips] == [
         ("node-name", 1, "talker"),
         ("publisher", 3, "/chatter"),
+        ("publisher-type", 3, "String"),
         ("subscriber", 5, "~scan"),
     ]
 
@@ -329,6 +339,15 @@ def test_a_script_that_reads_a_clock_and_sends_what_it_counts(tmp_path, before, 
     [
         ("counter = 0\nprint(conter)\n", ["`conter` is not defined anywhere: did you mean `counter`?"]),
         ("def run(speed):\n    return sped\n", ["`sped` is not defined anywhere: did you mean `speed`?"]),
+        (
+            "class A:\n    def go(self):\n        self.rate = 1\n        rate.sleep()\n",
+            ["`rate` is not defined anywhere: did you mean `self.rate`?"],
+        ),
+        (
+            "class A:\n    def go(self):\n        pass\n    self.go()\n",
+            ["line 4 stands in the class and in none of its methods, so it runs before them"],
+        ),
+        ("class A:\n    print('made')\n", []),
         ("from a import *\ncounter = 0\nprint(conter)\n", []),
         ("counter = 0\nprint(unlike)\n", []),
         ("try:\n    pass\nexcept Exception as error:\n    print(error, __file__)\n", []),

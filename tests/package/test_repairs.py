@@ -122,6 +122,17 @@ CASES = {
         ["python-syntax"],
         "the line after a `:` must be indented",
     ),
+    "further-in": (swapped(TALKER, ("    rate = ", "       rate = ")), ["python-syntax"], "line 8 of src/talker.py: t"),
+    "all-further-in": (
+        {TALKER: "#!/usr/bin/env python3\n" + "".join(f" {line}\n" for line in SCRIPT.split("\n")[1:-1] if line)},
+        ["python-syntax"],
+        "line 2 of src/talker.py: this line is indented further than the one above",
+    ),
+    "further-out": (
+        swapped(TALKER, ("        rate.sleep()", "       rate.sleep()")),
+        ["python-syntax"],
+        "line 11 of src/talker.py",
+    ),
     "tabs-of-4": (swapped(TALKER, ("    rate = ", "\trate = ")), ["python-syntax"], "line 8 of src/talker.py: tabs"),
     "print": (swapped(TALKER, ("        rate.sleep()", "        print 'a', 1\n        rate.sleep()")),
               ["python-syntax"], "line 11 of src/talker.py: this is Python 2: `print`"),

@@ -243,7 +243,8 @@ NAMED = {"init_node": "node-name", "Publisher": "publisher", "Subscriber": "subs
 
 
 def graph_names(tree):
-    """Where a script names its node, and the topics that it publishes and subscribes to, as written."""
+    """Where a script names its node, and the topics that it publishes and subscribes to, as written; and the types that
+    it publishes."""
     for node in ast.walk(tree):
         kind = NAMED.get(called_name(node))
         if not kind:
@@ -251,6 +252,10 @@ def graph_names(tree):
         names = node.args[:1] or [k.value for k in node.keywords if k.arg == "name"]
         if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
             yield {"line": names[0].lineno, "kind": kind, "message": names[0].value[:TEXT_LIMIT]}
+            types = node.args[1:2] or [k.value for k in node.keywords if k.arg == "data_class"]
+            name = dotted(types[0]).rpartition(".")[2] if types and kind == "publisher" else ""
+            if name.isidentifier():
+                yield {"line": names[0].lineno, "kind": "publisher-type", "message": name}
 
 
 def never_run(tree):
@@ -459,7 +464,7 @@ def read_parameter(node):
 
 
 def misspelt(tree):
-    """Names that are used and nowhere bound, where one that is bound is spelt alike."""
+    """Names that are used and nowhere bound, where one that is bound is spelt alike, or `self` has one of that name."""
     names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
     own = {n.id for n in names if not isinstance(n.ctx, ast.Load)}
     for node in ast.walk(tree):
@@ -474,14 +479,33 @@ def misspelt(tree):
         dotted(n) for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)
     }
     known = own | set(dir(builtins)) | MODULE_NAMES
+    outside = {id(n) for n in outside_methods(tree)}
     for node in names:
-        if node.id not in known:
-            near = difflib.get_close_matches(node.id[:TEXT_LIMIT], sorted(own), 1, 0.8)
-            near = ["self." + node.id] if "self." + node.id in attributes else near
-            near = near or [name for name in sorted(own) if sorted(name) == sorted(node.id)]
-            if near:
-                message = "`%s` is not defined anywhere: did you mean `%s`?" % (node.id[:TEXT_LIMIT], near[0])
-                yield {"line": node.lineno, "kind": "misspelt", "message": message}
+        if id(node) in outside and (node.id == "self" or node.id not in known):
+            message = (
+                "line %d stands in the class and in none of its methods, so it runs before them" % node.lineno
+            )
+            yield {"line": node.lineno, "kind": "outside-method", "message": message}
+            continue
+        if node.id in known:
+            continue
+        near = ["self." + node.id] if "self." + node.id in attributes else []
+        near = near or difflib.get_close_matches(node.id[:TEXT_LIMIT], sorted(own), 1, 0.8)
+        near = near or [name for name in sorted(own) if sorted(name) == sorted(node.id)]
+        if near:
+            message = "`%s` is not defined anywhere: did you mean `%s`?" % (
+                node.id[:TEXT_LIMIT],
+                near[0][:TEXT_LIMIT],
+            )
+            yield {"line": node.lineno, "kind": "misspelt", "message": message}
+
+
+def outside_methods(tree):
+    """Yield the nodes of statements that stand in a class and call something, in none of its methods."""
+    for node in ast.walk(tree):
+        for statement in node.body if isinstance(node, ast.ClassDef) else ():
+            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call):
+                yield from ast.walk(statement)
 
 
 def counts(tree):

@@ -382,6 +382,13 @@ def _undeclared(found: re.Match[str], _package: PackageFacts, _lines: Sequence[s
     )
 
 
+def _no_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    """A service's type has two parts, and nothing else."""
+    near = near_names(found[2], ("Request", "Response"))
+    hint = f"write {found[1]}::{near[0]}" if near else f"look up how the part of {found[1]} is called"
+    return Explained(f"there is no {found[2]} in {found[1]}", hint)
+
+
 def _no_member(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     return Explained(found.string, f"write {found[2]} in place of {found[1]}")
 
@@ -460,6 +467,7 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
     (r"expected '}' at end of input", _no_brace),
     (r"'([^']+)' was not declared in this scope(?:; did you mean '([^']+)')?", _undeclared),
+    (r"'([^']+)::(\w+)' has not been declared", _no_type),
     (r"'([^']+)' is not a member of .*; did you mean '([^']+)'", _no_member),
     (r"has no member named '([^']+)'; did you mean '([^']+)'", _no_member),
     (r"undefined reference to '([^']+)", _unlinked),

@@ -21,6 +21,7 @@ _NO_NUMBER = re.compile(
 _LOCAL = re.compile(r"local variable '(\w+)'")
 _OPERANDS = re.compile(r"unsupported operand type\(s\) for \S+ '(\w+)' and '(\w+)'")
 _ONE_TOO_MANY = re.compile(r"(\w+)\(\) takes (\d+) positional arguments? but (\d+) (?:was|were) given")
+_COMMAND = re.compile(r"Command '(?:\[')?(.+?)(?:'\])?' returned non-zero exit status (\d+)")
 _CALLED = re.compile(r"'(\w+)' object is not callable")
 _WANTS_NUMBER = re.compile(r"(?:real number|a number) is required, not (\w+)|must be real number, not (\w+)")
 
@@ -159,6 +160,17 @@ def _file(message: str, _source: str, _marked: tuple[int, int] | None) -> Meanin
     )
 
 
+def _command(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    found = _COMMAND.match(message)
+    if found is None:
+        return None
+    cause = f"the command `{shown(found[1])}` fails (exit code {found[2]})"
+    return (
+        cause,
+        "leave it out, or catch the error: where a node is started there is neither your folder nor a network",
+    )
+
+
 _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | None]] = {
     "IndexError": _index,
     "KeyError": _key,
@@ -167,6 +179,7 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
     "UnboundLocalError": _local,
     "AttributeError": _attribute,
     "FileNotFoundError": _file,
+    "CalledProcessError": _command,
     "ZeroDivisionError": lambda *_: (
         "it divides by zero",
         "check that the divisor is not 0 before you divide",

@@ -24,6 +24,8 @@ from grader.wording import join_words, seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
 ATTRIBUTES_SHOWN = 8
+OTHER_NAMES_SHOWN = 3
+"""Names of the same script that are not defined either."""
 MAIN = "`if __name__ == '__main__':`"
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
 IMPORT_ERRORS = ("ImportError", "ModuleNotFoundError")
@@ -33,7 +35,10 @@ ARGUMENT_HINT = (
 )
 LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
 CAUSES = {
-    "EOFError": ("it waits for input (`input()`), but a node gets none", "remove `input()`: a node runs by itself"),
+    "EOFError": ("it waits for input (`input()`), but a node gets none",
+     "put a value in the code in place of `input()`, and call `rate.sleep()` in the loop: nobody types for a node"),
+    "BdbQuit": ("the debugger (`set_trace()`, `breakpoint()`) waits for input, but a node gets none",
+     "remove `set_trace()` or `breakpoint()`, and its import"),
     "ROSInterruptException": ("ROS was told to shut down while the node slept, and nothing caught it",
      "call your main function in `try: … except rospy.ROSInterruptException: pass`"),
     "ROSInitException": ("it uses ROS before `rospy.init_node(…)`",
@@ -91,7 +96,7 @@ _ADDED = re.compile(
 )
 _NAME = re.compile(r"name '(\w+)' is not defined")
 _BY_PYTHON = re.compile(r"\. Did you mean: '(\w+)'\?$")
-_MEANT = re.compile(r"did you mean `([\w.]+)`\?$")
+_MEANT = re.compile(r"`(\w+)` is not defined anywhere: did you mean `([\w.]+)`\?$")
 _IN_MODULE = re.compile(r"No module named '(\w+\.(?:msg|srv))\.(\w+)'")
 _FROM_PACKAGE = re.compile(r"cannot import name '(\w+)' from '(\w+)'")
 _NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
@@ -381,7 +386,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     elif place is not None and found.kind == "TypeError":
         cause, hint = _operand(found) or (cause, hint)
     where = f" ({place.file}, line {place.line})" if place else ""
-    text = f"{shown(said)}{where}" + (f": {cause}" if cause else "")
+    text = f"{shown(said.rstrip('.'))}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else (), unbuilt=maker is not None)
 
 
@@ -431,17 +436,26 @@ def _other_module(message: str) -> tuple[str, str] | None:
 
 
 def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
-    """Return the name that is meant, where the file defines one that is spelt alike."""
+    """Return the name that is meant, where the file defines one that is spelt alike; other slips of its names are told
+    with it."""
     name = _NAME.search(found.message)
-    wrong = f"`{name[1]}` is not defined anywhere" if name else None
-    slips = (
-        s.message for s in package.slips if (s.file, s.line, s.kind) == (place.file, place.line, "misspelt")
-    )
-    said = next((message for message in slips if wrong and message.startswith(wrong)), "")
-    near = _MEANT.search(said)
-    if near is None or name is None:
+    slips = [s for s in package.slips if s.file == place.file]
+    if outside := next((s for s in slips if (s.line, s.kind) == (place.line, "outside-method")), None):
+        return (
+            outside.message,
+            f"indent line {place.line} like the lines of the method above it, or delete it",
+        )
+    meant = [
+        (s.line, match[1], match[2])
+        for s in slips
+        if s.kind == "misspelt" and (match := _MEANT.match(s.message))
+    ]
+    here = next((one for one in meant if name and one[:2] == (place.line, name[1])), None)
+    if here is None:
         return None
-    return f"did you mean {near[1]}?", f"in line {place.line}, write {near[1]} instead of {name[1]}"
+    others = [one for one in meant if one[0] != place.line][:OTHER_NAMES_SHOWN]
+    written = [f"in line {line}, write {new} instead of {old}" for line, old, new in (here, *others)]
+    return f"did you mean {here[2]}?", "; ".join(written)
 
 
 def _callback(found: Traceback, place: FileCitation | None, package: PackageFacts) -> PythonSlip | None:

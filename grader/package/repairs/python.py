@@ -28,8 +28,8 @@ ATTEMPTS = 3
 
 Cause = Literal[
     "tabs",
+    "level",
     "indent",
-    "outdent",
     "braces",
     "python2",
     "characters",
@@ -133,7 +133,7 @@ def _joined(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
         if (
             groups
             and groups[-1][0] == step.cause
-            and step.cause not in ("token", "indent", "outdent", "module", "import", "attribute")
+            and step.cause not in ("token", "indent", "module", "import", "attribute")
         ):
             groups[-1][1].append(step)
         else:
@@ -147,8 +147,8 @@ def _change(files: Files, file: str, cause: Cause, steps: list[_Step]) -> None:
     files.change(kind, file, steps[-1].text, message, fix)
 
 
-def _indented(before: str, after: str) -> str:
-    """How lines that are indented with tabs have to begin, so that the file parses."""
+def _indented(before: str, after: str, first: str = "replace the tabs: ") -> str:
+    """How lines that are indented otherwise have to begin, so that the file parses; `first` goes before it."""
     pairs = enumerate(zip(before.split("\n"), after.split("\n"), strict=False), start=1)
     lines: dict[int, list[int]] = {}
     for number, (old, new) in pairs:
@@ -164,7 +164,7 @@ def _indented(before: str, after: str) -> str:
         f"{'line' if len(some) == 1 else 'lines'} {join_words(map(str, some))} with {plural(spaces, 'space')}"
         for spaces, some in lines.items()
     ]
-    return f"replace the tabs: start {join_words(begun)}"
+    return f"{first}start {join_words(begun)}"
 
 
 def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[str, str]:
@@ -178,13 +178,13 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
             f"{place}: tabs and spaces are mixed in the indentation",
             _indented(before, steps[-1].text),
         ),
+        "level": (
+            f"{place}: {cause_of(first.error.message) if first.error else ''}",
+            _indented(before, steps[-1].text, ""),
+        ),
         "indent": (
             f"{place}: the line after a `:` must be indented",
             f"indent line {first.line} by four more spaces",
-        ),
-        "outdent": (
-            f"{place}: this line is indented further than the one above for no reason",
-            f"start line {first.line} exactly below the line above it",
         ),
         "braces": (
             f"{place}: Python has no `{{` and `}}` around a block",
@@ -198,7 +198,12 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
             f"{place}: `global {word}` stands below a line that uses {word}",
             f"take line {first.line} out: outside of a function `global` does nothing",
         ),
-        "old-name": (f"{place}: {word} is Python 2", ""),
+        "old-name": (
+            f"{place}: {word} is Python 2",
+            "put a value in the code in place of `raw_input(…)`: nobody types for a node"
+            if word == "raw_input"
+            else "",
+        ),
         "import": (f"{place} uses {word}, which is not imported", ""),
         "module": (f"{place}: messages are not imported from {word}", ""),
         "attribute": (f"{place}: there is no {word}", ""),
