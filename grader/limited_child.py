@@ -1,7 +1,8 @@
 """Runs one of the grader's own functions on hostile data in a child process with limits on memory, CPU, files and time.
 
 The arguments, and each value that the function yields, travel as JSON. The child is this Python without site-packages,
-and inherits none of the user's variables but those that a program needs to be loaded. A process for many jobs is not
+and inherits none of the user's variables but those that a program needs to be loaded. It imports little: to start it
+takes as long as most of what it is started for. A process for many jobs is not
 its business (`workers.py`), and neither are students' programs (`arena/`).
 """
 
@@ -10,26 +11,20 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import subprocess
 import sys
-import tempfile
-from dataclasses import asdict, dataclass
 from importlib import import_module
-from pathlib import Path
-
-from grader.host_programs import loading_environment
+from typing import NamedTuple
 
 try:
     import resource
 except ImportError:  # Windows
     resource = None  # type: ignore[assignment]
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120 - see above
 BOOTSTRAP = "import sys; sys.path.append(sys.argv[1]); from grader.limited_child import main; main()"
 
 
-@dataclass(frozen=True, kw_only=True)
-class ChildLimits:
+class ChildLimits(NamedTuple):
     """What the child may take: `memory_bytes` of address space, `cpu_s` of processor time, `wall_s` in all,
     `file_bytes` for each file that it writes; of its answer, `answer_bytes` are read."""
 
@@ -40,8 +35,7 @@ class ChildLimits:
     answer_bytes: int = 8 << 20
 
 
-@dataclass(frozen=True, kw_only=True)
-class Answer:
+class Answer(NamedTuple):
     """What the function yielded, a line of JSON each; `done` if it came to its end, `timed_out` if it took longer than
     `wall_s`. Where it is neither, the child went beyond another limit, or crashed."""
 
@@ -52,12 +46,17 @@ class Answer:
 
 def run_limited(function: str, *arguments: object, limits: ChildLimits) -> Answer:
     """Call `function` (`module:name`), which yields values for JSON, with these arguments."""
-    request = {"function": function, "arguments": arguments, "limits": asdict(limits)}
+    import subprocess  # noqa: PLC0415 - as below, the child needs none of them
+    import tempfile  # noqa: PLC0415
+
+    from grader.host_programs import loading_environment  # noqa: PLC0415
+
+    request = {"function": function, "arguments": arguments, "limits": limits._asdict()}
     with tempfile.TemporaryFile() as out:
         code: int | None = None
         with contextlib.suppress(subprocess.TimeoutExpired):
             code = subprocess.run(
-                [sys.executable, "-I", "-S", "-B", "-c", BOOTSTRAP, str(ROOT)],
+                [sys.executable, "-I", "-S", "-B", "-c", BOOTSTRAP, ROOT],
                 cwd="/",
                 env=loading_environment(os.environ),
                 input=json.dumps(request).encode("ascii"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import replace
 
 import pytest
 
@@ -33,12 +32,12 @@ def test_what_goes_beyond_a_limit_ends_and_what_came_before_counts(what, tmp_pat
 
 @pytest.mark.full
 def test_what_takes_too_long_is_ended() -> None:
-    found = ask("take_time", limits=replace(LIMITS, wall_s=3.0))
+    found = ask("take_time", limits=LIMITS._replace(wall_s=3.0))
     assert found == Answer(lines=b"1\n", done=False, timed_out=True)
 
 
 def test_an_answer_without_end_is_cut() -> None:
-    assert len(ask("say_much", limits=replace(LIMITS, answer_bytes=1000)).lines) == 1000
+    assert len(ask("say_much", limits=LIMITS._replace(answer_bytes=1000)).lines) == 1000
 
 
 def test_nothing_is_inherited_but_what_loading_takes(monkeypatch) -> None:

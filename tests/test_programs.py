@@ -68,8 +68,9 @@ STARTS = {
         "'/'",
         "its archive, and its source files, which are parsed and not run",
     ),
+    "workers.py:__init__": Start("_environment(env)", None, "nothing: it does no job"),
     "workers.py:_start": Start(
-        "{**with_absolute_paths(os.environ), **self._env}",
+        "_environment(self._env)",
         None,
         "what it submitted, as text in jobs that come through a pipe",
     ),
@@ -80,7 +81,10 @@ STARTS = {
     ),
     "classes/review/serve.py:git_user": Start("with_absolute_paths(os.environ)", "'/'", "nothing"),
 }
-REPLACED = {"arena/ros/namespaces.py:<module>": "becomes the program of the probe: arena/sandbox.py"}
+REPLACED = {
+    "arena/ros/namespaces.py:<module>": "becomes the program of the probe: arena/sandbox.py",
+    "workers.py:_stand_by": "a copy of the template does the jobs of a worker, as one that `_start` started",
+}
 MAKERS = {"Popen", "run", "call", "check_call", "check_output", "getoutput", "getstatusoutput"}
 STARTER = re.compile(
     r"\b(os|subprocess|Popen|create_subprocess_\w+)\b"
