@@ -22,13 +22,13 @@ from grader.checks.support.counters import (
     wrong_steps,
 )
 from grader.checks.support.exit_causes import explain_early_end
-from grader.checks.support.processes import PublishedTopic
+from grader.checks.support.processes import PublishedTopic, slips_of
 from grader.checks.support.text import LOOP
 from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 CONNECT_NS = 1_000_000_000
@@ -156,11 +156,12 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
         or _too_few(len(steps), run, package, params)
         or passed(f"the counter goes up by one, {plural(right, 'time')}")
     )
+    verdict = _of_clock(verdict, count, run, package, params)
     at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0)
     return verdict.about(
         expected=expected,
         measured=f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}",
-        citations=(cite(run, params.topic, at.from_ns, at.to_ns),),
+        citations=(*verdict.citations, cite(run, params.topic, at.from_ns, at.to_ns)),
     )
 
 
@@ -254,6 +255,21 @@ def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict 
         hint = "set the counter before the loop, and add one each time around it: nothing inside the loop may reset it"
     verdict = failed(f"the counter {message}: {place}", hint=hint)
     return verdict.once() if count.is_single(found.own) else verdict
+
+
+def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, params: StepParams) -> Verdict:
+    """Return that a clock is no counter, where the script reads its values from one: it skips when it is late."""
+    slips = slips_of(package, run, count.callerid, "clock-value")
+    last = params.topic.rpartition("/")[2]
+    slip = next((s for s in slips if s.message.rpartition("/")[2].lstrip("~") == last), None)
+    if slip is None or verdict.unjudged or verdict.status not in {Status.PASS, Status.FAIL}:
+        return verdict
+    message = (
+        f"the values on {params.topic} are read from a clock, not counted ({slip.file}, line {slip.line})"
+    )
+    seen = "" if verdict.status is Status.PASS else f"; {verdict.message}"
+    hint = "set a counter before the loop, publish it, and add one to it each time around the loop"
+    return failed(message + seen, hint=hint, citations=(FileCitation(file=slip.file, line=slip.line),))
 
 
 def _flooded(skips: int, params: StepParams) -> Verdict:

@@ -191,7 +191,8 @@ def _counted(package: PackageFacts, run: Run, channel: Channel, told: Sequence[f
         return None
     message = f"the number in the messages counts them ({told[0]:.0f}, {told[1]:.0f}, …) and is not a time"
     place = FileCitation(file=slip.file, line=slip.line)
-    return failed(f"{message}: {slip.file} reads no clock", hint=ASK_AGAIN, citations=(place,))
+    why = "reads no clock but once" if "once" in slip.message else "reads no clock"
+    return failed(f"{message}: {slip.file} {why}", hint=ASK_AGAIN, citations=(place,))
 
 
 def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:

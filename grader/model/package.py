@@ -253,6 +253,8 @@ SlipKind = Literal[
     "sleep-outside",
     "callback-called",
     "callback-values",
+    "clock-value",
+    "deaf",
     "node-name",
     "publisher",
     "publisher-type",
@@ -265,18 +267,20 @@ class PythonSlip(Record):
     """What is remarkable in a Python file that compiles, most of it slips that show only when the node runs.
 
     `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and nodes
-    get none. `misspelt`: a name that the file does not define, beside one that it does. `no-clock`: it publishes
-    and counts, and nothing in what it sends can tell the time; that is a slip only where its messages are to tell it.
-    `rate-parameter` and `rate-number`: no slip, but a loop or a timer whose rate is a parameter, `message` its name as
-    written, or a number, `message` in Hz. `reset-value` and `reset-limit`: where a counter goes back, to the number
-    `message`, or when it reaches it. `never-called`: a function that makes a node, publishes or waits, which nothing
-    names; `main-guard`: `__name__` beside another word than `__main__`. `never-reached`: an endless loop before the
-    first `publish(…)`; `spin-in-loop`: a loop that publishes and waits in `spin()`; `loop-left`: one that ends in its
-    first turn; `sleep-outside`: the `sleep()` that one lacks stands after it or around it. `callback-called`,
-    `callback-values`: a callback that is called where it is to be named, or that takes another number of values than
-    ROS has for it. `outside-method`: a call in a class that stands in none of its methods and uses a name
-    that is not there. `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a
-    topic; `message` is the name as written. `publisher-type`: the message type in the line of a `publisher`.
+    get none. `misspelt`: a name that the file does not define, beside one that it does. `no-clock`: it publishes and
+    counts, and nothing in what it sends tells the time, but at most the value that it counts on from: a slip only
+    where its messages are to tell it. `rate-parameter` and `rate-number`: no slip, but a loop or a timer whose rate
+    is a parameter, `message` its name as written, or a number, `message` in Hz. `reset-value` and `reset-limit`:
+    where a counter goes back, to the number `message`, or when it reaches it. `never-called`: a function that makes a
+    node, publishes or waits, which nothing names; `main-guard`: `__name__` beside another word than `__main__`.
+    `never-reached`: an endless loop before the first `publish(…)`; `spin-in-loop`: a loop that publishes and waits in
+    `spin()`; `loop-left`: one that ends in its first turn; `sleep-outside`: the `sleep()` that one lacks stands after
+    it or around it. `callback-called`, `callback-values`: a callback that is called where it is to be named, or that
+    takes another number of values than ROS has for it. `clock-value`: the values of the topic `message` are read from
+    a clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C, and behind `: ` how to repair it.
+    `outside-method`: a call in a class that stands in none of its methods and uses a name that is not there.
+    `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a topic; `message` is
+    the name as written. `publisher-type`: the message type in the line of a `publisher`.
     """
 
     file: str

@@ -188,6 +188,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
 def test_what_never_runs_is_known(tmp_path, text, found):
     (tmp_path / "a.py").write_text(text)
     others = (
+        "deaf",
         "rate-number",
         "no-clock",
         "misspelt",
@@ -310,6 +311,15 @@ def test_a_script_that_counts_and_reads_no_clock(tmp_path, value, imported, told
     assert [s.kind for s in slips] == ["no-clock"] * told
 
 
+IN_A_CLASS = """\
+class A:
+    def %s(self):
+        self.n = int(rospy.get_time())
+    def turn(self):
+        self.n += 1
+"""
+
+
 @pytest.mark.parametrize(
     ("before", "value", "told"),
     [
@@ -321,10 +331,18 @@ def test_a_script_that_counts_and_reads_no_clock(tmp_path, value, imported, told
         ),
         ("c = itertools.count()\nmessage = String()\nmessage.data = str(next(c))\n", "message.data", True),
         ("self.began = rospy.get_time()\nself.c = itertools.count()\n", "next(self.c)", True),
-        ("c = itertools.count(int(rospy.get_time()))\n", "next(c)", False),
+        ("c = itertools.count(int(rospy.get_time()))\n", "next(c)", True),
         ("c = itertools.count()\nt = int(rospy.get_time())\n", "t if next(c) else t", False),
         ("def now():\n    return rospy.get_time()\nc = itertools.count()\nnext(c)\n", "now()", False),
         ("from clocks import tick\nc = itertools.count()\nnext(c)\n", "tick()", False),
+        ("n = int(rospy.get_time())\nwhile True:\n    n += 1\n", "n", True),
+        ("n = int(rospy.get_time())\nwhile True:\n    n = n + 1\n", "n", True),
+        ("while True:\n    n = int(rospy.get_time())\n    n += 1\n", "n", False),
+        ("def turn():\n    n = int(rospy.get_time())\n    n += 1\n", "n", False),
+        ("n = 0\nwhile True:\n    n += rospy.get_time() - n\n", "n", False),
+        (IN_A_CLASS % "__init__", "self.n", True),
+        (IN_A_CLASS % "now", "self.n", False),
+        ("while True:\n    c = itertools.count(int(rospy.get_time()))\n", "next(c)", False),
     ],
 )
 def test_a_script_that_reads_a_clock_and_sends_what_it_counts(tmp_path, before, value, told):
@@ -332,6 +350,53 @@ def test_a_script_that_reads_a_clock_and_sends_what_it_counts(tmp_path, before, 
     (tmp_path / "a.py").write_text(text)
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "no-clock"]
     assert len(slips) == told
+
+
+NUMBERS = "pub = rospy.Publisher('numbers', Int8)\nsaid = rospy.Publisher('said', String)\n"
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        ("    pub.publish(int(rospy.get_time()) % 128)\n", True),
+        ("    n = int(time.time() * 10) % 128\n    pub.publish(n)\n", True),
+        ("    msg = Int8()\n    msg.data = rospy.Time.now().secs % 128\n    pub.publish(msg)\n", True),
+        ("    pub.publish(n % 128)\n    n += 1\n    said.publish(str(rospy.get_time()))\n", False),
+        ("    n = (n + 1) % 128\n    pub.publish(n)\n", False),
+        ("    if rospy.get_time() > last:\n        n = n + 1\n    pub.publish(n)\n", False),
+        ("    pub.publish(helper(rospy.get_time()))\n", False),
+        ("    pub.publish(next(c))\n", False),
+        ("    t = int(rospy.get_time())\n    pub.publish(len(seen))\n", False),
+    ],
+)
+def test_values_that_a_clock_gives_are_not_counted(tmp_path, code, told):
+    (tmp_path / "a.py").write_text(f"import rospy, time\n{NUMBERS}while not rospy.is_shutdown():\n{code}")
+    slips = [s.message for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "clock-value"]
+    assert ("numbers" in slips) == told
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        ("while True:\n    time.sleep(1)\n", "the loop in line 1 never asks"),
+        ("while not rospy.is_shutdown():\n    time.sleep(1)\n", ""),
+        ("while True:\n    rate.sleep()\n", ""),
+        ("while True:\n    try:\n        rate.sleep()\n    except rospy.ROSInterruptException:\n        pass\n",
+         "the `except` in line 4 catches what Ctrl-C raises, and the loop in line 1 goes on"),
+        ("while True:\n    try:\n        rate.sleep()\n    except:\n        break\n", ""),
+        ("while n < 9:\n    n = 0\n", "the loop in line 1"),
+        ("while n < 9:\n    n += 1\nwhile True:\n    n = 0\n", "the loop in line 3"),
+        ("for n in itertools.count():\n    time.sleep(1)\n", "the loop in line 1"),
+        ("for n in range(9):\n    time.sleep(1)\n", ""),
+        ("rospy.init_node('a', disable_signals=True)\n", "`disable_signals=True` in line 1"),
+        ("signal.signal(signal.SIGINT, signal.SIG_IGN)\n", "line 1 gives Ctrl-C another meaning"),
+    ],
+)  # fmt: skip
+def test_why_a_node_goes_on_after_ctrl_c(tmp_path, code, told):
+    (tmp_path / "a.py").write_text(code)
+    deaf = [s.message for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "deaf"]
+    assert len(deaf) == bool(told)
+    assert all(told in one and ": " in one for one in deaf)
 
 
 @pytest.mark.parametrize(

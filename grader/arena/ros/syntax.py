@@ -197,12 +197,14 @@ def slips(tree):
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             found.append({"line": node.lineno, "kind": "input", "message": message})
     finders = (misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops)
-    for find in (*finders, callbacks, graph_names):
+    for find in (*finders, callbacks, graph_names, deaf_loops, clock_values):
         found += find(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
-    if published is not None and counts(tree) and (not knows_time(tree) or sends_no_time(tree)):
-        message = "the script counts, and reads no clock"
-        found.append({"line": published.lineno, "kind": "no-clock", "message": message})
+    if published is not None and counts(tree):
+        message = "" if knows_time(tree) else "the script counts, and reads no clock"
+        message = message or sends_no_time(tree)
+        if message:
+            found.append({"line": published.lineno, "kind": "no-clock", "message": message})
     return sorted(found, key=lambda slip: slip["line"])[:SLIPS_LIMIT]
 
 
@@ -539,34 +541,158 @@ PLAIN_CALLS = {
 }  # fmt: skip
 
 
+CLOCK_METHODS = {"to_sec", "to_nsec"}
+
+
 def sends_no_time(tree):
-    """Whether what is published comes from counting alone, though the script may read a clock for something else."""
-    bound = {}
+    """Return what is to be said where what is published comes from counting alone, though the script may read a clock
+    for something else, or for the value that it counts on from; "" otherwise."""
+    source = Source(tree)
+    found = source.reached([arg for n in ast.walk(tree) if is_call(n, "publish") for arg in n.args])
+    if found.clock or found.unknown or not found.counts:
+        return ""
+    if source.reached(source.starts).clock:
+        return "the script reads the clock once, and counts on from there"
+    return "the script counts, and reads no clock for what it publishes"
+
+
+def clock_values(tree):
+    """Topics whose values are read from a clock in each turn, and not counted."""
+    source = Source(tree)
     for node in ast.walk(tree):
-        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
-        value = getattr(node, "iter", None) or getattr(node, "value", None)
-        for target in targets if value is not None else ():
-            part = target
-            while part is not None and dotted(part) != "self":
-                bound.setdefault(dotted(part), []).append(value)
-                part = getattr(part, "value", None)  # `msg.data = …` is a part of `msg`
-    functions = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
-    left = [arg for n in ast.walk(tree) if is_call(n, "publish") for arg in n.args]
-    seen, counted = set(), False
+        if not is_call(node, "publish"):
+            continue
+        makers = source.bound.get(dotted(node.func.value), [])
+        named = [
+            m.args[0] for m in makers if isinstance(m, ast.Call) and m.args and called_name(m) == "Publisher"
+        ]
+        found = source.reached(node.args)
+        name = named[0].value if len(named) == 1 and isinstance(named[0], ast.Constant) else None
+        if found.clock and not found.counts and not found.unknown and isinstance(name, str):
+            yield {"line": node.lineno, "kind": "clock-value", "message": name[:TEXT_LIMIT]}
+
+
+class Source:
+    """Where values come from. `bound` has what names are given; what a counter starts with is in `starts` instead."""
+
+    def __init__(self, tree):
+        self.bound, self.starts = {}, []
+        self.functions = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+        places = dict(turns(tree))
+        given = []
+        for node in ast.walk(tree):
+            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+            value = getattr(node, "iter", None) or getattr(node, "value", None)
+            given += [(node, t, value) for t in targets if value is not None and t is not None]
+        self.counted = {dotted(t) for n, t, value in given if is_increment(n, t, value)}
+        added = {dotted(t): places[n] for n, t, value in given if is_increment(n, t, value)}
+        for node, target, value in given:
+            function, again = places[node]
+            name, begins = dotted(target), not again and isinstance(node, ast.Assign)
+            where = added.get(name)
+            once = (
+                function is None or getattr(function, "name", "") == "__init__" or where == (function, True)
+            )
+            if begins and where and once:
+                self.starts.append(value)
+            elif begins and called_name(value) == "count":
+                self.starts += value.args
+                self.bound.setdefault(name, []).append(value.func)
+            else:
+                part = target
+                while part is not None and dotted(part) != "self":
+                    self.bound.setdefault(dotted(part), []).append(value)
+                    part = getattr(part, "value", None)  # `msg.data = …` is a part of `msg`
+
+    def reached(self, values):
+        """Return what the values are made of."""
+        found, left, seen = Reached(), list(values), set()
+        while left:
+            for node in ast.walk(left.pop()):
+                name = dotted(node.func if isinstance(node, ast.Call) else node)
+                last = called_name(node) or name
+                if name.rpartition(".")[2] in CLOCKS and name != "time":
+                    found.clock = True
+                elif isinstance(node, ast.Call) and last not in CLOCK_METHODS and not last[:1].isupper():
+                    found.unknown = found.unknown or (last not in PLAIN_CALLS and name not in self.functions)
+                counting = isinstance(node, ast.Call) and last in ("next", "count", "len", "range")
+                found.counts = found.counts or counting or name in self.counted
+                if name and name not in seen:
+                    seen.add(name)
+                    left += self.bound.get(name, [])
+                    left += [self.functions[name]] if name in self.functions else []
+        return found
+
+
+class Reached:
+    """Whether a clock, something that counts, or a call of unknown doings is among what a value is made of."""
+
+    clock = counts = unknown = False
+
+
+def turns(tree):
+    """Yield each node with its function, and whether a loop in there does it again and again."""
+    left = [(tree, None, False)]
     while left:
-        for node in ast.walk(left.pop()):
-            name = dotted(node.func if isinstance(node, ast.Call) else node)
-            if name.rpartition(".")[2] in CLOCKS and name != "time":
-                return False
-            last = called_name(node) or name
-            if isinstance(node, ast.Call) and last not in PLAIN_CALLS and name not in functions:
-                return False
-            counted = counted or (isinstance(node, ast.Call) and last in ("next", "count"))
-            if name and name not in seen:
-                seen.add(name)
-                left += bound.get(name, [])
-                left += [functions[name]] if name in functions else []
-    return counted
+        node, function, again = left.pop()
+        yield node, (function, again)
+        for child in ast.iter_child_nodes(node):
+            own = isinstance(child, (ast.FunctionDef, ast.Lambda))
+            looped = again or isinstance(node, (ast.While, ast.For))
+            left.append((child, child if own else function, looped and not own))
+
+
+def is_increment(node, target, value):
+    """Whether a name is given what it was before, and something more: `n += 1`, `n = (n + 1) % 128`."""
+    if isinstance(node, ast.AugAssign):
+        return isinstance(node.op, ast.Add) and isinstance(value, ast.Constant)
+    return any(dotted(part) == dotted(target) for part in ast.walk(value) if isinstance(part, type(target)))
+
+
+SWALLOWS = {"KeyboardInterrupt", "ROSInterruptException", "ROSException", "Exception", "BaseException"}
+ENDS = (ast.Break, ast.Return, ast.Raise)
+
+
+def deaf_loops(tree):
+    """Why a node goes on after Ctrl-C: loops that do not ask for it, an `except` within them, signals put off."""
+    catching, endless, others = [], [], []
+    for loop in ast.walk(tree):
+        inside = list(ast.walk(loop)) if isinstance(loop, ast.While) or is_counted_for(loop) else []
+        if not inside or any(map(is_shutdown, inside)):
+            continue
+        caught = [h for n in inside if isinstance(n, ast.Try) for h in n.handlers if goes_on(h)]
+        wakes = any(is_call(n, "sleep") and dotted(n.func) != "time.sleep" for n in inside)
+        asks = "ask `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
+        for handler in caught[:1]:
+            message = (
+                "the `except` in line %d catches what Ctrl-C raises, and the loop in line %d goes on: %s"
+            )
+            catching.append((loop.lineno, message % (handler.lineno, loop.lineno, asks)))
+        if not caught and not wakes:
+            known = isinstance(loop, ast.While) and isinstance(loop.test, ast.Constant)
+            message = "the loop in line %d never asks whether the node is to end: %s" % (loop.lineno, asks)
+            (endless if known else others).append((loop.lineno, message))
+    off = "`disable_signals=True` in line %d keeps Ctrl-C from rospy: leave it out"
+    taken = "line %d gives Ctrl-C another meaning: delete it"
+    for node in ast.walk(tree):
+        if is_call(node, "init_node") and any(k.arg == "disable_signals" for k in node.keywords):
+            yield {"line": node.lineno, "kind": "deaf", "message": off % node.lineno}
+        if is_call(node, "signal") and node.args and dotted(node.args[0]).endswith("SIGINT"):
+            yield {"line": node.lineno, "kind": "deaf", "message": taken % node.lineno}
+    for line, message in catching or endless or others:
+        yield {"line": line, "kind": "deaf", "message": message}
+
+
+def is_counted_for(loop):
+    return isinstance(loop, ast.For) and called_name(loop.iter) == "count"
+
+
+def goes_on(handler):
+    """Whether an `except` catches what Ctrl-C raises, and leaves neither the loop nor the script."""
+    kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
+    catches = any(kind is None or dotted(kind).rpartition(".")[2] in SWALLOWS for kind in kinds)
+    left = (n for n in ast.walk(handler) if isinstance(n, ENDS) or called_name(n) in ("exit", "_exit"))
+    return catches and next(left, None) is None
 
 
 def is_plain(module):
