@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 from grader.model.record import Record
 from grader.model.submission import chmod_hint
+from grader.wording import join_words
 
 RepairKind = Literal[
     "executable-bit",
@@ -86,16 +87,21 @@ def place_of(repair: Repair) -> str:
 
 def added_lines(before: str, after: str) -> str:
     """Return the lines that are new, in one line."""
+    return "; ".join(_added(before, after))
+
+
+def _added(before: str, after: str) -> list[str]:
     old = before.split("\n")
-    return "; ".join(line.strip() for line in after.split("\n") if line not in old and line.strip())
+    return [line.strip() for line in after.split("\n") if line not in old and line.strip()]
 
 
 def advice_of(repair: Repair) -> str:
-    """Return where and how the repair is done by hand: `package.xml: below line 9 add <depend>rospy</depend>`."""
-    new = repair.after.split("\n")
-    if repair.fix != added_lines(repair.before, repair.after):
+    """Return where and how the repair is done by hand: ``package.xml: below line 9 add `<depend>rospy</depend>` ``."""
+    new, added = repair.after.split("\n"), _added(repair.before, repair.after)
+    if repair.fix != "; ".join(added):
         return f"{place_of(repair)}: {repair.fix}"
+    code = join_words([line if "`" in line else f"`{line}`" for line in added])
     if repair.before not in (new[0], new[-1]):
-        return f"{place_of(repair)}: write {repair.fix}"
+        return f"{place_of(repair)}: write {code}"
     where = "below" if repair.before == new[0] else "above"
-    return f"{repair.file}: {where} line {repair.line} add {repair.fix}"
+    return f"{repair.file}: {where} line {repair.line} add {code}"

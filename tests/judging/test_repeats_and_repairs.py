@@ -206,7 +206,7 @@ def test_a_line_that_is_missing_is_added_below_its_neighbour() -> None:
     spin = TABS.model_copy(
         update={"before": "import rospy", "after": "import rospy\nimport sys", "fix": "import sys"}
     )
-    assert judged(DIED, GOOD_RUN, spin)["node"].hint == "src/numeric_talker.py: below line 7 add import sys"
+    assert judged(DIED, GOOD_RUN, spin)["node"].hint == "src/numeric_talker.py: below line 7 add `import sys`"
 
 
 def test_a_criterion_that_passes_on_the_copy_needs_no_hint() -> None:
@@ -234,7 +234,7 @@ def test_a_build_that_the_manifest_blocks_is_judged_on_the_copy() -> None:
     copy = built({"manifest": {}}, exit_code=0)["package"]
     about = {**copy.metadata, "repairs": json.dumps([tag.model_dump()])}
     manifest, build = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
-    assert (manifest.points, manifest.hint) == (0, f"package.xml line 5: write {tag.fix}")
+    assert (manifest.points, manifest.hint) == (0, f"package.xml line 5: write `{tag.fix}`")
     assert (build.status.value, build.points, build.hint) == ("partial", 5, "")
 
 
