@@ -6,6 +6,7 @@ import csv
 import json
 import shutil
 from datetime import datetime, timezone
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from mcap.writer import CompressionType, Writer
 
 from grader import __version__
 from grader.classes.batch.folder import open_batch, write_run
+from grader.classes.batch.renew_results import rewrite
 from grader.classes.batch.run import describe_rubric
 from grader.cli.main import run
 from grader.evidence.reader import load_evidence
@@ -81,6 +83,45 @@ def test_the_same_rubric_changes_nothing(tmp_path, capsys) -> None:
     assert {name: (out / name / "result.json").read_bytes() for name in kinds()} == before
     assert rows_of(out / "changes.csv") == []
     assert "2 of 2 judged again, 0 changed" in capsys.readouterr().out
+
+
+@pytest.mark.full
+def test_one_that_was_stopped_goes_on_and_says_what_all_of_it_changed(tmp_path, capsys, monkeypatch) -> None:
+    out = recorded(tmp_path / "out", kinds())
+    rubric = changed(tmp_path / "new.yaml", ("rate_hz: 10", "rate_hz: 20"))
+    with monkeypatch.context() as patch:
+        patch.setattr("grader.classes.batch.regrade.rewrite", _stops_at(2))
+        assert run(["regrade", str(out), "--rubric", str(rubric)]) == 130
+    assert "1 of 2 judged again; the same command continues" in capsys.readouterr().err
+    assert run(["regrade", str(out), "--rubric", str(rubric)]) == 1
+    assert "fewer points for 2: ada 100 -> 85, bob 100 -> 85\n" in capsys.readouterr().out
+    assert {row["id"] for row in rows_of(out / "changes.csv")} == {"ada", "bob"}
+    assert run(["regrade", str(out), "--rubric", str(rubric)]) == 1
+    assert rows_of(out / "changes.csv") == []
+
+
+def _stops_at(number: int):
+    calls = count(1)
+
+    def rewrites(*given):
+        if next(calls) == number:
+            raise KeyboardInterrupt
+        rewrite(*given)
+
+    return rewrites
+
+
+@pytest.mark.full
+def test_a_result_that_was_just_being_replaced_is_put_in_place_first(tmp_path, capsys) -> None:
+    out = recorded(tmp_path / "out", kinds())
+    ready = out / "ada" / ".grader-ready"
+    ready.mkdir()
+    (out / "ada" / "result.json").rename(ready / "result.json")
+    names = [path.name for path in (out / "ada").iterdir() if path != ready]
+    (ready / "names.json").write_text(json.dumps(["result.json", *names]))
+    assert run(["regrade", str(out)]) == 0
+    assert "2 of 2 judged again, 0 changed" in capsys.readouterr().out
+    assert not ready.exists()
 
 
 @pytest.mark.full

@@ -23,7 +23,7 @@ from grader.model.result import (
 from grader.model.verdict import Status
 from grader.model.version import RUN as RUN_FORMAT
 from grader.model.version import UPDATE
-from grader.results import EVIDENCE
+from grader.results import EVIDENCE, finish_killed
 from grader.results import read_result as read_result  # noqa: PLC0414 - for code that has a batch's folder
 from grader.untrusted_text import json_text
 
@@ -132,8 +132,12 @@ def write_run(folder: Path, run: BatchRun) -> None:
 
 
 def open_batch(folder: Path) -> BatchFolder:
-    """Return the batch in `folder`. Raises UsageError if there is none."""
+    """Return the batch in `folder`. Raises UsageError if there is none.
+
+    A result that a killed program was just putting in place is put there first: else there would be none.
+    """
     path = folder / RUN
+    finish_killed(folder)
     try:
         data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else b""
         return BatchFolder(folder, BatchRun.read_json(data))

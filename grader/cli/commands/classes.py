@@ -147,13 +147,18 @@ def regrade(
         from grader.cli import classes
         from grader.cli.class_display import open_class_display, print_regraded
         from grader.cli.host_support import warn_without_sandbox
+        from grader.cli.output import say_beside
         from grader.portable import cores
         from grader.rubric.load import load_rubric
     batch = open_batch(folder)
     source = rubric or batch.run.rubric_source
     loaded = load_rubric(source)
     own = cores()
-    batch, regraded = judge_again(batch, loaded, classes.rubric_source(source), jobs or own)
+
+    def stopped(done: int, of: int) -> None:
+        say_beside(f"{done} of {of} judged again; the same command continues")
+
+    batch, regraded = judge_again(batch, loaded, classes.rubric_source(source), jobs or own, stopped)
     if run_missing_too and any(one.missing for one in regraded):
         warn_without_sandbox(sandbox, loaded)
         with open_class_display() as watcher:
