@@ -1,5 +1,5 @@
 """MkDocs hooks: links that leave docs/ go to the repository, where it has an address, and are plain words elsewhere.
-A terminal's copy button copies the commands alone.
+A terminal's copy button copies the commands alone, and the empty corner of a table is no header.
 """
 
 from __future__ import annotations
@@ -46,4 +46,4 @@ def on_page_content(content: str, **_: object) -> str:
         copied = f' data-copy="{html.escape(commands)}"' if commands else ""
         return f'<div class="highlight"{copied}>{match[1]}</div>'
 
-    return TERMINAL.sub(with_commands, content)
+    return TERMINAL.sub(with_commands, content).replace("<th></th>", "<td></td>")

@@ -10,7 +10,8 @@ from scripts.pages import ROOT
 from tests.browser.conftest import DESKTOP, PHONE
 from tests.docs.test_site import build_site
 
-WCAG = ("wcag2a", "wcag2aa", "wcag21a", "wcag21aa")
+HANDLERS = """() => [...document.querySelectorAll("*")].flatMap((one) => [...one.attributes])
+    .filter((one) => one.name.startsWith("on") || one.value.startsWith("javascript:")).map((one) => one.name)"""
 
 
 @pytest.fixture(scope="module")
@@ -23,15 +24,17 @@ def site(tmp_path_factory) -> Path:
 @pytest.mark.full
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
-def test_every_page_is_accessible(browser, axe, site, size, scheme) -> None:
+def test_every_page_is_accessible_and_loads_nothing_from_elsewhere(browser, axe, site, size, scheme) -> None:
     context = browser.new_context(
         viewport={"width": size.width, "height": size.height}, color_scheme=scheme, reduced_motion="reduce"
     )
-    page, found = context.new_page(), {}
+    page, found, asked = context.new_page(), {}, []
+    page.on("request", lambda request: asked.append(request.url))
     pages = sorted(path for path in site.rglob("*.html") if path.name != "404.html")
     for path in pages:
         page.goto(path.as_uri())
-        found[str(path.relative_to(site))] = axe(page, *WCAG)
+        found[str(path.relative_to(site))] = axe(page) + page.evaluate(HANDLERS)
     context.close()
+    assert {url for url in asked if not url.startswith((site.as_uri(), "data:"))} == set()
     assert len(pages) > 30
     assert {name: faults for name, faults in found.items() if faults} == {}
