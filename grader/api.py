@@ -100,7 +100,7 @@ def grade(
 
     if sandbox not in SANDBOXES:
         raise UsageError(f"sandbox is {sandbox!r}", hint=f"it is one of {', '.join(SANDBOXES)}")
-    given, loaded, folder = _text(source), _loaded(rubric), Path(out)
+    given, loaded, folder = _text(source), _load_rubric(rubric), Path(out)
     check_writable(folder)
 
     def work(stop: Stop, steps: Progress) -> GradingResult:
@@ -133,7 +133,7 @@ def judge(evidence: StrPath | Sequence[StrPath], rubric: StrPath | LoadedRubric)
     from grader.judging.summary import assemble_result, environment_info  # noqa: PLC0415 - as above
 
     paths = [evidence] if isinstance(evidence, (str, os.PathLike)) else evidence
-    loaded = _loaded(rubric)
+    loaded = _load_rubric(rubric)
     runs = load_evidence([Path(path) for path in paths])
     criteria = criteria_of(loaded.rubric, runs, loaded.checks, loaded.handed_out)
     return assemble_result(
@@ -244,7 +244,7 @@ def _text(path: StrPath) -> str:
     return text
 
 
-def _loaded(rubric: StrPath | LoadedRubric) -> LoadedRubric:
+def _load_rubric(rubric: StrPath | LoadedRubric) -> LoadedRubric:
     return rubric if isinstance(rubric, LoadedRubric) else load_rubric(rubric)
 
 

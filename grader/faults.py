@@ -170,7 +170,7 @@ def _write_error_result(fault: GraderError, context: GradingContext) -> str:
 
     An earlier complete result stays, unless the submission itself is at fault now.
     """
-    submission = context.submission or _identified(context)
+    submission = context.submission or _identify(context)
     if submission is None:
         return ""
     folder = context.out / submission.id
@@ -190,7 +190,7 @@ def _write_error_result(fault: GraderError, context: GradingContext) -> str:
     return ""
 
 
-def _identified(context: GradingContext) -> SubmissionInfo | None:
+def _identify(context: GradingContext) -> SubmissionInfo | None:
     known = identify(context.source, context.submission_id)
     if known is None:
         return None

@@ -99,7 +99,9 @@ def _new_beside(target: Path, folder: Path, *, public: bool = False) -> Iterator
     for _ in range(ATTEMPTS):
         beside = folder / f"{prefix}{secrets.token_hex(6)}"
         file = new_file(beside, public=public)
-        if _held(file.fileno()) and beside.exists():  # else another writer has swept it before it was locked
+        if (
+            _try_lock(file.fileno()) and beside.exists()
+        ):  # else another writer has swept it before it was locked
             break
         file.close()
     try:
@@ -322,7 +324,7 @@ def _new(prefix: str, place: Path) -> tuple[Path, int]:
             folder = Path(tempfile.mkdtemp(prefix=prefix, dir=place))
             with suppress(FileNotFoundError):
                 descriptor = os.open(folder / MARK, os.O_RDWR | os.O_CREAT | os.O_EXCL | CLOEXEC, 0o600)
-                if _held(descriptor) and (folder / MARK).exists():
+                if _try_lock(descriptor) and (folder / MARK).exists():
                     return folder, descriptor
                 os.close(descriptor)
     except OSError as error:
@@ -334,7 +336,7 @@ def _new(prefix: str, place: Path) -> tuple[Path, int]:
     raise HostError(f"temporary folders in {place} do not stay", hint="set TMPDIR to another folder")
 
 
-def _held(descriptor: int) -> bool:
+def _try_lock(descriptor: int) -> bool:
     try:
         return lock(descriptor)
     except OSError:  # a file system without locks: there nothing is swept either

@@ -81,9 +81,11 @@ def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator
     turns out to be none that can be repaired."""
     with temporary_folder("repaired") as folder:
         try:
-            main = _repaired(submission.package, folder / "main", [r for r in repairs if not _is_of_other(r)])
+            main = _repair_copy(
+                submission.package, folder / "main", [r for r in repairs if not _is_of_other(r)]
+            )
             also = tuple(
-                _repaired(package, folder / package.asked, _of(submission, package, repairs))
+                _repair_copy(package, folder / package.asked, _of(submission, package, repairs))
                 for package in submission.also
             )
         except (NotRepairable, OSError):
@@ -102,7 +104,7 @@ def _of(submission: Submission, package: SourcePackage, repairs: Sequence[Repair
     return [r.with_paths(lambda path: path.removeprefix(way)) for r in repairs if r.file.startswith(way)]
 
 
-def _repaired(package: SourcePackage, folder: Path, repairs: Sequence[Repair]) -> SourcePackage:
+def _repair_copy(package: SourcePackage, folder: Path, repairs: Sequence[Repair]) -> SourcePackage:
     """Return a copy of the package in `folder` with the repairs. Raises NotRepairable, OSError."""
     copy = folder / package.folder.name
     shutil.copytree(package.folder, copy, symlinks=True, ignore=_left_out(package.folder, package.left_out))

@@ -154,7 +154,7 @@ def _locked(folder: Path) -> int:
             descriptor = open_folder(folder)
         except FileNotFoundError:
             continue
-        held = _held(descriptor)
+        held = _try_lock(descriptor)
         if held and _is_at(descriptor, folder):
             return descriptor
         close(descriptor)
@@ -175,7 +175,7 @@ def _is_at(descriptor: int, folder: Path) -> bool:
         return False
 
 
-def _held(descriptor: int) -> bool:
+def _try_lock(descriptor: int) -> bool:
     try:
         return lock(descriptor)
     except OSError:  # a file system without locks: its users must not grade the same submission at once

@@ -42,7 +42,7 @@ def visible(text: str, *, lines: bool = False) -> str:
     What is visible already stays as it is.
     """
     if not (text.isascii() and text.isprintable()):
-        text = _unstacked(text.translate(_LINES if lines else _LINE))
+        text = _unstack_marks(text.translate(_LINES if lines else _LINE))
     return without_ci_commands(text)
 
 
@@ -153,7 +153,7 @@ def _written_out(character: str) -> str:
     return f"\\u{code:04x}" if code <= 0xFFFF else f"\\U{code:08x}"
 
 
-def _unstacked(text: str) -> str:
+def _unstack_marks(text: str) -> str:
     """Marks that are drawn over their letter, and in number over the lines around it: four, then written out."""
     if text.isascii() or not any(map(_is_mark, text)):
         return text

@@ -65,7 +65,7 @@ def sign(folder: Path, key: Path) -> None:
     done = _ssh_keygen(["-Y", "sign", "-f", str(key.absolute()), "-n", NAMESPACE], text)
     if done.returncode or not done.stdout:
         raise UsageError(
-            f"{key}: ssh-keygen cannot sign with it: {_said(done)}",
+            f"{key}: ssh-keygen cannot sign with it: {_printed_text(done)}",
             hint=f"chmod 600 {key}" if b"UNPROTECTED" in done.stderr else LOCKED_KEY,
         )
     (folder / SIGNATURE).unlink(missing_ok=True)
@@ -126,7 +126,7 @@ def read_signature(folder: Path, allowed: Path | None) -> Signature:
         return Signature(state="unsigned")
     signature = ["-s", str((folder / SIGNATURE).absolute())]
     checked = _ssh_keygen(["-Y", "check-novalidate", "-n", NAMESPACE, *signature], text)
-    key = KEY.search(_said(checked))
+    key = KEY.search(_printed_text(checked))
     if checked.returncode or key is None:
         return Signature(state="bad")
     if allowed is None:
@@ -160,7 +160,7 @@ def _ssh_keygen(words: Sequence[str], data: bytes) -> subprocess.CompletedProces
         raise HostError(f"ssh-keygen did not end within {TIMEOUT_S:g} s") from error
 
 
-def _said(done: subprocess.CompletedProcess[bytes]) -> str:
+def _printed_text(done: subprocess.CompletedProcess[bytes]) -> str:
     text = (done.stdout + b"\n" + done.stderr).decode("utf-8", "replace")
     return " ".join(text.split())[:300]
 

@@ -34,7 +34,7 @@ class Start(NamedTuple):
 
 
 STARTS = {
-    "arena/sandbox.py:_said": Start("HOST_ENV", "'/'", "nothing"),
+    "arena/sandbox.py:_last_line": Start("HOST_ENV", "'/'", "nothing"),
     "arena/ros/launching.py:launch": Start(
         "HOST_ENV",
         "stage.folder if gate is not None else NOWHERE",
@@ -44,7 +44,7 @@ STARTS = {
     "arena/arena_process.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
     "cli/doctor.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
     "cli/doctor.py:_modules": Start("ros.env", "'/'", "nothing"),
-    "arena/control_groups.py:_moved": Start(
+    "arena/control_groups.py:_move_to_scope": Start(
         "_environment()", "'/'", "nothing: systemd is asked for this process's number"
     ),
     "ros_packages.py:_prints": Start("HOST_ENV", "'/'", "nothing: names that the rubric gives"),
@@ -55,7 +55,7 @@ STARTS = {
     "intake/git.py:_configured_ssh": Start(
         "environment", "cwd", "nothing: the settings of the user who grades"
     ),
-    "intake/git.py:_started": Start(
+    "intake/git.py:_start": Start(
         "environment", "cwd", "its repository's data; no setting, hook or filter of it"
     ),
     "intake/credentials.py:helper_password": Start(

@@ -183,14 +183,14 @@ class Admission:
         """Return a place to start, locked; False where all that are allowed now are taken."""
         if self._folder is None:
             return True
-        for number in range(self._allowed(self._folder)):
+        for number in range(self._starts_allowed(self._folder)):
             place = FileLock(self._folder / f"start-{number}")
             if place.take():
                 return place
             place.close()
         return False
 
-    def _allowed(self, folder: Path) -> int:
+    def _starts_allowed(self, folder: Path) -> int:
         late_ms = latest_ms(folder / "lateness")
         return max(1, self._starts - int(min(late_ms, LATE_MS * self._starts) / LATE_MS))
 

@@ -197,7 +197,7 @@ def read_kept(name: str, bytes_max: int = BYTES_MAX) -> bytes | None:
     """Return what was kept under that name; None where there is none that is whole and only this user's."""
     with suppress(OSError):
         if _is_private(_folder().lstat()):
-            return _checked(_read(name, bytes_max))
+            return _verify_sum(_read(name, bytes_max))
     return None
 
 
@@ -236,7 +236,7 @@ def _read(name: str, bytes_max: int) -> bytes:
         return file.read(bytes_max) if own else b""
 
 
-def _checked(data: bytes) -> bytes | None:
+def _verify_sum(data: bytes) -> bytes | None:
     content = data[hashlib.sha256().digest_size :]
     return content if data[: -len(content) or None] == _sum(content) else None
 

@@ -100,7 +100,7 @@ async def build(
         ok=ok,
         trace=trace,
         root=place.package_folder,
-        syntax=_kept(place, SYNTAX),
+        syntax=_kept_file(place, SYNTAX),
         others={
             name: CMakeTrace(trace=_trace(one)[0], root=one.package_folder) for name, one in others.items()
         },
@@ -166,7 +166,7 @@ async def _with_setup(place: ProcessEnvironment, arena: ArenaSession) -> Process
     arena.start(spec)
     if not await arena.wait(lambda: SETUP in arena.exit_codes, STEP_S):
         await arena.interrupt(SETUP, int_s=1.0, term_s=1.0)
-    path = _kept(place, ENVIRONMENT)
+    path = _kept_file(place, ENVIRONMENT)
     dump = path.read_bytes() if path and arena.exit_codes.get(SETUP) == 0 else None
     excess = excess_of(dump) if dump else ""
     if excess:
@@ -200,19 +200,19 @@ def _trace(place: ProcessEnvironment) -> tuple[Path | None, str]:
     source = workspace.built / "src" / workspace.folder
     written = written_calls(data[:READ_MAX], source, place.package_folder)
     too_large = f"CMake's trace is more than {READ_MAX >> 20} MB" if len(data) > READ_MAX else ""
-    return _written(place, f"{workspace.folder}-{TRACE}", written.trace), too_large or written.too_much
+    return _write_kept(place, f"{workspace.folder}-{TRACE}", written.trace), too_large or written.too_much
 
 
-def _kept(place: ProcessEnvironment, name: str) -> Path | None:
+def _kept_file(place: ProcessEnvironment, name: str) -> Path | None:
     """Return the file that a step handed over under that name; without a sandbox, a copy of the file that it left."""
     kept = place.workspace.kept / name
     if place.sandbox.bubblewrap:
         return kept if kept.is_file() and kept.stat().st_size else None
     data = read_untrusted(Path(place.output) / name)
-    return None if data is None else _written(place, name, data)
+    return None if data is None else _write_kept(place, name, data)
 
 
-def _written(place: ProcessEnvironment, name: str, data: bytes) -> Path:
+def _write_kept(place: ProcessEnvironment, name: str, data: bytes) -> Path:
     path = place.workspace.kept / name
     path.write_bytes(data)
     return path

@@ -306,7 +306,7 @@ def enter_scope() -> None:
     """
     if system() or not SYSTEMD.exists():
         return
-    if find_cgroups().memory is None and has_memory() and _may_move() and _moved():
+    if find_cgroups().memory is None and has_memory() and _may_move() and _move_to_scope():
         find_cgroups.cache_clear()
 
 
@@ -331,7 +331,7 @@ def _environment() -> dict[str, str]:
     return {**HOST_ENV, "XDG_RUNTIME_DIR": str(RUNTIME / str(os.geteuid()))}
 
 
-def _moved() -> bool:
+def _move_to_scope() -> bool:
     """Ask for the move and wait until it is done: the answer only says that it will be."""
     busctl, pid = find_host_program("busctl"), os.getpid()
     if busctl is None:

@@ -98,8 +98,8 @@ def limits(gradings: int = 1) -> Iterator[Checked]:
         yield Checked(
             name=f"ulimit {need.flag}",
             what=need.what,
-            found=_shown(need, hard) + (f", with {running} in use" if running else ""),
-            needed=f"{wanted} more" if running else _shown(need, wanted),
+            found=_amount_text(need, hard) + (f", with {running} in use" if running else ""),
+            needed=f"{wanted} more" if running else _amount_text(need, wanted),
             command=_command(need, wanted + running) if 0 <= hard < wanted + running else "",
             hopeless=0 <= hard < need.own + running,
         )
@@ -176,7 +176,7 @@ def _is_root() -> bool:
     return os.geteuid() == 0
 
 
-def _shown(need: Need, amount: int) -> str:
+def _amount_text(need: Need, amount: int) -> str:
     if amount < 0:
         return "unlimited"
     if need.option in COUNTS:

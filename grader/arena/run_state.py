@@ -365,8 +365,8 @@ def _enough(live: RunState, until: Until, now_s: float) -> tuple[bool, ...]:
     return (
         _window(live, until, now_s),
         _messages(live, until),
-        _connected(live, until, now_s),
-        _heard(live, until, now_s),
+        _are_connected(live, until, now_s),
+        _has_heard(live, until, now_s),
         _nodes(live, until, now_s),
         _quiet(live, until, now_s),
     )
@@ -423,7 +423,7 @@ def next_look_s(live: RunState, until: Until, now_s: float) -> float:
     return min([*ahead, 1.0]) + 0.001
 
 
-def _seen(live: RunState, topics: Iterable[str]) -> list[TopicSeen]:
+def _seen_topics(live: RunState, topics: Iterable[str]) -> list[TopicSeen]:
     return [live.topics[t] for t in topics if live.topics[t].count]
 
 
@@ -436,7 +436,7 @@ def _window(live: RunState, until: Until, now_s: float) -> bool:
     if until.window_s is None:
         return True
     topics = until.topics or tuple(live.topics)
-    seen = _seen(live, topics)
+    seen = _seen_topics(live, topics)
     if not seen:
         return _talks_elsewhere(live, until, now_s)
     if _rates_are_clear(live, until.topics):
@@ -465,7 +465,7 @@ def _messages(live: RunState, until: Until) -> bool:
     return all(live.topics[topic].count >= count for topic, count in until.messages.items())
 
 
-def _connected(live: RunState, until: Until, now_s: float) -> bool:
+def _are_connected(live: RunState, until: Until, now_s: float) -> bool:
     """Return whether the nodes have been connected for so long that one which dies as soon as it is up would
     have died."""
     since = [live.connected_s.get(topic, now_s) for topic in until.connected]
@@ -488,7 +488,7 @@ def _quiet(live: RunState, until: Until, now_s: float) -> bool:
     return until.quiet_s is None or (live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s)
 
 
-def _heard(live: RunState, until: Until, now_s: float) -> bool:
+def _has_heard(live: RunState, until: Until, now_s: float) -> bool:
     if not until.heard or not live.unheard or is_settled(live, now_s):
         return True
     lost_s = min(live.lost_s, HEARD_LOST_S_MAX)

@@ -340,7 +340,7 @@ def refused_limits() -> str:
     if prlimit is None:
         return ""
     limits = Sandbox(bubblewrap=False, uid=None).rlimits(RunLimits())
-    return _said([*_drop(), prlimit, *limits, "--", "/bin/true"])
+    return _last_line([*_drop(), prlimit, *limits, "--", "/bin/true"])
 
 
 def why_no_sandbox() -> str:
@@ -381,7 +381,7 @@ def _refusal(*more: str) -> str:
     calls = ["--seccomp", "0"] if system_call_filter() else []
     files = ["--ro-bind", "/", "/", "--proc", "/proc", "--clearenv", "--setenv", "LANG", "C.UTF-8"]
     walls = [*files, *WALLS, *more, *calls, "--die-with-parent", "/bin/true"]
-    return _said(
+    return _last_line(
         [sys.executable, "-I", str(NAMESPACES), *_drop(), find_host_program("bwrap") or "bwrap", *walls]
     )
 
@@ -392,7 +392,7 @@ def _drop() -> list[str]:
     return [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if setpriv else []
 
 
-def _said(command: list[str]) -> str:
+def _last_line(command: list[str]) -> str:
     """Return the last line that a command of this machine printed where it failed; empty where it did not fail."""
     try:
         done = subprocess.run(

@@ -127,7 +127,7 @@ def standin_packages() -> tuple[str, ...]:
 
 def missing_packages(ros: RosInstallation) -> tuple[str, ...]:
     """Return those of the packages that this ROS does not know."""
-    known = set(_installed(ros)) | set(_overlaid(ros))
+    known = set(_installed_standins(ros)) | set(_overlaid(ros))
     return tuple(name for name in standin_packages() if name not in known)
 
 
@@ -202,7 +202,7 @@ def _is_program(path: Path) -> bool:
         return file.read(len(SHEBANG)) == SHEBANG
 
 
-def _installed(ros: RosInstallation) -> Iterator[str]:
+def _installed_standins(ros: RosInstallation) -> Iterator[str]:
     entries = [Path(entry) for entry in _package_path(ros)]
     for share in (*entries, *(Path(prefix) / SHARE for prefix in ros.prefixes)):
         yield from (name for name in standin_packages() if (share / name / MANIFEST).is_file())

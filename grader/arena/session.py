@@ -282,7 +282,7 @@ class ArenaSession:
         elif topic == "/grader/console":
             self._print(**record)
         elif topic == "/grader/process" and record["event"] == "exit":
-            self._exited(record)
+            self._note_exit(record)
         elif topic == "/grader/host":
             self._on_lateness(record["p95_ms"])
             self.live.note_machine(record["busy"], record["own_busy"], time.monotonic())
@@ -311,7 +311,7 @@ class ArenaSession:
         if process in self.live.running | self.live.ended:
             self.live.note_line(line, time.monotonic())
 
-    def _exited(self, record: dict[str, Any]) -> None:
+    def _note_exit(self, record: dict[str, Any]) -> None:
         name = record["name"]
         if record["role"] == "grader":
             self.cpu_s += record["cpu_s"]
@@ -335,7 +335,7 @@ class ArenaSession:
         elif status == "left":
             self._left.add(fields["name"], fields["path"], fields["bytes"], fields["data"], self.now_ns())
         elif status in {"request", "other-type"}:
-            self._asked(time_ns, fields)
+            self._note_service_call(time_ns, fields)
         elif status == "graph":
             pairs = [c for c in fields["connections"] if not is_grader_node(c["subscriber"])]
             self.live.note_connections({c["topic"] for c in pairs}, time.monotonic())
@@ -347,7 +347,7 @@ class ArenaSession:
             self._note_cost(fields)
             self._done = True
 
-    def _asked(self, time_ns: int, fields: dict[str, Any]) -> None:
+    def _note_service_call(self, time_ns: int, fields: dict[str, Any]) -> None:
         """Handle a client's call of a service that the grader offers, by its type or by another one."""
         if fields["status"] == "request":
             self.live.note_activity(time.monotonic())

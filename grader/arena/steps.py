@@ -322,12 +322,12 @@ class StepRunner:
                 )
             except (EvidenceError, ValueError) as error:
                 raise ArenaError(f"{play.bag} cannot be played: {error}") from error
-        for channel in self._played(play):
+        for channel in self._channels_to_play(play):
             if self._md5sums.setdefault(channel.topic, channel.md5sum) == channel.md5sum:
                 about = {"type": channel.type, "md5sum": channel.md5sum, "definition": channel.definition}
                 self._announce(channel.topic, {**about, "latching": channel.latching})
 
-    def _played(self, play: Play) -> list[Channel]:
+    def _channels_to_play(self, play: Play) -> list[Channel]:
         wanted = set(play.topics)
         return [
             channel
@@ -336,7 +336,7 @@ class StepRunner:
         ]
 
     async def _play(self, play: Play) -> None:
-        channels = [c for c in self._played(play) if self._md5sums[c.topic] == c.md5sum]
+        channels = [c for c in self._channels_to_play(play) if self._md5sums[c.topic] == c.md5sum]
         messages = sorted((m.log_time_ns, c.topic, m.data) for c in channels for m in c.messages)
         topics = {channel.topic for channel in channels}
         self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")

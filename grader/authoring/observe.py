@@ -74,10 +74,10 @@ def observe(run: Run) -> Observed:
         topics=tuple(_topic(c) for c in run.student_channels() if c.topic not in SYSTEM_TOPICS),
         listens=_listens(run),
         services=_services(run),
-        connected=_connected(run),
+        connected=_connected_topics(run),
         ended=bool(early),
         failed=_last_words(run) if bad else "",
-        logged=_logged(run),
+        logged=_logged_texts(run),
         read=_read(run),
     )
 
@@ -164,7 +164,7 @@ def _services(run: Run) -> dict[str, str]:
     return found
 
 
-def _connected(run: Run) -> tuple[str, ...]:
+def _connected_topics(run: Run) -> tuple[str, ...]:
     found = (
         c.topic
         for _, event in run.graph
@@ -176,7 +176,7 @@ def _connected(run: Run) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def _logged(run: Run) -> tuple[str, ...]:
+def _logged_texts(run: Run) -> tuple[str, ...]:
     values = (v for c in run.student_channels("/rosout") for v in c.values if isinstance(v, dict))
     made_up = {str(e.value) for _, e in run.actors if e.action == "param"}
     texts = [str(v.get("msg", "")).strip() for v in values if v.get("level") == INFO]

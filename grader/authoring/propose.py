@@ -71,7 +71,7 @@ class Proposal(Sheet):
             package,
             reproduce="cat CMakeLists.txt",
         )
-        installed = self._installed()
+        installed = self._installed_scripts()
         if installed:
             parameters: Entry = {"scripts": installed}
             self.add(
@@ -86,7 +86,7 @@ class Proposal(Sheet):
             reproduce="catkin_make",
         )
 
-    def _installed(self) -> list[str]:
+    def _installed_scripts(self) -> list[str]:
         calls = self._facts.cmake.calls if self._facts.cmake else ()
         named = {PurePosixPath(a).name for c in calls if c.name == "catkin_install_python" for a in c.args}
         return [s for s in self._parts.nodes.values() if PurePosixPath(s).name in named]

@@ -100,13 +100,13 @@ class _Dumper(yaml.SafeDumper):
         super().increase_indent(flow, False)
 
 
-def _quoted(dumper: _Dumper, text: str) -> yaml.ScalarNode:
+def _quote_text(dumper: _Dumper, text: str) -> yaml.ScalarNode:
     """What a CI's log could take for a command stands in double quotes, where `without_ci_commands` writes escapes."""
     style = '"' if "##" in text or "::" in text else None
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
 
-_Dumper.add_representer(str, _quoted)
+_Dumper.add_representer(str, _quote_text)
 
 
 def rubric_text(
@@ -125,23 +125,23 @@ def rubric_text(
         "package": package,
     }
     parts = [HEAD + "".join(f"# NOTE: {_one_line(note)}\n" for note in notes), _block(about)]
-    runs = [_indented({name: scenario}) for name, scenario in scenarios.items()]
+    runs = [_indent({name: scenario}) for name, scenario in scenarios.items()]
     parts.append("scenarios:\n" + "\n".join(runs) if runs else "scenarios: {}\n")
-    parts.append("criteria:\n" + "\n".join(_indented([criterion]) for criterion in criteria))
+    parts.append("criteria:\n" + "\n".join(_indent([criterion]) for criterion in criteria))
     return "\n".join(parts)
 
 
 def _block(data: object) -> str:
-    return _dumped(data, flow=False)
+    return _dump(data, flow=False)
 
 
-def _indented(data: object) -> str:
+def _indent(data: object) -> str:
     """Innermost lists and maps in flow style: `[rospy, std_msgs]`."""
-    rows = _dumped(data, flow=None).removesuffix("\n").split("\n")
+    rows = _dump(data, flow=None).removesuffix("\n").split("\n")
     return "".join(f"  {row}\n" if row else "\n" for row in rows)
 
 
-def _dumped(data: object, *, flow: bool | None) -> str:
+def _dump(data: object, *, flow: bool | None) -> str:
     """Names of topics and texts come from a program: where one holds what cannot be seen, letters are escaped."""
 
     def dump(*, letters: bool) -> str:
@@ -286,11 +286,11 @@ def _name(path: str, taken: set[str]) -> str:
     stem = re.sub(r"[^a-z0-9]+", "-", PurePosixPath(path).stem.lower()).strip("-")
     stem = stem if stem[:1].isalpha() else f"p-{stem}".rstrip("-")
     stem += "-launch" if path.endswith(".launch") else ""
-    name = next(n for n in _numbered(stem) if n not in taken)
+    name = next(n for n in _numbered_names(stem) if n not in taken)
     taken.add(name)
     return name
 
 
-def _numbered(stem: str) -> Iterable[str]:
+def _numbered_names(stem: str) -> Iterable[str]:
     yield stem
     yield from (f"{stem}-{number}" for number in range(2, 1000))

@@ -100,7 +100,8 @@ def action_result(package: PackageFacts, run: Run, params: ActionResultParams) -
     span = (goal.at_ns, goal.ended_ns) if goal else (None, None)
     return verdict.about(
         expected=params.words,
-        measured=verdict.measured or (_measured(run, goal, params) if goal else "no such goal could be sent"),
+        measured=verdict.measured
+        or (_measured_text(run, goal, params) if goal else "no such goal could be sent"),
         citations=(*verdict.citations, cite(run, "/grader/actor", *span)),
     )
 
@@ -246,7 +247,7 @@ def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> V
     return unjudged(f"{what}{others}", hint=hint, measured=join_words(servers) or "no action server")
 
 
-def _measured(run: Run, goal: Goal, params: ActionResultParams) -> str:
+def _measured_text(run: Run, goal: Goal, params: ActionResultParams) -> str:
     came = plural(_feedback(run, goal, params), "feedback", "feedbacks")
     if goal.end is None or goal.end.value is None:
         return f"{came}, no result"

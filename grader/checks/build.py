@@ -213,10 +213,10 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     if verdict.status is not Status.PASS:
         return verdict.about(expected=expected)
     started = [one for one in lives(run) if "/" in one.name]
-    made = {one.name: one for one in _made(package)}
+    made = {one.name: one for one in _built_programs(package)}
     if made and not started:
         return _not_started(package, made).about(expected=expected)
-    broken = list(_broken(package, run, started))
+    broken = list(_broken_programs(package, run, started))
     measured = f"{verdict.measured}; programs: {join_words(_name(p) for p in started) or 'none'}"
     if not broken:
         message = f"{verdict.message}{_how_they_went(started)}"
@@ -234,7 +234,7 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     )
 
 
-def _made(package: PackageFacts) -> Iterator[Executable]:
+def _built_programs(package: PackageFacts) -> Iterator[Executable]:
     """Yield the programs that are made of sources."""
     for one in programs(package):
         if len(one.call.args) > 1 and not NO_PROGRAM & set(one.call.args[1:3]):
@@ -271,7 +271,7 @@ def _not_started(package: PackageFacts, made: dict[str, Executable]) -> Verdict:
     return failed(message, measured="built, not where rosrun looks", hint=hint, citations=cited)
 
 
-def _broken(package: PackageFacts, run: Run, programs: list[Life]) -> Iterator[Broken]:
+def _broken_programs(package: PackageFacts, run: Run, programs: list[Life]) -> Iterator[Broken]:
     for one in programs:
         if not one.ended_early or one.end is None or _gave_way(run, one):
             continue

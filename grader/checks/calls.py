@@ -97,7 +97,7 @@ def calls(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
         or _too_soon(made, run, params)
         or passed(f"{params.service} is called with {join_words(dict.fromkeys(_text(r) for r in made))}")
         if missing is None
-        else _excused(
+        else _excuse(
             _never(package, run, params) if not made else _fault(package, run, params, *missing), run
         )
     )
@@ -189,7 +189,7 @@ def _never(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
     asked = [e for _, e in run.actors if e.action == "lookup" and run.is_student_node(e.actor)]
     looked = {e.topic or "": e.actor for e in asked} | _clients(run)
     near = near_names(service, looked)
-    if refused := _refused(run, service):
+    if refused := _judge_refusal(run, service):
         return refused
     if near and service not in looked:
         hint = f"use the name {service} both where you wait for it and where you call it"
@@ -225,7 +225,7 @@ def _unless_over(verdict: Verdict, run: Run) -> Verdict:
     return verdict if all(one.ended_early for one in lives(run)) else verdict.once()
 
 
-def _refused(run: Run, service: str) -> Verdict | None:
+def _judge_refusal(run: Run, service: str) -> Verdict | None:
     """Return the verdict where the grader could not offer it, or a client asked for another type."""
     for _, note in run.actors:
         if note.action != "note" or note.topic not in {service, f"{service}/feedback", f"{service}/result"}:
@@ -245,6 +245,6 @@ def _refused(run: Run, service: str) -> Verdict | None:
     return None
 
 
-def _excused(verdict: Verdict, run: Run) -> Verdict:
+def _excuse(verdict: Verdict, run: Run) -> Verdict:
     """Calls that did not come may be the machine's fault; those that came are not."""
     return excused(verdict, run, run.start_ns, run.end_ns, why_late) if verdict.timing else verdict

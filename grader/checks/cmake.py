@@ -230,20 +230,20 @@ def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) ->
     if any(one.kind == "PROGRAMS" and is_bin(one.destination or "", package) for one in by_python):
         return None
     if by_python:
-        return _misplaced(package, by_python[0])
+        return _why_misplaced(package, by_python[0])
     blurred = next((o for o in all_named if o.call.name == PYTHON and not o.known), None)
     if blurred is not None:
         why = f"only CMake knows which scripts {blurred.path} holds, and it did not finish"
         return Lack(why, "build the package with catkin_make", _line(blurred), unsure=True)
-    return _unnamed(package, all_named, hits, paths[0])
+    return _why_unnamed(package, all_named, hits, paths[0])
 
 
-def _misplaced(package: PackageFacts, one: Installed) -> Lack:
+def _why_misplaced(package: PackageFacts, one: Installed) -> Lack:
     where = f"line {one.call.line}"
     if one.kind != "PROGRAMS":
         why = f"{where}: catkin_install_python(…) does not begin with the word PROGRAMS"
         return Lack(why, f"write catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(one))
-    if "DESTINATION" in one.call.args and not one.destination and not _called(package, "catkin_package"):
+    if "DESTINATION" in one.call.args and not one.destination and not _has_call(package, "catkin_package"):
         why = f"{where}: {BIN} has no value, because catkin_package() is not called before it"
         return Lack(why, "call catkin_package() above catkin_install_python(…)", _line(one), follows=True)
     if one.destination is None:
@@ -255,7 +255,7 @@ def _misplaced(package: PackageFacts, one: Installed) -> Lack:
     return Lack(why, f"write DESTINATION {BIN}, below find_package(catkin …)", _line(one))
 
 
-def _unnamed(
+def _why_unnamed(
     package: PackageFacts, all_named: Sequence[Installed], hits: Sequence[Installed], path: str
 ) -> Lack:
     """Another command names it, a slip of its name or place is named, or nothing is."""
@@ -306,7 +306,7 @@ def _folder_above(all_named: Sequence[Installed], path: str) -> Installed | None
     return next((one for one in folders if names_script(one, above)), None)
 
 
-def _called(package: PackageFacts, name: str) -> bool:
+def _has_call(package: PackageFacts, name: str) -> bool:
     return package.cmake is not None and any(call.name == name for call in package.cmake.calls)
 
 

@@ -236,7 +236,7 @@ def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict 
     if not found.steps or found.excused:
         return None
     if found.flood:
-        return _flooded(len(found.steps), params)
+        return _flood_verdict(len(found.steps), params)
     if not found.own:
         missing = sum(int(min(s.change, LARGEST)) - 1 for s in found.lost)
         message = f"{plural(missing, 'value')} of {params.topic} were lost on the way, with a gap in time"
@@ -272,7 +272,7 @@ def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, p
     return failed(message + seen, hint=hint, citations=(FileCitation(file=slip.file, line=slip.line),))
 
 
-def _flooded(skips: int, params: StepParams) -> Verdict:
+def _flood_verdict(skips: int, params: StepParams) -> Verdict:
     message = f"{params.topic} is flooded, so its publisher drops most values: {plural(skips, 'skip')}"
     return unjudged(
         message, hint=f"first publish at {significant(params.rate_hz)} Hz, then look at the counter again"

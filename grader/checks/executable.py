@@ -70,7 +70,7 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
         a syntax error: fix that line, or the one above it.
     """
     found = find_script(package, params.path)
-    verdict = _missing(package, params.path) if found is None else _judged(package, build, found, params)
+    verdict = _missing(package, params.path) if found is None else _judge_file(package, build, found, params)
     whole = ", all of it valid Python" if found is not None and _syntax_fault(found) else ""
     return verdict.about(
         expected=f"{params.path}, executable, beginning with {_asked_first_line(found)}{whole}"
@@ -83,7 +83,7 @@ def _asked_first_line(found: SourceFile | None) -> str:
     return f"#!{found.shebang.text}" if found and found.shebang and own else RIGHT_SHEBANG
 
 
-def _judged(package: PackageFacts, build: Run, found: SourceFile, params: ExecutableParams) -> Verdict:
+def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: ExecutableParams) -> Verdict:
     remarks = package.hints_on(found.path)
     of_first_line = list(shebang_obstacles(found))
     obstacles = [*of_first_line, *_mode_obstacles(found, remarks)]
@@ -91,7 +91,7 @@ def _judged(package: PackageFacts, build: Run, found: SourceFile, params: Execut
     hint = moved or "; ".join(remarks)
     fault = _syntax_fault(found)
     if fault is not None:
-        verdict = _unparsed(found, fault, [] if has_wrapper(package, build, found.path) else obstacles)
+        verdict = _syntax_verdict(found, fault, [] if has_wrapper(package, build, found.path) else obstacles)
     elif found.executable and not obstacles:
         verdict = passed(f"{found.path} is executable and names {_interpreter(found)}", hint=hint)
     elif has_wrapper(package, build, found.path):
@@ -123,7 +123,7 @@ def _syntax_fault(file: SourceFile) -> Fault | None:
     return fault if fault is not None and fault.kind in UNPARSED and not old else None
 
 
-def _unparsed(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -> Verdict:
+def _syntax_verdict(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -> Verdict:
     where = f"line {fault.line}" if fault.line else "cannot be parsed"
     others = f"; it also {' and '.join(o.why for o in obstacles)}" if obstacles else ""
     fixes = [

@@ -180,22 +180,22 @@ def _not_left(files: Sequence[LeftFile], package: PackageFacts, run: Run, params
         hint = "end rosbag record with Ctrl-C (SIGINT), or start it in the launch file"
         return failed(message, hint=hint)
     if elsewhere := [path for path in paths if PurePosixPath(path).match(name)]:
-        message = f"{params.file} was written to another folder: {_listed(elsewhere)}"
+        message = f"{params.file} was written to another folder: {_list_paths(elsewhere)}"
         return failed(message, hint=f"write it to {params.file}, below ~ or below the package")
     names = [PurePosixPath(path).name for path in paths]
     alike = [one for one in names if PurePosixPath(one).suffix == PurePosixPath(name).suffix != ""]
     if near := near_names(name, names) or alike:
-        return failed(f"{params.file} was not written; {_listed(near)} was", hint=f"name the file {name}")
+        return failed(f"{params.file} was not written; {_list_paths(near)} was", hint=f"name the file {name}")
     what = f"{params.file} was not written"
     if end := explain_early_end(package, run):
         return end.verdict(unjudged, f"{what}: the program ended before ({end.cause})")
     hint = f"write {params.file} before the program ends"
     if paths:
-        return failed(f"{what}; what it wrote is {_listed(paths)}", hint=hint).once()
+        return failed(f"{what}; what it wrote is {_list_paths(paths)}", hint=hint).once()
     return failed(f"{what}, and no other file", hint=hint).once()
 
 
-def _listed(paths: Iterable[str]) -> str:
+def _list_paths(paths: Iterable[str]) -> str:
     return first_few([shown(path) for path in paths], NAMES_SHOWN)
 
 
@@ -209,7 +209,7 @@ def _recording(file: LeftFile, topics: dict[str, TopicLeft], run: Run) -> Verdic
         found = [channel for channel in channels if channel.topic == topic]
         if wrong := _wrong_topic(file.path, topic, wanted, found, run):
             seen = list(dict.fromkeys(channel.topic for channel in channels if channel.messages))
-            return wrong.about(measured=_listed(seen) or "no topic")
+            return wrong.about(measured=_list_paths(seen) or "no topic")
     return None
 
 
@@ -222,7 +222,7 @@ def _wrong_topic(
         return failed(f"{path} holds no message on {topic}", hint=hint).once()
     types = {plain_type(channel.type) for channel in found}
     if wanted.type is not None and types != {wanted.type}:
-        message = f"{path}: {topic} has the type {_listed(sorted(types))}, not {wanted.type}"
+        message = f"{path}: {topic} has the type {_list_paths(sorted(types))}, not {wanted.type}"
         return failed(message, hint=f"publish {wanted.type} on {topic}")
     if count < wanted.at_least:
         message = f"{path} holds {plural(count, 'message')} on {topic}, not {wanted.at_least}"

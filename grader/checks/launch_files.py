@@ -78,7 +78,7 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
     verdict = _all_lacking(package, file, params, refused) or passed(
         f"{file.path} has a <node> for {join_words(wanted)}", hint=_advice(package, file)
     )
-    seen = f"{plural(len(file.brings), 'node')}: {join_words(map(_shown, file.brings))}"
+    seen = f"{plural(len(file.brings), 'node')}: {join_words(map(_node_text, file.brings))}"
     citations = verdict.citations or (FileCitation(file=file.path, line=1),)
     measured = seen if file.brings else "no <node>"
     return verdict.about(expected=expected, measured=measured, citations=citations)
@@ -172,7 +172,7 @@ def _advice(package: PackageFacts, file: LaunchFile) -> str:
     return f"{slip.file}, line {slip.line}: {slip.why}; {slip.fix}" if slip else ""
 
 
-def _shown(node: LaunchNode) -> str:
+def _node_text(node: LaunchNode) -> str:
     return f"{node.name or 'no name'} ({node.pkg or 'no pkg'}/{node.type or 'no type'})"
 
 

@@ -87,7 +87,7 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
     verdict = (
         not_run(run)
         or missing_node(package, file, params.script)
-        or _judged(package, file, run, params)
+        or _judge_loaded(package, file, run, params)
         or passed(f"roslaunch loads {params.file}, then runs {PurePosixPath(params.script).name}")
     )
     found = without_system_params(params_on_server(run, by=lambda caller: caller not in run.student_nodes()))
@@ -99,7 +99,9 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
     )
 
 
-def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchLoadsParams) -> Verdict | None:
+def _judge_loaded(
+    package: PackageFacts, file: LaunchFile, run: Run, params: LaunchLoadsParams
+) -> Verdict | None:
     node = nodes_of_script(package, file, params.script)[0]
     up = nodes_up(run, node)
     start_ns = min((t for t, event in run.graph if set(up) & set(event.nodes)), default=run.end_ns)
@@ -125,7 +127,7 @@ def _read_where_loaded(
     """The file is loaded into a namespace, and the node reads it there: it prints all that is in it."""
     lines = [line for line in printed_lines(run) if not SUMMARY.match(line.text)]
     return any(
-        all(name in before and is_printed(before[name], lines) for name in _moved(load, params))
+        all(name in before and is_printed(before[name], lines) for name in _names_in_namespace(load, params))
         for load in file.loads
         if _is_of(load, params)
     )
@@ -139,7 +141,7 @@ def _read_by_other_names(run: Run, params: LaunchLoadsParams, before: Mapping[st
     return all(name is not None and is_printed(before[name], lines) for name in there)
 
 
-def _moved(load: LaunchLoad, params: LaunchLoadsParams) -> list[str]:
+def _names_in_namespace(load: LaunchLoad, params: LaunchLoadsParams) -> list[str]:
     return [load.namespace.rstrip("/") + absolute_name(name) for name in params.names]
 
 
@@ -162,7 +164,7 @@ def _not_loaded(
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
     if absence := refusal(run):
-        return _refused(file, run, params, absence)
+        return _refusal_verdict(file, run, params, absence)
     loads = [load for load in file.loads if _is_of(load, params)]
     if not loads:
         message = f"{file.path} has no <rosparam> that loads {params.file}"
@@ -185,7 +187,7 @@ def _loaded_otherwise(run: Run, params: LaunchLoadsParams, loads: list[LaunchLoa
     return unjudged(message, hint=f"fix the names in {params.file}")
 
 
-def _refused(file: LaunchFile, run: Run, params: LaunchLoadsParams, absence: Absence) -> Verdict:
+def _refusal_verdict(file: LaunchFile, run: Run, params: LaunchLoadsParams, absence: Absence) -> Verdict:
     """roslaunch starts nothing. Where it found the file and could not read it, the file is at fault."""
     broken = "cannot load its file" in absence.why
     verdict = unjudged if broken else failed
@@ -279,9 +281,11 @@ def _wrong_value(
         message = f'{place}{name} is the text "{found}", which the node does not read as a number'
         hint = f'write <param name="{name}" type="int" value="{value}"/>'
         return failed(message, hint=hint, citations=cited)
-    seen = ", ".join(_shown(before[place + n]) for n in wanted)
-    right = ", ".join(map(_shown, wanted.values()))
-    message = f"{place}{name} is {_shown(found)}, not {_shown(value)}: {join_words(wanted)} are {seen}"
+    seen = ", ".join(_value_text(before[place + n]) for n in wanted)
+    right = ", ".join(map(_value_text, wanted.values()))
+    message = (
+        f"{place}{name} is {_value_text(found)}, not {_value_text(value)}: {join_words(wanted)} are {seen}"
+    )
     return failed(message, hint=f"{join_words(wanted)} have to be {right}", citations=cited)
 
 
@@ -306,7 +310,7 @@ def _fits(found: object, wanted: float | str) -> bool:
     return abs(found - wanted) < (0.5 if isinstance(wanted, int) else 1e-9)
 
 
-def _shown(value: object) -> str:
+def _value_text(value: object) -> str:
     return (
         significant(value) if isinstance(value, int | float) and not isinstance(value, bool) else f'"{value}"'
     )

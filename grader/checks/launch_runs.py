@@ -81,7 +81,7 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
     verdict = (
         not_run(run)
         or _names_missing(nodes, file, params)
-        or (None if found else _unconnected(package, file, run, params))
+        or (None if found else _why_unconnected(package, file, run, params))
         or passed(f"roslaunch connects {found[0][0]} and {found[0][1]} over {params.topic}")
     )
     return verdict.about(
@@ -116,7 +116,9 @@ def _names_missing(nodes: tuple[str, ...], file: LaunchFile, params: LaunchConne
     )
 
 
-def _unconnected(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchConnectsParams) -> Verdict:
+def _why_unconnected(
+    package: PackageFacts, file: LaunchFile, run: Run, params: LaunchConnectsParams
+) -> Verdict:
     """Return why no two nodes are connected: a wrong attribute, an error of roslaunch's, or what the graph shows."""
     said = roslaunch_error(run)
     for node in file.nodes:
@@ -242,21 +244,21 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     if isinstance(file, Verdict):
         unjudged_too = {"unjudged": bool(params.scripts)}
         return file.about(expected=expected).model_copy(update=unjudged_too)
-    verdict = not_run(run) or _unnamed(package, file, params) or _judged(package, file, run, params)
+    verdict = not_run(run) or _find_unnamed(package, file, params) or _judge_nodes(package, file, run, params)
     citations = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph"))
     return verdict.about(expected=expected, measured=_listed_nodes(run), citations=citations)
 
 
-def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Verdict:
+def _judge_nodes(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Verdict:
     """By what came up. The file names all that is wanted."""
-    wanted = list(_wanted(package, file, run, params))
+    wanted = list(_wanted_nodes(package, file, run, params))
     lacking = next((w for w in wanted if not nodes_up(run, w.node)), None)
     if lacking is not None:
         return _not_up(package, file, run, lacking)
     names = [name for w in wanted for name in nodes_up(run, w.node)]
-    if params.topic and not _connected(run, params.topic, names):
+    if params.topic and not _are_connected(run, params.topic, names):
         return _not_connected(package, file, run, wanted, params.topic)
-    if dead := _died(package, run, wanted, "came up, but then"):
+    if dead := _judge_deaths(package, run, wanted, "came up, but then"):
         return dead
     if params.programs and params.params:
         program = nodes_of_program(file, params.programs[0])[0]
@@ -267,12 +269,14 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRun
     return passed(f"roslaunch brings up {join_words(dict.fromkeys(names))}{over}")
 
 
-def _wanted(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Iterator[Wanted]:
+def _wanted_nodes(
+    package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams
+) -> Iterator[Wanted]:
     for script in params.scripts:
         yield from (Wanted(node, own=True) for node in _of_script(package, file, run, script))
     own = {package.name, *(one.name for one in package.also)}
     for name in params.nodes:
-        yield from (Wanted(node, own=node.pkg in own) for node in _named(file, name)[:1])
+        yield from (Wanted(node, own=node.pkg in own) for node in _nodes_named(file, name)[:1])
     for program in params.programs:
         node = nodes_of_program(file, program)[0]
         yield Wanted(node, own=node.pkg in own)
@@ -286,13 +290,13 @@ def _of_script(package: PackageFacts, file: LaunchFile, run: Run, script: str) -
     return certain or [n for n in exact if nodes_up(run, n)] or exact[:1]
 
 
-def _unnamed(package: PackageFacts, file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
+def _find_unnamed(package: PackageFacts, file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
     """The file does not even name a node that is wanted. For scripts that is launch-xml's to judge."""
     for script in params.scripts:
         if verdict := missing_node(package, file, script):
             return verdict.model_copy(update={"unjudged": True})
     for name, pkg in params.nodes.items():
-        if verdict := _wrong_name(file, name, pkg) or _swapped(file, name, params):
+        if verdict := _wrong_name(file, name, pkg) or _find_swap(file, name, params):
             return verdict
     for program in params.programs:
         if not nodes_of_program(file, program):
@@ -304,7 +308,7 @@ def _unnamed(package: PackageFacts, file: LaunchFile, params: LaunchRunsParams) 
 
 
 def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
-    found = _named(file, name)
+    found = _nodes_named(file, name)
     if any(n.pkg == pkg or "$(" in (n.pkg or "") for n in found):
         return None
     if found:
@@ -317,9 +321,9 @@ def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
     return failed(f"{file.path} has no node /{name.lstrip('/')}{seen}", hint=hint)
 
 
-def _swapped(file: LaunchFile, name: str, params: LaunchRunsParams) -> Verdict | None:
+def _find_swap(file: LaunchFile, name: str, params: LaunchRunsParams) -> Verdict | None:
     """The name of one node is on the program of another: `/talker` runs listener.py."""
-    for node in _named(file, name):
+    for node in _nodes_named(file, name):
         program = PurePosixPath(node.type or "").stem
         if program != name.lstrip("/") and program in {n.lstrip("/") for n in params.nodes}:
             why = f"/{name.lstrip('/')} runs {node.type}, whose name is /{program}: the names are swapped"
@@ -328,7 +332,7 @@ def _swapped(file: LaunchFile, name: str, params: LaunchRunsParams) -> Verdict |
     return None
 
 
-def _named(file: LaunchFile, name: str) -> list[LaunchNode]:
+def _nodes_named(file: LaunchFile, name: str) -> list[LaunchNode]:
     exact = [n for n in file.brings if n.full_name == f"/{name.lstrip('/')}"]
     return exact or [n for n in file.brings if not is_exact(n) and "$(anon" not in n.full_name]
 
@@ -349,11 +353,11 @@ def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) 
     return found.model_copy(update={"unbuilt": absence.unbuilt})
 
 
-def _connected(run: Run, topic: str, names: list[str]) -> bool:
+def _are_connected(run: Run, topic: str, names: list[str]) -> bool:
     return any({*pair} <= {*names} for pair in connections(run, topic))
 
 
-def _died(package: PackageFacts, run: Run, wanted: list[Wanted], when: str) -> Verdict | None:
+def _judge_deaths(package: PackageFacts, run: Run, wanted: list[Wanted], when: str) -> Verdict | None:
     for one in wanted:
         if absence := why_died(package, run, one.node):
             verdict = unjudged if one.own else failed
@@ -384,7 +388,7 @@ def _not_connected(
     package: PackageFacts, file: LaunchFile, run: Run, wanted: list[Wanted], topic: str
 ) -> Verdict:
     """A node that died, the launch file's remaps and namespaces, or the scripts' own topics."""
-    if dead := _died(package, run, wanted, "came up, but before it was connected"):
+    if dead := _judge_deaths(package, run, wanted, "came up, but before it was connected"):
         return dead
     other = over_another_topic(run, topic)
     moved = [w.node for w in wanted if w.node.remaps or w.node.namespace != "/"]

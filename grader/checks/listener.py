@@ -112,7 +112,7 @@ def _other_words(
     there at all."""
     if params.template == VALUE or not all(text_places(missing, lines, VALUE)):
         return None
-    said = [line.text for line in lines if _squeezed(missing[0].value) in _squeezed(line.text)]
+    said = [line.text for line in lines if _without_blanks(missing[0].value) in _without_blanks(line.text)]
     seen = f": it prints {shown(said[0])!r}" if said else ""
     wanted = in_words(params.template)
     message = f"{_how_many(missing, probes)} printed, but not as '{wanted}'{seen}"
@@ -132,7 +132,7 @@ def _how_many(missing: Sequence[Probe], probes: Sequence[Probe]) -> str:
     return f"{len(missing)} of {plural(len(probes), 'message')} are"
 
 
-def _squeezed(text: object) -> str:
+def _without_blanks(text: object) -> str:
     return "".join(str(text).split())
 
 
@@ -167,14 +167,14 @@ def not_printed(
 ) -> Verdict:
     """Some or all of what was sent was not printed: the likeliest reason that shows."""
     return (
-        _broken(package, run)
+        _judge_error(package, run)
         or _some_numbers(probes, missing, lines)
         or _only_again(probes, missing)
         or _by_number(probes, missing, lines)
     )
 
 
-def _broken(package: PackageFacts, run: Run) -> Verdict | None:
+def _judge_error(package: PackageFacts, run: Run) -> Verdict | None:
     """An error in the callback, which rospy reports and outlives, or the node's end."""
     if end := explain_early_end(package, run):
         return end.verdict(failed, f"the node ended before it had printed everything: {end.cause}")

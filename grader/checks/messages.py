@@ -175,13 +175,15 @@ def _wrong_time(
         if wrong is not None:
             too_few = own_doing and wrong.status.value == "inconclusive"
             return _too_few(package, run, heard, params) if too_few else wrong
-        counted = _counted(package, run, channel, told)
+        counted = _judge_counting(package, run, channel, told)
         if counted is not None:
             return counted
     return None
 
 
-def _counted(package: PackageFacts, run: Run, channel: Channel, told: Sequence[float]) -> Verdict | None:
+def _judge_counting(
+    package: PackageFacts, run: Run, channel: Channel, told: Sequence[float]
+) -> Verdict | None:
     """Return the verdict on whole numbers, each the one before plus one, of a script that reads no clock. At one a
     second they grow as the time does."""
     if any(after - before != 1 for before, after in pairwise(told)) or told[0] != int(told[0]):

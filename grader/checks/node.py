@@ -99,7 +99,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
     verdict = (
         _early_end(one, run, package)
         or _registration(one, run, nodes)
-        or _misnamed(package, run, nodes, params)
+        or _judge_misnamed(package, run, nodes, params)
         or _short_watch(one, up_ns, params)
         or _bad_end(one, run, package)
         or passed(message)
@@ -134,7 +134,7 @@ def node_name(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
         return _nameless(package, run, params).about(expected=expected)
     cited = (cite(run, "/grader/graph"),)
     measured = join_words(nodes)
-    wrong = _misnamed(package, run, nodes, params)
+    wrong = _judge_misnamed(package, run, nodes, params)
     verdict = wrong or passed(f"the node is {_fitting(nodes, params)[0]}")
     return verdict.about(expected=expected, measured=measured, citations=cited)
 
@@ -154,7 +154,7 @@ def _fitting(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) -
     return [n for n in nodes if is_named(n, params.names, params.anonymous)]
 
 
-def _misnamed(
+def _judge_misnamed(
     package: PackageFacts, run: Run, nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams
 ) -> Verdict | None:
     """Return None where a name fits, or none is asked for."""

@@ -190,17 +190,17 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
         line (`<run_depend>` in format 1) each package that a node imports.
     """
     needs = f", {join_words(params.dependencies)} at run time" if params.dependencies else ""
-    verdict = _judged(package, params)
+    verdict = _judge_manifest(package, params)
     return verdict.about(expected=f"package.xml, readable, name {params.name}, build tool catkin{needs}")
 
 
-def _judged(package: PackageFacts, params: ManifestParams) -> Verdict:
+def _judge_manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
     found = package.manifest
     if found is None:
         return _unreadable(package.manifest_fault)
     if (found.build_type or "").startswith("ament"):
         return _of_ros_2(found, params)
-    wrong = [v for v in (_misnamed(package, found, params.name), _unbuilt(found)) if v is not None]
+    wrong = [v for v in (_judge_misnamed(package, found, params.name), _unbuilt(found)) if v is not None]
     if lacking := _lacking(found, params.dependencies):
         wrong.append(lacking)
     if wrong:
@@ -225,7 +225,7 @@ def _of_ros_2(found: Manifest, params: ManifestParams) -> Verdict:
     )
 
 
-def _misnamed(package: PackageFacts, found: Manifest, name: str) -> Verdict | None:
+def _judge_misnamed(package: PackageFacts, found: Manifest, name: str) -> Verdict | None:
     if found.name == name:
         return None
     slip = " (a typo in the name)" if near_names(name, [found.name]) else ""
@@ -271,7 +271,7 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
     if found is None:
         message = "package.xml cannot be read, so its dependencies are not known"
         return unjudged(message, expected=expected, hint="first fix package.xml")
-    declared = passed(f"{found.file} declares {join_words(params.names)}", measured=_declared(found))
+    declared = passed(f"{found.file} declares {join_words(params.names)}", measured=_declared_text(found))
     return (_lacking(found, params.names) or declared).about(expected=expected)
 
 
@@ -330,7 +330,7 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
     return f"write {join_words(places[:PLACES_SHOWN])}" + (" and so on" if places[PLACES_SHOWN:] else "")
 
 
-def _declared(found: Manifest) -> str:
+def _declared_text(found: Manifest) -> str:
     names = dict.fromkeys(d.name for d in found.dependencies if d.kind in RUNTIME_KINDS)
     return f"at run time: {join_words(names) or 'none'}"
 
@@ -349,7 +349,7 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     lines = tuple(FileCitation(file=found.file, line=d.line) for d in at_build)
     return failed(
         f"{found.file} does not declare {join_words(missing)} for run time{only or slip}",
-        measured=_declared(found),
+        measured=_declared_text(found),
         hint="add " + " ".join(f"<{tag}>{n}</{tag}>" for n in missing),
         citations=lines or (FileCitation(file=found.file, line=found.name_line),),
     )

@@ -94,7 +94,9 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
             or (_missing(found, missing, source.path, package, build) if missing else None)
             or passed(
                 f"{source.path} loads and sets {join_words(wanted)}",
-                hint="; ".join(filter(None, (moved, _shadowed(source.path, _keys_of(build, source.path))))),
+                hint="; ".join(
+                    filter(None, (moved, _duplicate_advice(source.path, _keys_of(build, source.path))))
+                ),
             )
         )
     measured = f"on the server: {join_words(found)}" if found else "nothing on the server"
@@ -198,7 +200,7 @@ def _lines_of(keys: tuple[Key, ...]) -> dict[str, list[int]]:
     return lines
 
 
-def _shadowed(path: str, keys: tuple[Key, ...]) -> str:
+def _duplicate_advice(path: str, keys: tuple[Key, ...]) -> str:
     """Return the advice where a name is given twice: YAML keeps only the last, and says nothing."""
     twice = next(((name, at) for name, at in _lines_of(keys).items() if len(at) > 1), None)
     if twice is None:
@@ -390,7 +392,7 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
     expected = f"{params.name} is {params.value}{others}" + (", and it is logged" if params.logged else "")
     verdict = (
         (None if _is_value(got, params.value) else _not_set(package, run, after, params, until_ns))
-        or _clobbered(run, after, params)
+        or _judge_unchanged(run, after, params)
         or _not_logged(run, params)
         or passed(f"sets {params.name} to {params.value}{' and logs it' if params.logged else ''}")
     )
@@ -438,7 +440,7 @@ def _set_to_another(mine: Sequence[ParamEvent], got: object, params: ParamsSetPa
     return failed(f"{params.name} is set to {now}, not to {params.value}", hint=hint)
 
 
-def _clobbered(run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verdict | None:
+def _judge_unchanged(run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verdict | None:
     known = params_given(run)
     before = params_on_server(run, by=lambda caller: not run.is_student_node(caller))
     for name in params.unchanged:
@@ -500,11 +502,11 @@ def param_value(package: PackageFacts, build: Run, run: Run, params: ParamValueP
         loads. Within `<node>`, and with `~`, a name is below the node's own. `rosparam get <name>` shows it.
     """
     held = params_on_server(run, until_ns=_until_ns(run))
-    got = _held(held, absolute_name(params.name))
+    got = _value_below(held, absolute_name(params.name))
     verdict = (
         _not_there(package, run, without_system_params(held), params)
         if got is MISSING
-        else _given_before(package, build, params, got) or _judged(got, params)
+        else _given_before(package, build, params, got) or _judge_value(got, params)
     )
     cited = cite(run, "/grader/param")
     return verdict.about(
@@ -527,7 +529,9 @@ def _given_before(package: PackageFacts, build: Run, params: ParamValueParams, g
         if values[0] == str(params.value) != values[-1]:
             last = keys[-1].line
             place = FileCitation(file=file, line=last)
-            return failed(_shadowed(file, tuple(keys)), hint=f"delete line {last}", citations=(place,))
+            return failed(
+                _duplicate_advice(file, tuple(keys)), hint=f"delete line {last}", citations=(place,)
+            )
     return None
 
 
@@ -537,15 +541,15 @@ def _until_ns(run: Run) -> int:
     return run.end_ns if pressed_ns is None else pressed_ns
 
 
-def _held(leaves: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - a parameter may be anything
+def _value_below(leaves: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - a parameter may be anything
     """Return the value, or the map of all values below the name."""
     if name in leaves:
         return leaves[name]
     parts = [n.removeprefix(f"{name}/").partition("/")[0] for n in leaves if n.startswith(f"{name}/")]
-    return {part: _held(leaves, f"{name}/{part}") for part in dict.fromkeys(parts)} or MISSING
+    return {part: _value_below(leaves, f"{name}/{part}") for part in dict.fromkeys(parts)} or MISSING
 
 
-def _judged(got: object, params: ParamValueParams) -> Verdict:
+def _judge_value(got: object, params: ParamValueParams) -> Verdict:
     wrong = [str(one) for one in differences(got, params.value, EXACT)]
     if not wrong:
         return passed(f"{params.name} is {shown(value_text(got))}")

@@ -128,7 +128,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     verdict = (
         _flood(found, run, package, params)
         or _short(found, run, package, params)
-        or _excused(_uneven(found, run, package, params), found, run, params)
+        or _excuse_lateness(_uneven(found, run, package, params), found, run, params)
         or passed(f"{params.topic} runs at {hertz(found.mean_hz)}, evenly")
     )
     citations = (*verdict.citations, cite(run, params.topic, found.times_ns[0], found.times_ns[-1]))
@@ -138,7 +138,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
-def _excused(uneven: Verdict | None, found: Rhythm, run: Run, params: RateParams) -> Verdict | None:
+def _excuse_lateness(uneven: Verdict | None, found: Rhythm, run: Run, params: RateParams) -> Verdict | None:
     """The verdict, unless the machine was late itself."""
     if uneven is None:
         return None

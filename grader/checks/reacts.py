@@ -139,7 +139,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         _nothing_to_judge(package, run, effects, own, params)
         or _early(causes, effects, run, params)
         or _never_caused(causes, run, params)
-        or _unanswered(answers, run, params, _instead(causes, effects, params))
+        or _judge_unanswered(answers, run, params, _instead(causes, effects, params))
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.cause.words}")
     )
     times = [one.after_s for one in answers if one.after_s is not None]
@@ -249,7 +249,7 @@ def _instead(
     return words, f"{hint} {value_text(wanted)}"
 
 
-def _unanswered(
+def _judge_unanswered(
     answers: Sequence[Answer], run: Run, params: ReactsParams, instead: tuple[str, str] | None
 ) -> Verdict | None:
     hint = f"publish on {params.effect.topic} in the callback of {params.cause.topic}"

@@ -110,7 +110,7 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
         hint = "print what you publish: a division by zero, or a square root of a negative number?"
         verdict = failed(f"the messages on {params.topic} {found.fault}", measured=found.fault, hint=hint)
     else:
-        verdict = _judged(found, run, params)
+        verdict = _judge_track(found, run, params)
     span = cite(run, params.topic)
     return verdict.about(
         expected=f"a way through {join_words(map(spot, params.points))}, within {metres(params.tolerance_m)}",
@@ -125,7 +125,7 @@ def _nothing(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     return nothing_sent(package, run, params.topic, params.of or "student")
 
 
-def _judged(found: Track, run: Run, params: PathParams) -> Verdict:
+def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
     taken = relative(found.path) if params.relative else list(found.path)
     course = followed(taken, params.way.points, params.tolerance_m)
     figures = measured(taken, course, params.way)
@@ -202,13 +202,13 @@ def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: boo
             "publish a linear.x that is not 0, again and again for as long as it should drive",
         )
     return (
-        (_mirrored(path, way) if mirror else None)
+        (_explain_mirrored(path, way) if mirror else None)
         or _wrong_start(path, way, course)
         or (_strays(path, way, course) if course.strayed is not None else _ends_short(path, way, course))
     )
 
 
-def _mirrored(path: Sequence[Pose], way: Way) -> Words | None:
+def _explain_mirrored(path: Sequence[Pose], way: Way) -> Words | None:
     for sign_x, sign_y, message, hint in (
         (
             1,

@@ -140,7 +140,7 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
     verdict = _unreadable(found, package, run, params) or _not_asked(asked, run, params)
     if verdict is None and found is not None and asked is not None:
         judged = path_to_judge(found, asked, params)
-        verdict = _arrived(judged, asked, params) if judged else _too_late(asked, params)
+        verdict = _judge_arrival(judged, asked, params) if judged else _too_late(asked, params)
         verdict = _excused_end(verdict, judged, run, params) if judged else verdict
     assert verdict is not None  # noqa: S101 - one of them always is
     return verdict.about(
@@ -200,7 +200,7 @@ def _too_late(asked: Stretch, params: EndsAtParams) -> Verdict:
     return inconclusive(message, hint="grade again")
 
 
-def _arrived(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> Verdict:
+def _judge_arrival(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> Verdict:
     last = judged[-1]
     apart_m = math.dist(last.point, params.goal)
     figures = f"{metres(apart_m)} from the goal, at {spot(last.point)}"
@@ -257,10 +257,10 @@ def _excused_end(verdict: Verdict, judged: Sequence[Pose], run: Run, params: End
     """A robot that never moved has no excuse; nearly there is also who was there, but looks elsewhere, or late."""
     if verdict.status is not Status.FAIL or stands(judged):
         return verdict
-    return _excused(verdict, run, nearly=params.is_near(judged[-1], NEARLY))
+    return _excuse_nearly(verdict, run, nearly=params.is_near(judged[-1], NEARLY))
 
 
-def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
+def _excuse_nearly(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
     """What nearly is right counts if it is seen twice, and not where the machine was late; all else is lost, unless the
     machine stood still for so long that a robot drives into a wall."""
 
@@ -401,7 +401,7 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
         always = f"for {inside:.0%} of the time" if any(out) else "all the time"
         return passed(f"it is {region.words} {always}", measured=figures)
     nearly = inside * NEARLY >= params.share and long_m * NEARLY >= params.least_m
-    return _excused(verdict.about(measured=figures), run, nearly=nearly)
+    return _excuse_nearly(verdict.about(measured=figures), run, nearly=nearly)
 
 
 def share_inside(path: Sequence[Pose], out: Sequence[float]) -> float:

@@ -92,7 +92,7 @@ def rostest(package: PackageFacts, run: Run, params: RostestParams) -> Verdict:
     if not started or not lives(run):
         return not_started("your package's program").about(expected="the tests pass")
     found = _results(run, params)
-    verdict = _faulty(found, run, params) or _judged(found, run, package, started[0])
+    verdict = _faulty(found, run, params) or _judge_results(found, run, package, started[0])
     counts = (
         f"{sum(c.outcome == 'passed' for c in found.cases)} of {plural(len(found.cases), 'testcase')} passed"
     )
@@ -174,7 +174,7 @@ def _last_line(run: Run, process: str) -> str:
     return f"it printed last: {shorten((errors or lines)[-1], LINE_CHARS)}" if lines else "it printed nothing"
 
 
-def _judged(found: Results, run: Run, package: PackageFacts, start_ns: int) -> Verdict:
+def _judge_results(found: Results, run: Run, package: PackageFacts, start_ns: int) -> Verdict:
     late = [
         f"{name} was not over after {significant(one.limit_s)} s"
         if one is not None and one.end == "late"

@@ -66,7 +66,9 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
     found = offers(run)
     offer = found.get(params.service)
     verdict = (
-        not_offered(package, run, params.service) if offer is None else _judged(offer, package, run, params)
+        not_offered(package, run, params.service)
+        if offer is None
+        else _judge_service(offer, package, run, params)
     )
     cited = cite(run, "/grader/graph")
     return verdict.about(
@@ -101,18 +103,18 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
     wrong = next(((one, v) for one, w in pairs if (v := _fault(one, w, package, run, params))), None)
     verdict = (
         (wrong[1] if wrong else None)
-        or _uncalled(made, package, run, params)
+        or _judge_uncalled(made, package, run, params)
         or passed(f"{params.service} answers {plural(len(pairs), 'call')} as it should")
     )
     call = wrong[0] if wrong else next(reversed(made), None)
     return verdict.about(
         expected=join_words(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1)),
-        measured=verdict.measured or _measured(call),
+        measured=verdict.measured or _measured_text(call),
         citations=(*verdict.citations, _citation(call, run)),
     )
 
 
-def _judged(offer: Offer, package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
+def _judge_service(offer: Offer, package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
     """A service of that name is there, or was."""
     name, _, kind = params.type.partition("/")
     hint = f"{imports(name, kind, 'srv')}, then {service_call(params.service, f'{kind}, callback')}"
@@ -147,7 +149,7 @@ def _fault(
     return failed(message, hint=f"try it by hand: rosservice call {params.service} …")
 
 
-def _uncalled(
+def _judge_uncalled(
     made: tuple[Exchange, ...], package: PackageFacts, run: Run, params: ServiceAnswersParams
 ) -> Verdict | None:
     if len(made) >= len(params.expect):
@@ -169,7 +171,7 @@ def _not_there(package: PackageFacts, run: Run, params: ServiceAnswersParams) ->
     return not_offered(package, run, params.service).model_copy(update={"unjudged": True})
 
 
-def _measured(one: Exchange | None) -> str:
+def _measured_text(one: Exchange | None) -> str:
     if one is None:
         return "not called"
     return "no answer" if one.response is None else fields_text(one.response)
@@ -269,11 +271,11 @@ def handler_traceback(run: Run, service: str, since_ns: int) -> Traceback | None
     if one is None:
         return None
     printed = [c.line for t, c in run.lines(one.name) if c.stream == "stderr" and t >= since_ns]
-    lines = [part for line in printed for part in _unpacked(line)]
+    lines = [part for line in printed for part in _unpack_traceback(line)]
     return next(iter(tracebacks(lines)), None)
 
 
-def _unpacked(line: str) -> list[str]:
+def _unpack_traceback(line: str) -> list[str]:
     start = line.find("['" + HEADING)
     if start < 0:
         return [line]

@@ -113,7 +113,7 @@ def _stamps(run: Run, channel: Channel, path: str) -> list[Stamp]:
     if to_s is None:
         return []
     found = [
-        Stamp(one.time_ns, to_s(one.time_ns), *_told(value))
+        Stamp(one.time_ns, to_s(one.time_ns), *_stamp_fields(value))
         for one in readings([channel], path, numbers=False)
         for value in one.values
         if _time_in(value) is not None
@@ -129,7 +129,7 @@ def _time_in(value: Any) -> Mapping[str, int] | None:  # noqa: ANN401 - decoded 
     return time if isinstance(time, Mapping) and time.keys() == {"secs", "nsecs"} else None
 
 
-def _told(value: Mapping[str, Any]) -> tuple[float, bool, str | None]:
+def _stamp_fields(value: Mapping[str, Any]) -> tuple[float, bool, str | None]:
     time = _time_in(value) or {"secs": 0, "nsecs": 0}
     frame = value.get("frame_id")
     return (

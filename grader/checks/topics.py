@@ -88,7 +88,7 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
         verdict = passed(f"{publishers} publishes {params.type} on {params.topic} ({count})")
     measured = join_words(f"{plain_type(c.type)} by {c.publisher}" for c in channels) or _listed_topics(run)
     expected = f"{params.type} on {params.topic}"
-    return verdict.about(expected=expected, measured=measured, citations=_cited(run, channels))
+    return verdict.about(expected=expected, measured=measured, citations=_cite_channels(run, channels))
 
 
 def _listed_topics(run: Run) -> str:
@@ -109,7 +109,7 @@ def _wrong_type(package: PackageFacts, run: Run, channel: Channel, params: Topic
     return failed(message, hint=hint, citations=cited)
 
 
-def _cited(run: Run, channels: tuple[Channel, ...]) -> tuple[Citation, ...]:
+def _cite_channels(run: Run, channels: tuple[Channel, ...]) -> tuple[Citation, ...]:
     times = sorted(t for c in channels for t in c.times_ns[:1] + c.times_ns[-1:])
     if times:
         return (cite(run, channels[0].topic, times[0], times[-1]),)
@@ -161,7 +161,7 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
     published = published_topics(run)
     unexpected = [topic for topic in published if not params.allows(topic)]
     if unexpected:
-        verdict = _unexpected(unexpected, published, run, params)
+        verdict = _judge_unexpected(unexpected, published, run, params)
     else:
         missing = None if published else no_node(package, run, "no topic was published")
         verdict = missing or passed("no topic beside those of the lab is published")
@@ -172,7 +172,7 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
     )
 
 
-def _unexpected(
+def _judge_unexpected(
     unexpected: list[str], published: dict[str, str], run: Run, params: OnlyTopicsParams
 ) -> Verdict:
     first = unexpected[0]
@@ -273,7 +273,7 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
         message type. `rosnode info <node>` and `rqt_graph` show the connections.
     """
     found = next(_pairs(run, params), None)
-    ends = [_wanted(params.name(end), end) for end in ENDS]
+    ends = [_wanted_text(params.name(end), end) for end in ENDS]
     if found:
         verdict = passed(f"{found[0]} and {found[1]} are connected over {params.topic}")
     else:
@@ -306,7 +306,7 @@ def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
     """Return why no two nodes are connected: one is missing, or not on the topic, or the types differ."""
     lacking = [end for end in ENDS if not _on(run, params.topic, end, params)]
     for end in lacking:
-        if verdict := _misnamed(run, end, params):
+        if verdict := _judge_misnamed(run, end, params):
             return verdict
     if lacking:
         absent = no_node(package, run, f"nothing is connected over {params.topic}")
@@ -321,7 +321,7 @@ def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
     return failed(message, hint="do both use the same message type?").once()
 
 
-def _misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:
+def _judge_misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:
     """The node is there under another name."""
     wanted, there = params.name(end), [n for n in _nodes(run) if not is_grader_node(n)]
     if not wanted or not there or any(is_called(n, wanted) for n in there):
@@ -352,5 +352,5 @@ def _nodes(run: Run) -> tuple[str, ...]:
     return tuple(dict.fromkeys(node for _, event in run.graph for node in event.nodes))
 
 
-def _wanted(name: str, end: End) -> str:
+def _wanted_text(name: str, end: End) -> str:
     return f"/{name.lstrip('/')}" if name else f"a {end.removesuffix('s')} of the package"

@@ -108,7 +108,7 @@ def transform(package: PackageFacts, run: Run, params: TransformParams) -> Verdi
         from the parent. `rosrun tf tf_echo <parent> <child>` shows it.
     """
     own = sent_on(run.student_channels())
-    seen = _seen(run, own, params)
+    seen = _seen_transforms(run, own, params)
     verdict = (
         _not_sent(package, run, own, seen, params)
         or _other_topic(own, params)
@@ -120,13 +120,13 @@ def transform(package: PackageFacts, run: Run, params: TransformParams) -> Verdi
     )
     topics = dict.fromkeys(one.topic for one in own) or (TOPICS[1] if params.static else TOPICS[0],)
     return verdict.about(
-        expected=_expected(params),
-        measured=verdict.measured or _measured(seen, own),
+        expected=_expected_text(params),
+        measured=verdict.measured or _measured_text(seen, own),
         citations=(*verdict.citations, *(cite(run, topic) for topic in topics)),
     )
 
 
-def _seen(run: Run, own: Sequence[Sent], params: TransformParams) -> list[Seen]:
+def _seen_transforms(run: Run, own: Sequence[Sent], params: TransformParams) -> list[Seen]:
     """Return the transform each time that it was sent, or that one of its path was."""
     if not params.through:
         return [Seen(s.time_ns, s.value) for s in own if (s.parent, s.child) == (params.parent, params.child)]
@@ -215,7 +215,7 @@ def _fits(value: Transform, wanted: Transform, params: TransformParams) -> bool:
     return metres <= params.tolerance_m + 1e-6 and degrees <= params.tolerance_deg + 1e-3
 
 
-def _wanted(value: Transform, params: TransformParams) -> Transform:
+def _wanted_transform(value: Transform, params: TransformParams) -> Transform:
     """Return the transform as asked for; what is not asked for is as it is."""
     turn = value.turn if params.rotation_deg is None else turn_of(params.rotation_deg)
     return Transform(params.translation or value.at, turn)
@@ -223,10 +223,10 @@ def _wanted(value: Transform, params: TransformParams) -> Transform:
 
 def _other_value(seen: Sequence[Seen], params: TransformParams) -> Verdict | None:
     values = [one.value for one in seen if one.value is not None]
-    wrong = [value for value in values if not _fits(value, _wanted(value, params), params)]
+    wrong = [value for value in values if not _fits(value, _wanted_transform(value, params), params)]
     if not wrong or params.pose_of:
         return None
-    value, wanted = wrong[0], _wanted(wrong[0], params)
+    value, wanted = wrong[0], _wanted_transform(wrong[0], params)
     count = f"in {len(wrong)} of {plural(len(seen), 'message')}"
     hint = "the translation is in metres, and the angles of quaternion_from_euler in radians"
     why = _why(value, wanted, params)
@@ -335,7 +335,7 @@ def _too_seldom(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verd
     return excused(verdict.once(), run, seen[0].time_ns, seen[-1].time_ns, why_late)
 
 
-def _expected(params: TransformParams) -> str:
+def _expected_text(params: TransformParams) -> str:
     value = f" following {params.pose_of}" if params.pose_of else ""
     if params.translation is not None:
         value += f" at ({', '.join(f'{v:g}' for v in params.translation)}) m"
@@ -344,7 +344,7 @@ def _expected(params: TransformParams) -> str:
     return f"{params.parent} → {params.child}{value}"
 
 
-def _measured(seen: Sequence[Seen], own: Sequence[Sent]) -> str:
+def _measured_text(seen: Sequence[Seen], own: Sequence[Sent]) -> str:
     if not seen:
         return _edge_words(_edges(own)) or "no transform"
     last = seen[-1].value

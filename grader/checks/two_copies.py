@@ -98,8 +98,8 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
     verdict = (
         _taken_over(package, run, trio, params)
         or _not_both_alive(package, run, trio)
-        or _unnamed(run, trio)
-        or _heard(package, run, trio, params)
+        or _judge_unknown_nodes(run, trio)
+        or _judge_heard(package, run, trio, params)
     )
     names = dict.fromkeys((*trio.first_nodes, *trio.second_nodes))
     graph = cite(run, "/grader/graph")
@@ -177,7 +177,7 @@ def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | No
     return unjudged(message, hint=end.hint, citations=cited)  # the first would have ended alone too
 
 
-def _unnamed(run: Run, trio: Trio) -> Verdict | None:
+def _judge_unknown_nodes(run: Run, trio: Trio) -> Verdict | None:
     if trio.first_nodes and trio.second_nodes:
         return None
     if run.student_nodes() and not are_noted(run):
@@ -199,7 +199,7 @@ def _listener_gone(package: PackageFacts, run: Run, trio: Trio) -> Verdict | Non
     return end.verdict(unjudged, message)
 
 
-def _heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) -> Verdict:
+def _judge_heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) -> Verdict:
     """Messages of both that came while both were sending, by what the listener printed."""
     copies = (trio.first_nodes, trio.second_nodes)
     from_ns = both_from_ns(run, params.topic, *copies)
@@ -213,9 +213,9 @@ def _heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) ->
     texts = {**first, **second}
     said, known = (printed_times(run, trio.listener.name, texts, form) for form in (params.template, VALUE))
     return (
-        _judged(first, second, said, trio, params)
+        _judge_both(first, second, said, trio, params)
         or _listener_gone(package, run, trio)
-        or (_judged(first, second, known, trio, params) and _other_words(params))
+        or (_judge_both(first, second, known, trio, params) and _other_words(params))
         or _unheard(run, (first, second), known, trio, params)
     )
 
@@ -226,7 +226,7 @@ def _other_words(params: CopiesParams) -> Verdict:
     return unjudged(message, hint=f"print '{wanted}', in the handout's own words")
 
 
-def _judged(
+def _judge_both(
     first: Counter[str], second: Counter[str], printed: Counter[str], trio: Trio, params: CopiesParams
 ) -> Verdict | None:
     """A pass where both were heard."""

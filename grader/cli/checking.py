@@ -262,7 +262,7 @@ def _remarks(found: GitStatus, check: Check) -> Iterator[RenderableType]:
 
 def _parts(found: GitStatus, encoding: str) -> Iterator[RenderableType]:
     if found.summary:
-        yield Text(f"\n{_fitted(found.summary, encoding)}", "dim")
+        yield Text(f"\n{_fit_encoding(found.summary, encoding)}", "dim")
     differing = [point for point in found.points if not point.remark]
     remarks = [point for point in found.points if point.remark]
     for title, points in ((TITLE, differing), (REMARKS, remarks)):
@@ -273,10 +273,10 @@ def _parts(found: GitStatus, encoding: str) -> Iterator[RenderableType]:
 
 
 def _point(point: Point, encoding: str) -> Iterator[RenderableType]:
-    yield Padding(Text(_fitted(point.text, encoding)), (0, 0, 0, 2))
+    yield Padding(Text(_fit_encoding(point.text, encoding)), (0, 0, 0, 2))
     for command in filter(None, point.fix.split(" && ")):
-        yield Padding(Text(_fitted(command, encoding), "bold"), (0, 0, 0, 6))
+        yield Padding(Text(_fit_encoding(command, encoding), "bold"), (0, 0, 0, 6))
 
 
-def _fitted(text: str, encoding: str) -> str:
+def _fit_encoding(text: str, encoding: str) -> str:
     return line(text, LINE_CHARS).encode(encoding, "backslashreplace").decode(encoding)

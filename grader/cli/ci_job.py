@@ -53,7 +53,7 @@ def run_job(system: str) -> ExitCode:
     try:
         settings = read_settings(variables)
         with teller.commands_stopped():
-            graded = _graded(settings)
+            graded = _grade(settings)
     except Exception as error:
         teller.tell_error(fault_of(error))
         raise
@@ -68,7 +68,7 @@ def run_job(system: str) -> ExitCode:
     return code if graded.fails else ExitCode.PASSED
 
 
-def _graded(settings: Settings) -> Graded:
+def _grade(settings: Settings) -> Graded:
     settings.check_attempt()
     chosen = _choose(settings)
     source, rubric = chosen.source, with_pass_mark(chosen.rubric, settings.mark)
@@ -96,7 +96,7 @@ def _graded(settings: Settings) -> Graded:
     add_forms(settings.out, result, rubric.rubric, prefix, rubric.docs)
     hidden = len(hidden_ids(rubric.rubric))
     print_report(result, rubric.rubric, open_console(sys.stdout), hidden=hidden, static=settings.static)
-    return _judged(result, rubric, settings, prefix)
+    return _outcome_of(result, rubric, settings, prefix)
 
 
 def _choose(settings: Settings) -> Chosen:
@@ -125,8 +125,8 @@ def _prefix(result: GradingResult, source: Path) -> str:
     return package_prefix(result, source if cloned and source.is_dir() else Path.cwd()) or ""
 
 
-def _judged(result: GradingResult, rubric: LoadedRubric, settings: Settings, prefix: str) -> Graded:
-    counted = _counted(result, rubric.rubric, static=settings.static)
+def _outcome_of(result: GradingResult, rubric: LoadedRubric, settings: Settings, prefix: str) -> Graded:
+    counted = _counting_result(result, rubric.rubric, static=settings.static)
     error = result.error if result.status == "error" else None
     lab = rubric.rubric
     code = ExitCode.NOT_GRADED if error or not counted.criteria else exit_code(counted.criteria, lab)
@@ -148,7 +148,7 @@ def _judged(result: GradingResult, rubric: LoadedRubric, settings: Settings, pre
     )
 
 
-def _counted(result: GradingResult, rubric: Rubric, *, static: bool) -> GradingResult:
+def _counting_result(result: GradingResult, rubric: Rubric, *, static: bool) -> GradingResult:
     """Return, with `static`, the result of the criteria that can be judged from the files alone."""
     if not static or result.error is not None:
         return result

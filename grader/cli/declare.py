@@ -160,14 +160,14 @@ def loading() -> Iterator[None]:
     so that looking for garbage in between is for nothing."""
     gc.disable()
     try:
-        with _uninterrupted():
+        with _block_signals():
             yield
     finally:
         gc.enable()
 
 
 @contextmanager
-def _uninterrupted() -> Iterator[None]:
+def _block_signals() -> Iterator[None]:
     if sys.platform == "win32":
         yield
         return

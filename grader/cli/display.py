@@ -116,7 +116,7 @@ class PlainSteps(Steps):
         if before is not None and before.state == after.state:
             return
         stamp = datetime.now().astimezone().strftime("%H:%M:%S")
-        words = [line(after.name, NAME_LIMIT), after.state, _times(after, now_s), _shown(after.detail)]
+        words = [line(after.name, NAME_LIMIT), after.state, _times(after, now_s), _detail_line(after.detail)]
         print(stamp, "  ".join(word for word in words if word), file=self.stream, flush=True)
 
 
@@ -143,7 +143,7 @@ class LiveSteps(Steps):
         for step in steps:
             symbol, style = WORDS[step.state]
             name = Text(f"{symbol} {line(step.name, NAME_LIMIT)}", style)
-            detail = Text(_shown(step.detail), "dim")
+            detail = Text(_detail_line(step.detail), "dim")
             table.add_row(name, Text(step.state, style), Text(_times(step, now_s)), detail)
         table.add_row(
             Text("total", "bold"),
@@ -204,7 +204,7 @@ def _time_left(steps: tuple[Step, ...], now_s: float) -> str:
     return f"about {longest_s:.0f} s to go" if longest_s >= 1 else ""
 
 
-def _shown(detail: str) -> str:
+def _detail_line(detail: str) -> str:
     return line(detail, DETAIL_LIMIT)
 
 
@@ -221,7 +221,7 @@ def print_early(
         if above is None:
             say(row.plain)
         else:
-            for part in _wrapped(row, width):
+            for part in _wrap_lines(row, width):
                 above(part)
     sys.stdout.flush()
 
@@ -250,7 +250,7 @@ def _rows(verdicts: tuple[EarlyVerdict, ...], encoding: str) -> Iterator[Text]:
     yield Text()
 
 
-def _wrapped(row: Text, width: int) -> Iterator[Text]:
+def _wrap_lines(row: Text, width: int) -> Iterator[Text]:
     """Return its lines as a terminal shows them, none of which a CI system takes for a command."""
     parts = row.wrap(Console(width=width), width - ESCAPE - HANGING, overflow="fold") or [row]
     for number, part in enumerate(parts):

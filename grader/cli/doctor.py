@@ -71,7 +71,7 @@ def diagnose() -> tuple[Row, ...]:
 def diagnose_rubric(loaded: LoadedRubric) -> tuple[Row, ...]:
     """Return a row for each ROS package that the rubric's programs and types come from, and for what it `needs`."""
     packages, own, needs = ros_packages(), loaded.rubric.packages, loaded.rubric.needs
-    needed = _needed(loaded)
+    needed = _needed_by_package(loaded)
     rows = [_package(name, needed[name], packages) for name in sorted(needed) if name not in own]
     brought = [Row(name=n, state="ok", detail="beside the rubric; built when the lab is graded") for n in own]
     return (*rows, *brought, *map(_need, look_for(ros=(), apt=needs.apt, pip=needs.pip)))
@@ -83,7 +83,7 @@ def _need(need: Need) -> Row:
     return Row(name=need.name, state=state, detail=detail, fix="" if need.here else need.install)
 
 
-def _needed(loaded: LoadedRubric) -> dict[str, list[str]]:
+def _needed_by_package(loaded: LoadedRubric) -> dict[str, list[str]]:
     """Return by package what the rubric asks of it, nothing where it only needs it; the student's own left out."""
     rubric = loaded.rubric
     names = [start.program for s in rubric.scenarios.values() for start in s.start if start.program]

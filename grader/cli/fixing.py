@@ -78,7 +78,7 @@ def _fix_package(chosen: Chosen, *, dry_run: bool, yes: bool) -> bool:
             emit(open_console(sys.stdout), _parts(repairs, _diff(folder, repairs, preview)))
         if not found:
             say("There is nothing here that --fix repairs.")
-    if found and not dry_run and (yes or _agreed(sum(map(len, found.values())))):
+    if found and not dry_run and (yes or _ask_agreement(sum(map(len, found.values())))):
         for folder, repairs in found.items():
             for repair in repairs:
                 _apply(folder, repair)
@@ -147,7 +147,7 @@ def _parts(repairs: Sequence[Repair], diff: str) -> Iterator[RenderableType]:
     yield Text("")
 
 
-def _agreed(count: int) -> bool:
+def _ask_agreement(count: int) -> bool:
     words = "this change" if count == 1 else f"these {count} changes"
     try:
         answer = input(f"Make {words}? [y/N] ")

@@ -67,7 +67,7 @@ def sandbox_rows() -> Iterator[Row]:
     yield _probe("user namespaces", [unshare, "--user", "--pid", "--fork", "/bin/true"], drop=user_id() == 0)
     yield _probe("network", [sys.executable, "-I", str(NAMESPACES), "/bin/true"], drop=False)
     yield _limits_of_trees()
-    yield from _inherited()
+    yield from _inherited_rows()
     yield _limits_of_processes()
     yield _chosen_sandbox()
 
@@ -111,7 +111,7 @@ def _switch() -> str:
     return CONTAINER
 
 
-def _inherited() -> Iterator[Row]:
+def _inherited_rows() -> Iterator[Row]:
     from grader.arena.inherited_limits import group, limits  # noqa: PLC0415 - other systems lack what it imports
 
     for limit in (*limits(), *group()):

@@ -210,7 +210,7 @@ def build_parser() -> argparse.ArgumentParser:
         "--version", action=VersionAction, help="show the versions of grader, Python and ROS, and exit"
     )
     places = {"": parser.add_subparsers(metavar="COMMAND", required=True, title="commands")}
-    for command in _ordered():
+    for command in _ordered_commands():
         group, _, name = command.name.rpartition(" ")
         if group not in places:
             text = GROUPS[group]
@@ -233,7 +233,7 @@ def build_parser() -> argparse.ArgumentParser:
 def overview() -> str:
     """Return one line for each command: first those of students, then those of instructors, then the others."""
     lines: list[str] = []
-    for title, commands_of in groupby(_ordered(), key=lambda command: command.group):
+    for title, commands_of in groupby(_ordered_commands(), key=lambda command: command.group):
         lines += ["", f"{title}:"] if lines else [f"{title}:"]
         texts = {
             c.name.partition(" ")[0]: GROUPS.get(c.name.partition(" ")[0], c.summary) for c in commands_of
@@ -267,7 +267,7 @@ def value_of(action: argparse.Action) -> str:
     return str(action.metavar or action.dest)
 
 
-def _ordered() -> list[Command]:
+def _ordered_commands() -> list[Command]:
     order = (STUDENTS, INSTRUCTORS, REST)
     return sorted(COMMANDS.values(), key=lambda command: order.index(command.group))
 

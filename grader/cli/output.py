@@ -75,14 +75,14 @@ def report(error: GraderError) -> None:
     fault of a rubric has its own line."""
     faults = error.faults if isinstance(error, RubricError) else [error.message]
     for fault in faults:
-        _say(_fitted(f"grader: error: {_line(fault)}"))
+        _say(_wrap_for_terminal(f"grader: error: {_line(fault)}"))
     if error.hint:
-        _say(_fitted(f"  hint: {_line(error.hint)}"))
+        _say(_wrap_for_terminal(f"  hint: {_line(error.hint)}"))
     if error.note:
-        _say(_fitted(f"  note: {_line(error.note)}"))
+        _say(_wrap_for_terminal(f"  note: {_line(error.note)}"))
 
 
-def _fitted(text: str) -> str:
+def _wrap_for_terminal(text: str) -> str:
     """The line as it is, or on a terminal in lines that end between words."""
     if sys.stderr is None or not sys.stderr.isatty():
         return text

@@ -159,14 +159,14 @@ def _show(form: Form, selection: Selection, failures: Sequence[Failure], setting
         )
     _say_failures(failures)
     ready = len(selection.todo) - len(failures)
-    say(", ".join([f"{ready} would be sent by {form.name}", *_others(selection), *_failed(failures)]))
+    say(", ".join([f"{ready} would be sent by {form.name}", *_others(selection), *_failure_words(failures)]))
     return ExitCode.NOT_GRADED if failures else ExitCode.PASSED
 
 
 def _end(form: Form, selection: Selection, delivery: Delivery) -> None:
     _say_failures(delivery.failures)
     sent = [f"{len(delivery.sent)} sent by {form.name}"]
-    say(", ".join([*sent, *_others(selection), *_failed(delivery.failures)]))
+    say(", ".join([*sent, *_others(selection), *_failure_words(delivery.failures)]))
     if selection.unpublished:
         say(f"  not published: {first_few(selection.unpublished, NAMES_SHOWN)}")
 
@@ -192,7 +192,7 @@ def _others(selection: Selection) -> Iterator[str]:
     return (f"{number(len(names))} {said}" for said, names in counts.items() if names)
 
 
-def _failed(failures: Sequence[Failure]) -> list[str]:
+def _failure_words(failures: Sequence[Failure]) -> list[str]:
     return [f"{len(failures)} could not be sent"] if failures else []
 
 

@@ -70,7 +70,9 @@ def judge_submissions(folders: Sequence[Path], loaded: LoadedRubric, out: str, j
     others. Return the exit code of the worst."""
     order = {folder: index for index, folder in enumerate(folders)}
     judged = sorted(judge_all(folders, loaded, jobs), key=lambda one: order[one.folder])
-    _write(out, lambda ascii_only: judged_text(loaded.rubric, map(_named, judged), ascii_only=ascii_only))
+    _write(
+        out, lambda ascii_only: judged_text(loaded.rubric, map(_named_outcome, judged), ascii_only=ascii_only)
+    )
     for one in judged:
         if one.criteria is None:
             report(EvidenceError(one.error, hint=one.hint))
@@ -81,7 +83,7 @@ def judge_submissions(folders: Sequence[Path], loaded: LoadedRubric, out: str, j
     return next((code for code in WORST_FIRST if code in codes), ExitCode.PASSED)
 
 
-def _named(one: Judged) -> tuple[str, tuple[CriterionResult, ...] | str]:
+def _named_outcome(one: Judged) -> tuple[str, tuple[CriterionResult, ...] | str]:
     return one.folder.name, one.error if one.criteria is None else one.criteria
 
 
@@ -316,7 +318,7 @@ def write_form(
         rubric=rubric.rubric,
         hidden=missing_hidden(shown, rubric.rubric),
         prefix=where,
-        passed=_passed(shown, rubric.rubric),
+        passed=_has_passed(shown, rubric.rubric),
         docs=rubric.docs,
         load_figures=lambda: figures_in(folder, shown, rubric.rubric),
     )
@@ -339,5 +341,5 @@ def _prefix(result: GradingResult, given: str | None) -> str:
     return found or ""
 
 
-def _passed(result: GradingResult, rubric: Rubric) -> bool:
+def _has_passed(result: GradingResult, rubric: Rubric) -> bool:
     return result.status != "error" and exit_code(result.criteria, rubric) is ExitCode.PASSED

@@ -78,7 +78,7 @@ def choose_all(path: Path, rubric: str | None, package: str = "") -> tuple[Chose
         found = replace(found, candidates=named or found.candidates)
     if rubric is not None:
         return (_choose_named(path, found, load_rubric(rubric)),)
-    return tuple(_chosen(path, found, lab) for lab in labs_of(found))
+    return tuple(_choose_lab(path, found, lab) for lab in labs_of(found))
 
 
 def only_package(source: str) -> str:
@@ -123,7 +123,7 @@ def _choose_named(path: Path, found: Found, rubric: LoadedRubric) -> Chosen:
     return Chosen(rubric=rubric, source=source, package=package.folder, words=words)
 
 
-def _chosen(path: Path, found: Found, lab: Lab) -> Chosen:
+def _choose_lab(path: Path, found: Found, lab: Lab) -> Chosen:
     folder = short_path(lab.package.folder)
     where = f" in {folder}" if folder != "." else ""
     words = f"Checking {lab.package.name}{where} against {lab.rubric}{f', {lab.why}' if lab.why else ''}"
@@ -221,7 +221,7 @@ def _none(found: Found) -> UsageError:
     known = packages_of_labs()
     near = _near(names, known)
     if near is None:
-        hint = f"give the lab with --rubric: {_listed(known)}; or --rubric FILE for a lab of your own"
+        hint = f"give the lab with --rubric: {_list_labs(known)}; or --rubric FILE for a lab of your own"
     else:
         hint = (
             f"{near} is for a package named {known[near]}: fix <name> in {MANIFEST}, "
@@ -264,7 +264,7 @@ def _plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
-def _listed(known: dict[str, str]) -> str:
+def _list_labs(known: dict[str, str]) -> str:
     return ", ".join(f"{rubric} (package {package})" for rubric, package in known.items())
 
 

@@ -114,7 +114,7 @@ def _next(source: ReadDataStream, meter: _Meter) -> tuple[int, bytes | Message]:
 
 def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord]:
     """Most of a file's records are messages in chunks: they are taken from the unpacked bytes where they lie."""
-    plain = _unpacked(chunk)
+    plain = _unpack(chunk)
     meter.unpacked(len(plain))
     _verify(chunk.uncompressed_crc, zlib.crc32(plain), "a chunk")
     begin, size_bytes = _HEAD.size, len(plain)
@@ -141,7 +141,7 @@ def _verify(said: int, found: int, what: str) -> None:
         raise ContainerError(f"the checksum of {what} is wrong")
 
 
-def _unpacked(chunk: Chunk) -> bytes:
+def _unpack(chunk: Chunk) -> bytes:
     """Return a chunk's unpacked bytes, never more than the limit, whatever the chunk and the compressed data claim."""
     if chunk.uncompressed_size > MAX_CHUNK_BYTES:
         raise ContainerError(f"a chunk of more than {MAX_CHUNK_BYTES >> 20} MiB")

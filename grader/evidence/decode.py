@@ -118,13 +118,13 @@ class _Plan:
     def encode(self, value: Mapping[str, Any]) -> bytes:
         if not self._types[self._type]:
             return _nothing(self._type, value)
-        message = _message(self._store, self._name, self._renamed(self._type, value))
+        message = _message(self._store, self._name, self._rename_fields(self._type, value))
         try:
             return bytes(self._store.serialize_ros1(message, self._name))
         except (struct.error, OverflowError, SerdeError, AttributeError, TypeError) as error:
             raise ValueError(f"{self._type} cannot hold {value!r}: {error}") from error
 
-    def _renamed(self, type_: str, value: Value) -> Value:
+    def _rename_fields(self, type_: str, value: Value) -> Value:
         """Return the fields by the names that they have in generated code."""
         if not isinstance(value, Mapping):
             raise ValueError(f"{type_} is made of fields, not {value!r}")  # noqa: TRY004 - as every other misfit
@@ -137,8 +137,8 @@ class _Plan:
         if field.primitive:
             return value
         if field.array:
-            return [self._renamed(field.type, item) for item in value]
-        return self._renamed(field.type, value)
+            return [self._rename_fields(field.type, item) for item in value]
+        return self._rename_fields(field.type, value)
 
     def _plain(self, type_: str, message: object) -> dict[str, Any]:
         return {f.name: self._value(f, getattr(message, f.attribute)) for f in self._types[type_]}
@@ -156,15 +156,19 @@ class _Plan:
 
 
 def _plan(type_: str, definition: str) -> _Plan | None:
-    return _kept(type_, definition) if len(definition) <= KEPT_LETTERS_MAX else _made(type_, definition)
+    return (
+        _cached_plan(type_, definition)
+        if len(definition) <= KEPT_LETTERS_MAX
+        else _make_plan(type_, definition)
+    )
 
 
 @lru_cache(maxsize=64)
-def _kept(type_: str, definition: str) -> _Plan | None:
-    return _made(type_, definition)
+def _cached_plan(type_: str, definition: str) -> _Plan | None:
+    return _make_plan(type_, definition)
 
 
-def _made(type_: str, definition: str) -> _Plan | None:
+def _make_plan(type_: str, definition: str) -> _Plan | None:
     try:
         return _Plan(type_, definition)
     except (DefinitionError, TypesysError, SyntaxError, RecursionError):
@@ -185,12 +189,12 @@ def encode(type: str, value: Mapping[str, Any]) -> bytes:  # noqa: A002 - ROS's 
 
 def definition(type: str) -> str:  # noqa: A002 - ROS's own word
     """Return the full definition of one of ROS Noetic's own types. Raises ValueError for any other."""
-    return _described(type)[0]
+    return _definition_of(type)[0]
 
 
 def md5sum(type: str) -> str:  # noqa: A002 - ROS's own word
     """Return the type's MD5 sum as ROS computes it. Raises ValueError for a type that is not ROS Noetic's own."""
-    return _described(type)[1]
+    return _definition_of(type)[1]
 
 
 @lru_cache(maxsize=1)
@@ -203,7 +207,7 @@ def _noetic() -> Typestore:
 
 
 @lru_cache(maxsize=256)
-def _described(type_: str) -> tuple[str, str]:
+def _definition_of(type_: str) -> tuple[str, str]:
     return _noetic().generate_msgdef(_ros2_name(type_), ros_version=1)
 
 
@@ -227,7 +231,7 @@ def _message(store: Typestore, name: str, value: Mapping[str, Any]) -> object:
 def _field(store: Typestore, desc: Value, value: Value) -> Value:
     kind, detail = desc
     if kind == Nodetype.BASE:
-        return _zero(detail[0]) if value is None else _checked(detail[0], value)
+        return _zero(detail[0]) if value is None else _check_value(detail[0], value)
     if kind == Nodetype.NAME:
         return _message(store, detail, value or {})
     inner, size = detail
@@ -252,7 +256,7 @@ def _zero(base: str) -> Value:
     return "" if base == "string" else False if base == "bool" else 0
 
 
-def _checked(base: str, value: Value) -> Value:
+def _check_value(base: str, value: Value) -> Value:
     wanted = {"string": str, "bool": bool}.get(base, (int, float) if base.startswith("float") else int)
     if not isinstance(value, wanted) or (isinstance(value, bool) and base != "bool"):
         raise ValueError(f"{value!r} is no {base}")
@@ -276,7 +280,7 @@ def full_definition(type_: str, text: str, find_text: FindText) -> str:
     """Return a type's text with a `MSG:` part for each type that it needs. Raises ValueError where one is nowhere."""
     package = type_.partition("/")[0]
     parts: dict[str, str] = {}
-    waiting = _needed(text, package)
+    waiting = _needed_types(text, package)
     while waiting:
         name = waiting.pop()
         if name in parts:
@@ -284,7 +288,7 @@ def full_definition(type_: str, text: str, find_text: FindText) -> str:
         if len(parts) > _PARTS_MAX:
             raise ValueError(f"{type_} needs more than {_PARTS_MAX} other types")
         parts[name] = _text_of(name, find_text)
-        waiting += _needed(parts[name], name.partition("/")[0])
+        waiting += _needed_types(parts[name], name.partition("/")[0])
     sections = [text, *(f"MSG: {name}\n{part}" for name, part in parts.items())]
     return f"\n{RULE}\n".join(sections)
 
@@ -295,7 +299,7 @@ def _text_of(name: str, find_text: FindText) -> str:
     return found if found is not None else definition(name).partition(RULE)[0]
 
 
-def _needed(text: str, package: str) -> list[str]:
+def _needed_types(text: str, package: str) -> list[str]:
     types = (match[1] for line in text.splitlines() if (match := _TYPE.match(line.partition("#")[0])))
     return [_full(name, package) for name in types if name not in _BUILT_IN]
 

@@ -125,7 +125,7 @@ def sections_of(type_: str, definition: str) -> Iterator[tuple[str, tuple[str, .
     for raw in definition.split("\n"):
         line = raw.partition("#")[0].strip()
         if line and set(line) == {"="}:
-            yield _named(name), tuple(lines)
+            yield _check_name(name), tuple(lines)
             name, lines = None, []
         elif name is None and line:
             if not line.startswith("MSG: "):
@@ -133,10 +133,10 @@ def sections_of(type_: str, definition: str) -> Iterator[tuple[str, tuple[str, .
             name = line.removeprefix("MSG: ").strip()
         elif line:
             lines.append(raw.strip())
-    yield _named(name), tuple(lines)
+    yield _check_name(name), tuple(lines)
 
 
-def _named(name: str | None) -> str:
+def _check_name(name: str | None) -> str:
     if name is None or not _NAME.fullmatch(name):
         raise DefinitionError(f"no message type: {name!r}")
     return name
@@ -154,13 +154,13 @@ def _fields(owner: str, lines: tuple[str, ...]) -> Iterator[Field]:
         yield Field(
             name=match["name"],
             attribute=f"f{number}",
-            type=_resolved(owner, match["type"]),
+            type=_full_type(owner, match["type"]),
             array=match["array"] is not None,
             size=int(match["size"]) if match["size"] else None,
         )
 
 
-def _resolved(owner: str, type_: str) -> str:
+def _full_type(owner: str, type_: str) -> str:
     if type_ in PRIMITIVES or type_ in _CLOCKS or "/" in type_:
         return type_
     if type_ in _SYNONYMS:

@@ -257,7 +257,7 @@ def _turns(value: object, fields: object) -> list[Any] | None:
 
 def _items(field: Field, value: object) -> list[Any]:
     if isinstance(value, Mapping):
-        value = _repeated(field, value)
+        value = _repeat(field, value)
     if not isinstance(value, list):
         wrong = f"{field.name} is an array: write a list, or {{repeat: …, count: …}}, not {value!r}"
         raise ValueError(wrong)  # noqa: TRY004 - as every other misfit
@@ -266,7 +266,7 @@ def _items(field: Field, value: object) -> list[Any]:
     return value
 
 
-def _repeated(field: Field, value: Mapping[str, Any]) -> list[Any]:
+def _repeat(field: Field, value: Mapping[str, Any]) -> list[Any]:
     """Return the items of `{repeat: .inf, count: 360, except: {"150-210": 0.3}}`; both ends of a span belong to it."""
     if "repeat" not in value or not set(value) <= {"repeat", "count", "except"}:
         raise ValueError(

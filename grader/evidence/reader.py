@@ -318,13 +318,13 @@ class _RunBuilder:
         """Of another tool's recording; channels of other encodings beside ROS's are left alone."""
         encodings = {channel.message_encoding for channel in self._channels.values()}
         if encodings and not encodings & SCHEMAS.keys():
-            names = ", ".join(map(_shown, sorted(encodings)[:NAMES_SHOWN]))
+            names = ", ".join(map(_one_line, sorted(encodings)[:NAMES_SHOWN]))
             raise EvidenceError(f"{self._shown}: no message of ROS in it, only {names}")
         for channel in self._channels.values():
             schema, wanted = self._schemas.get(channel.schema_id), SCHEMAS.get(channel.message_encoding)
             if wanted and (schema is None or schema.encoding != wanted):
                 raise EvidenceError(
-                    f"{self._shown}: {_shown(channel.topic)} has no message definition ({wanted})"
+                    f"{self._shown}: {_one_line(channel.topic)} has no message definition ({wanted})"
                 )
 
     def _ros_channels(self) -> tuple[Channel, ...]:
@@ -363,12 +363,14 @@ class _RunBuilder:
         found = [
             message
             for number, channel in self._channels.items()
-            if channel.topic == topic and channel.message_encoding == "json" and self._described(channel)
+            if channel.topic == topic
+            and channel.message_encoding == "json"
+            and self._has_json_schema(channel)
             for message in self._messages.get(number, ())
         ]
         return sorted(found, key=lambda message: message.log_time_ns)
 
-    def _described(self, channel: mcap.Channel) -> bool:
+    def _has_json_schema(self, channel: mcap.Channel) -> bool:
         schema = self._schemas.get(channel.schema_id)
         return schema is not None and schema.encoding == "jsonschema"
 
@@ -381,7 +383,7 @@ class _RunBuilder:
         return messages[-1].data if messages else None
 
 
-def _shown(name: str) -> str:
+def _one_line(name: str) -> str:
     """Return a name from a foreign file so that it can be shown on one line."""
     text = name[:NAME_CHARS_SHOWN] + ("…" if len(name) > NAME_CHARS_SHOWN else "")
     return text if text.isprintable() else repr(text)

@@ -120,7 +120,7 @@ class EvidenceStream:
         self._mcap.finish()  # type: ignore[no-untyped-call] # mcap leaves this one out
 
     def _json(self, topic: str, log_time_ns: int, record: Record) -> None:
-        data = _encoded(record)
+        data = _encode(record)
         channel = self._events.get(topic)
         if channel is None:
             schema = self._schema(f"grader.{type(record).__name__}", "jsonschema", _json_schema(type(record)))
@@ -233,7 +233,7 @@ def _text(text: str) -> str:
     return text.encode(errors="replace").decode()
 
 
-def _encoded(record: Record) -> bytes:
+def _encode(record: Record) -> bytes:
     """Return the record as JSON that reads back; a value that would not is converted into one that does."""
     try:
         data = record.model_dump_json().encode()

@@ -139,14 +139,14 @@ def _unpack(path: Path, into: Path, limits: IntakeLimits) -> dict[str, Any]:
             f"{name} is packed in a way that is not read here ({error})", hint=KINDS
         ) from None
     except DAMAGED as error:
-        raise _damaged(name, error) from None
+        raise _damage_error(name, error) from None
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:
             raise SubmissionError(f"{name} holds a path that is too long", hint="Shorten it.") from None
         # gzip and bz2 report what is damaged in this way too, but without a number.
         if error.errno is not None:
             raise
-        raise _damaged(name, error) from None
+        raise _damage_error(name, error) from None
     return {"sha256": file_digest(path).hexdigest(), "executable": unpacker.executable, "hints": hints}
 
 
@@ -184,7 +184,7 @@ def _no_archive(path: Path, head: bytes) -> SubmissionError:
     return SubmissionError(f"{name} is a file, not an archive", hint=f"Give the package's folder. {KINDS}")
 
 
-def _damaged(name: str, error: Exception) -> SubmissionError:
+def _damage_error(name: str, error: Exception) -> SubmissionError:
     what = "a name stands for a file and a folder at once" if getattr(error, "errno", None) else str(error)
     return SubmissionError(
         f"{name} is damaged or incomplete ({brief(what) or type(error).__name__})",

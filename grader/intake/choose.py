@@ -59,7 +59,7 @@ def choose(candidates: list[Candidate], wanted: Wanted) -> Choice | None:
         groups = ([c for c in group if c.name == wanted.asked] for group in (seen, ignored, bare))
         return next((_best(group, wanted) for group in groups if group), None)
     for group in (seen, ignored):
-        for fits in (_named, _named_alike, _in_folder):
+        for fits in (_is_named, _named_alike, _in_folder):
             matches = [c for c in group if fits(c, wanted.name)]
             if matches:
                 return _best(matches, wanted)
@@ -70,7 +70,7 @@ def choose(candidates: list[Candidate], wanted: Wanted) -> Choice | None:
     return _best(near, wanted) if len({c.manifest for c in near}) == 1 else None
 
 
-def _named(candidate: Candidate, wanted: str) -> bool:
+def _is_named(candidate: Candidate, wanted: str) -> bool:
     return candidate.manifest == wanted
 
 

@@ -205,10 +205,10 @@ def _https_host(url: str) -> str:
 def without_password(source: str) -> str:
     """SOURCE as it may be kept and shown: of `https://` nothing before the `@` of the server (a token may stand in
     place of a user), of other schemes the user alone. What is no address stays as it is."""
-    return _TORN.sub(r"\g<scheme>://…", _AUTHORITY.sub(_kept, source, count=1))
+    return _TORN.sub(r"\g<scheme>://…", _AUTHORITY.sub(_without_secret, source, count=1))
 
 
-def _kept(match: re.Match[str]) -> str:
+def _without_secret(match: re.Match[str]) -> str:
     scheme, user = match["scheme"], match["user"].split(":", 1)[0]
     web = scheme.lower() in ("http", "https")
     return f"{scheme}://" if web or not user else f"{scheme}://{user}@"

@@ -84,7 +84,9 @@ def _looked_at(root: Path, leave_out: Path | None) -> Iterator[tuple[Folder, Can
         hidden = ignored.get(folder.path) or _marker(folder)
         candidate = _candidate(root, folder, hidden)
         yield folder, candidate
-        folder.folders[:] = [] if candidate and candidate.has_manifest else _entered(root, folder, leave_out)
+        folder.folders[:] = (
+            [] if candidate and candidate.has_manifest else _folders_to_enter(root, folder, leave_out)
+        )
         if hidden:
             ignored.update({folder.inside(name): hidden for name in folder.folders})
 
@@ -160,7 +162,7 @@ def _candidate(root: Path, folder: Folder, ignored_by: str | None) -> Candidate 
     )
 
 
-def _entered(root: Path, folder: Folder, leave_out: Path | None) -> list[str]:
+def _folders_to_enter(root: Path, folder: Folder, leave_out: Path | None) -> list[str]:
     return [
         name
         for name in folder.folders

@@ -126,7 +126,7 @@ class Git:
         with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
             whole = (*access.options, *_place(repository), *args)
             environment = self._environment(cwd, access) if remote else self._local_environment()
-            with self._started(whole, cwd, environment, stdout=out, stderr=err) as process:
+            with self._start(whole, cwd, environment, stdout=out, stderr=err) as process:
                 try:
                     code = process.wait(max(0.0, self._deadline - time.monotonic()))
                 except subprocess.TimeoutExpired:
@@ -147,7 +147,7 @@ class Git:
         """Yield the NUL-ended records that git prints, one by one, so that a caller can stop an endless listing."""
         whole = (*_place(repository), *args)
         environment = self._local_environment()
-        with self._started(
+        with self._start(
             whole, cwd, environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         ) as process:
             stream = process.stdout
@@ -186,7 +186,7 @@ class Git:
             timer.cancel()
 
     @contextmanager
-    def _started(
+    def _start(
         self,
         args: tuple[str, ...],
         cwd: Path,

@@ -94,7 +94,7 @@ def open_submission(
     Raises UsageError for a source that does not exist, OutputError for a `workdir` that cannot be written,
     PackageNotFound where the package is not there, SubmissionError for all else that is wrong with it.
     """
-    parsed = _parsed(source)
+    parsed = _parse(source)
     with _base(workdir) as base:
         try:
             git = Git(base / "git-home", timeout_s=git_timeout_s)
@@ -105,7 +105,7 @@ def open_submission(
             submission = describe(located, git, limits)
         except OSError as error:
             raise unreadable(parsed.given, error) from error
-    return _named(submission, submission_id)
+    return _with_id(submission, submission_id)
 
 
 def open_recording(source: str | Source, *, submission_id: str | None = None) -> RecordedSubmission | None:
@@ -114,14 +114,14 @@ def open_recording(source: str | Source, *, submission_id: str | None = None) ->
 
     Raises what `open_submission` raises.
     """
-    parsed = _parsed(source)
+    parsed = _parse(source)
     try:
         if parsed.kind != "archive" or parsed.path is None or not is_recording(parsed.path):
             return None
         submission = _one_recording(parsed, parsed.path)
     except OSError as error:
         raise unreadable(parsed.given, error) from error
-    return _named(submission, submission_id)
+    return _with_id(submission, submission_id)
 
 
 def open_recorded(
@@ -129,23 +129,23 @@ def open_recorded(
 ) -> RecordedSubmission:
     """Return the submission of a lab that asks for recordings alone: as `open_submission`, and no package is looked
     for."""
-    parsed = _parsed(source)
+    parsed = _parse(source)
     with _base(workdir) as base:
         try:
             git = Git(base / "git-home", timeout_s=git_timeout_s)
             submission = _all_recordings(open_source(parsed, git, base, IntakeLimits()), git)
         except OSError as error:
             raise unreadable(parsed.given, error) from error
-    return _named(submission, submission_id)
+    return _with_id(submission, submission_id)
 
 
-def _named(submission: _AnySubmission, submission_id: str | None) -> _AnySubmission:
+def _with_id(submission: _AnySubmission, submission_id: str | None) -> _AnySubmission:
     if submission_id is None:
         return submission
     return submission.model_copy(update={"id": safe_name(submission_id)})
 
 
-def _parsed(source: str | Source) -> Source:
+def _parse(source: str | Source) -> Source:
     if isinstance(source, Source):
         return source
     try:

@@ -184,7 +184,7 @@ def folder_modes(entries: Iterable[Entry], folder: Path, repositories: Repositor
     tracked = {path: bit for path, bit in index.items() if path in on_disk}
     if not tracked:
         return Modes(source="disk" if MODES_ON_DISK else "none", executable=dict(on_disk), hints=hints)
-    hints = (*hints, *_differences(folder, on_disk, tracked), *_untracked(folder, on_disk, tracked))
+    hints = (*hints, *_differences(folder, on_disk, tracked), *_untracked_hint(folder, on_disk, tracked))
     return Modes(source="git", executable={**on_disk, **tracked}, hints=hints)
 
 
@@ -204,7 +204,7 @@ def _index(folder: Path, repositories: Repositories) -> tuple[dict[str, bool], t
     """The tracked files below the folder with git's executable bit, and a hint where git cannot be asked."""
     try:
         repository = repositories.around(folder)
-        return ({}, ()) if repository is None else (_tracked(folder, repository, repositories.git), ())
+        return ({}, ()) if repository is None else (_tracked_modes(folder, repository, repositories.git), ())
     except GitMissing:
         return {}, ("git is not installed here: executable bits were read from the disk",)
     except Unfit as unfit:
@@ -214,7 +214,7 @@ def _index(folder: Path, repositories: Repositories) -> tuple[dict[str, bool], t
     return {}, (f"git cannot read this repository ({said}): executable bits were read from the disk",)
 
 
-def _tracked(folder: Path, repository: Repository, git: Git) -> dict[str, bool]:
+def _tracked_modes(folder: Path, repository: Repository, git: Git) -> dict[str, bool]:
     index: dict[str, bool] = {}
     listing_args = ("ls-files", "--stage", "-z")
     with closing(git.records(*listing_args, cwd=folder, repository=repository)) as records:
@@ -256,7 +256,9 @@ def _differences(folder: Path, on_disk: Mapping[str, bool | None], tracked: Mapp
     return hints
 
 
-def _untracked(folder: Path, on_disk: Mapping[str, bool | None], tracked: Mapping[str, bool]) -> list[str]:
+def _untracked_hint(
+    folder: Path, on_disk: Mapping[str, bool | None], tracked: Mapping[str, bool]
+) -> list[str]:
     new = sorted(path for path in on_disk.keys() - tracked.keys() if is_script(folder, path))
     return (
         [f"not in git yet, so not handed in by a push: {listing(new)} (git add, git commit)"] if new else []

@@ -71,7 +71,7 @@ def clone(source: Source, git: Git, into: Path, limits: IntakeLimits) -> Clone:
         refs = _remote_refs(fetched, git, into)
         wanted = choose_ref(refs, source.ref, given=source.given)
         commit = _fetch(fetched, git, into, refs, wanted)
-        files = _measured(source, git, into, commit, limits)
+        files = _measure_files(source, git, into, commit, limits)
         _checkout(source, git, into, commit, files)
     except GitFailed as failure:
         raise explained(failure, source) from None
@@ -134,14 +134,14 @@ def _fetch(source: Source, git: Git, into: Path, refs: dict[str, str], wanted: W
     if one:
         try:
             _fetch_refs(source, git, into, ("--depth=1",), one)
-            return _peeled(git, into, "FETCH_HEAD")
+            return _commit_of(git, into, "FETCH_HEAD")
         except (GitTimeout, GitTooMuch):
             raise
         except GitFailed:
             pass
     _fetch_refs(source, git, into, ("--update-shallow",), *_everything(refs, wanted))
     try:
-        return _peeled(git, into, wanted.commit or "FETCH_HEAD")
+        return _commit_of(git, into, wanted.commit or "FETCH_HEAD")
     except GitFailed:
         raise no_such_ref(refs, source.ref or "HEAD", given=source.given) from None
 
@@ -173,12 +173,12 @@ def ask(source: Source, git: Git, repository: Repository, command: tuple[str, ..
     )
 
 
-def _peeled(git: Git, into: Path, name: str) -> str:
+def _commit_of(git: Git, into: Path, name: str) -> str:
     args = ("rev-parse", "--verify", "--quiet", f"{name}^{{commit}}")
     return git.run(*args, cwd=into, repository=_own(into)).decode().strip()
 
 
-def _measured(source: Source, git: Git, into: Path, commit: str, limits: IntakeLimits) -> _Files:
+def _measure_files(source: Source, git: Git, into: Path, commit: str, limits: IntakeLimits) -> _Files:
     """Counts the commit's files before they are written: a few objects can stand for any number of them."""
     meter = Meter(limits, name=source.given)
     git_links, left_out = [], []

@@ -62,7 +62,7 @@ def walk(root: Path, *, tolerant: bool = False) -> Iterator[Folder]:
     while waiting:
         path = waiting.popleft()
         try:
-            entries = _scanned(root, path)
+            entries = _scan(root, path)
         except (OSError, SubmissionError) as error:
             hidden = isinstance(error, OSError) and _is_hidden(path)
             if (tolerant or hidden) and path != ".":
@@ -83,7 +83,7 @@ def walk(root: Path, *, tolerant: bool = False) -> Iterator[Folder]:
         waiting.extend(below)
 
 
-def _scanned(root: Path, path: str) -> list[os.DirEntry[str]]:
+def _scan(root: Path, path: str) -> list[os.DirEntry[str]]:
     with os.scandir(root / path) as scan:
         entries = list(islice(scan, MAX_IN_FOLDER + 1))
     if len(entries) > MAX_IN_FOLDER:

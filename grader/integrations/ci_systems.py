@@ -102,14 +102,14 @@ def read_settings(variables: Mapping[str, str]) -> Settings:
 
 def _package(text: str) -> str:
     if text and not is_package_name(text):
-        raise UsageError(f"package: {_quoted(text)} cannot be a package's name", hint="write its <name>")
+        raise UsageError(f"package: {_quote(text)} cannot be a package's name", hint="write its <name>")
     return text
 
 
 def _attempts(text: str) -> int | None:
     if text and not re.fullmatch(r"[1-9]\d{0,5}", text):
         raise UsageError(
-            f"attempts: {_quoted(text)} is not a number of attempts", hint="write 5, say, or nothing"
+            f"attempts: {_quote(text)} is not a number of attempts", hint="write 5, say, or nothing"
         )
     return int(text) if text else None
 
@@ -122,7 +122,7 @@ def _fail_on(text: str) -> frozenset[Outcome]:
     unknown = [word for word in words if word not in known]
     if unknown:
         raise UsageError(
-            f"fail-on: {_quoted(unknown[0])} is not an outcome",
+            f"fail-on: {_quote(unknown[0])} is not an outcome",
             hint=f"name any of {', '.join(known)}, or {NEVER} alone",
         )
     return frozenset(known[word] for word in words) or frozenset(FAILING)
@@ -131,16 +131,16 @@ def _fail_on(text: str) -> frozenset[Outcome]:
 def _yes(text: str) -> bool:
     if text.lower() in YES | NO:
         return text.lower() in YES
-    raise UsageError(f"static: {_quoted(text)} is neither true nor false", hint="write true or false")
+    raise UsageError(f"static: {_quote(text)} is neither true nor false", hint="write true or false")
 
 
 def _sandbox(text: str) -> SandboxMode:
     if (text or "auto") not in MODES:
-        raise UsageError(f"sandbox: {_quoted(text)} is not a mode", hint=f"write {', '.join(MODES)}")
+        raise UsageError(f"sandbox: {_quote(text)} is not a mode", hint=f"write {', '.join(MODES)}")
     return cast("SandboxMode", text or "auto")
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     return f'"{line(text, SHOWN_CHARS)}"'
 
 

@@ -223,13 +223,13 @@ def with_recordings(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
     alone = foreign[0] if len(foreign) == 1 and PACKAGE_RUN not in own else None
     found = dict(own)
     for name, scenario in rubric.scenarios.items():
-        run = own.get(name) or _named(name, scenario, foreign) or alone
+        run = own.get(name) or _run_named(name, scenario, foreign) or alone
         if run is not None:
             found[name] = run
     return found
 
 
-def _named(name: str, scenario: Scenario, foreign: list[Run]) -> Run | None:
+def _run_named(name: str, scenario: Scenario, foreign: list[Run]) -> Run | None:
     by_name = [run for run in foreign if run.scenario == name]
     pattern = PurePosixPath(scenario.recording or "").name
     fitting = [run for run in foreign if fnmatchcase(run.evidence.casefold(), pattern.casefold())]

@@ -147,16 +147,16 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
             for explain in (explain_by_exception, explain_by_unheard_topic, explain_by_unread_parameter):
                 found = explain(check, package, run, found)
             found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found)
-        return _named(choose_hint_language(found, criterion, facts), criterion, facts)
+        return _with_package_name(choose_hint_language(found, criterion, facts), criterion, facts)
     except NotRecorded as missing:
         return missing.verdict
     except EvidenceError as error:
         return inconclusive(error.message, hint=error.hint)
     except Exception as error:  # noqa: BLE001 - whatever goes wrong in a check must not cost a student a mark
-        return _broken(check, error)
+        return _verdict_of_crash(check, error)
 
 
-def _named(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
+def _with_package_name(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
     """Return a verdict on another package than the main one with its name, and files as they lie from the main one's
     folder."""
     main, package = facts.package, facts.package_of(criterion)
@@ -177,7 +177,7 @@ def _sound(verdict: object) -> Verdict:
     return verdict
 
 
-def _broken(check: Check, error: Exception) -> Verdict:
+def _verdict_of_crash(check: Check, error: Exception) -> Verdict:
     kind = type(error).__name__
     message = f"the check {check.name!r} itself failed ({kind}); this costs no marks"
     hint = "please report this with the evidence file"
@@ -309,7 +309,7 @@ def result_of(
         expected=verdict.expected,
         measured=verdict.measured,
         hint=verdict.hint or (criterion.hint if lost else ""),
-        reproduce=_compiled(verdict) or criterion.reproduce,
+        reproduce=_compile_command(verdict) or criterion.reproduce,
         citations=verdict.citations,
         blocked_by=verdict.blocked_by,
         repaired=repaired,
@@ -317,7 +317,7 @@ def result_of(
     )
 
 
-def _compiled(verdict: Verdict) -> str:
+def _compile_command(verdict: Verdict) -> str:
     """Return the command that shows a fault of a script's grammar; "" for any other verdict."""
     told = verdict.status.is_lost and any(kind in verdict.message for kind in SYNTAX)
     cited = (one.file for one in verdict.citations if isinstance(one, FileCitation))
@@ -411,14 +411,14 @@ class _Judging:
         return Facts(
             rubric=self._rubric,
             runs=runs,
-            package=_watched(main, asked),
-            others={name: _watched(package, asked) for name, package in others.items()},
+            package=_watch_package(main, asked),
+            others={name: _watch_package(package, asked) for name, package in others.items()},
         )
 
 
-def _watched(package: PackageFacts, asked: set[str]) -> PackageFacts:
+def _watch_package(package: PackageFacts, asked: set[str]) -> PackageFacts:
     files = tuple(_Watched(file, asked, REFINED_OF_FILES) for file in package.files)
-    also = tuple(_watched(other, asked) for other in package.also)
+    also = tuple(_watch_package(other, asked) for other in package.also)
     seen = package.model_copy(update={"files": files, "also": also})
     return cast("PackageFacts", _Watched(seen, asked, REFINED))
 

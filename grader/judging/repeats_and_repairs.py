@@ -165,21 +165,21 @@ def concerns(
 def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric, *, built: bool) -> bool:
     """Return whether the scenario runs the repaired file, as far as the rubric says. A launch file may run any."""
     name, launches = PurePosixPath(repair.file).name, any(start.launch for start in scenario.start)
-    known = any(name in _started(one) for one in rubric.scenarios.values())
+    known = any(name in _started_files(one) for one in rubric.scenarios.values())
     if repair.kind in DONE_BEFORE_RUNS:
         return launches and not known
     if repair.kind in OF_BUILDS:
         return not built or any(start.built for start in scenario.start)
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         return True
-    if name in _started(scenario):
+    if name in _started_files(scenario):
         return True
     if name.endswith((".launch", ".launch.xml")):
         return launches and not known
     return repair.kind != "launch-type" and (launches or not known)
 
 
-def _started(scenario: Scenario) -> set[str]:
+def _started_files(scenario: Scenario) -> set[str]:
     """Return the names of the files that the scenario starts."""
     return {PurePosixPath(path).name for s in scenario.start for path in (s.script, s.launch) if path}
 

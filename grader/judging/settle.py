@@ -54,9 +54,9 @@ def settle(
     automatic = unsettled(result, rubric)
     judged = take_in(automatic.criteria)
     said = {criterion.id: _automatic(criterion) for criterion in judged}
-    applied = tuple(_applied(name, overrides[name], said[name], before) for name in said if name in overrides)
+    applied = tuple(_apply(name, overrides[name], said[name], before) for name in said if name in overrides)
     decided = awarded(applied)
-    criteria = tuple(_decided(criterion, decided.get(criterion.id), rubric.digits) for criterion in judged)
+    criteria = tuple(_decide(criterion, decided.get(criterion.id), rubric.digits) for criterion in judged)
     criteria = leave_out(rubric, criteria)
     points = total_points(rubric, criteria)
     late = lateness(points, rubric, handed_in)
@@ -111,7 +111,7 @@ def _automatic(criterion: CriterionResult) -> Automatic:
     return Automatic(status=criterion.status, points=criterion.points, message=criterion.message)
 
 
-def _applied(
+def _apply(
     criterion: str, override: Override, now: Automatic, before: tuple[AppliedOverride, ...]
 ) -> AppliedOverride:
     earlier = next((b for b in before if b.criterion == criterion and _is(b, override)), None)
@@ -130,7 +130,7 @@ def _is(earlier: AppliedOverride, override: Override) -> bool:
     return all(getattr(earlier, name) == getattr(override, name) for name in Override.model_fields)
 
 
-def _decided(criterion: CriterionResult, override: Override | None, digits: int) -> CriterionResult:
+def _decide(criterion: CriterionResult, override: Override | None, digits: int) -> CriterionResult:
     """Return the criterion with a person's points, if there are any. What was expected and measured stays."""
     if override is None or override.points is None:
         return criterion

@@ -211,7 +211,7 @@ def notes_of(runs: Mapping[str, Run]) -> tuple[Note, ...]:
         for scenario, run in runs.items()
         if not run.foreign and "/" not in scenario  # what a repaired copy does is not the student's
         for kind in KINDS
-        for note in _bounded(scenario, kind, tuple(dict.fromkeys(_notes(scenario, kind, run))))
+        for note in _bound_notes(scenario, kind, tuple(dict.fromkeys(_notes(scenario, kind, run))))
     )
 
 
@@ -222,7 +222,7 @@ def _notes(scenario: str, kind: str, run: Run) -> Iterator[Note]:
             yield Note.model_validate({"scenario": scenario, "actor": actor, "kind": kind, "text": text})
 
 
-def _bounded(scenario: str, kind: str, notes: tuple[Note, ...]) -> Iterator[Note]:
+def _bound_notes(scenario: str, kind: str, notes: tuple[Note, ...]) -> Iterator[Note]:
     yield from notes[:NOTES_MAX]
     left = len(notes) - NOTES_MAX
     if left > 0:

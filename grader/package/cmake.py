@@ -57,7 +57,7 @@ def read_cmake(
     facts = parse_cmake(folder, name)
     if facts is None:
         return None
-    facts = facts.model_copy(update={"calls": _kept(facts.calls)})
+    facts = facts.model_copy(update={"calls": _without_left_out(facts.calls)})
     return facts if trace is None else refine_cmake(facts, (name, folder.name), trace=trace, root=root)
 
 
@@ -81,13 +81,13 @@ def refine_cmake(
     return CMakeFacts(
         file=facts.file,
         source="trace",
-        calls=(*_kept(calls), *rest),
+        calls=(*_without_left_out(calls), *rest),
         last_line=facts.last_line,
         stopped_line=reached if stopped else None,
     )
 
 
-def _kept(calls: tuple[CMakeCall, ...]) -> tuple[CMakeCall, ...]:
+def _without_left_out(calls: tuple[CMakeCall, ...]) -> tuple[CMakeCall, ...]:
     return tuple(call for call in calls if call.name not in _LEFT_OUT)
 
 
@@ -148,14 +148,14 @@ def _entries(trace: Path) -> Iterator[dict[str, Any]]:
                 read_bytes += len(line)
                 if not line or read_bytes > _TRACE_BYTES_MAX:
                     return
-                entry = _decoded(line)
+                entry = _decode(line)
                 if isinstance(entry, dict):
                     yield entry
     except OSError:
         return
 
 
-def _decoded(line: bytes) -> Any:  # noqa: ANN401 - whatever JSON holds
+def _decode(line: bytes) -> Any:  # noqa: ANN401 - whatever JSON holds
     try:
         return json.loads(line)
     except (ValueError, RecursionError):  # garbage between the lines, or the last one cut short

@@ -198,7 +198,7 @@ class _Reader:
         if references * max(map(len, self.variables.values())) > _CHARS_MAX:
             return [printable(token.value[:_VALUE_CHARS_MAX]) for token in tokens]
         try:
-            resolved = resolve_args(self.context, [_escaped(t) for t in tokens if t.kind != "COMMENT"])
+            resolved = resolve_args(self.context, [_escape(t) for t in tokens if t.kind != "COMMENT"])
         except (CMakeError, RecursionError) as error:
             line = tokens[0].line
             cause = "a variable `${...}` is never closed by `}`"
@@ -211,7 +211,7 @@ class _Reader:
         return args
 
 
-def _escaped(token: Token) -> Token:
+def _escape(token: Token) -> Token:
     """With each `$` escaped that begins no variable (`$<TARGET_FILE:x>`): the library stops there."""
     value = _LONE_DOLLAR.sub(lambda found: found[1] or r"\$", token.value)
     if token.kind == "BRACKETED" or value == token.value:
@@ -228,7 +228,7 @@ def parse_tree_of(data: bytes, file: str) -> tuple[list[nodes.AstFileNode], Faul
     if text is None:
         return [], _fault(file, None, "too many brackets", f"`{file}` holds too many `[[` to be read")
     commands, fault = _commands(text, file)
-    whole, unbalanced = _balanced(commands, file)
+    whole, unbalanced = _balance(commands, file)
     fault = unbalanced or fault
     if fault is not None and whole:
         text = text[: whole[-1].span.stop]
@@ -263,11 +263,11 @@ def _commands(text: str, file: str) -> tuple[list[nodes.Command], Fault | None]:
     except RecursionError:
         return commands, _fault(file, None, "nested too deep", "brackets are nested too deep")
     except CMakeError as error:
-        return commands, _explained(text, commands[-1].span.stop if commands else 0, file, str(error))
+        return commands, _explain_fault(text, commands[-1].span.stop if commands else 0, file, str(error))
     return commands, None
 
 
-def _explained(text: str, end: int, file: str, message: str) -> Fault:
+def _explain_fault(text: str, end: int, file: str, message: str) -> Fault:
     """Return the fault of the command that begins behind `end`, the place where the last good one stopped."""
     tokens = [t for t in tokenize(text) if t.kind != "COMMENT" and t.span.start >= end]
     first = tokens[0] if tokens else Token("RAW", "", slice(end, end), text.count("\n") + 1, 1)
@@ -288,7 +288,7 @@ def _word(token: Token) -> str:
     return str(token.value or "")[:40]
 
 
-def _balanced(commands: list[nodes.Command], file: str) -> tuple[list[nodes.Command], Fault | None]:
+def _balance(commands: list[nodes.Command], file: str) -> tuple[list[nodes.Command], Fault | None]:
     """Return the commands up to the last one outside every open block, and the fault where blocks do not match."""
     open_blocks: list[nodes.Command] = []
     whole = 0

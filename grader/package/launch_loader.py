@@ -122,7 +122,7 @@ class _Loader:
             elif child.tag == "include":
                 self._include(child, scope.of(child), depth)
             elif child.tag in {"arg", "remap", "param"}:
-                scope = self._changed(child, scope)
+                scope = self._change_scope(child, scope)
             else:
                 self._add(child, scope.of(child))
 
@@ -130,7 +130,7 @@ class _Loader:
         if not any(fault.message == _TOO_MUCH for fault in self.loaded.faults):
             self.loaded.faults.append(_fault(child, scope, _TOO_MUCH))
 
-    def _changed(self, child: etree._Element, scope: Scope) -> Scope:
+    def _change_scope(self, child: etree._Element, scope: Scope) -> Scope:
         if child.tag == "arg":
             return _with_arg(child, scope)
         if child.tag == "remap":

@@ -192,13 +192,13 @@ def check_syntax(folder: Path, paths: Sequence[str], *, timeout_s: float = 10.0)
         found, timed_out = _run(folder, left, remaining_s)
         done = set(found.checked)
         left = [path for path in left if printable(path) not in done]
-        report = _joined(report, found)
+        report = _join_reports(report, found)
         if left:
             kind, message = (
                 ("NotChecked", "takes too long") if timed_out else ("PythonCrash", "crashes Python")
             )
-            report = _joined(report, _without_result([left.pop(0)], kind, message))
-    return _joined(report, _without_result(left, "NotChecked", "was not reached in time"))
+            report = _join_reports(report, _without_result([left.pop(0)], kind, message))
+    return _join_reports(report, _without_result(left, "NotChecked", "was not reached in time"))
 
 
 def _run(folder: Path, paths: list[str], timeout_s: float) -> tuple[SyntaxReport, bool]:
@@ -222,7 +222,7 @@ def _without_result(paths: Iterable[str], kind: str, message: str) -> SyntaxRepo
     return SyntaxReport(checked=tuple(faults), faults=faults)
 
 
-def _joined(one: SyntaxReport, two: SyntaxReport) -> SyntaxReport:
+def _join_reports(one: SyntaxReport, two: SyntaxReport) -> SyntaxReport:
     return SyntaxReport(
         checked=one.checked + two.checked,
         faults={**one.faults, **two.faults},

@@ -40,7 +40,7 @@ def regular_file(folder: Path, path: str) -> Path:
         real = os.path.realpath(folder / path, strict=True)
         mode = Path(real).stat().st_mode
     except OSError as error:
-        raise _translated(error) from error
+        raise _translate(error) from error
     if not Path(real).is_relative_to(os.path.realpath(folder)):
         raise Unreadable("OutsideLink", "is a link to a place outside the package")
     if not stat.S_ISREG(mode):
@@ -48,7 +48,7 @@ def regular_file(folder: Path, path: str) -> Path:
     return Path(real)
 
 
-def _translated(error: OSError) -> Unreadable:
+def _translate(error: OSError) -> Unreadable:
     if error.errno == errno.ELOOP:
         return Unreadable("LinkLoop", "is a link that leads back to itself")
     if error.errno in {errno.ENOENT, errno.ENOTDIR}:
@@ -65,7 +65,7 @@ def read_markup(folder: Path, path: str, limit_bytes: int = MARKUP_LIMIT_BYTES) 
     except Unreadable as error:
         return _unread(folder, path, error)
     except OSError as error:
-        return _unread(folder, path, _translated(error))
+        return _unread(folder, path, _translate(error))
     if len(data) > limit_bytes:
         size = f"{limit_bytes // 1_000_000} MB" if limit_bytes >= 1_000_000 else f"{limit_bytes // 1_000} kB"
         return _unread(folder, path, Unreadable("TooLarge", f"is larger than {size} and was not read"))

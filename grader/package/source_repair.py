@@ -110,7 +110,7 @@ def _span(lines: list[str], node: ast.expr) -> tuple[int, int, int] | None:
     return line, start, end
 
 
-def _edited(text: str, edits: Iterable[tuple[int, int, int, str]]) -> str:
+def _edit(text: str, edits: Iterable[tuple[int, int, int, str]]) -> str:
     lines = text.split("\n")
     for line, start, end, new in sorted(edits, reverse=True):
         lines[line] = lines[line][:start] + new + lines[line][end:]
@@ -130,7 +130,7 @@ def _without_old_names(text: str) -> Iterator[Step]:
     spans = [(span, OLD_NAMES[n.id]) for n in uses if (span := _span(lines, n))]
     if spans:
         names = ", ".join(sorted({n.id for n in uses}))
-        after = _edited(text, [(*span, new) for span, new in spans])
+        after = _edit(text, [(*span, new) for span, new in spans])
         yield from _step("old-name", min(n.lineno for n in uses), text, after, names)
 
 
@@ -219,9 +219,11 @@ def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
         if hasattr(builtins, name):
             continue
         if name in MODULES and name in modules:
-            after = _imported(text, f"import {name}", "", "")
+            after = _add_import(text, f"import {name}", "", "")
         elif name in packages:
-            after = _imported(text, f"from {packages[name]}.msg import {name}", f"{packages[name]}.msg", name)
+            after = _add_import(
+                text, f"from {packages[name]}.msg import {name}", f"{packages[name]}.msg", name
+            )
         else:
             continue
         for step in _step("import", missing[name], text, after, name):
@@ -229,7 +231,7 @@ def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
             yield step
 
 
-def _imported(text: str, statement: str, module: str, name: str) -> str:
+def _add_import(text: str, statement: str, module: str, name: str) -> str:
     """The text with one more import: in the line that imports from this module, or below the last import."""
     body, lines = ast.parse(text).body, text.split("\n")
     imports = [s for s in body if isinstance(s, ast.Import | ast.ImportFrom)]
@@ -237,7 +239,7 @@ def _imported(text: str, statement: str, module: str, name: str) -> str:
         if module and isinstance(one, ast.ImportFrom) and one.module == module and not one.level:
             span = _span(lines, one.names[-1])  # type: ignore[arg-type] # an alias has a place too
             if span is not None:
-                return _edited(text, [(span[0], span[2], span[2], f", {name}")])
+                return _edit(text, [(span[0], span[2], span[2], f", {name}")])
     first = next((s for s in body if not is_docstring(s)), None)
     at = (imports[-1].end_lineno or 0) if imports else (first.lineno - 1 if first else len(lines))
     return "\n".join([*lines[:at], statement, *lines[at:]])
@@ -258,7 +260,7 @@ def _with_attributes(text: str) -> Iterator[Step]:
         span = _span(lines, node)
         if meant and span is not None and not node.attr.startswith("_"):
             line, _, end = span
-            after = _edited(text, [(line, end - len(node.attr), end, meant)])
+            after = _edit(text, [(line, end - len(node.attr), end, meant)])
             for step in _step("attribute", line + 1, text, after, f"rospy.{node.attr}"):
                 text, lines = step["text"], step["text"].split("\n")
                 yield step
@@ -267,15 +269,17 @@ def _with_attributes(text: str) -> Iterator[Step]:
 def _with_calls(text: str) -> Iterator[Step]:
     tree, lines = ast.parse(text), text.split("\n")
     own = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
-    named = [n for n in chain.from_iterable(map(_uncalled, ast.walk(tree))) if _is_callable(n, own)]
+    named = [
+        n for n in chain.from_iterable(map(_uncalled_expressions, ast.walk(tree))) if _is_callable(n, own)
+    ]
     spans = [span for n in named if (span := _span(lines, n))]
     if spans:
-        after = _edited(text, [(line, end, end, "()") for line, _, end in spans])
+        after = _edit(text, [(line, end, end, "()") for line, _, end in spans])
         words = dict.fromkeys(ast.unparse(n) for n in sorted(named, key=lambda n: n.lineno))
         yield from _step("call", min(spans)[0] + 1, text, after, ", ".join(words))
 
 
-def _uncalled(node: ast.AST) -> Iterator[ast.expr]:
+def _uncalled_expressions(node: ast.AST) -> Iterator[ast.expr]:
     """Yield what stands there by itself and says nothing: a statement, or a condition."""
     if isinstance(node, ast.Expr):
         yield node.value
@@ -305,7 +309,7 @@ def _with_callbacks(text: str) -> Iterator[Step]:
             ]
     spans = [(span, ast.unparse(n.func)) for n in called if (span := _span(lines, n))]
     if spans:
-        after = _edited(text, [(*span, name) for span, name in spans])
+        after = _edit(text, [(*span, name) for span, name in spans])
         words = ", ".join(dict.fromkeys(name for _, name in spans))
         yield from _step("callback", min(span for span, _ in spans)[0] + 1, text, after, words)
 
@@ -322,7 +326,7 @@ def _with_main(text: str) -> Iterator[Step]:
                 and span
             ):
                 if word.value != "__main__":
-                    after = _edited(text, [(*span, "'__main__'")])
+                    after = _edit(text, [(*span, "'__main__'")])
                     yield from _step("guard", node.lineno, text, after, str(word.value))
                 return
     runs = (
@@ -388,7 +392,7 @@ def _names(text: str) -> list[dict[str, Any]]:
     tree, lines = ast.parse(text), text.split("\n")
     constants = _constants(tree)
     found = []
-    for role, node in _named(tree):
+    for role, node in _named_texts(tree):
         given = constants.get(node.id) if isinstance(node, ast.Name) else node
         if not isinstance(given, ast.Constant) or not isinstance(given.value, str):
             continue
@@ -399,7 +403,7 @@ def _names(text: str) -> list[dict[str, Any]]:
     return found
 
 
-def _named(tree: ast.Module) -> Iterator[tuple[str, ast.expr]]:
+def _named_texts(tree: ast.Module) -> Iterator[tuple[str, ast.expr]]:
     for call in ast.walk(tree):
         if isinstance(call, ast.Subscript) and isinstance(call.slice, ast.Constant):
             yield "key", call.slice

@@ -73,7 +73,7 @@ def _first_changed(before: str, after: str) -> int:
 
 
 def _all_expanded(text: str, width: int) -> str:
-    return "\n".join(_expanded(line, width) for line in text.split("\n"))
+    return "\n".join(_expand_tabs(line, width) for line in text.split("\n"))
 
 
 def _like_the_line_before(text: str, number: int) -> str:
@@ -201,7 +201,7 @@ def _with_global_first(text: str, number: int) -> Iterator[tuple[str, str]]:
     yield "global", "\n".join(lines)
 
 
-def _expanded(line: str, width: int) -> str:
+def _expand_tabs(line: str, width: int) -> str:
     code = line.lstrip(" \t")
     return line[: len(line) - len(code)].expandtabs(width) + code
 
@@ -231,7 +231,7 @@ def _fixed_statement(lines: list[str]) -> list[str] | None:
     after = "    pass\n" if _code(lines[-1]).endswith(":") else ""
     source = before + "\n".join([first, *lines[1:]]) + "\n" + after
     tools = _tools()[::-1] if OLD_PRINT.search(source) else _tools()
-    fixed = next((f for tool in tools if (f := _refactored(tool, source)) not in (None, source)), None)
+    fixed = next((f for tool in tools if (f := _refactor(tool, source)) not in (None, source)), None)
     if fixed is None:
         return None
     body = fixed.removeprefix(before).removesuffix("\n" + after if after else "\n").split("\n")
@@ -252,7 +252,7 @@ def _tools() -> list[Any]:
     return _TOOLS
 
 
-def _refactored(tool: Any, source: str) -> str | None:  # noqa: ANN401 - a library without types
+def _refactor(tool: Any, source: str) -> str | None:  # noqa: ANN401 - a library without types
     try:
         return str(tool.refactor_string(source, "script"))
     except Exception:  # noqa: BLE001 - the library raises whatever its parser and tokenizer do

@@ -121,7 +121,7 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
     known = 0 < column <= len(text) + 1
     log = [str(entry.message)[:_MESSAGE_CHARS_MAX] for entry in islice(parser.error_log, _MESSAGES)]
     cause = cause_of(message, log, text, root=root)[:_MESSAGE_CHARS_MAX]
-    if (opened := _opened(cause, log)) and opened != line:
+    if (opened := _unclosed_line(cause, log)) and opened != line:
         line, text = opened, _line(data, opened)
         column = text.find("<") + 1
         known = column > 0
@@ -136,7 +136,7 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
     )
 
 
-def _opened(cause: str, log: list[str]) -> int | None:
+def _unclosed_line(cause: str, log: list[str]) -> int | None:
     """Return the line of the tag that is not ended, where the cause is that one: libxml2 says where it noticed."""
     if told := re.search(r"of line (\d+) (?:is still open|is never closed)", cause):
         return int(told[1])

@@ -241,7 +241,7 @@ def _result(finding: Finding, rule: int) -> dict[str, object]:
         "ruleId": line(finding.criterion.check, 200),
         "ruleIndex": rule,
         "level": LEVELS[finding.severity],
-        "message": {"text": _unlinked(finding.said)},
+        "message": {"text": _escape_links(finding.said)},
         "locations": [_location(first)],
         **({"relatedLocations": related} if related else {}),
         "partialFingerprints": {FINGERPRINT: finding.fingerprint},
@@ -254,6 +254,6 @@ def _location(place: SourceLine) -> dict[str, object]:
     return {"physicalLocation": {"artifactLocation": artifact, "region": {"startLine": place.line}}}
 
 
-def _unlinked(text: str) -> str:
+def _escape_links(text: str) -> str:
     """SARIF's own links, `[text](target)`, are escaped; brackets that make none stay as they are."""
     return text.replace("[", "\\[").replace("]", "\\]") if "](" in text else text

@@ -67,7 +67,7 @@ class _Writer:
         if result.error is not None:
             self._error(suite, result.rubric.id, result.error)
         if result.notes:
-            etree.SubElement(suite, "system-out").text = self._noticed(result.notes)
+            etree.SubElement(suite, "system-out").text = self._notes_text(result.notes)
         counts = _counts(result)
         del counts["skipped"]  # the schema has it for suites only
         root = etree.Element("testsuites", counts)
@@ -116,7 +116,7 @@ class _Writer:
         """`measured: 5 Hz`, a line each."""
         return "\n".join(f"{name}: {self._text(value)}" for name, value in rows.items() if value)
 
-    def _noticed(self, notes: tuple[Note, ...]) -> str:
+    def _notes_text(self, notes: tuple[Note, ...]) -> str:
         lines = [f"{self._text(note_place(note))}: {self._text(note_text(note))}" for note in notes]
         return "\n".join([f"{NOTICED_TITLE}. {COSTS_NOTHING}", *lines])
 

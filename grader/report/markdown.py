@@ -108,18 +108,22 @@ class _Writer:
     ) -> str:
         view = arrange(result, rubric)
         lost, still = ((), ()) if not_graded(result) else (view.lost, view.open)
-        lines = [*self._head(result, rubric, hidden), *self._changed(changes), *self._decided(result)]
-        lines += self._listed("What was lost", lost)
-        lines += self._listed("What is still open", still)
+        lines = [*self._head(result, rubric, hidden), *self._changes(changes), *self._decisions(result)]
+        lines += self._list_losses("What was lost", lost)
+        lines += self._list_losses("What is still open", still)
         if self._detail.folded:
-            told = [row for loss in (*lost, *still) for row in self._told(loss)]
-            lines += self._folded("Details, and how to fix it", told)
-            lines += self._folded(_counted("Advice (costs nothing)", view.advice), self._advice(view.advice))
-            lines += self._folded(
-                _counted(sentences.NOTICED_TITLE, result.notes), self._noticed(result.notes)
+            told = [row for loss in (*lost, *still) for row in self._loss_section(loss)]
+            lines += self._fold("Details, and how to fix it", told)
+            lines += self._fold(
+                _title_with_count("Advice (costs nothing)", view.advice), self._advice(view.advice)
             )
-            lines += self._folded("Nodes and topics", self._graphs(graphs) if self._detail.graphs else ())
-            lines += self._folded(_counted("All criteria", result.criteria), self._table(result.criteria))
+            lines += self._fold(
+                _title_with_count(sentences.NOTICED_TITLE, result.notes), self._note_lines(result.notes)
+            )
+            lines += self._fold("Nodes and topics", self._graphs(graphs) if self._detail.graphs else ())
+            lines += self._fold(
+                _title_with_count("All criteria", result.criteria), self._table(result.criteria)
+            )
         else:
             lines += ["The details are too long for this form: they are in the other reports.", ""]
         lines += self._foot(result)
@@ -151,13 +155,13 @@ class _Writer:
         yield f"Submission {self._code(submission.id)}{kind if result.error is None else ''}{commit}."
         yield ""
 
-    def _changed(self, changes: tuple[str, ...]) -> Iterator[str]:
+    def _changes(self, changes: tuple[str, ...]) -> Iterator[str]:
         if changes:
             yield from (f"## {sentences.CHANGED_TITLE}", "")
             yield from (f"- {self._text(change)}" for change in self._first(changes))
             yield from (*self._more(changes), "")
 
-    def _decided(self, result: GradingResult) -> Iterator[str]:
+    def _decisions(self, result: GradingResult) -> Iterator[str]:
         found = decided_criteria(result)
         if not found:
             return
@@ -171,7 +175,7 @@ class _Writer:
         yield from self._more(found)
         yield ""
 
-    def _listed(self, title: str, losses: tuple[Loss, ...]) -> Iterator[str]:
+    def _list_losses(self, title: str, losses: tuple[Loss, ...]) -> Iterator[str]:
         """A line each: what it is, what it cost, why."""
         if not losses:
             return
@@ -185,10 +189,10 @@ class _Writer:
         yield from self._more(losses)
         yield ""
 
-    def _told(self, loss: Loss) -> Iterator[str]:
+    def _loss_section(self, loss: Loss) -> Iterator[str]:
         criterion = loss.criterion
         yield from (f"### {self._code(criterion.id)}: {points_of(criterion)}, {criterion.status.value}", "")
-        details = [*self._details(criterion), *self._blocked(loss)]
+        details = [*self._details(criterion), *self._blocked_lines(loss)]
         yield from (*(details or [self._text(criterion.title)]), "")
         for pair in pointed_at(criterion):
             yield from (markdown_block(pair), "")
@@ -205,7 +209,7 @@ class _Writer:
         if criterion.citations:
             yield f"- Where: {', '.join(self._code(cited) for cited in places(criterion))}"
 
-    def _blocked(self, loss: Loss) -> Iterator[str]:
+    def _blocked_lines(self, loss: Loss) -> Iterator[str]:
         if loss.alike:
             yield f"- The same holds for: {self._names(loss.alike)}"
         if loss.blocked:
@@ -221,7 +225,7 @@ class _Writer:
         yield from self._more(criteria)
         yield from [""] if criteria else []
 
-    def _noticed(self, notes: tuple[Note, ...]) -> Iterator[str]:
+    def _note_lines(self, notes: tuple[Note, ...]) -> Iterator[str]:
         if not notes:
             return
         yield from (sentences.COSTS_NOTHING, "")
@@ -266,7 +270,7 @@ class _Writer:
             f"{f', {kind} digest {self._code(digest)}' if digest else ''}."
         )
 
-    def _folded(self, title: str, rows: Iterable[str]) -> Iterator[str]:
+    def _fold(self, title: str, rows: Iterable[str]) -> Iterator[str]:
         """What is shown when someone opens it. The empty lines make Markdown of what is inside."""
         inside = list(rows)
         if inside:
@@ -287,7 +291,7 @@ class _Writer:
         return markdown_code(line(text, self._detail.text), cell=cell)
 
 
-def _counted(title: str, items: Sequence[object]) -> str:
+def _title_with_count(title: str, items: Sequence[object]) -> str:
     return f"{title} ({len(items)})"
 
 

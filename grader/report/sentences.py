@@ -167,18 +167,18 @@ def automatic_words(override: AppliedOverride, criterion: CriterionResult) -> st
     if override.automatic.status is Status.MANUAL or not override.awards:
         return ""
     message = override.automatic.message
-    return _said(override.automatic, criterion) + (f": {message}" if message else "")
+    return _automatic_text(override.automatic, criterion) + (f": {message}" if message else "")
 
 
 def look_again(override: AppliedOverride, criterion: CriterionResult) -> str:
     """Why a person should look again; empty where the check says what it said then."""
     if not override.changed:
         return ""
-    now, then = _said(override.automatic, criterion), _said(override.was, criterion)
+    now, then = _automatic_text(override.automatic, criterion), _automatic_text(override.was, criterion)
     return f"the check now says {now}, it said {then} when this was decided: look again"
 
 
-def _said(automatic: Automatic, criterion: CriterionResult) -> str:
+def _automatic_text(automatic: Automatic, criterion: CriterionResult) -> str:
     points = points_of(criterion.model_copy(update={"points": automatic.points, "left_out": None}))
     return f"{automatic.status.value} {points}"
 

@@ -151,8 +151,8 @@ class Terminal:
             sentences.decided_title(result),
             [self._decision(o, c) for o, c in sentences.decided_criteria(result)],
         )
-        parts += self._section(NOTICED_TITLE, self._noticed(result.notes))
-        parts += self._reached(result, unrun, full=full)
+        parts += self._section(NOTICED_TITLE, self._note_lines(result.notes))
+        parts += self._reached_lines(result, unrun, full=full)
         parts += self._section("Advice (costs nothing)", [self._advice(c) for c in view.advice])
         parts += [Text(f"\n{visible_words(result, hidden)}")] if hidden else []
         parts += remarks
@@ -231,24 +231,24 @@ class Terminal:
         """`-5`; `0/5` where the points are not lost for good."""
         if criterion.status.is_open:
             return points_of(criterion)
-        minus = MINUS if self._encoded(MINUS) == MINUS else "-"
+        minus = MINUS if self._fit_encoding(MINUS) == MINUS else "-"
         return f"{minus}{number(criterion.missing)}"
 
     def _advice(self, criterion: CriterionResult) -> RenderableType:
         words = self._words(criterion.message or criterion.title)
         return Group(self._line(criterion), words, *self._rows([("hint", criterion.hint)]))
 
-    def _noticed(self, notes: tuple[Note, ...]) -> list[RenderableType]:
+    def _note_lines(self, notes: tuple[Note, ...]) -> list[RenderableType]:
         said = [self._words(f"{note_place(note)}: {note_text(note)}") for note in notes]
         return [*said, Text(COSTS_NOTHING, "dim")] if notes else []
 
-    def _reached(self, result: GradingResult, unrun: str, *, full: bool) -> list[RenderableType]:
+    def _reached_lines(self, result: GradingResult, unrun: str, *, full: bool) -> list[RenderableType]:
         """Return how many criteria are reached; with `full`, each of those that were judged with what was measured."""
         judged = [c for c in result.criteria if not unrun or not c.status.is_open]
         reached = [c for c in judged if c.status is Status.PASS]
         if full:
             title = "All criteria that could be judged" if unrun else "All criteria"
-            return self._section(title, [self._measured(c) for c in judged])
+            return self._section(title, [self._measured_line(c) for c in judged])
         if not reached:
             return []
         others = "" if len(reached) == len(result.criteria) else "other "
@@ -256,7 +256,7 @@ class Terminal:
         sign = mark(Status.PASS, self.console.encoding)
         return [Text(f"\n{sign} {said}", STYLES[Status.PASS])]
 
-    def _measured(self, criterion: CriterionResult) -> RenderableType:
+    def _measured_line(self, criterion: CriterionResult) -> RenderableType:
         measured = criterion.measured or (
             criterion.title if criterion.status is Status.PASS else criterion.message
         )
@@ -290,10 +290,10 @@ class Terminal:
 
     def _code(self, text: str, carets: str) -> list[RenderableType]:
         """Return a line of code and the carets below it, which three dots in place of an ellipsis move."""
-        if self._encoded("…") != "…":
+        if self._fit_encoding("…") != "…":
             carets = carets.replace(" | ", " |   ", 1) if " | …" in text else carets
             text = text.replace("…", "...")
-        rows = (" " * (INDENT + 2) + self._encoded(row) for row in (text, carets))
+        rows = (" " * (INDENT + 2) + self._fit_encoding(row) for row in (text, carets))
         return [Text(row, no_wrap=True, overflow="ignore") for row in rows]
 
     def _rows(self, rows: Iterable[tuple[str, str]]) -> list[RenderableType]:
@@ -302,9 +302,9 @@ class Terminal:
 
     def _show(self, text: str, limit: int = LIMIT) -> str:
         """Harmless, of bounded length, and in characters that the terminal's encoding has."""
-        return self._encoded(line(text, limit))
+        return self._fit_encoding(line(text, limit))
 
-    def _encoded(self, text: str) -> str:
+    def _fit_encoding(self, text: str) -> str:
         return text.encode(self.console.encoding, "backslashreplace").decode(self.console.encoding)
 
 

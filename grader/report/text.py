@@ -127,28 +127,28 @@ def _with_code(word: str, *, cell: bool) -> str:
         return _word(word, cell=cell)
     if any(_LINKED.search(part) for part in plain[::2]):
         return _code("".join(plain), cell=cell)
-    return "".join(_code(part, cell=cell) if i % 2 else _escaped(part) for i, part in enumerate(plain))
+    return "".join(_code(part, cell=cell) if i % 2 else _escape(part) for i, part in enumerate(plain))
 
 
 def _word(word: str, *, cell: bool) -> str:
     if _LINKED.search(word) is None:
-        return _escaped(word)
+        return _escape(word)
     rest = word.lstrip(_BEFORE)
     call = re.match(_CALL, rest)
     whole = call is not None and not rest[call.end() :].strip(_AFTER)
-    middle = call[0] if call and whole else _closed(rest, rest.rstrip(_AFTER))
+    middle = call[0] if call and whole else _close_brackets(rest, rest.rstrip(_AFTER))
     before, after = word[: len(word) - len(rest)], rest[len(middle) :]
-    return _escaped(before) + _code(middle, cell=cell) + _escaped(after)
+    return _escape(before) + _code(middle, cell=cell) + _escape(after)
 
 
-def _closed(rest: str, middle: str) -> str:
+def _close_brackets(rest: str, middle: str) -> str:
     """With the brackets that close what was opened in it: `rate.sleep()`."""
     closing = re.match(r"\)*", rest[len(middle) :])
     missing = middle.count("(") - middle.count(")")
     return middle + ")" * min(max(missing, 0), len(closing.group()) if closing else 0)
 
 
-def _escaped(text: str) -> str:
+def _escape(text: str) -> str:
     text = "".join(_ENTITIES.get(character, character) for character in text)
     return _MARKUP.sub(lambda match: "\\" + match.group(), text)
 

@@ -68,7 +68,7 @@ def arrange(result: GradingResult, rubric: Rubric | None = None) -> ReportView:
     told |= awarded(result.overrides).keys()
     return ReportView(
         lost=_told_once([loss for loss in losses if not loss.criterion.status.is_open]),
-        open=_folded([loss for loss in losses if loss.criterion.status.is_open]),
+        open=_fold([loss for loss in losses if loss.criterion.status.is_open]),
         advice=tuple(c for c in result.criteria if c.id not in told and _advises(c)),
     )
 
@@ -90,7 +90,7 @@ def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
         if (used := loss.criterion.repaired) and used.charged
         for one in used.repairs
     }
-    folded = _folded(asked_first, partial(_mistake, charged=charged))
+    folded = _fold(asked_first, partial(_mistake, charged=charged))
     return tuple(sorted(folded, key=lambda loss: -loss.points))
 
 
@@ -114,7 +114,7 @@ def _open_alike(loss: Loss) -> Hashable:
     return loss.criterion.status, loss.criterion.hint
 
 
-def _folded(losses: list[Loss], key: Callable[[Loss], Hashable] = _open_alike) -> tuple[Loss, ...]:
+def _fold(losses: list[Loss], key: Callable[[Loss], Hashable] = _open_alike) -> tuple[Loss, ...]:
     """One entry for all that have the same key."""
     groups: dict[Hashable, list[Loss]] = {}
     for loss in losses:
@@ -398,7 +398,7 @@ def for_student(result: GradingResult, hidden: frozenset[str]) -> GradingResult:
     All criteria of the ids in `hidden` are one row with points and without words, and nothing speaks to those who mark.
     """
     unseen = [c for c in result.criteria if c.id in hidden]
-    shown = [_unlinked(c, hidden) for c in result.criteria if c.id not in hidden]
+    shown = [_unlink(c, hidden) for c in result.criteria if c.id not in hidden]
     runs = {c.scenario for c in unseen} - {c.scenario for c in shown}
     gate = result.gate
     update = {
@@ -414,7 +414,7 @@ def for_student(result: GradingResult, hidden: frozenset[str]) -> GradingResult:
     return result.model_copy(update=update)
 
 
-def _unlinked(criterion: CriterionResult, hidden: frozenset[str]) -> CriterionResult:
+def _unlink(criterion: CriterionResult, hidden: frozenset[str]) -> CriterionResult:
     if criterion.blocked_by not in hidden:
         return criterion
     return criterion.model_copy(update={"blocked_by": NOT_SHOWN})

@@ -45,7 +45,7 @@ def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = 
         path = ("criteria", index)
         faults += _check(path, criterion, checks, complete=complete)
         faults += _place(path, criterion, scenarios, checks)
-        faults += _uncalled(path, criterion, scenarios)
+        faults += _uncalled_faults(path, criterion, scenarios)
     faults += _names(criteria)
     faults += _circles(criteria)
     faults += _points(rubric, criteria)
@@ -119,7 +119,7 @@ def _place(
             yield (*path, "check"), f'"{check}" judges more than messages, and a recording holds no more'
 
 
-def _uncalled(path: KeyPath, criterion: dict[str, Any], scenarios: dict[str, Any]) -> Iterator[Fault]:
+def _uncalled_faults(path: KeyPath, criterion: dict[str, Any], scenarios: dict[str, Any]) -> Iterator[Fault]:
     """Answers can only be judged to calls that the scenario makes."""
     given, scenario = as_map(criterion.get("with")), criterion.get("scenario")
     expect, service = given.get("expect"), given.get("service")

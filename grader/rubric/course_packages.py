@@ -89,7 +89,7 @@ def _programs(rubric: dict[str, Any], package: str, files: Mapping[str, bytes]) 
     known |= {path.rpartition("/")[2] for path in files if path.endswith((*LAUNCH_ENDINGS, ROSTEST_ENDING))}
     cmake = files.get(f"{package}/CMakeLists.txt", b"").decode(errors="replace")
     known |= set(_TARGET.findall(cmake))
-    for path, program in _started(rubric):
+    for path, program in _started_programs(rubric):
         owner, _, name = program.partition("/")
         if owner == package and name not in known and "${" not in cmake:
             yield path, f'{package} has no program or launch file "{name}"{did_you_mean(name, known)}'
@@ -107,7 +107,7 @@ def _started_by_test(rubric: dict[str, Any], name: str, text: str) -> Iterator[s
             yield f"{name} starts something of {own}: take it out, and start it in the scenario, before the tests"
 
 
-def _started(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+def _started_programs(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     for name, scenario in as_map(rubric.get("scenarios")).items():
         for index, start in as_maps(as_map(scenario).get("start")):
             program = start.get("program")

@@ -32,11 +32,11 @@ def fetch_rubric(url: str, digest: str) -> Path:
     """
     if urlsplit(url).scheme.lower() != "https" or "@" in urlsplit(url).netloc:
         raise UsageError(
-            f"{_shown(url.rpartition('@')[2])}: a rubric is fetched by https:// without a password only"
+            f"{_printable(url.rpartition('@')[2])}: a rubric is fetched by https:// without a password only"
         )
     if not digest:
         raise UsageError(
-            f"{_shown(url)}: a rubric's address needs the rubric's digest",
+            f"{_printable(url)}: a rubric's address needs the rubric's digest",
             hint="write #sha256: and the digest behind it, as `grader rubric validate` prints it",
         )
     name = re.sub(r"[^\w.-]", "", urlsplit(url).path.rpartition("/")[2]).removesuffix(".yaml").strip(".")
@@ -48,7 +48,7 @@ def fetch_rubric(url: str, digest: str) -> Path:
     found = hashlib.sha256(data).hexdigest()
     if found != digest:
         raise UsageError(
-            f"{_shown(url)} is not the rubric that was pinned: its digest is sha256:{found}, not sha256:{digest}",
+            f"{_printable(url)} is not the rubric that was pinned: its digest is sha256:{found}, not sha256:{digest}",
             hint="look at what has changed there before you pin it",
         )
     try:
@@ -76,20 +76,24 @@ def _download(url: str) -> bytes:
             while block := answer.read1(BLOCK_BYTES):
                 data += block
                 if len(data) > BYTES_MAX:
-                    raise UsageError(f"{_shown(url)} has more than {BYTES_MAX >> 20} MB: it is no rubric")
+                    raise UsageError(f"{_printable(url)} has more than {BYTES_MAX >> 20} MB: it is no rubric")
                 if time.monotonic() > end:
-                    raise HostError(f"{_shown(url)} did not come within {WHOLE_S:g} s", hint="try it again")
+                    raise HostError(
+                        f"{_printable(url)} did not come within {WHOLE_S:g} s", hint="try it again"
+                    )
     except HTTPError as error:
-        raise UsageError(f"{_shown(url)} cannot be fetched: {error.code} {_shown(error.reason)}") from error
+        raise UsageError(
+            f"{_printable(url)} cannot be fetched: {error.code} {_printable(error.reason)}"
+        ) from error
     except (OSError, HTTPException, ValueError) as error:
         reason = error.reason if isinstance(error, URLError) else error
         raise HostError(
-            f"{_shown(url)} cannot be fetched: {_shown(str(reason))}", hint="try it again"
+            f"{_printable(url)} cannot be fetched: {_printable(str(reason))}", hint="try it again"
         ) from error
     return data
 
 
-def _shown(text: str) -> str:
+def _printable(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text)[:300]
 
 

@@ -78,7 +78,7 @@ def load_rubric(name_or_path: str) -> LoadedRubric:
     if of_course:
         loaded = _load_of_course(*of_course)
     else:
-        loaded = _load_file(*(_fetched(name, pin) if address else locate(name)))
+        loaded = _load_file(*(_fetch_pinned(name, pin) if address else locate(name)))
     if not pin:
         return loaded
     if pin != loaded.digest:
@@ -112,7 +112,7 @@ def _load_file(path: Path, name: str) -> LoadedRubric:
     )
 
 
-def _fetched(url: str, pin: str) -> tuple[Path, str]:
+def _fetch_pinned(url: str, pin: str) -> tuple[Path, str]:
     from grader.rubric.download import fetch_rubric  # noqa: PLC0415 - slow to import, and seldom needed
 
     return fetch_rubric(url, pin), url

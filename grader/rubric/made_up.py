@@ -175,7 +175,7 @@ def values_of(rubric: Rubric, criterion: Criterion) -> dict[str, Value]:
     """Return the values that a criterion is judged by: its own, and those of its run."""
     if not rubric.values:
         return {}
-    written, scenario = _written(rubric, criterion)
+    written, scenario = _written_criterion(rubric, criterion)
     names = names_in([scenario, *(written.get(key) for key in PLACES)])
     return {name: value for name, value in rubric.values.items() if name in names}
 
@@ -185,7 +185,7 @@ def tell_made_up(rubric: Rubric, criterion: Criterion, hint: str, seen: str) -> 
     into the code, with where the run gives them. What was `seen` the program has got, and needs no words."""
     if not rubric.values:
         return hint
-    written, scenario = _written(rubric, criterion)
+    written, scenario = _written_criterion(rubric, criterion)
     told = []
     for name in sorted(names_in(written.get("with"))):
         value = as_text(rubric.values[name])
@@ -200,7 +200,7 @@ def tell_made_up(rubric: Rubric, criterion: Criterion, hint: str, seen: str) -> 
     return "; ".join(filter(None, (hint, *told)))
 
 
-def _written(rubric: Rubric, criterion: Criterion) -> tuple[dict[str, Any], dict[str, Any]]:
+def _written_criterion(rubric: Rubric, criterion: Criterion) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return a criterion and its scenario as the rubric has them."""
     criteria = (one for _, one in as_maps(rubric.written.get("criteria")))
     own: dict[str, Any] = next((one for one in criteria if one.get("id") == criterion.id), {})
@@ -303,7 +303,7 @@ def sample_data(data: Any) -> list[Any]:  # noqa: ANN401 - what a file holds
     places. The words of criteria stay as they are written, and so does what is declared with a fault."""
     if not isinstance(data, dict) or KEY not in data:
         return [data]
-    declared = _declared(data)
+    declared = _declared_values(data)
     longest = max((len(one.one_of) for one in declared.values()), default=0)
     samples = []
     for nth in (*range(max(longest, 1)), COUNT_MAX):
@@ -340,7 +340,9 @@ def made_up_faults(data: Mapping[str, Any]) -> Iterator[Fault]:
     above: dict[str, MadeUp] = {}
     for name, one in declared.items():
         yield from (((KEY, name, *at), fault) for at, fault in _faults_of(as_map(one), above))
-        above = {other: made_up for other, made_up in _declared(data).items() if other in {*above, name}}
+        above = {
+            other: made_up for other, made_up in _declared_values(data).items() if other in {*above, name}
+        }
     used: set[str] = set()
     for path, name in places({key: part for key, part in data.items() if key != KEY}):
         used |= {name, *operands_of(name, declared)}
@@ -361,7 +363,7 @@ def made_up_faults(data: Mapping[str, Any]) -> Iterator[Fault]:
                 yield path, f'{run} gives programs no "{name}": they could not know it'
 
 
-def _declared(data: Mapping[str, Any]) -> dict[str, MadeUp]:
+def _declared_values(data: Mapping[str, Any]) -> dict[str, MadeUp]:
     """Return what is declared without a fault."""
     found: dict[str, MadeUp] = {}
     for name, one in as_map(data.get(KEY)).items():

@@ -109,11 +109,11 @@ def run_checks_file(path: Path, raw: bytes) -> OwnChecks:
     faults = [*collection.faults, *([fault] if fault else [])]
     if not faults and not collection.checks:
         faults.append((1, "registers no check: decorate functions with @check(…), from grader.checks"))
-    checks = {name: replace(c, function=_contained(c.function)) for name, c in collection.checks.items()}
+    checks = {name: replace(c, function=_contain(c.function)) for name, c in collection.checks.items()}
     return OwnChecks(checks=checks, faults=tuple(sorted(faults)), complete=not faults)
 
 
-def _contained(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
+def _contain(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
     """What it prints goes to stderr, as stdout may be JSON, and it does not end the grader."""
 
     @wraps(function)

@@ -181,7 +181,7 @@ def _last_words(folder: Path, code: int) -> str:
 
 def _verdict(outcome: SessionOutcome, params: PytestParams) -> Verdict:
     """Return the share of the points of the tests that passed, of those that count."""
-    verdict = _judged(outcome, params)
+    verdict = _judge_tests(outcome, params)
     lost = [t for t in outcome.tests if t.outcome == "failed"]
     lines = dict.fromkeys((t.file, t.line) for t in lost if t.file)
     cited = tuple(FileCitation(file=file, line=line) for file, line in lines)
@@ -192,7 +192,7 @@ def _verdict(outcome: SessionOutcome, params: PytestParams) -> Verdict:
     )
 
 
-def _judged(outcome: SessionOutcome, params: PytestParams) -> Verdict:
+def _judge_tests(outcome: SessionOutcome, params: PytestParams) -> Verdict:
     counted = [t for t in outcome.tests if t.outcome in {"passed", "failed"}]
     unsettled = [t for t in outcome.tests if t.outcome == "open"]
     if unsettled:
@@ -205,10 +205,10 @@ def _judged(outcome: SessionOutcome, params: PytestParams) -> Verdict:
     reached = sum(t.points for t in counted if t.outcome == "passed")
     if total <= 0:
         raise TestsBroken(f"the tests of {params.file} that count have 0 points together")
-    return _scored(counted, reached / total)
+    return _score_tests(counted, reached / total)
 
 
-def _scored(counted: list[TestOutcome], score: float) -> Verdict:
+def _score_tests(counted: list[TestOutcome], score: float) -> Verdict:
     lost = [t for t in counted if t.outcome == "failed"]
     passing = f"{len(counted) - len(lost)} of {len(counted)} tests pass"
     hint = "; ".join(f"{t.name}: {t.message}" for t in lost[:HINTS])

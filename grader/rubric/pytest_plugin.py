@@ -217,12 +217,12 @@ class StudentFile:
                     f"the arguments of {function} are longer than {REQUEST_CHARS_MAX} characters"
                 )
             answer = self._ask(request)
-            return _value(answer, _shown(function, args, kwargs))
+            return _value(answer, _call_text(function, args, kwargs))
 
         return call
 
 
-def _shown(function: str, args: tuple[object, ...], kwargs: dict[str, object]) -> str:
+def _call_text(function: str, args: tuple[object, ...], kwargs: dict[str, object]) -> str:
     given = ", ".join([*map(repr, args), *(f"{name}={value!r}" for name, value in kwargs.items())])
     return f"{function}({given if len(given) <= ARGUMENTS_CHARS else '…'})"
 
@@ -235,7 +235,7 @@ def _value(answer: Answer, shown: str) -> object:
         except (ValueError, TypeError, KeyError, RecursionError) as error:
             raise StudentError(f"{shown}: its answer cannot be read") from error
     if "raised" in answer:
-        raise _raised(answer, shown)
+        raise _student_error(answer, shown)
     if "other" in answer:
         raise StudentError(
             f"{shown} gives back a {answer['other']}, not numbers, text, lists, tuples or dicts"
@@ -245,7 +245,7 @@ def _value(answer: Answer, shown: str) -> object:
     raise StudentError(message, late=answer.get("fault") == "late")
 
 
-def _raised(answer: Answer, shown: str) -> StudentError:
+def _student_error(answer: Answer, shown: str) -> StudentError:
     """`pytest.raises(ValueError)` takes it where a student's function raises a ValueError."""
     file, line = str(answer.get("file", "")), answer.get("line")
     line = line if isinstance(line, int) else 0

@@ -48,7 +48,7 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
             yield from _criterion_faults(("criteria", index), criterion, check, judged, rubric)
             yield from _unknown_fields(("criteria", index, "with"), as_map(criterion.get("with")), rubric)
             yield from _unknown_expected(("criteria", index), criterion, judged or {})
-    yield from _unused(rubric, scenarios, checks)
+    yield from _unused_faults(rubric, scenarios, checks)
     yield from _unknown_topics(rubric, scenarios, checks)
     yield from _too_many(rubric, scenarios, checks)
     yield from _unknown_causes(rubric, scenarios, checks)
@@ -130,8 +130,8 @@ def _misfits(
         words, listed = LISTED[one.to]
         if value not in (there := sorted(listed(scenario))):
             yield words.format(name=name, value=value, instead=_instead(value, there))
-    elif one.to == "kept" and not any(PurePosixPath(value).match(keep) for keep in _kept(scenario)):
-        yield f'{name} keeps no file "{value}"{_instead(value, _kept(scenario))}; add it to its keeps'
+    elif one.to == "kept" and not any(PurePosixPath(value).match(keep) for keep in _kept_patterns(scenario)):
+        yield f'{name} keeps no file "{value}"{_instead(value, _kept_patterns(scenario))}; add it to its keeps'
     elif one.to == "set" and not _is_set(value, scenario):
         there = [str(param.get("name")) for _, param in as_maps(scenario.get("params"))]
         yield f"{name} sets no parameter {value}{did_you_mean(value, there)}: add it to its params"
@@ -212,7 +212,7 @@ def _steps_s(scenario: dict[str, Any]) -> float | None:
     return total_s
 
 
-def _unused(
+def _unused_faults(
     rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
 ) -> Iterator[Fault]:
     """Yield scenarios that are run for nothing; a check that sees all of them may ask for any."""
@@ -396,7 +396,7 @@ def _misspelt_scripts(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any
     paths = {n: as_map(c.get("with")).get("path") for n, c in criteria if c.get("check") == "executable"}
     named = {n: PurePosixPath(path).name for n, path in paths.items() if isinstance(path, str)}
     starts = [start for scenario in scenarios.values() for start in _starts(scenario)]
-    started = {PurePosixPath(script).name for script in _named(starts, "script")}
+    started = {PurePosixPath(script).name for script in _values_of(starts, "script")}
     for index, name in named.items():
         near = "" if name in started else _near(name, started - {*named.values()}, cutoff=SURE)
         if near:
@@ -456,7 +456,7 @@ def _topics_in(value: object) -> Iterator[str]:
         yield from (topic for item in value for topic in _topics_in(item))
 
 
-def _sent(scenario: dict[str, Any]) -> set[str]:
+def _sent_topics(scenario: dict[str, Any]) -> set[str]:
     """Return the topics on which probes send, and steps of the scenario."""
     sent = {str(probe.get("topic")) for _, probe in as_maps(scenario.get("probes"))}
     return sent | set(_topics_in(scenario.get("steps")))
@@ -470,20 +470,20 @@ def _actions(scenario: dict[str, Any]) -> list[str]:
     ]
 
 
-def _kept(scenario: dict[str, Any]) -> list[str]:
+def _kept_patterns(scenario: dict[str, Any]) -> list[str]:
     return [pattern for _, pattern in as_texts(scenario.get("keeps")) if pattern]
 
 
-def _served(scenario: dict[str, Any]) -> list[str]:
+def _served_names(scenario: dict[str, Any]) -> list[str]:
     return [str(one.get("service") or one.get("action")) for _, one in as_maps(scenario.get("serves"))]
 
 
 LISTED: Mapping[str, tuple[str, Callable[[dict[str, Any]], Iterable[str]]]] = {
     "launch": (
         '{name} does not start "{value}"{instead}',
-        lambda scenario: _named(_starts(scenario), "launch"),
+        lambda scenario: _values_of(_starts(scenario), "launch"),
     ),
-    "sent": ("no probe of {name} sends on {value}{instead}", _sent),
+    "sent": ("no probe of {name} sends on {value}{instead}", _sent_topics),
     "action": ("no step of {name} sends a goal to {value}{instead}", _actions),
     "rostest": (
         '{name} starts no .test file as "{value}"{instead}',
@@ -491,7 +491,7 @@ LISTED: Mapping[str, tuple[str, Callable[[dict[str, Any]], Iterable[str]]]] = {
             str(s.get("name")) for s in _starts(scenario) if str(s.get("program")).endswith(ROSTEST_ENDING)
         ],
     ),
-    "served": ("the grader does not offer {value} in {name}{instead}: add it to serves", _served),
+    "served": ("the grader does not offer {value} in {name}{instead}: add it to serves", _served_names),
 }
 """Of what a scenario has to list: what is said where it does not, and where to look."""
 
@@ -500,7 +500,7 @@ def _starts(scenario: dict[str, Any]) -> list[dict[str, Any]]:
     return [start for _, start in as_maps(scenario.get("start"))]
 
 
-def _named(starts: list[dict[str, Any]], key: str) -> list[str]:
+def _values_of(starts: list[dict[str, Any]], key: str) -> list[str]:
     return [str(start[key]) for start in starts if start.get(key) is not None]
 
 

@@ -65,7 +65,7 @@ def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
         at = (*path, "steps", index)
         given = [kind for kind in KINDS if step.get(kind) is not None]
         if len(given) != 1:
-            yield at, f"give one of {_one_of(KINDS)}: {_found(given)}"
+            yield at, f"give one of {_one_of(KINDS)}: {_found_text(given)}"
         for kind in given:
             yield from _faults_of((*at, kind), kind, as_map(step[kind]), types)
     lasting_s = sum(_seconds(step) for _, step in as_maps(scenario.get("steps")))
@@ -94,7 +94,7 @@ def _one_of(names: tuple[str, ...]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _found(given: list[str]) -> str:
+def _found_text(given: list[str]) -> str:
     return f"{' and '.join(given)} are there" if given else "none is there"
 
 
@@ -195,7 +195,7 @@ def _processes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
 def _wait(at: KeyPath, wait: dict[str, Any]) -> Iterator[Fault]:
     given = [key for key in WAITS if wait.get(key) is not None]
     if len(given) != 1:
-        yield at, f"give one of {_one_of(WAITS)}: {_found(given)}"
+        yield at, f"give one of {_one_of(WAITS)}: {_found_text(given)}"
     for key in ("messages", "new"):
         if key in wait and "topic" not in given:
             yield (*at, key), "is for a topic"

@@ -146,7 +146,7 @@ class _Advice:
         if early:
             return GitStatus(points=tuple(points))
         server = read_server(self._view, self._package, self._branch, self._commit)
-        points += self._pushed(server)
+        points += self._push_advice(server)
         if points:
             return GitStatus(points=tuple(points))
         where = printable(server.marked or "the server")
@@ -178,7 +178,7 @@ class _Advice:
             text = f"git does not have the executable bit of {listing(list(files.modes))}"
             yield Point(kind="mode", text=text, fix=commands.make_executable(files.modes))
 
-    def _pushed(self, server: Server) -> Iterator[Point]:
+    def _push_advice(self, server: Server) -> Iterator[Point]:
         """What the server lacks, or has on another branch than the marked one. Commits that do not touch the package
         do not matter."""
         branch, name, git = self._branch, server.name or "REMOTE", self._commands.git
@@ -273,7 +273,7 @@ def read_files(view: View, package: Path) -> tuple[str | None, str | None, Files
     prefix = "" if path == "." else f"{path}/"
     index = dict(_index(view, package))
     on_disk = _files_on_disk(package)
-    renamed = dict(_renamed(index, on_disk))
+    renamed = dict(_case_advice(index, on_disk))
     taken = {*renamed, *renamed.values()}
     changes = [record.split(" ", FIELDS[record[0]]) for record in records if record[0] in FIELDS]
     changed = {c[-1].removeprefix(prefix): c for c in changes if c[-1].removeprefix(prefix) not in taken}
@@ -318,7 +318,7 @@ def _files_on_disk(package: Path) -> set[str]:
         return set()
 
 
-def _renamed(index: Iterable[str], on_disk: set[str]) -> Iterator[tuple[str, str]]:
+def _case_advice(index: Iterable[str], on_disk: set[str]) -> Iterator[tuple[str, str]]:
     """Where a file system knows no case, git keeps the name that it was first given."""
 
     def composed(path: str) -> str:

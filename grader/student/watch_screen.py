@@ -62,7 +62,7 @@ class TerminalScreen(Screen):
         """See `Screen`."""
         self._at = self._clock()
         doing = "looking at the files" if self._static else "running everything"
-        self._say(f"{self._saved(saved)}: {doing} … {ENDS}" if saved else f"{doing} … {ENDS}")
+        self._say(f"{self._saved_text(saved)}: {doing} … {ENDS}" if saved else f"{doing} … {ENDS}")
 
     def restart(self) -> None:
         """See `Screen`."""
@@ -71,7 +71,7 @@ class TerminalScreen(Screen):
     def unchanged(self, saved: tuple[str, ...]) -> None:
         """See `Screen`."""
         self._at = self._clock()
-        self._say(f"{self._saved(saved)}: nothing has changed … {ENDS}")
+        self._say(f"{self._saved_text(saved)}: nothing has changed … {ENDS}")
 
     def end(self, outcome: Outcome, saved: tuple[str, ...]) -> None:
         """See `Screen`."""
@@ -87,7 +87,7 @@ class TerminalScreen(Screen):
         else:
             self._emit(self._short(result, self._last))
         self._last = result if result.error is None else self._last
-        self._say(f"{self._saved(saved)} … {ENDS}" if saved else ENDS)
+        self._say(f"{self._saved_text(saved)} … {ENDS}" if saved else ENDS)
 
     def _short(self, result: GradingResult, before: GradingResult) -> Iterable[RenderableType]:
         view = arrange(result, self._rubric)
@@ -114,7 +114,7 @@ class TerminalScreen(Screen):
             if words:
                 yield Padding(Text(f"{name}: {self._show(words)}", "dim"), (0, 0, 0, INDENT))
 
-    def _saved(self, saved: tuple[str, ...]) -> str:
+    def _saved_text(self, saved: tuple[str, ...]) -> str:
         """`saved src/talker.py at 12:03:04`."""
         names = first_few([self._show(name, NAME_CHARS) for name in saved], NAMES_SHOWN)
         return f"saved {names} at {self._at:%H:%M:%S}"

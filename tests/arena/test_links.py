@@ -261,7 +261,7 @@ def two(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iter
         raise OSError
 
     if request.param == "proc":
-        monkeypatch.setattr(sockets, "_asked", not_here)
+        monkeypatch.setattr(sockets, "_ask_kernel", not_here)
     with Program(PUBLISHER) as publisher, Program(SUBSCRIBER) as subscriber:
         yield publisher, subscriber
 

@@ -176,7 +176,7 @@ def test_limits_are_asked_for_as_the_user_who_gets_them(monkeypatch) -> None:
     command = sandbox._drop()
     assert Path(command[0]).name == "setpriv"
     asked: list[list[str]] = []
-    monkeypatch.setattr(sandbox, "_said", lambda argv: asked.append(argv) or "")
+    monkeypatch.setattr(sandbox, "_last_line", lambda argv: asked.append(argv) or "")
     sandbox.refused_limits.cache_clear()
     try:
         assert sandbox.refused_limits() == ""

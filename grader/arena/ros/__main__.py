@@ -124,7 +124,7 @@ class Arena:
         try:
             groups = self._new_groups() if spec["role"] != "grader" else None
             process = Process(
-                self.loop, self._wire, spec, self._limits, self._exited, groups=groups, stage=self._stage
+                self.loop, self._wire, spec, self._limits, self._on_exit, groups=groups, stage=self._stage
             )
             self._processes[process.name] = process
             if process.role == "student":
@@ -271,7 +271,7 @@ class Arena:
             max(students, key=Process.descriptors).stop_for(excess)
         self.loop.call_later(WATCH_S, self._watch_sockets)
 
-    def _exited(self, process):
+    def _on_exit(self, process):
         del self._processes[process.name]
         self._end_when_empty()
 

@@ -63,7 +63,7 @@ def launch(spec, stage, groups):
             groups.take([popen.pid])
         if gate is not None:
             with contextlib.suppress(BrokenPipeError):  # it has ended already, and said why
-                os.write(gate, _joined(arguments))
+                os.write(gate, _join_words(arguments))
         ours.pop_all()
     return Launched(popen, lifeline, info, collect, scratches)
 
@@ -78,10 +78,10 @@ def _words(spec, fds):
     """Return how many variables there are, the variables, and what is to be run: `place.HEAD` reads it."""
     variables = ["{}={}".format(name, value) for name, value in spec["env"].items()]
     argv = [_filled_in(word, fds) for word in spec["argv"]] if spec["collect"] else spec["argv"]
-    return _joined([str(len(variables)), *variables, *argv])
+    return _join_words([str(len(variables)), *variables, *argv])
 
 
-def _joined(words):
+def _join_words(words):
     return b"".join(os.fsencode(word) + b"\0" for word in words)
 
 

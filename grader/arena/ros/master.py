@@ -64,7 +64,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._guard = guard
         self._links = Links(own, owners, guard)
         owners.tell = guard.limit
-        self._rules = Rules(owners, self._registered, own_ports)
+        self._rules = Rules(owners, self._node_address, own_ports)
         self._params = ParamLog(wire, self._guard)
         self._graph = GraphLog(loop, wire, self._guard, self.graph)
         # Unset, every rospy.loginfo asks the master for it, and a SIGINT during that call locks the node up for ever.
@@ -97,7 +97,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
     def _process(self):
         return self._caller.process if self._caller else None
 
-    def _registered(self, node):
+    def _node_address(self, node):
         """Return the address of a node, or None."""
         with self.ps_lock:
             known = self.reg_manager.get_node(node)
@@ -110,7 +110,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
             held = self._recorder.connect(topic, caller_id, caller_api, self._process)
             if held:
                 self._await_subscribers(topic, caller_id, caller_api)
-        return self._arrived(answer)
+        return self._note_arrival(answer)
 
     def _await_subscribers(self, topic, caller_id, caller_api):
         """Those that are there already shall not miss the first message because the publisher counts the recorder
@@ -131,7 +131,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
 
     def registerSubscriber(self, caller_id, topic, topic_type, caller_api):
         self._owners.of(caller_api)
-        return self._arrived(super().registerSubscriber(caller_id, topic, topic_type, caller_api))
+        return self._note_arrival(super().registerSubscriber(caller_id, topic, topic_type, caller_api))
 
     def unregisterSubscriber(self, caller_id, topic, caller_api):
         self._graph.before_leaving()
@@ -144,33 +144,33 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         answer = super().registerService(caller_id, service, service_api, caller_api)
         if answer[0] == 1 and not service.endswith(EVERY_NODE_HAS):
             self._pool.submit(self._process, lambda: self._learn_type(service, service_api))
-        return self._arrived(answer)
+        return self._note_arrival(answer)
 
     def lookupService(self, caller_id, service):
         """What a client asks for is told once: `wait_for_service` asks again and again."""
         answer = super().lookupService(caller_id, service)
-        self._asked("lookup", caller_id, service, is_there=answer[0] == 1)
+        self._note_lookup("lookup", caller_id, service, is_there=answer[0] == 1)
         return answer
 
     def getParam(self, caller_id, key):
         if key == "/use_sim_time":
             self._recorder.gate(caller_id)
         answer = super().getParam(caller_id, key)
-        self._asked("read", caller_id, key, is_there=answer[0] == 1)
+        self._note_lookup("read", caller_id, key, is_there=answer[0] == 1)
         return answer
 
     def hasParam(self, caller_id, key):
         answer = super().hasParam(caller_id, key)
-        self._asked("read", caller_id, key, is_there=answer[2] is True)
+        self._note_lookup("read", caller_id, key, is_there=answer[2] is True)
         return answer
 
     def subscribeParam(self, caller_id, caller_api, key):
         """What is read by `get_param_cached`, and by roscpp; of a name that is not there the answer is empty."""
         answer = super().subscribeParam(caller_id, caller_api, key)
-        self._asked("read", caller_id, key, is_there=answer[2] != {})
+        self._note_lookup("read", caller_id, key, is_there=answer[2] != {})
         return answer
 
-    def _asked(self, action, caller_id, name, is_there):
+    def _note_lookup(self, action, caller_id, name, is_there):
         """Tell the first time that a node asks for a name."""
         asked = self._told[action]
         if self._caller is not None and (caller_id, str(name)) not in asked and len(asked) < TOLD_MAX:
@@ -278,7 +278,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._graph.changed(self._process)
         return answer
 
-    def _arrived(self, answer):
+    def _note_arrival(self, answer):
         self._graph.changed(self._process, arrival=True)
         return answer
 
@@ -341,12 +341,12 @@ class GraphLog:
     def _schedule(self):
         if not self._due:
             self._due = True
-            self._loop.call_later(self._pause_s(), self._changed)
+            self._loop.call_later(self._pause_s(), self._tell_change)
 
     def _pause_s(self):
         return QUIET_S if self._bytes < OFTEN_BYTES else RARELY_S
 
-    def _changed(self):
+    def _tell_change(self):
         self._due = self._arrivals = False
         self.tell(self._look())
 

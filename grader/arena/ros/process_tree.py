@@ -255,7 +255,7 @@ class Groups:
                 self._make(controller, found["version"], found["folder"], amount)
 
     def _make(self, controller, version, parent, amount):
-        folder = self._shared(version, parent)
+        folder = self._shared_groups(version, parent)
         try:
             os.makedirs(folder, exist_ok=True)
             if amount is not None:
@@ -269,7 +269,7 @@ class Groups:
             with contextlib.suppress(OSError):  # a kernel without swap accounting
                 _write(folder, SWAP[version], amount if version == 1 else 0)
 
-    def _shared(self, version, parent):
+    def _shared_groups(self, version, parent):
         """Of version 2, a process is in one group only, which has all controllers."""
         made = [folder for known, folder in self._made.values() if known == version == 2]
         ours = "grader-{}-{}".format(os.getpid(), secrets.token_hex(6))

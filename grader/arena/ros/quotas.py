@@ -141,7 +141,7 @@ class Pool:
         try:
             job()
         finally:
-            self._done(key)
+            self._finish(key)
         return True
 
     def _next(self):
@@ -155,7 +155,7 @@ class Pool:
                 return key, job
         return None
 
-    def _done(self, key):
+    def _finish(self, key):
         with self._changed:
             self._busy[key] -= 1
             if not self._busy[key]:

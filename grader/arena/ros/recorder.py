@@ -68,11 +68,11 @@ class Recorder:
 
         def work():
             self._connect(topic, caller_id, caller_api, deadline)
-            self._answered(caller_id, connected)
+            self._note_answer(caller_id, connected)
 
         if not self._pool.submit(process, work):
             self._guard.limit(process or caller_id, "registered publishers faster than they can be recorded")
-            self._answered(caller_id, connected)
+            self._note_answer(caller_id, connected)
         if serving:
             connected.wait(HOLD_S)
         return serving
@@ -123,7 +123,7 @@ class Recorder:
             self._guard.limit(process or caller_id, "published on so many topics that not all are recorded")
         return account
 
-    def _answered(self, caller_id, connected):
+    def _note_answer(self, caller_id, connected):
         with self._lock:
             pending = self._pending[caller_id]
             pending.remove(connected)

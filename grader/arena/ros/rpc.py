@@ -69,12 +69,12 @@ class Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
 
     def process_request(self, request, client_address):
         """One thread a connection; where there are too many, those of the process that has most make way."""
-        if self._admitted(request) or (self._make_room() and self._admitted(request)):
+        if self._admit(request) or (self._make_room() and self._admit(request)):
             super().process_request(request, client_address)
         else:
             self.shutdown_request(request)
 
-    def _admitted(self, request):
+    def _admit(self, request):
         with self._lock:
             if len(self._open) >= CONNECTIONS_MAX:
                 return False
@@ -231,7 +231,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         except (xmlrpc_parser.Malformed, xmlrpc.client.Fault) as error:
             raise Refused(REFUSED_CODE, "what is no call: {}".format(shown(error))) from error
         if method != MULTICALL:
-            return self._called(method, args)
+            return self._call(method, args)
         calls = args[0] if len(args) == 1 and isinstance(args[0], list) else []
         if len(calls) > MULTICALLS_MAX:
             raise Refused(TOO_LARGE_CODE, "more than {} calls at once".format(MULTICALLS_MAX))
@@ -241,12 +241,12 @@ class _Handler(http.server.BaseHTTPRequestHandler):
     def _one_of_many(self, one):
         one = one if isinstance(one, dict) else {}
         args = one.get("params")
-        result = self._called(one.get("methodName"), args if isinstance(args, list) else [])
+        result = self._call(one.get("methodName"), args if isinstance(args, list) else [])
         if isinstance(result, xmlrpc.client.Fault):
             return {"faultCode": result.faultCode, "faultString": result.faultString}
         return [result]
 
-    def _called(self, method, args):
+    def _call(self, method, args):
         try:
             return self.server.answer(method, tuple(args), self.caller)
         except Exception as error:  # noqa: BLE001 - whatever it was, the caller is told, as Python's own server does

@@ -65,7 +65,7 @@ class Services:
 
     def serve(self, sock, header, who):
         """Serve one connection to its end, in its own thread. Raises OSError or Closed once the client has gone."""
-        with self._counted(who) as number:
+        with self._count_connection(who) as number:
             service = self._services.get(header.get("service"))
             problem = self._problem(service, header)
             if number > CONNECTIONS_MAX:
@@ -80,7 +80,7 @@ class Services:
             sock.close()
 
     @contextlib.contextmanager
-    def _counted(self, who):
+    def _count_connection(self, who):
         """Inside, the connection counts as one of that process; how many these are."""
         with self._lock:
             self._open[who] += 1

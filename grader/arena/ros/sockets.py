@@ -62,9 +62,9 @@ Row = collections.namedtuple("Row", "state near far inode")
 def listening(port):
     """Of those that listen on a port."""
     try:
-        rows = _dumped(1 << LISTEN, port)
+        rows = _dump_sockets(1 << LISTEN, port)
     except OSError:
-        rows = _listed(TABLES, port)
+        rows = _list_sockets(TABLES, port)
     return [row.inode for row in rows if row.state == LISTEN]
 
 
@@ -72,9 +72,9 @@ def connected(near, far):
     """Of the end `near` of a connection from `near` to `far`, both (IPv4 address, port)."""
     try:
         ends = [(socket.inet_aton(address), port) for address, port in (near, far)]
-        found = _asked(socket.AF_INET, ALL_STATES, *ends)
+        found = _ask_kernel(socket.AF_INET, ALL_STATES, *ends)
     except OSError:
-        found = _listed(TABLES, near[1], far[1])
+        found = _list_sockets(TABLES, near[1], far[1])
     return [row.inode for row in found if row.state != LISTEN]
 
 
@@ -83,23 +83,23 @@ def streams():
     many."""
     states = (LISTEN, ESTABLISHED, CLOSE_WAIT)
     try:
-        rows = _dumped(sum(1 << state for state in states), 0, ROWS_MAX + 1)
+        rows = _dump_sockets(sum(1 << state for state in states), 0, ROWS_MAX + 1)
     except OSError:
-        rows = list(itertools.islice(_listed(TABLES), ROWS_MAX + 1))
+        rows = list(itertools.islice(_list_sockets(TABLES), ROWS_MAX + 1))
     return [row for row in rows if row.state in states] if len(rows) <= ROWS_MAX else None
 
 
 def datagrams():
     """Return all UDP sockets; None where there are too many."""
-    rows = list(itertools.islice(_listed(DATAGRAM_TABLES), ROWS_MAX + 1))
+    rows = list(itertools.islice(_list_sockets(DATAGRAM_TABLES), ROWS_MAX + 1))
     return rows if len(rows) <= ROWS_MAX else None
 
 
-def _dumped(states, port, most=SOCKETS_MAX):
+def _dump_sockets(states, port, most=SOCKETS_MAX):
     """Of both families, on a port, or on all where it is 0; raise OSError as below."""
     families = (socket.AF_INET, socket.AF_INET6)
     ends = (b"", port), (b"", 0)
-    return [row for family in families for row in _asked(family, states, *ends, dump=True, most=most)]
+    return [row for family in families for row in _ask_kernel(family, states, *ends, dump=True, most=most)]
 
 
 def buffer_bytes(limit_bytes):
@@ -149,7 +149,7 @@ def _memory_bytes(question, answer_bytes, wanted):
     return held
 
 
-def _asked(family, states, near, far, *, dump=False, most=SOCKETS_MAX):
+def _ask_kernel(family, states, near, far, *, dump=False, most=SOCKETS_MAX):
     """The rows of what the kernel answers; raise OSError where it does not answer such questions."""
     (source, port), (destination, far_port) = near, far
     identity = _ID.pack(port, far_port, source.ljust(16, b"\0"), destination.ljust(16, b"\0"), _NO_COOKIE)
@@ -183,7 +183,7 @@ def _answers(question, *, dump):
             more = dump
 
 
-def _listed(tables, port=None, far_port=None):
+def _list_sockets(tables, port=None, far_port=None):
     """The same from /proc (man 5 proc); without a port, all."""
     ending = ":" if port is None else ":{:04X}".format(port)
     for table in tables:

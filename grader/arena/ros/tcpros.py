@@ -60,7 +60,7 @@ def write_header(sock, fields):
 
 def probe_service(service, uri, caller_id, timeout_s):
     """Return the type that the service says it has; raise ProtocolError where it says none."""
-    with _connected(service, uri, caller_id, timeout_s, probe="1") as sock:
+    with _connect(service, uri, caller_id, timeout_s, probe="1") as sock:
         header = _header(sock)
     if "type" not in header:
         raise ProtocolError("header without type")
@@ -76,7 +76,7 @@ def call_service(service, uri, caller_id, *, type_, request, timeout_s):
     found = probe_service(service, uri, caller_id, timeout_s)
     if found != type_:
         raise ProtocolError("the service is of type {}".format(found))
-    with _connected(service, uri, caller_id, until_s - time.monotonic()) as sock:
+    with _connect(service, uri, caller_id, until_s - time.monotonic()) as sock:
         try:
             _header(sock)
             sock.sendall(LENGTH.pack(len(request)) + request)
@@ -94,7 +94,7 @@ def call_service(service, uri, caller_id, *, type_, request, timeout_s):
     return data
 
 
-def _connected(service, uri, caller_id, timeout_s, **more):
+def _connect(service, uri, caller_id, timeout_s, **more):
     try:
         sock = connect(port_of(uri), max(0.05, timeout_s), HEADER_BYTES_MAX + ANSWER_BYTES_MAX)
     except OSError as error:

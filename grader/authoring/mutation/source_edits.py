@@ -111,15 +111,15 @@ class Document:
         self.data = data
         self._open: list[Element] = []
         self._parser = expat.ParserCreate()
-        self._parser.StartElementHandler = self._started
-        self._parser.EndElementHandler = self._ended
+        self._parser.StartElementHandler = self._on_start_tag
+        self._parser.EndElementHandler = self._on_end_tag
         self.root: Element | None = None
         try:
             self._parser.Parse(data, True)
         except expat.ExpatError as error:
             raise ValueError(str(error)) from error
 
-    def _started(self, tag: str, attributes: dict[str, str]) -> None:
+    def _on_start_tag(self, tag: str, attributes: dict[str, str]) -> None:
         start = self._parser.CurrentByteIndex
         match = START_TAG.match(self.data, start)
         inner = match.end() if match else start
@@ -131,7 +131,7 @@ class Document:
             parent.children.append(element)
         self._open.append(element)
 
-    def _ended(self, _tag: str) -> None:
+    def _on_end_tag(self, _tag: str) -> None:
         element = self._open.pop()
         closed_itself = self.data[: element.inner].endswith(b"/>")
         index = self._parser.CurrentByteIndex
@@ -270,12 +270,12 @@ class Script:
 
     def before(self, statement: ast.stmt, *lines: str) -> Edit:
         start = self.starts[statement.lineno - 1]
-        return Edit(start, start, self._indented(statement, lines))
+        return Edit(start, start, self._indent(statement, lines))
 
     def after(self, statement: ast.stmt, *lines: str) -> Edit:
         end = self._line_span([statement])[1]
         glue = "" if self.text[:end].endswith("\n") else "\n"
-        return Edit(end, end, glue + self._indented(statement, lines))
+        return Edit(end, end, glue + self._indent(statement, lines))
 
     def wrap(self, statements: Sequence[ast.stmt], header: str, footer: Sequence[str] = ()) -> Edit:
         """Put the statements one step deeper under the header; the footer's lines come after them."""
@@ -283,7 +283,7 @@ class Script:
         lines = self.text[start:end].removesuffix("\n").split("\n")
         inner = "".join(f"{self.unit}{line}\n" if line.strip() else f"{line}\n" for line in lines)
         first = statements[0]
-        return Edit(start, end, self._indented(first, [header]) + inner + self._indented(first, footer))
+        return Edit(start, end, self._indent(first, [header]) + inner + self._indent(first, footer))
 
     def can_wrap(self, statements: Sequence[ast.stmt]) -> bool:
         """Whether deeper indentation keeps their meaning: lines of their own, and no string over several lines."""
@@ -306,7 +306,7 @@ class Script:
         last = statements[-1].end_lineno or statements[-1].lineno
         return self.starts[statements[0].lineno - 1], min(self.starts[last], len(self.text))
 
-    def _indented(self, statement: ast.stmt, lines: Sequence[str]) -> str:
+    def _indent(self, statement: ast.stmt, lines: Sequence[str]) -> str:
         indentation = self.indentation(statement)
         return "".join(f"{indentation}{line}\n" for line in lines)
 

@@ -372,7 +372,7 @@ def _no_brace(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str
     )
 
 
-def _undeclared(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+def _explain_undeclared(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     name, near = found[1], found[2]
     if name in STANDARD:
         return Explained(found.string, f"write std::{name}, and #include <{STANDARD[name]}> at the top")
@@ -393,7 +393,7 @@ def _no_member(found: re.Match[str], _package: PackageFacts, _lines: Sequence[st
     return Explained(found.string, f"write {found[2]} in place of {found[1]}")
 
 
-def _unlinked(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+def _explain_unlinked(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     if found[1] == "main":
         return Explained(
             "a program has no `main` function",
@@ -466,10 +466,10 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"(\w+)/(\w+)\.h: No such file or directory", _header_race),
     (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
     (r"expected '}' at end of input", _no_brace),
-    (r"'([^']+)' was not declared in this scope(?:; did you mean '([^']+)')?", _undeclared),
+    (r"'([^']+)' was not declared in this scope(?:; did you mean '([^']+)')?", _explain_undeclared),
     (r"'([^']+)::(\w+)' has not been declared", _no_type),
     (r"'([^']+)' is not a member of .*; did you mean '([^']+)'", _no_member),
     (r"has no member named '([^']+)'; did you mean '([^']+)'", _no_member),
-    (r"undefined reference to '([^']+)", _unlinked),
+    (r"undefined reference to '([^']+)", _explain_unlinked),
     (r"multiple definition of 'main", _main_twice),
 )

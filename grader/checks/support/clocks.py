@@ -52,7 +52,7 @@ def run_seconds(run: Run) -> ToSeconds | None:
     if run.clock != "warped":
         return lambda time_ns: (time_ns - run.start_ns) / 1e9
     ticks = _ticks(run)
-    return _interpolated(ticks, ticks[0][1]) if ticks else None
+    return _interpolate(ticks, ticks[0][1]) if ticks else None
 
 
 def time_between(run: Run, from_ns: int, to_ns: int) -> str:
@@ -66,10 +66,10 @@ def ros_seconds(run: Run) -> ToSeconds | None:
     if run.clock != "warped":
         return lambda time_ns: time_ns / 1e9
     ticks = _ticks(run)
-    return _interpolated(ticks, 0.0) if ticks else None
+    return _interpolate(ticks, 0.0) if ticks else None
 
 
-def _interpolated(ticks: list[tuple[int, float]], zero_s: float) -> ToSeconds:
+def _interpolate(ticks: list[tuple[int, float]], zero_s: float) -> ToSeconds:
     times = [time_ns for time_ns, _ in ticks]
 
     def seconds(time_ns: int) -> float:

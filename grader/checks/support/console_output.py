@@ -73,7 +73,8 @@ def printed_lines(run: Run) -> tuple[Line, ...]:
     ]
     names = sorted(run.student_nodes()[:NAMES_MAX], key=len, reverse=True)
     return tuple(
-        Line(t, _bare(text, names)) for t, text in sorted([*lines, *_logged(run)], key=lambda line: line[0])
+        Line(t, _bare(text, names))
+        for t, text in sorted([*lines, *_logged_lines(run)], key=lambda line: line[0])
     )
 
 
@@ -81,11 +82,11 @@ def stream_lines(run: Run, process: str) -> tuple[tuple[Line, ...], ...]:
     """Return what one process printed on stdout and on stderr, and what its nodes logged, each by time."""
     nodes = run.student_nodes(process)[:NAMES_MAX]
     console = ([(t, c.line) for t, c in run.lines(process) if c.stream == s] for s in ("stdout", "stderr"))
-    streams = (*console, _logged(run, nodes))
+    streams = (*console, _logged_lines(run, nodes))
     return tuple(tuple(Line(t, _bare(text, nodes)) for t, text in stream) for stream in streams)
 
 
-def _logged(run: Run, nodes: Collection[str] | None = None) -> list[tuple[int, str]]:
+def _logged_lines(run: Run, nodes: Collection[str] | None = None) -> list[tuple[int, str]]:
     """Return the messages on /rosout, line by line: of these nodes, or of all that are the student's."""
     texts = (
         (t, str(value.get("msg", "")))
@@ -124,7 +125,7 @@ def numbers_in(text: str) -> frozenset[int]:
 
 def _numbers(text: str, *, dashes: bool) -> Iterator[tuple[int, int]]:
     """Yield each whole number with its offset. With `dashes`, a `-` after a letter or a dot is no sign."""
-    for match in _NUMBER.finditer(_TIME.sub(_blanked, _HEX.sub(_blanked, text))):
+    for match in _NUMBER.finditer(_TIME.sub(_blanks_for, _HEX.sub(_blanks_for, text))):
         sign, whole, fraction = match.groups()
         if len(whole) > 18 or (fraction and fraction.strip(".0")):
             continue
@@ -132,7 +133,7 @@ def _numbers(text: str, *, dashes: bool) -> Iterator[tuple[int, int]]:
         yield match.start(), int(whole if dashes and (before.isalpha() or before == ".") else sign + whole)
 
 
-def _blanked(match: re.Match[str]) -> str:
+def _blanks_for(match: re.Match[str]) -> str:
     return " " * len(match[0])
 
 
@@ -151,7 +152,9 @@ def places_of(
 
 def line_finder(probes: Sequence[Probe], lines: Sequence[Line], template: str) -> Callable[[int], Line]:
     """Return a function from a place of `places_of` to the line that begins there, or before it."""
-    starts = _starts(lines) if _are_numbers(probes) else [offset for _, offset in _joined(lines, template)[1]]
+    starts = (
+        _starts(lines) if _are_numbers(probes) else [offset for _, offset in _join_lines(lines, template)[1]]
+    )
     return lambda place: lines[bisect_right(starts, place) - 1]
 
 
@@ -172,7 +175,7 @@ def number_places(
     numbers are printed that any probe would be among them. A `-` after a letter is a sign in all lines or in none.
     """
     hidden = re.compile("|".join(map(re.escape, sorted(texts, key=len, reverse=True))) or r"(?!)")
-    shown = [Line(line.at_ns, hidden.sub(_blanked, line.text)) for line in lines]
+    shown = [Line(line.at_ns, hidden.sub(_blanks_for, line.text)) for line in lines]
     rows = sum(_NUMBER.search(line.text) is not None for line in shown)
     if rows > LINES_PER_PROBE * (len(probes) + len(set(texts))) + LINES_SPARE:
         return None
@@ -199,7 +202,7 @@ def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -
     The template's own words may be in capitals or not; the text itself stands letter by letter.
     """
     blank = "" if template == VALUE else " "
-    blob, starts = _joined(lines, template)
+    blob, starts = _join_lines(lines, template)
     places = []
     for probe in probes:
         begin = next((at for t, at in starts if t >= probe.at_ns - CLOCK_SLACK_NS), len(blob))
@@ -210,7 +213,7 @@ def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -
     return places
 
 
-def _joined(lines: Sequence[Line], template: str) -> tuple[str, list[tuple[int, int]]]:
+def _join_lines(lines: Sequence[Line], template: str) -> tuple[str, list[tuple[int, int]]]:
     """Return all that was printed, and when and at which offset each line begins."""
     blank = "" if template == VALUE else " "
     parts, starts, offset = [], [], 0
@@ -259,7 +262,9 @@ def printed_times(run: Run, process: str, texts: Collection[str], template: str)
 
     Of a flood of texts, some that seem to have been printed are enough to look at.
     """
-    streams = [[(_squeezed(line.text), line.text) for line in lines] for lines in stream_lines(run, process)]
+    streams = [
+        [(_single_spaced(line.text), line.text) for line in lines] for lines in stream_lines(run, process)
+    ]
     printed_chars = sum(len(line) for lines in streams for _, line in lines)
     most = min(LOOKED_AT, max(LOOKED_AT_LEAST, SEARCHED_CHARS_MAX // (1 + printed_chars)))
     texts = [text for text in texts if len(text) <= TEXT_CHARS_MAX]
@@ -269,7 +274,7 @@ def printed_times(run: Run, process: str, texts: Collection[str], template: str)
     return Counter({text: count for text, count in counts.items() if count})
 
 
-def _squeezed(text: str) -> str:
+def _single_spaced(text: str) -> str:
     return " ".join(text.split())
 
 

@@ -245,7 +245,7 @@ def judge_wraps(
     if losses(run, params.topic) and not count.is_flood(run, params.rate_hz):
         message = f"only {plural(len(good), 'reset')} of {params.wraps} is recorded"
         return inconclusive(message, hint="grade again"), last
-    verdict = _died(count, run, package, params) or _stuck(count, params)
+    verdict = _judge_death(count, run, package, params) or _stuck(count, params)
     return verdict or _silent(count, run, package, params) or _too_few(count, good, run, params), last
 
 
@@ -346,7 +346,7 @@ def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
     return f"the counter goes back before it has reached {high}: {comes}"
 
 
-def _died(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
+def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
     end = explain_early_end(package, run)
     if end is None:
         return None

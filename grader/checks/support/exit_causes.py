@@ -260,10 +260,10 @@ def explain_early_end(package: PackageFacts, run: Run) -> Ending | None:
 
 def explain_end(life: Life, run: Run, package: PackageFacts) -> Ending:
     """Return why a process ended: a name that ROS refuses, its last traceback, a limit, a signal or its last output."""
-    return _explained(life, run, package)._replace(process=life.name)
+    return _find_cause(life, run, package)._replace(process=life.name)
 
 
-def _explained(life: Life, run: Run, package: PackageFacts) -> Ending:
+def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     if refused := _refused_name(life, run):
         return refused
     if limit := _limit(life, run):

@@ -321,7 +321,7 @@ def name_pattern(node: LaunchNode) -> re.Pattern[str]:
     before, *others = _SUBSTITUTION.split(re.escape(node.full_name).replace(r"\ ", " "))
     literals, gaps = [before], list[str]()
     for inside, literal in zip(others[::2], others[1::2], strict=True):
-        name, gap = _substituted(inside)
+        name, gap = _substitute_inside(inside)
         literals[-1] += name
         gaps.append(gap)
         literals.append(literal)
@@ -356,14 +356,14 @@ def refusal(run: Run) -> Absence | None:
 def died(run: Run, node: LaunchNode) -> int | None:
     """Return the exit code with which roslaunch saw it die before Ctrl-C; None where it did not."""
     until_ns = observed_until_ns(run) or run.end_ns
-    lines = _joined(bare(c.line) for t, c in run.console if t <= until_ns)
+    lines = _join_required(bare(c.line) for t, c in run.console if t <= until_ns)
     codes = [int(m[2]) for line in lines if (m := _DIED.search(line)) and _is(node, m[1])]
     return codes[-1] if codes else None
 
 
 def finished(run: Run, node: LaunchNode) -> bool:
     """Return whether it ran to its own end without an error."""
-    return any((m := _FINISHED.search(line)) and _is(node, m[1]) for line in _joined(_lines(run)))
+    return any((m := _FINISHED.search(line)) and _is(node, m[1]) for line in _join_required(_lines(run)))
 
 
 def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
@@ -496,13 +496,13 @@ def _is(node: LaunchNode, process: str) -> bool:
     return name_pattern(node).fullmatch(f"/{process}") is not None
 
 
-def _substituted(inside: str) -> tuple[str, str]:
+def _substitute_inside(inside: str) -> tuple[str, str]:
     """Return what stands for `$(inside)` in a pattern: the name that is known, and what follows it."""
     words = re.sub(r"\\(.)", r"\1", inside).split()
     return (f"{re.escape(words[1])}_", ".+") if len(words) == 2 and words[0] == "anon" else ("", ".*")
 
 
-def _joined(lines: Iterable[str]) -> Iterator[str]:
+def _join_required(lines: Iterable[str]) -> Iterator[str]:
     """Of a node with required="true", roslaunch says in one line that it "died", and in the next one how it ended."""
     name = ""
     for line in lines:

@@ -113,7 +113,7 @@ def is_elsewhere(program: Executable, package: PackageFacts) -> bool:
 def installed(package: PackageFacts) -> Iterator[Installed]:
     """Yield every file that `install` or `catkin_install_python` names, in the order of the calls."""
     for call in cmake_calls(package, PYTHON, "install"):
-        yield from _named(call)
+        yield from _named_by(call)
 
 
 def names_script(one: Installed, path: str) -> bool:
@@ -148,7 +148,7 @@ def _names(package: PackageFacts) -> set[str]:
     return {package.name, *projects} | ({package.manifest.name} if package.manifest else set())
 
 
-def _named(call: CMakeCall) -> Iterator[Installed]:
+def _named_by(call: CMakeCall) -> Iterator[Installed]:
     kind, words = "", list(call.args)
     if words and words[0].upper() in _KINDS:
         kind = words.pop(0).upper()

@@ -50,7 +50,7 @@ def near_names(wanted: str, names: Iterable[str]) -> tuple[str, ...]:
 def _is_near(wanted: str, name: str) -> bool:
     last_wanted, last_name = (n.rstrip("/").rpartition("/")[2] for n in (wanted, name))
     same_words = sorted(_words(last_wanted)) == sorted(_words(last_name)) != []
-    squeezed = _squeezed(last_wanted), _squeezed(last_name)
+    squeezed = _joined_words(last_wanted), _joined_words(last_name)
     same = same_words or squeezed[0] == squeezed[1]
     slip = min(map(len, squeezed)) >= SLIP_CHARS_MIN and is_one_edit(*squeezed)
     return same or slip or _is_similar(wanted, name)
@@ -69,7 +69,7 @@ def _similarity(first: str, second: str) -> float:
 
 
 def _matcher(first: str, second: str) -> difflib.SequenceMatcher[str]:
-    one, other = (_squeezed(name)[:NAME_CHARS_MAX] for name in (first, second))
+    one, other = (_joined_words(name)[:NAME_CHARS_MAX] for name in (first, second))
     return difflib.SequenceMatcher(None, one, other)
 
 
@@ -77,7 +77,7 @@ def _words(name: str) -> list[str]:
     return re.findall(r"[a-z0-9]+", name.casefold())
 
 
-def _squeezed(name: str) -> str:
+def _joined_words(name: str) -> str:
     return "".join(_words(name))
 
 

@@ -93,22 +93,24 @@ def no_message(
             f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all topics"
         )
         return unjudged(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
-    if misnamed := _misnamed(package, run, topic, of_node):
+    if misnamed := _judge_misnamed(package, run, topic, of_node):
         return misnamed
-    if absent := no_node(package, run, what) or _refused(run, topic) or misfit(run):
+    if absent := no_node(package, run, what) or _judge_refused(run, topic) or misfit(run):
         return absent if topic in published else _with_others(absent, published)
     if topic in published:
-        return _advertised(package, run, what, of_node)
+        return _judge_advertised(package, run, what, of_node)
     return _not_advertised(package, run, topic, of_node)
 
 
-def _misnamed(package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict]) -> Verdict | None:
+def _judge_misnamed(
+    package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict]
+) -> Verdict | None:
     """Return the verdict where a node publishes under a name that is nearly the topic's, or that a launch file made."""
     published, what = published_topics(run), f"no message came on {topic}"
     if topic in published or not published:
         return None
     near, measured = near_names(topic, published), join_words(published)
-    if node := _remapped(package, run, topic):
+    if node := _namespaced_node(package, run, topic):
         here = [name for name in published if name.startswith(node.namespace)] or near or published
         hint = "look at its <remap>: `from` is the name in the script, `to` the new one"
         verdict = of_node(f"{what}; the node publishes on {join_words(here)}", measured=measured, hint=hint)
@@ -120,7 +122,7 @@ def _misnamed(package: PackageFacts, run: Run, topic: str, of_node: Callable[...
     return verdict.about(citations=named_at(package, run, "publisher", near[0]))
 
 
-def _remapped(package: PackageFacts, run: Run, topic: str) -> LaunchNode | None:
+def _namespaced_node(package: PackageFacts, run: Run, topic: str) -> LaunchNode | None:
     """Return the launch file's node in whose namespace the topic is, where the run is a launch file's and the node's
     names are remapped."""
     if not lives(run) or any(one.start.script for one in lives(run)):
@@ -132,7 +134,7 @@ def _remapped(package: PackageFacts, run: Run, topic: str) -> LaunchNode | None:
 def _not_advertised(package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict]) -> Verdict:
     published, what = published_topics(run), f"no message came on {topic}"
     measured = join_words(published) or "no topic"
-    if slip := _unreached(package, run):
+    if slip := _why_unreached(package, run):
         verdict = of_node(f"{what}: {slip.message}", measured=measured, hint=_reach_hint(slip))
         return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
     hint = f"add {publisher(topic)} and publish in the loop"
@@ -146,11 +148,11 @@ def _with_others(absent: Verdict, published: Collection[str]) -> Verdict:
     return absent.model_copy(update={"message": f"{absent.message}{others}"})
 
 
-def _advertised(package: PackageFacts, run: Run, what: str, of_node: Callable[..., Verdict]) -> Verdict:
+def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Callable[..., Verdict]) -> Verdict:
     message = f"{what}, although it is advertised"
     if end := explain_error(package, run):
         return end.verdict(of_node, f"{message}: an error comes first: {end.cause}", measured="no message")
-    if slip := _unreached(package, run):
+    if slip := _why_unreached(package, run):
         verdict = of_node(f"{message}: {slip.message}", measured="no message", hint=_reach_hint(slip))
         return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
     if deaf := unheard(run):
@@ -203,7 +205,7 @@ def explain_by_unheard_topic(
     return verdict.model_copy(update={**update, "citations": (*verdict.citations, cited)})
 
 
-def _unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
+def _why_unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
     """Return why a script that runs does not come to its `publish(…)`."""
     scripts = {one.start.script for one in lives(run)}
     kinds = ("never-reached", "never-called", "spin-in-loop")
@@ -245,7 +247,7 @@ def misfit(run: Run, topic: str = "") -> Verdict | None:
     return failed(message, hint="use the handout's names and types in the .msg file, and build again")
 
 
-def _refused(run: Run, topic: str) -> Verdict | None:
+def _judge_refused(run: Run, topic: str) -> Verdict | None:
     """Return the verdict where the recorder could not connect to the topic's publisher."""
     refused = [e for _, e in run.recorder if e.topic == topic and e.event in {"refused", "invalid"}]
     if not refused or run.student_channels(topic):

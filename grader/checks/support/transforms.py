@@ -24,14 +24,14 @@ class Transform(NamedTuple):
 
     def __matmul__(self, other: Transform) -> Transform:
         """Return this transform, and then the other one in the frame that it leads to."""
-        x, y, z = _turned(self.turn, other.at)
+        x, y, z = _rotate(self.turn, other.at)
         return Transform((self.at[0] + x, self.at[1] + y, self.at[2] + z), _product(self.turn, other.turn))
 
     @property
     def inverse(self) -> Transform:
         x, y, z, w = self.turn
         back = (-x, -y, -z, w)
-        away = _turned(back, self.at)
+        away = _rotate(back, self.at)
         return Transform((-away[0], -away[1], -away[2]), back)
 
     @property
@@ -71,7 +71,7 @@ def _product(a: Quaternion, b: Quaternion) -> Quaternion:
     )
 
 
-def _turned(turn: Quaternion, vector: Vector) -> Vector:
+def _rotate(turn: Quaternion, vector: Vector) -> Vector:
     x, y, z, w = turn
     rx, ry, rz, _ = _product(_product(turn, (*vector, 0.0)), (-x, -y, -z, w))
     return rx, ry, rz
@@ -101,10 +101,10 @@ def sent_on(channels: Sequence[Channel]) -> list[Sent]:
 
 
 def _transform(value: Mapping[str, Any]) -> Transform | None:
-    return _made(value["translation"], value["rotation"])
+    return _make_transform(value["translation"], value["rotation"])
 
 
-def _made(at: Mapping[str, float], turn: Mapping[str, float]) -> Transform | None:
+def _make_transform(at: Mapping[str, float], turn: Mapping[str, float]) -> Transform | None:
     vector = (at["x"], at["y"], at["z"])
     turn_ = (turn["x"], turn["y"], turn["z"], turn["w"])
     length = math.hypot(*turn_)
@@ -119,7 +119,7 @@ def pose_in(value: object) -> Transform | None:
         if not isinstance(value, Mapping):
             return None
         if {"position", "orientation"} <= value.keys():
-            return _made(value["position"], value["orientation"])
+            return _make_transform(value["position"], value["orientation"])
         if {"x", "y", "theta"} <= value.keys():
             planar = (value["x"], value["y"], 0.0)
             return Transform(planar, turn_of((0, 0, math.degrees(value["theta"]))))

@@ -112,7 +112,7 @@ class Comments(Sender):
     def _once(self, feedback: Feedback, path: str, *, look: bool) -> str:
         """Make it, and look whether it is there where that is not known."""
         for left in reversed(range(TRIES)):
-            if look and (found := self._found(feedback, path)):
+            if look and (found := self._find_comment(feedback, path)):
                 return found
             try:
                 return self._make(feedback, path)
@@ -137,7 +137,7 @@ class Comments(Sender):
                     raise
         return self.open_issue(path, feedback.subject, body)
 
-    def _found(self, feedback: Feedback, path: str) -> str:
+    def _find_comment(self, feedback: Feedback, path: str) -> str:
         issue = _ISSUE.search(feedback.last_place)
         if not self.settings.issues:
             found = self.comments(path, feedback.commit)

@@ -201,7 +201,7 @@ class Server:
     def send(self, to: list[str], data: bytes) -> None:
         """Send one mail. Raises NotSent, Unsure where the connection broke behind the mail's end, and HostError."""
         for left in reversed(range(TRIES)):
-            self._connected()
+            self._reconnect()
             try:
                 return self._send(to, data)
             except smtplib.SMTPResponseException as error:
@@ -215,7 +215,7 @@ class Server:
             self._sleep(WAIT_S)
         raise AssertionError
 
-    def _connected(self) -> None:
+    def _reconnect(self) -> None:
         """Servers end a connection after a while, or after so many mails."""
         if self._smtp is not None:
             with suppress(OSError, smtplib.SMTPException):

@@ -110,7 +110,7 @@ class Api:
             if answer.status < 300:
                 return _json(answer.data)
             if answer.status in (301, 302, 307, 308) and moved < 3:
-                url, moved = self._moved(url, answer), moved + 1
+                url, moved = self._new_address(url, answer), moved + 1
                 continue
             wait_s = _wait_s(answer, limited)
             if wait_s is None or limited >= TRIES:
@@ -139,7 +139,7 @@ class Api:
             reason = error.reason if isinstance(error, URLError) else error
             raise Broken(line(str(reason) or type(error).__name__, SAID_CHARS)) from error
 
-    def _moved(self, url: str, answer: _Answer) -> str:
+    def _new_address(self, url: str, answer: _Answer) -> str:
         """Return where a repository that was renamed is, on the same server."""
         there = urljoin(url, answer.headers.get("location", ""))
         if urlsplit(there)[:2] != urlsplit(url)[:2]:

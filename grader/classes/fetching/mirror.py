@@ -97,14 +97,14 @@ class Mirror:
     def commit(self, listing: Listing, wanted: Wanted) -> str | None:
         """The full hash of what is wanted, fetched where no branch or tag reaches it; None where it is not there."""
         name = listing.refs[wanted.refspec] if wanted.refspec else str(wanted.commit)
-        found = self._peeled(name)
+        found = self._commit_of(name)
         if found is None and (wanted.refspec or len(name) in _WHOLE_HASHES):
             try:
                 self._fetch((), wanted.refspec or name)
             except GitFailed as failure:
                 if wanted.refspec or not _is_unknown(failure):
                     raise
-            found = self._peeled(name)
+            found = self._commit_of(name)
         return found
 
     @contextmanager
@@ -147,7 +147,7 @@ class Mirror:
             with suppress(OSError):
                 (self.path / "FETCH_HEAD").unlink()
 
-    def _peeled(self, name: str) -> str | None:
+    def _commit_of(self, name: str) -> str | None:
         try:
             return self._run("rev-parse", "--verify", "--quiet", f"{name}^{{commit}}")
         except GitFailed as failure:

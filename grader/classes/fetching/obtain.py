@@ -147,7 +147,7 @@ def _room(workdir: Path) -> Iterator[Path]:
 def _from_repository(task: Task, room: Path) -> Obtained:
     """Raises _Unreadable for a folder with a `.git` that is not to be read."""
     try:
-        here = _served(task, room)
+        here = _serve_local(task, room)
         return _through_mirror(replace(task, request=replace(task.request, source=here)), room)
     except GitTooMuch as failure:
         if task.rule.is_any:
@@ -157,7 +157,7 @@ def _from_repository(task: Task, room: Path) -> Obtained:
         raise error_of(problem, task.source) from None
 
 
-def _served(task: Task, room: Path) -> Source:
+def _serve_local(task: Task, room: Path) -> Source:
     try:
         return served(task.source, git_in(room), room / "view")
     except SubmissionError as error:
@@ -203,7 +203,7 @@ def _commit_of(place: MirrorFolder, task: Task, room: Path) -> Obtained:
         raise no_such_ref(listing.refs, task.source.ref or "HEAD", given=task.source.given)
     commit, handed_in = _choose_commit(mirror, listing, wanted, tip, task)
     mirror.copy(commit.hash, room / "commit.git")
-    return _obtained(task, commit, handed_in, wanted, room)
+    return _obtain_commit(task, commit, handed_in, wanted, room)
 
 
 def _choose_commit(
@@ -266,10 +266,10 @@ def _without_history(task: Task, room: Path) -> Obtained:
         mirror.copy(commit.hash, room / "commit.git")
     except (GitFailed, GivenUp) as problem:
         raise error_of(problem, task.source) from None
-    return _obtained(task, commit, not_chosen(task.rule, task.entry, commit.at), wanted, room)
+    return _obtain_commit(task, commit, not_chosen(task.rule, task.entry, commit.at), wanted, room)
 
 
-def _obtained(task: Task, commit: Commit, handed_in: HandedIn, wanted: Wanted, room: Path) -> Obtained:
+def _obtain_commit(task: Task, commit: Commit, handed_in: HandedIn, wanted: Wanted, room: Path) -> Obtained:
     copy = room / "commit.git"
     source = replace(
         task.source,

@@ -132,13 +132,13 @@ def number_text(value: float) -> str:
 
 def visible_text(text: str) -> str:
     """One visible line. Where letters need joiners between them, those stay."""
-    return _joined(line(text, CELL_CHARS))
+    return _restore_joiners(line(text, CELL_CHARS))
 
 
 def harmless(cells: Sequence[Cell]) -> list[str]:
     """Return one row as text that no spreadsheet takes for a formula. A number stays as it is written, in text too."""
     texts = [number_text(cell) if isinstance(cell, int | float) else cell or "" for cell in cells]
-    return [text if _NUMBER.fullmatch(text) else _joined(csv_cell(text)) for text in texts]
+    return [text if _NUMBER.fullmatch(text) else _restore_joiners(csv_cell(text)) for text in texts]
 
 
 def csv_line(cells: Sequence[Cell], *, quoted: bool = False) -> str:
@@ -149,7 +149,7 @@ def csv_line(cells: Sequence[Cell], *, quoted: bool = False) -> str:
     return out.getvalue()
 
 
-def _joined(text: str) -> str:
+def _restore_joiners(text: str) -> str:
     for joiner in _JOINERS:
         text = text.replace(f"\\u{ord(joiner):04x}", joiner)
     return text

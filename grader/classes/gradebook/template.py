@@ -68,7 +68,7 @@ def fill_template(
         else:
             who = f"{mark.entry.id} ({mark.entry.name})" if mark.entry.name else mark.entry.id
             work.remarks.append(f"{who}: not in {template.name}: {found.doubtful[place]}")
-    work.remarks += _unmatched(work, students, theirs, set(found.rows.values()))
+    work.remarks += _unmatched_remarks(work, students, theirs, set(found.rows.values()))
     return sheet.to_bytes(), work.remarks
 
 
@@ -99,10 +99,10 @@ def _find_columns(work: _Work, *, named: bool) -> None:
     whole = len(work.wanted) == 1
     for wanted in work.wanted:
         place = find_column(header, wanted, work.platform, work.known, named=named and whole)
-        work.places.append(_added(work, wanted) if place is None else place)
+        work.places.append(_add_column(work, wanted) if place is None else place)
 
 
-def _added(work: _Work, wanted: Wanted) -> int:
+def _add_column(work: _Work, wanted: Wanted) -> int:
     """A new column at the end of every row."""
     place = len(work.sheet.header)
     points = number_text(wanted.max_points)
@@ -157,7 +157,7 @@ def _fill(work: _Work, record: Record, mark: Mark) -> None:
             record.cells[place] = work.sheet.written(number_text(points), record.cells[place])
 
 
-def _unmatched(
+def _unmatched_remarks(
     work: _Work, students: Sequence[Record], theirs: Sequence[Identity], taken: set[int]
 ) -> Iterator[str]:
     """Yield a remark for each student who is in the export only."""

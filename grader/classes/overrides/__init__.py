@@ -82,13 +82,13 @@ def read_written(path: Path, rubric: Rubric, ids: Collection[str], bank: Bank) -
 def parse(raw: bytes, name: str) -> Source:
     """Return the data of such a file, called `name`. Raises RubricError. The last ones are kept: who writes reads."""
     try:
-        return replace(_parsed(raw), name=name)
+        return replace(_parse(raw), name=name)
     except RubricError:
         return source_of(raw, name, FORM)  # raises it with that name
 
 
 @lru_cache(maxsize=2)
-def _parsed(raw: bytes) -> Source:
+def _parse(raw: bytes) -> Source:
     return source_of(raw, FILE, FORM)
 
 

@@ -115,7 +115,7 @@ def _changed_text(path: Path, raw: bytes, changes: Sequence[tuple[str, str, Fiel
     ]
     new = edited(raw.decode("utf-8-sig"), before, edits)
     try:
-        sound = _without_empty(_data(path, new.encode())) == _without_empty(_expected(before, edits))
+        sound = _without_empty(_data(path, new.encode())) == _without_empty(_expected_data(before, edits))
     except RubricError:
         sound = False
     if not sound:
@@ -138,7 +138,7 @@ def _data(path: Path, raw: bytes) -> dict[str, Any]:
     return as_map(source.data)
 
 
-def _expected(before: dict[str, Any], edits: Iterable[Edit]) -> dict[str, Any]:
+def _expected_data(before: dict[str, Any], edits: Iterable[Edit]) -> dict[str, Any]:
     after = {key: dict(value) if isinstance(value, dict) else value for key, value in before.items()}
     for key, criterion, fields in edits:
         if fields is not None:
@@ -204,7 +204,7 @@ def _pass(text: str, before: Mapping[str, Any], edits: Sequence[Edit]) -> tuple[
             splices += _with(text, found, now, edit.criterion, edit.fields)
         elif edit.fields is not None:
             new.append(edit)
-    return spliced(text, [*splices, *([_added(text, root, new)] if new else [])]), later
+    return spliced(text, [*splices, *([_add_entries(text, root, new)] if new else [])]), later
 
 
 def _without(text: str, root: yaml.MappingNode, submission: Pair, criterion: str) -> list[Splice]:
@@ -220,7 +220,7 @@ def _with(text: str, submission: Pair, now: object, criterion: str, fields: Fiel
     if not isinstance(of, yaml.MappingNode):
         return [set_value(text, submission, f"{{{entry}}}")]
     found = _pair(of, criterion)
-    return _updated(text, found, now, fields) if found else [add_pairs(text, of, [entry])]
+    return _update_entry(text, found, now, fields) if found else [add_pairs(text, of, [entry])]
 
 
 def _pair(node: yaml.Node, key: str) -> Pair | None:
@@ -235,7 +235,7 @@ def _first(text: str, edit: Edit) -> Splice:
     return block_lines(text, len(text), 0, lines if text.strip() else [f"{SCHEMA_KEY}: {schema}", *lines])
 
 
-def _added(text: str, root: yaml.MappingNode, edits: Iterable[Edit]) -> Splice:
+def _add_entries(text: str, root: yaml.MappingNode, edits: Iterable[Edit]) -> Splice:
     """More submissions."""
     if root.flow_style or not root.value:
         entries = [f"{_key(e.submission)}: {{{_entry(e.criterion, e.fields or {})}}}" for e in edits]
@@ -247,7 +247,7 @@ def _lines(edit: Edit) -> list[str]:
     return [f"{_key(edit.submission)}:", f"  {_entry(edit.criterion, edit.fields or {})}"]
 
 
-def _updated(text: str, found: Pair, now: object, fields: Fields) -> list[Splice]:
+def _update_entry(text: str, found: Pair, now: object, fields: Fields) -> list[Splice]:
     """Only what changed, so that comments inside of it stay; the whole where something is to go."""
     node, current = found[1], as_map(now)
     gone = [name for name in current if current[name] is not None and name in KNOWN and name not in fields]
@@ -276,18 +276,18 @@ def _scalar(name: str, value: object) -> str:
         return f"{Decimal(repr(value)).normalize():f}"
     if isinstance(value, list):
         return f"[{', '.join(map(_key, value))}]"
-    return str(value) if name == "date" else _quoted(str(value))
+    return str(value) if name == "date" else _quote(str(value))
 
 
 @lru_cache(maxsize=4096)
 def _key(text: str) -> str:
     """Plain where every reader of YAML takes it for a text."""
     plain = PLAIN_KEY.fullmatch(text) and yaml.safe_load(text) == text
-    return text if plain else _quoted(text)
+    return text if plain else _quote(text)
 
 
 @lru_cache(maxsize=4096)
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     return str(yaml.safe_dump(text, default_style='"', allow_unicode=True, width=10**9)).rstrip("\n")
 
 

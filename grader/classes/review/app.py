@@ -121,7 +121,7 @@ class _Views:
         place = place_of(items, request.args)
         return render_template(
             "list.html",
-            said=self._said,
+            said=self._masked_text,
             titles={c.id: c.title for c in self._session.rubric.rubric.criteria},
             run=self._session.submissions.batch().run,
             place=place,
@@ -161,7 +161,7 @@ class _Views:
         typed = Draft(points=form.get("points", ""), comment=form.get("comment", ""), comments=chosen)
         typed = replace(typed, answer=form.get("answer", ""))
         try:
-            override = self._wanted(item, asked)
+            override = self._override_from_form(item, asked)
             waits = self._saved_as(item, criterion, override)
         except Conflict:
             return self._not_saved(item, criterion, _draft(typed, conflict=True), 409)
@@ -172,7 +172,7 @@ class _Views:
             return self._not_saved(
                 item, criterion, _draft(typed, error=f"Not saved: {error.message}.{hint}"), 422
             )
-        return self._saved(item, criterion, waits)
+        return self._saved_response(item, criterion, waits)
 
     def _saved_as(self, item: Item, criterion: str, wanted: WrittenOverride | None) -> str:
         """Save it for one, or for all that are alike; return what is to be said of that."""
@@ -260,17 +260,17 @@ class _Views:
         row = self._session.submissions.row(item.key)
         return row.result.submission.commit if row else None
 
-    def _said(self, item: Item, text: str) -> str:
+    def _masked_text(self, item: Item, text: str) -> str:
         mask = self._session.mask(item, None)
         return mask.text(text) if mask else text
 
     def look(self) -> Response:
         """Return the style of all pages."""
-        return _kept(style() + _own("review.css"), "text/css")
+        return _cacheable(style() + _own("review.css"), "text/css")
 
     def script(self) -> Response:
         """Saves without a reload, and keys."""
-        return _kept(_own("review.js"), "text/javascript")
+        return _cacheable(_own("review.js"), "text/javascript")
 
     def _item(self, key: str) -> Item:
         item = self._session.item(key)
@@ -278,7 +278,7 @@ class _Views:
             raise NotFound("The class has no such submission.")
         return item
 
-    def _wanted(self, item: Item, asked: Criterion) -> WrittenOverride | None:
+    def _override_from_form(self, item: Item, asked: Criterion) -> WrittenOverride | None:
         form, (least, most) = request.form, bounds(asked)
         if form.get("do") in {"remove", "undo"}:
             return None
@@ -341,7 +341,7 @@ class _Views:
             found = self._session.decisions()
             result = self._session.result(item, found.come_to)
             row = row.model_copy(update={"result": result}) if result else row
-            known, troubles = self._known(item), self._troubles()
+            known, troubles = self._known_of(item), self._troubles()
         except RubricError as error:
             known = Known(decided={o.criterion: as_written(o) for o in row.result.overrides}, bank={})
             troubles = ["Nothing can be saved until overrides.yaml is fixed:", *error.faults]
@@ -354,7 +354,7 @@ class _Views:
             row = row.model_copy(update={"result": without})
         return row, cards(row, rubric, known, drafts), troubles
 
-    def _known(self, item: Item) -> Known:
+    def _known_of(self, item: Item) -> Known:
         found, name = self._session.decisions(), item.entry.id
         come_to, written = found.come_to.get(name, {}), found.written.get(name, {})
         decided = {of: Decided(written=written[of], override=come_to[of]) for of in written}
@@ -387,7 +387,7 @@ class _Views:
         data = {"error": draft.error} | (self._parts(item, criterion, draft) if draft.conflict else {})
         return with_code(jsonify(data), code)
 
-    def _saved(self, item: Item, criterion: str, waits: str) -> AnyResponse:
+    def _saved_response(self, item: Item, criterion: str, waits: str) -> AnyResponse:
         at = _now()
         go_on = request.form.get("do") == "next"
         place = place_of(self._session.items(), request.form, at=item.key)
@@ -406,7 +406,7 @@ class _Views:
         """What of a card changes, as a script puts it in place."""
         row, _, _ = self._row(item, {})
         drafts = {criterion: draft} if draft else {}
-        one = card(row, self._session.rubric.rubric, criterion, self._known(item), drafts)
+        one = card(row, self._session.rubric.rubric, criterion, self._known_of(item), drafts)
         return {
             "head": str(get_template_attribute("parts.html", "head")(one)),
             "notes": str(get_template_attribute("parts.html", "notes")(one)),
@@ -438,7 +438,7 @@ def _now() -> str:
     return f"{datetime.now():%H:%M:%S}"  # noqa: DTZ005 - the time on the wall
 
 
-def _kept(text: str, mimetype: str) -> Response:
+def _cacheable(text: str, mimetype: str) -> Response:
     """Return what does not change while a review runs: browsers need not ask again on each page."""
     return Response(text, mimetype=mimetype, headers={"Cache-Control": "private, max-age=86400, immutable"})
 

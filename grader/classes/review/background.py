@@ -59,7 +59,7 @@ class BackgroundWriter:
         return self._first is None
 
     def _run(self) -> None:
-        while self._begun():
+        while self._wait_until_due():
             is_busy = False
             try:
                 self._work()
@@ -82,7 +82,7 @@ class BackgroundWriter:
                     self._first = self._last = time.monotonic() + self._pace.again_s
                 self._condition.notify_all()
 
-    def _begun(self) -> bool:
+    def _wait_until_due(self) -> bool:
         """Wait until the work is due; False at the end, with nothing left to do."""
         with self._condition:
             while not self._closing:

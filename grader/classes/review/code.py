@@ -191,12 +191,12 @@ def highlighted(lines: Sequence[str], suffix: str) -> list[Markup]:
     text = "\n".join(lines)
     made, at = [], 0
     for found in pattern.finditer(text):
-        made += [escape(text[at : found.start()]), _marked(found[0], found.lastgroup or "")]
+        made += [escape(text[at : found.start()]), _mark_up(found[0], found.lastgroup or "")]
         at = found.end()
     return [Markup(part) for part in "".join([*made, escape(text[at:])]).split("\n")]  # noqa: S704 - escaped
 
 
-def _marked(text: str, kind: str) -> str:
+def _mark_up(text: str, kind: str) -> str:
     """Return an element for each line of it."""
     parts = escape(text).split("\n")
     return "\n".join(part and f'<span class="hl-{kind}">{part}</span>' for part in parts)

@@ -53,7 +53,7 @@ def share_of(folder: Path, marker: str | None, of: str | None, group: str | None
         return Share(group=group)
     if of.isdigit() and 0 < int(of) < 1000:
         with hold_review(folder):
-            names, count = _claimed(folder, marker, int(of)), int(of)
+            names, count = _claim_share(folder, marker, int(of)), int(of)
     else:
         names = [name.strip() for name in of.split(",")]
         count = len(names)
@@ -62,7 +62,7 @@ def share_of(folder: Path, marker: str | None, of: str | None, group: str | None
     return Share(number=names.index(marker), of=count, group=group)
 
 
-def _claimed(folder: Path, marker: str, count: int) -> list[str]:
+def _claim_share(folder: Path, marker: str, count: int) -> list[str]:
     """Return who has which share, with this marker among them where one is free."""
     path = folder / SHARES
     try:

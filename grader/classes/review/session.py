@@ -144,7 +144,7 @@ class ReviewSession:
 
     def items(self) -> tuple[Item, ...]:
         """Return every submission of the share, with what was decided since its result was written."""
-        items = self._unnamed(item for item in self.submissions.items() if self.share(item.entry))
+        items = self._anonymous_items(item for item in self.submissions.items() if self.share(item.entry))
         with suppress(RubricError):
             decided, asked = self.overrides(), self.requests().found
             found = []
@@ -179,14 +179,14 @@ class ReviewSession:
         """Return the submission of an address; None where the class has none."""
         if not self.blind:
             return self.submissions.item(address)
-        items = self._unnamed(self.submissions.items())
+        items = self._anonymous_items(self.submissions.items())
         return next((item for item in items if item.address == address), None)
 
     def mask(self, item: Item, commit: str | None) -> Mask | None:
         """Return what takes a submission's names out of its texts; None where they are not hidden."""
         return mask_of(item.entry, commit or "", self._names()[1]) if item.alias else None
 
-    def _unnamed(self, items: Iterable[Item]) -> tuple[Item, ...]:
+    def _anonymous_items(self, items: Iterable[Item]) -> tuple[Item, ...]:
         """Return them in another order and without names, but for those that are published."""
         if not self.blind:
             return tuple(items)
@@ -343,7 +343,7 @@ class ReviewSession:
         try:
             overrides = self.overrides()
             for item in filter(None, map(self.submissions.item, sorted(keys))):
-                now, why = self._settled(item, overrides)
+                now, why = self._settle_result(item, overrides)
                 wanted += [Rewriting(folder=self.path / item.key, result=now)] if now else []
             self._rewrite(wanted)
         except BaseException:
@@ -373,7 +373,7 @@ class ReviewSession:
         with self._guard:
             return len(self._pending) + self._being_written
 
-    def _settled(self, item: Item, overrides: Overrides) -> tuple[GradingResult | None, str]:
+    def _settle_result(self, item: Item, overrides: Overrides) -> tuple[GradingResult | None, str]:
         """Return the result that is to be written, None where the one that is there is right, and why there is none."""
         batch = self.submissions.batch()
         if batch.run.rubric.digest != self.rubric.digest:

@@ -55,11 +55,11 @@ def _places(source: str) -> list[Path]:
     try:
         read = parse_source(source)
     except GraderError:
-        return _written(source)
+        return _paths_written(source)
     return [place for place in (read.path, read.top) if place is not None]
 
 
-def _written(source: str) -> list[Path]:
+def _paths_written(source: str) -> list[Path]:
     scheme, colon, rest = source.partition("://")
     if colon and scheme.lower() == "file":
         path = f"/{rest.partition('/')[2]}"
@@ -145,12 +145,12 @@ def entries_of(table: Table, path: Path, local: Local) -> Roster:
     names = known_columns(table, path)
     header = f"{path.name}:{table.line}"
     found = [Found(where=header, faults=(meant,)) for _, meant in near_misses(table.columns)]
-    found += [_found(row, names, table, path, local) for row in table.rows]
+    found += [_read_row(row, names, table, path, local) for row in table.rows]
     further = tuple(column for column in table.columns if column and column not in names)
     return gather(path, found, columns=further)
 
 
-def _found(row: Row, names: dict[str, str], table: Table, path: Path, local: Local) -> Found:
+def _read_row(row: Row, names: dict[str, str], table: Table, path: Path, local: Local) -> Found:
     where, base = f"{path.name}:{row.line}", path.parent
     fields = {names[column]: field for column, field in row.fields.items() if column in names}
     if row.faults:  # what stands in which column is not sure

@@ -60,7 +60,7 @@ def from_folder(folder: Path, local: Local) -> Roster:
         named = platform_name(path.name) if encodable(path.name) else None
         key = (named.platform, named.id) if named else ("", path.name)
         students.setdefault(key, []).append((path, named))
-    found = [_allowed(_student(files), folder, local) for files in students.values()]
+    found = [_check_links(_student(files), folder, local) for files in students.values()]
     return gather(folder, found, columns=columns_of(one.entry for one in found))
 
 
@@ -73,7 +73,7 @@ def _inside(folder: Path) -> list[Path]:
         raise UsageError(f"{folder}: cannot be read: {error.strerror}") from error
 
 
-def _allowed(found: Found, folder: Path, local: Local) -> Found:
+def _check_links(found: Found, folder: Path, local: Local) -> Found:
     """A link may lead out of the folder."""
     fault = local_fault(found.entry.source, folder, local) if found.entry else ""
     return _faulty(found.entry, fault) if fault and found.entry else found
@@ -89,7 +89,7 @@ def _faulty(entry: Entry, fault: str) -> Found:
 def _student(files: list[tuple[Path, Named | None]]) -> Found:
     path, named = files[0]
     if named is not None:
-        return _named([(path, named) for path, named in files if named])
+        return _from_download([(path, named) for path, named in files if named])
     where = printable(path.name)
     if not encodable(path.name):
         return Found(where=where, faults=("its name is not UTF-8: rename it",))
@@ -99,7 +99,7 @@ def _student(files: list[tuple[Path, Named | None]]) -> Found:
     return Found(where=where, id=name, entry=Entry(id=name, source=str(path.absolute()), where=where))
 
 
-def _named(files: list[tuple[Path, Named]]) -> Found:
+def _from_download(files: list[tuple[Path, Named]]) -> Found:
     """What a platform has from one student: the one folder, or the one archive among the files."""
     taken = [one for one in files if _can_be_graded(one[0]) and not one[1].is_text]
     path, named = (taken or files)[0]
@@ -307,14 +307,14 @@ def with_roster_columns(table: Table) -> Table:
 
 
 def _row(row: Row) -> Row:
-    fields = _renamed(row.fields)
+    fields = _rename_columns(row.fields)
     if row.faults or fields.get("source"):
         return Row(row.line, fields, row.faults, row.shifted)
     who = fields.get("name") or fields["id"] or "?"
     return Row(row.line, fields, (f"{who} has no repository",))
 
 
-def _renamed(fields: Mapping[str, str]) -> dict[str, str]:
+def _rename_columns(fields: Mapping[str, str]) -> dict[str, str]:
     renamed = {COLUMNS.get(column, column): field for column, field in fields.items()}
     return {"id": fields.get("github_username") or fields.get("roster_identifier", ""), **renamed}
 
@@ -332,14 +332,14 @@ def from_gitlab(path: Path, local: Local) -> Roster:
     Raises UsageError where the file is no such list.
     """
     found = [
-        _found(project, f"{path.name}: project {number}", path.parent, local)
+        _read_project(project, f"{path.name}: project {number}", path.parent, local)
         for number, project in enumerate(_projects(path), start=1)
     ]
     found = _told_apart(found)
     return gather(path, found, columns=columns_of(one.entry for one in found))
 
 
-def _found(project: object, where: str, base: Path, local: Local) -> Found:
+def _read_project(project: object, where: str, base: Path, local: Local) -> Found:
     if not isinstance(project, dict):
         return Found(where=where, faults=("no project",))
     texts = {key: text for key, text in project.items() if isinstance(text, str) and encodable(text)}

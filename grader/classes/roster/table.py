@@ -78,7 +78,7 @@ def _rows(lines: Sequence[str], delimiter: str, start: int) -> Iterator[_Fields]
                 begins = start + reader.line_num
         except csv.Error as error:
             first = lines[begins].partition(delimiter)[0]
-            yield _Fields(begins + 1, [] if '"' in first else [first], (_said(error),))
+            yield _Fields(begins + 1, [] if '"' in first else [first], (_explain_csv(error),))
             start, unreadable = begins + 1, unreadable + 1
         else:
             return
@@ -86,7 +86,7 @@ def _rows(lines: Sequence[str], delimiter: str, start: int) -> Iterator[_Fields]
         yield _Fields(start + 1, [], ("too many rows that cannot be read before it: the rest is left out",))
 
 
-def _said(error: csv.Error) -> str:
+def _explain_csv(error: csv.Error) -> str:
     said = str(error)
     if said == "unexpected end of data":
         return "a quotation mark that never ends"

@@ -89,12 +89,12 @@ def apply_repair(folder: Path, repair: Repair) -> None:
         data = read_data(folder, repair.file)
         if data is None:
             raise NotRepairable(f"{repair.file} is no file that can be repaired")
-        write_data(folder, repair.file, _repaired(data, repair))
+        write_data(folder, repair.file, _repair_bytes(data, repair))
         if repair.kind == "package-name" and repair.file == MANIFEST:
             _rename_package(folder, repair)
 
 
-def _repaired(data: bytes, repair: Repair) -> bytes:
+def _repair_bytes(data: bytes, repair: Repair) -> bytes:
     if repair.kind == "line-ends":
         return data.replace(b"\r\n", b"\n")
     if repair.kind == "byte-order-mark":

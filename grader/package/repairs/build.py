@@ -90,14 +90,14 @@ def _close_tag(files: Files) -> None:
 
 def _add_buildtool(files: Files) -> None:
     text = files.text(MANIFEST) or ""
-    if not re.search(r"<buildtool_depend[^>]*>\s*catkin\s*<", _uncommented(text)) and _parses(text):
+    if not re.search(r"<buildtool_depend[^>]*>\s*catkin\s*<", _without_comments(text)) and _parses(text):
         message = f"{MANIFEST} does not name catkin as its build tool"
         _insert(files, "<buildtool_depend>catkin</buildtool_depend>", message)
 
 
 def _add_dependency(files: Files, name: str) -> None:
     text = files.text(MANIFEST) or ""
-    given = {match[2] for match in ALL_NEEDS.finditer(_uncommented(text))}
+    given = {match[2] for match in ALL_NEEDS.finditer(_without_comments(text))}
     if name in given or not _parses(text):
         return
     old = re.search(r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>", text) is not None
@@ -106,7 +106,7 @@ def _add_dependency(files: Files, name: str) -> None:
     _insert(files, "\n".join(lines) if old else f"<depend>{name}</depend>", message)
 
 
-def _uncommented(text: str) -> str:
+def _without_comments(text: str) -> str:
     return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
 
 
@@ -122,8 +122,8 @@ def _insert(files: Files, tags: str, message: str) -> None:
         changed = "\n".join([*lines[:at], *(f"{indentation}{tag}" for tag in tags.split("\n")), *lines[at:]])
         if (
             _parses(changed)
-            and _uncommented(changed) != _uncommented(text)
-            and tags.split("\n", 1)[0] in _uncommented(changed)
+            and _without_comments(changed) != _without_comments(text)
+            and tags.split("\n", 1)[0] in _without_comments(changed)
         ):
             files.change("manifest-line", MANIFEST, changed, message)
             return
@@ -177,7 +177,7 @@ def _calls_catkin(files: Files, package: PackageFacts) -> bool:
     return any(words[:1] == ["catkin"] for words in (*written, *known))
 
 
-def _replaced(text: str, token: Token, new: str) -> str:
+def _replace_token(text: str, token: Token, new: str) -> str:
     return text[: token.span.start] + new + text[token.span.stop :]
 
 
@@ -221,7 +221,7 @@ def _correct_include(files: Files) -> None:
         text = _cmake(files)
         taken = [words[at], *absent] if absent == given else absent
         for token in reversed(taken):
-            text = _replaced(text, token, "")
+            text = _replace_token(text, token, "")
         listed = " ".join(t.value for t in absent)
         folders = join_words(f"the folder {t.value.strip('/')}/" for t in absent)
         message = (
@@ -241,7 +241,7 @@ def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -
             given = words[0].value
             message = f"line {command.line} of {CMAKE}: project({given}) is not the package's name, {name}"
             kind: RepairKind = "package-name" if is_near(given, name) else "build-line"
-            files.change(kind, CMAKE, _replaced(_cmake(files), words[0], name), message)
+            files.change(kind, CMAKE, _replace_token(_cmake(files), words[0], name), message)
 
 
 def _add_call(files: Files, what: str, pattern: str, line: str, below: Sequence[str]) -> None:
@@ -319,7 +319,7 @@ def _name_scripts(files: Files, own: Sequence[str], paths: Sequence[str]) -> Non
     programs = next(t for t in _words(call) if t.value == "PROGRAMS")
     message = f"line {call.line} of {CMAKE}: {INSTALL}(…) does not name {join_words(unnamed)}"
     fix = f"write {listed} after PROGRAMS"
-    files.change("build-line", CMAKE, _replaced(text, programs, f"PROGRAMS {listed}"), message, fix)
+    files.change("build-line", CMAKE, _replace_token(text, programs, f"PROGRAMS {listed}"), message, fix)
 
 
 def _replace_stray(files: Files, own: Sequence[str], path: str) -> bool:
@@ -329,7 +329,7 @@ def _replace_stray(files: Files, own: Sequence[str], path: str) -> bool:
             if _plain(token.value) not in own and _is_about(PurePosixPath(token.value).name, name):
                 message = f"line {call.line} of {CMAKE}: {token.value} does not exist; the script is {path}"
                 fix = f"write {path} for {token.value}"
-                files.change("build-line", CMAKE, _replaced(_cmake(files), token, path), message, fix)
+                files.change("build-line", CMAKE, _replace_token(_cmake(files), token, path), message, fix)
                 return True
     return False
 
@@ -355,5 +355,5 @@ def _correct_destination(files: Files, scripts: Collection[str]) -> None:
         if given and names_one and given.value != BIN and given.value.strip("${}").startswith("CATKIN_"):
             message = f"line {call.line} of {CMAKE}: {given.value} is not where rosrun looks"
             fix = f"write DESTINATION {BIN}"
-            files.change("build-line", CMAKE, _replaced(_cmake(files), given, BIN), message, fix)
+            files.change("build-line", CMAKE, _replace_token(_cmake(files), given, BIN), message, fix)
             return

@@ -37,14 +37,14 @@ class NotRepairable(ValueError):
 def read_data(folder: Path, file: str, limit_bytes: int = TEXT_BYTES_MAX) -> bytes | None:
     """Return a file's bytes; None for what is no regular file inside the folder, or too large."""
     try:
-        with _opened(folder, file) as stream:
+        with _open(folder, file) as stream:
             data = stream.read(limit_bytes + 1)
     except (OSError, ValueError):
         return None
     return data if len(data) <= limit_bytes else None
 
 
-def _opened(folder: Path, file: str) -> BinaryIO:
+def _open(folder: Path, file: str) -> BinaryIO:
     if HAS_DIR_FD:
         return open_untrusted(folder, *parts_of(file))
     return open_untrusted(_without_links(folder, file))
@@ -218,7 +218,7 @@ def write_data(folder: Path, file: str, data: bytes, *, mode: int | None = None)
 def is_executable(folder: Path, file: str) -> bool:
     """Return whether its owner may execute the file on this disk, whatever git has of it."""
     try:
-        with _opened(folder, file) as stream:
+        with _open(folder, file) as stream:
             return bool(os.fstat(stream.fileno()).st_mode & stat.S_IXUSR)
     except (OSError, ValueError):
         return False
@@ -229,7 +229,7 @@ def make_executable(folder: Path, file: str) -> None:
 
     A file that has another name elsewhere gets a copy: its bits would change there too.
     """
-    with _opened(folder, file) as stream:
+    with _open(folder, file) as stream:
         was = os.fstat(stream.fileno())
         mode = stat.S_IMODE(was.st_mode)
         mode |= (mode & 0o444) >> 2

@@ -162,11 +162,11 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
     for role in ROLES:
         asked = asked_of.get(role, branches)
         given = [name for name in names if name.role == role]
-        used = {_resolved(name, node) for name in given}
+        used = {_resolve(name, node) for name in given}
         absent = [w for w in asked if _bare(w, role) not in used]
         for name in dict.fromkeys(given):
             right = next((w for w in absent if _is_slip(name, w, node)), "")
-            if right and _resolved(name, node) not in {_bare(w, role) for w in asked}:
+            if right and _resolve(name, node) not in {_bare(w, role) for w in asked}:
                 literal = _literal(name, right, node)
                 _replace_literal(files, file, name, literal, right)
                 node = literal if role == "node" else node
@@ -176,7 +176,7 @@ def _bare(name: str, role: str) -> str:
     return name.strip("/") if role == "node" else f"/{name.lstrip('/')}"
 
 
-def _resolved(name: Name, node: str) -> str:
+def _resolve(name: Name, node: str) -> str:
     """Return the whole name, as ROS resolves it for a node in the root namespace."""
     if name.role == "node":
         return name.value.strip("/")
@@ -186,7 +186,7 @@ def _resolved(name: Name, node: str) -> str:
 
 
 def _is_slip(name: Name, right: str, node: str) -> bool:
-    resolved, bare = _resolved(name, node), _bare(right, name.role)
+    resolved, bare = _resolve(name, node), _bare(right, name.role)
     astray = resolved != bare and name.value.lstrip("/~") == bare.lstrip("/")
     return is_near(resolved, bare) or astray
 

@@ -89,14 +89,14 @@ def repair_python(files: Files, scripts: Sequence[str], types: Sequence[str]) ->
     """Find what keeps the sources from running, and return the names that they use once they do."""
     texts = {script: text for script in scripts if (text := files.text(script))}
     names: dict[str, tuple[Name, ...]] = {}
-    for entry in _examined(texts, types):
-        for cause, steps in _joined(entry.steps):
+    for entry in _examine(texts, types):
+        for cause, steps in _join_steps(entry.steps):
             _change(files, entry.file, cause, steps)
         names[entry.file] = entry.names
     return names
 
 
-def _examined(texts: dict[str, str], types: Sequence[str]) -> Iterator[_Entry]:
+def _examine(texts: dict[str, str], types: Sequence[str]) -> Iterator[_Entry]:
     deadline, left = time.monotonic() + WALL_S, list(texts)
     for _ in range(ATTEMPTS):
         wall_s = deadline - time.monotonic()
@@ -126,7 +126,7 @@ def _entry(line: bytes) -> _Entry | None:
         return None
 
 
-def _joined(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
+def _join_steps(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
     """Steps of one cause that follow each other are one mistake, but each missing token and import is its own."""
     groups: list[tuple[Cause, list[_Step]]] = []
     for step in steps:
@@ -147,7 +147,7 @@ def _change(files: Files, file: str, cause: Cause, steps: list[_Step]) -> None:
     files.change(kind, file, steps[-1].text, message, fix)
 
 
-def _indented(before: str, after: str, first: str = "replace the tabs: ") -> str:
+def _required_indentation(before: str, after: str, first: str = "replace the tabs: ") -> str:
     """How lines that are indented otherwise have to begin, so that the file parses; `first` goes before it."""
     pairs = enumerate(zip(before.split("\n"), after.split("\n"), strict=False), start=1)
     lines: dict[int, list[int]] = {}
@@ -176,11 +176,11 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     said: dict[Cause, tuple[str, str]] = {
         "tabs": (
             f"{place}: tabs and spaces are mixed in the indentation",
-            _indented(before, steps[-1].text),
+            _required_indentation(before, steps[-1].text),
         ),
         "level": (
             f"{place}: {cause_of(first.error.message) if first.error else ''}",
-            _indented(before, steps[-1].text, ""),
+            _required_indentation(before, steps[-1].text, ""),
         ),
         "indent": (
             f"{place}: the line after a `:` must be indented",

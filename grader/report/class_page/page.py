@@ -95,7 +95,7 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
     heat = heat_map(lines, run.criteria)
     points = spread_of([one.points for one in judged], run.max_points)
     cost = costs(lines, run.criteria)
-    shared, alone = _listed(run, found.diagnoses)
+    shared, alone = _list_diagnoses(run, found.diagnoses)
     parts: dict[str, Any] = {
         "run": run,
         "anonymous": out is None,
@@ -124,7 +124,7 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
     return _template().render(parts)
 
 
-def _listed(run: BatchRun, found: Sequence[Diagnosis]) -> tuple[list[Listed], list[Listed]]:
+def _list_diagnoses(run: BatchRun, found: Sequence[Diagnosis]) -> tuple[list[Listed], list[Listed]]:
     """Diagnoses that several share, and those that one has alone."""
     worth: Mapping[str, Any] = {criterion.id: criterion for criterion in run.criteria}
     shared = [one for one in found if len(one.members) > 1][:SHARED_MAX]
@@ -240,15 +240,15 @@ def again(run: BatchRun, out: Path, only: str = "", *, static: bool | None = Non
     words += ["--cluster", run.cluster] if run.cluster else []
     words += ["--cluster-insecure"] if run.cluster_insecure else []
     words += ["--only", only] if only else []
-    return _typed(words)
+    return _command_line(words)
 
 
 def review(out: Path) -> Markup:
     """Where a person gives points."""
-    return _typed(["grader", "review", str(out.absolute())])
+    return _command_line(["grader", "review", str(out.absolute())])
 
 
-def _typed(words: list[str]) -> Markup:
+def _command_line(words: list[str]) -> Markup:
     """Whole, however long it is."""
     return Markup(html(shlex.join(words)))  # noqa: S704 - escaped
 

@@ -104,7 +104,7 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
             LETTERS[found.status] if found and not found.left_out else ABSENT for found in judged
         ),
         earned={place: found.points for place, found in enumerate(judged) if found and _unusual(found)},
-        caused=_caused(result, criteria),
+        caused=_points_lost(result, criteria),
         late_s=late.late_s if late else 0.0,
         late_lost=max(0.0, late.points_before - late.points) if late else 0.0,
         decided=sum(override.awards for override in result.overrides),
@@ -116,7 +116,7 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
     )
 
 
-def _caused(result: GradingResult, criteria: Sequence[CriterionInfo]) -> dict[int, float]:
+def _points_lost(result: GradingResult, criteria: Sequence[CriterionInfo]) -> dict[int, float]:
     if result.error is not None:
         return {}
     places = {criterion.id: place for place, criterion in enumerate(criteria)}
@@ -205,7 +205,7 @@ def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]],
     shuffled = order(ids, salt)
     now = {before: place for place, before in enumerate(shuffled)}
     lines = [
-        _unnamed(named.lines[before], pseudonym, words)
+        _anonymous_line(named.lines[before], pseudonym, words)
         for pseudonym, before in zip(pseudonyms(ids), shuffled, strict=True)
     ]
     diagnoses = [
@@ -220,7 +220,7 @@ def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]],
     return Gathered(lines=lines, diagnoses=diagnoses)
 
 
-def _unnamed(named: Line, pseudonym: str, words: frozenset[str]) -> Line:
+def _anonymous_line(named: Line, pseudonym: str, words: frozenset[str]) -> Line:
     problem = named.problem
     if problem is not None:
         problem = replace(problem, message=withoutwords_in(problem.message, words), hint="")

@@ -86,11 +86,11 @@ def _by_criterion(
 
 
 def _all_of(facts: Facts, criterion: Criterion, result: CriterionResult) -> tuple[Figure, ...]:
-    shown = _drawn(facts, criterion, result) or _graph(facts, criterion, result)
-    return (*shown, *_cited(facts, result))
+    shown = _figures_of_check(facts, criterion, result) or _graph(facts, criterion, result)
+    return (*shown, *_cited_code(facts, result))
 
 
-def _drawn(facts: Facts, criterion: Criterion, result: CriterionResult) -> tuple[Figure, ...]:
+def _figures_of_check(facts: Facts, criterion: Criterion, result: CriterionResult) -> tuple[Figure, ...]:
     """What shows the check's measurement; nothing where the check itself was given no run to judge. Where it is lost
     all the same, how late the machine was has decided nothing."""
     found = _try_make(_from_facts, facts, criterion) or ()
@@ -122,7 +122,7 @@ def _graph(facts: Facts, criterion: Criterion, result: CriterionResult) -> tuple
     return (marked,) if marked and marked.wrong else ()
 
 
-def _cited(facts: Facts, result: CriterionResult) -> tuple[Figure, ...]:
+def _cited_code(facts: Facts, result: CriterionResult) -> tuple[Figure, ...]:
     build = facts.runs.get(PACKAGE_RUN)
     found = _try_make(lambda: tuple(code_figures(build, result.citations))) if build else None
     return found or ()

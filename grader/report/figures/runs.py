@@ -319,7 +319,7 @@ def _lives(run: Run, name: str) -> Iterator[Stretch]:
         if event.event == "start":
             begin = time_ns
         elif begin is not None:
-            yield _stretch(run, begin, time_ns, _how_it_ended(event), wrong=_failed(event))
+            yield _stretch(run, begin, time_ns, _how_it_ended(event), wrong=_has_failed(event))
             begin = None
     if begin is not None:
         yield _stretch(run, begin, run.end_ns, "ran to the end")
@@ -330,7 +330,7 @@ def _how_it_ended(event: ProcessEvent) -> str:
     return (stopped if event.stopped_by else "ended by itself: ") + how_it_ended(event)
 
 
-def _failed(event: ProcessEvent) -> bool:
+def _has_failed(event: ProcessEvent) -> bool:
     killed = event.stopped_by == "KILL" and event.role == "student"
     return killed or (event.stopped_by is None and event.exit_code != 0)
 
@@ -390,10 +390,10 @@ def _errors(run: Run) -> Iterator[Stretch]:
 def _actions(run: Run) -> Iterator[Stretch]:
     for time_ns, event in run.actors:
         if event.action not in QUIET or event.action == "interrupt":
-            yield _stretch(run, time_ns, time_ns, _done(event))
+            yield _stretch(run, time_ns, time_ns, _action_text(event))
 
 
-def _done(event: ActorEvent) -> str:
+def _action_text(event: ActorEvent) -> str:
     """`publish /chatter "abc"`; `Ctrl-C`."""
     if event.action == "interrupt":
         return "Ctrl-C"

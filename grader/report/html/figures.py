@@ -83,14 +83,14 @@ class Drawer:
             return Drawn(name="", kind=figure.kind, title=earlier.title, same_as=earlier.name)
         name = f"figure-{len(self._seen) + 1}"
         try:
-            drawn = self._drawn(figure, name)
+            drawn = self._draw(figure, name)
         except Exception:  # noqa: BLE001 - no report hangs on a picture
             drawn = Drawn(name=name, kind=figure.kind, title="This picture could not be drawn")
         drawn = replace(drawn, title=clip(drawn.title, TITLE_CHARS))
         self._seen.append((figure, drawn))
         return drawn
 
-    def _drawn(self, figure: Figure, name: str) -> Drawn:
+    def _draw(self, figure: Figure, name: str) -> Drawn:
         if isinstance(figure, ConsoleFigure):
             return self._console(figure, name)
         return DRAWN[figure.kind](figure, name)
@@ -134,7 +134,7 @@ def _rate(figure: RateFigure, name: str) -> Drawn:
         points=len(figure.gaps_s),
         plots=rate_plots(figure, name),
         second="How long the gaps are",
-        left_out="" if figure.counts else _thinned(len(figure.gaps_s), figure.messages - 1),
+        left_out="" if figure.counts else _thinned_text(len(figure.gaps_s), figure.messages - 1),
     )
 
 
@@ -148,15 +148,15 @@ def _counter(figure: CounterFigure, name: str) -> Drawn:
         plots=counter_plots(figure, name),
         second="All values",
         notes=tuple(wrong_steps(figure)),
-        left_out=_thinned(len(figure.values), figure.messages),
+        left_out=_thinned_text(len(figure.values), figure.messages),
     )
 
 
-def _thinned(shown: int, there: int) -> str:
+def _thinned_text(shown: int, there: int) -> str:
     return f"{shown} of {there} messages are shown." if there > shown else ""
 
 
-def _heard(figure: HeardFigure, name: str) -> Drawn:
+def _draw_heard(figure: HeardFigure, name: str) -> Drawn:
     missed = [row for row in figure.rows if row.heard is None]
     rows = _first(figure.rows, missed)
     many = len(figure.rows)
@@ -170,7 +170,7 @@ def _heard(figure: HeardFigure, name: str) -> Drawn:
         words=said,
         points=len(rows),
         rows=rows,
-        left_out=_thinned(len(rows), many + figure.left_out),
+        left_out=_thinned_text(len(rows), many + figure.left_out),
     )
 
 
@@ -242,7 +242,7 @@ def _path(figure: PathFigure, name: str) -> Drawn:
         words=path_words(figure),
         points=len(figure.points),
         plots=[plot] if plot else [],
-        left_out=_thinned(len(figure.points), figure.messages),
+        left_out=_thinned_text(len(figure.points), figure.messages),
     )
 
 
@@ -254,7 +254,7 @@ def _place(figure: PlaceFigure, name: str) -> Drawn:
         words=figure.says,
         points=len(figure.points),
         plots=[place_plot(figure, name)],
-        left_out=_thinned(len(figure.points), figure.messages),
+        left_out=_thinned_text(len(figure.points), figure.messages),
     )
 
 
@@ -274,7 +274,7 @@ def _timeline(figure: TimelineFigure, name: str) -> Drawn:
 DRAWN: dict[str, Callable[..., Drawn]] = {
     "rate": _rate,
     "counter": _counter,
-    "heard": _heard,
+    "heard": _draw_heard,
     "graph": _graph,
     "code": _code,
     "path": _path,
@@ -330,7 +330,7 @@ class Timeline:
 
 def timeline(figure: TimelineFigure) -> Timeline:
     """Return the names, the axis and the list."""
-    happened = sorted(_happened(figure.lanes), key=lambda one: one.at_s)
+    happened = sorted(_happenings(figure.lanes), key=lambda one: one.at_s)
     return Timeline(
         lanes=[(WORDS[lane.kind], lane.name) for lane in figure.lanes],
         axis=list(_axis(figure.length_s)),
@@ -410,7 +410,7 @@ def _axis(length_s: float) -> Iterator[Tick]:
         yield Tick(at=100 * at_s / length_s, label=f"{number(at_s, 2)} s", fine=i % FINE != 0)
 
 
-def _happened(lanes: Sequence[Lane]) -> Iterator[Happened]:
+def _happenings(lanes: Sequence[Lane]) -> Iterator[Happened]:
     for lane in lanes:
         if lane.kind == "topic":
             yield from _heard_bars(lane)

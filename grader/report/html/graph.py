@@ -30,7 +30,7 @@ def graph_plot(figure: GraphFigure, name: str) -> Markup | None:
     layers = layered(vertices, arrows)
     places, size = _places(layers, figure)
     children = [_heads(name)]
-    children += [_drawn(arrow, layers, places, name) for arrow in layers.routes]
+    children += [_draw_arrow(arrow, layers, places, name) for arrow in layers.routes]
     children += [part for vertex in vertices for part in _shape(vertex, places[vertex], figure)]
     words = f"{len(figure.nodes)} nodes and {len(figure.topics)} topics; the table says who publishes and who listens."
     words += "".join(f" {said}." for said in graph_faults(figure))
@@ -65,18 +65,18 @@ def _arrow(edge: tuple[str, str, bool]) -> Arrow:
     return (node, topic) if publishes else (topic, node)
 
 
-def _clipped(name: str) -> str:
+def _clip_name(name: str) -> str:
     return shorten(name, NAME_CHARS)
 
 
 def _width(vertex: str, figure: GraphFigure) -> float:
     if is_bend(vertex):
         return 0.0
-    name = LETTER * len(_clipped(vertex[1:]))
-    said = SMALL_LETTER * len(_clipped(figure.wrong.get(vertex[1:], ""))) - 2 * EDGE
+    name = LETTER * len(_clip_name(vertex[1:]))
+    said = SMALL_LETTER * len(_clip_name(figure.wrong.get(vertex[1:], ""))) - 2 * EDGE
     if vertex[0] == "n":
         return max(72.0, name * 1.15 + 34, said)
-    return max(72.0, name + 22, said, SMALL_LETTER * len(_clipped(figure.types.get(vertex[1:], ""))) + 22)
+    return max(72.0, name + 22, said, SMALL_LETTER * len(_clip_name(figure.types.get(vertex[1:], ""))) + 22)
 
 
 def _places(layers: Layers, figure: GraphFigure) -> tuple[dict[str, Place], tuple[float, float]]:
@@ -96,8 +96,8 @@ def _places(layers: Layers, figure: GraphFigure) -> tuple[dict[str, Place], tupl
 def _shape(vertex: str, place: Place, figure: GraphFigure) -> list[Markup]:
     x, y, width = place
     full = vertex[1:]
-    name = text(x, y + 5, _clipped(full), class_="name", text_anchor="middle")
-    said = _clipped(figure.wrong.get(full, ""))
+    name = text(x, y + 5, _clip_name(full), class_="name", text_anchor="middle")
+    said = _clip_name(figure.wrong.get(full, ""))
     below = [text(x, y + HEIGHT / 2 + 15, said, class_="alarm", text_anchor="middle")] if said else []
     look = " wrong" if said else ""
     if vertex[0] == "n":
@@ -110,10 +110,10 @@ def _shape(vertex: str, place: Place, figure: GraphFigure) -> list[Markup]:
     box = element(
         "rect", x=x - width / 2, y=y - HEIGHT / 2, width=width, height=HEIGHT, class_=f"topic{look}"
     )
-    kind = _clipped(figure.types.get(full, ""))
+    kind = _clip_name(figure.types.get(full, ""))
     if not kind:
         return [box, name, *below]
-    name = text(x, y - 1, _clipped(full), class_="name", text_anchor="middle")
+    name = text(x, y - 1, _clip_name(full), class_="name", text_anchor="middle")
     return [box, name, text(x, y + 15, kind, text_anchor="middle"), *below]
 
 
@@ -133,7 +133,7 @@ def _heads(name: str) -> Markup:
     return element("defs", marker)
 
 
-def _drawn(arrow: Arrow, layers: Layers, places: dict[str, Place], name: str) -> Markup:
+def _draw_arrow(arrow: Arrow, layers: Layers, places: dict[str, Place], name: str) -> Markup:
     """A curve to the right through all that it passes; one that leads back hangs below."""
     route = layers.routes[arrow]
     stops = [places[vertex] for vertex in route]

@@ -99,7 +99,7 @@ def render_html(
     page = ""
     for detail in DETAILS:
         made = Maker(result, rubric, figures or Figures(), docs or {}, detail).page(view)
-        page = _rendered(result, rubric, head, made, detail.text)
+        page = _render(result, rubric, head, made, detail.text)
         if len(page.encode("utf-8", "backslashreplace")) <= BYTES_MAX:
             break
     return page
@@ -110,7 +110,7 @@ def load_template() -> Template:
     return environment().get_template("report.html")
 
 
-def _rendered(result: GradingResult, rubric: Rubric, head: Head, page: Page, limit: int) -> str:
+def _render(result: GradingResult, rubric: Rubric, head: Head, page: Page, limit: int) -> str:
     ours = script("report.js")
     return load_template().render(
         result=result,

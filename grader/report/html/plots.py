@@ -102,7 +102,7 @@ def _plot(figure: CounterFigure, name: str, shown: range, size: tuple[float, flo
         x_high=max(times[-1], *(at for at, _ in died), times[0] + TINY_S),
         y_low=low - (pad if low != 0 else 0),
         y_high=high + pad,
-        log_y=_dwarfed(values),
+        log_y=_has_dwarfed(values),
     )
     points = [(frame.x(t), frame.y(v)) for t, v in zip(times, values, strict=True)]
     at = dict(zip(shown, points, strict=True))
@@ -124,7 +124,7 @@ def _plot(figure: CounterFigure, name: str, shown: range, size: tuple[float, flo
     return drawing(name, size, title, counter_words(figure), *children)
 
 
-def _dwarfed(values: Sequence[float]) -> bool:
+def _has_dwarfed(values: Sequence[float]) -> bool:
     """Return whether few of the values leave no room to the others on a linear axis."""
     sizes = sorted(map(abs, values))
     return sizes[-1] > DWARFS * max(sizes[int(0.9 * (len(sizes) - 1))], 1.0)
@@ -201,7 +201,7 @@ def path_plot(figure: PathFigure, name: str) -> Markup | None:
     taken = [(frame.x(x), frame.y(y)) for x, y in figure.points]
     children.append(element("path", d=path(taken), class_="line strong-line"))
     children += _corners(figure, corners)
-    children += _marked(figure.strayed, taken, "leaves it here")
+    children += _mark_point(figure.strayed, taken, "leaves it here")
     size = (frame.width, frame.height)
     return drawing(name, size, f"The path of {figure.topic}, seen from above", path_words(figure), *children)
 
@@ -236,7 +236,7 @@ def place_plot(figure: PlaceFigure, name: str) -> Markup:
         children.append(element("path", d=lines, class_="wall"))
     children.append(element("path", d=path(taken), class_="line strong-line"))
     children.append(element("circle", cx=taken[0][0], cy=taken[0][1], r=4, class_="corner"))
-    children += _marked(figure.wrong, taken, "here")
+    children += _mark_point(figure.wrong, taken, "here")
     size = (frame.width, frame.height)
     return drawing(name, size, f"Where {figure.topic} was, seen from above", figure.says, *children)
 
@@ -272,7 +272,7 @@ def _corners(figure: PathFigure, corners: list[tuple[float, float]]) -> Iterator
             yield text(x + 8, y - 8, "start" if i == 0 and not figure.first else f"{i + figure.first}")
 
 
-def _marked(index: int | None, taken: list[tuple[float, float]], words: str) -> Iterator[Markup]:
+def _mark_point(index: int | None, taken: list[tuple[float, float]], words: str) -> Iterator[Markup]:
     if index is None:
         return
     x, y = taken[index]
@@ -307,10 +307,12 @@ def rate_words(figure: RateFigure) -> str:
     if len(figure.counts) > 1:
         least, most = (f"{count / figure.slice_s:,.0f}" for count in (min(figure.counts), max(figure.counts)))
         words = f"{figure.topic}: {least} to {most} messages a second came, counted every {number(figure.slice_s)} s"
-        return f"{words}; {_allowed(figure)} (the green line) passes."
+        return f"{words}; {_allowed_text(figure)} (the green line) passes."
     gaps = figure.gaps_s
     mean = f"{hertz(figure.mean_hz)} on average" if figure.mean_hz is not None else "no mean"
-    words = f"{figure.topic}: {mean}; {_allowed(figure)} (the green band) passes. Each dot is a message. "
+    words = (
+        f"{figure.topic}: {mean}; {_allowed_text(figure)} (the green band) passes. Each dot is a message. "
+    )
     words += f"The gaps between messages are {_ms(min(gaps))} to {_ms(max(gaps))} ms long"
     words += _outside(figure)
     if figure.ends_silent:
@@ -321,7 +323,7 @@ def rate_words(figure: RateFigure) -> str:
     return words + "."
 
 
-def _allowed(figure: RateFigure) -> str:
+def _allowed_text(figure: RateFigure) -> str:
     return f"{number(figure.low_hz, 2)} to {number(figure.high_hz, 2)} Hz"
 
 
@@ -365,7 +367,9 @@ def _over_time(figure: RateFigure, name: str) -> Markup:
     children += frame.axes("seconds since the run began", "Hz")
     points = [(frame.x(t), frame.y(r)) for t, r in zip(figure.times_s, rates, strict=True)]
     children.append(element("path", d=dots(points), class_="dots"))
-    children.append(text(LEFT + 5, frame.y(figure.high_hz) - 5, f"{_allowed(figure)} passes", class_="good"))
+    children.append(
+        text(LEFT + 5, frame.y(figure.high_hz) - 5, f"{_allowed_text(figure)} passes", class_="good")
+    )
     children += _mean(frame, figure.mean_hz)
     children += _deaths(died, frame)
     return drawing(name, OVER_TIME, f"Rate of {figure.topic} over time", rate_words(figure), *children)
@@ -398,7 +402,7 @@ def _flood(figure: RateFigure, name: str) -> Markup:
         element("line", x1=LEFT, x2=frame.right, y1=y, y2=y, class_=look) for look in ("halo", "passes")
     ]
     above = frame.y(max(hz)) - 8
-    children.append(text(LEFT + 5, above, f"green: {_allowed(figure)} passes", class_="good"))
+    children.append(text(LEFT + 5, above, f"green: {_allowed_text(figure)} passes", class_="good"))
     mean = f"mean {figure.mean_hz:,.0f} Hz" if figure.mean_hz else ""
     children.append(text(frame.right - 4, above, mean, class_="strong", text_anchor="end"))
     return drawing(name, OVER_TIME, f"Rate of {figure.topic} over time", rate_words(figure), *children)

@@ -45,7 +45,7 @@ def own_file(name: str) -> str:
 @cache
 def style() -> Markup:
     """Return the look of all pages, for a `<style>`."""
-    return Markup(_unindented(own_file("style.css")))  # noqa: S704 - ours
+    return Markup(_unindent(own_file("style.css")))  # noqa: S704 - ours
 
 
 @cache
@@ -67,13 +67,13 @@ def policy(*scripts: str) -> str:
 def _templates() -> dict[str, str]:
     folder = files(__package__).joinpath("templates")
     return {
-        file.name: _unindented(file.read_text(encoding="utf-8"))
+        file.name: _unindent(file.read_text(encoding="utf-8"))
         for file in folder.iterdir()
         if file.name.endswith(SUFFIX)
     }
 
 
-def _unindented(text: str) -> str:
+def _unindent(text: str) -> str:
     """Without the blanks that lines begin with: no page of ours needs them."""
     return "\n".join(row.strip() for row in text.splitlines())
 

@@ -170,12 +170,12 @@ class Robot:
         x, y = self.x + chord * cos(self.theta + half), self.y + chord * sin(self.theta + half)
         theta = self.theta + 2 * half
         self.theta = theta - TURN * floor((theta + pi) / TURN)
-        self.hits = bool(forward) and self._blocked(x, y)
+        self.hits = bool(forward) and self._is_blocked(x, y)
         self.forward = 0.0 if self.hits else forward
         if not self.hits:
             self.x, self.y = x, y
 
-    def _blocked(self, x, y):
+    def _is_blocked(self, x, y):
         """Whether a wall is in the way, and nearer than before."""
         at = self._near_at
         if at is None or hypot(x - at[0], y - at[1]) > NEAR_M:
@@ -231,7 +231,7 @@ class Laser:
                         far = cross / slant
                         if far < ranges[i]:  # noqa: PLR1730 - min() takes three times as long
                             ranges[i] = far
-        return [self._told(far) for far in ranges]
+        return [self._reading(far) for far in ranges]
 
     def _between(self, ax, ay, bx, by):
         """The numbers of the rays between two points, the second to the left of the first: once or twice a stretch."""
@@ -243,7 +243,7 @@ class Laser:
             if first <= last:
                 yield first, last
 
-    def _told(self, far):
+    def _reading(self, far):
         if self._noise and far < inf:
             far = max(0.0, far + self._random.gauss(0.0, self._noise))
         return inf if far > self.reach else -inf if far < self.least else far

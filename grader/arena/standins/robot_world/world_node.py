@@ -117,10 +117,10 @@ class World:
         rospy.loginfo("A robot like %s at %s, %d walls", about["robot"], list(self._start), len(walls))
 
     def _advertise(self, walls):
-        tf_message = _generated(
+        tf_message = _generate_class(
             "tf2_msgs/TFMessage", "geometry_msgs/TransformStamped[] transforms", TransformStamped
         )
-        marker = _generated("visualization_msgs/Marker", MARKER, Header, Pose, Vector3, ColorRGBA)
+        marker = _generate_class("visualization_msgs/Marker", MARKER, Header, Pose, Vector3, ColorRGBA)
         self._odom = rospy.Publisher("odom", Odometry, queue_size=QUEUE)
         self._truth = rospy.Publisher("base_pose_ground_truth", Odometry, queue_size=QUEUE)
         self._scan = rospy.Publisher(self._about["scan_topic"], LaserScan, queue_size=QUEUE)
@@ -229,7 +229,7 @@ def _walls():
     return walls + (read_plan(path, yaml.safe_load) if path else [])
 
 
-def _generated(name, text, *parts):
+def _generate_class(name, text, *parts):
     """The class of a message whose package a machine may lack, made of its definition and those of its parts."""
     named = [f"{part._type}\n{part._full_text}" for part in parts]  # noqa: SLF001 - genpy's own names
     return generate_dynamic(name, RULE.join([text, *named]))[name]
@@ -239,7 +239,7 @@ def _odometry(frame, pose, speed, stamp):
     x, y, theta = pose
     odometry = Odometry(child_frame_id="base_footprint")
     odometry.header.stamp, odometry.header.frame_id = stamp, frame
-    odometry.pose.pose = Pose(Point(x, y, 0.0), _turned(theta))
+    odometry.pose.pose = Pose(Point(x, y, 0.0), _quaternion(theta))
     odometry.twist.twist.linear.x, odometry.twist.twist.angular.z = speed
     return odometry
 
@@ -248,11 +248,11 @@ def _transform(parent, child, pose, stamp):
     x, y, theta = pose
     one = TransformStamped(child_frame_id=child)
     one.header.stamp, one.header.frame_id = stamp, parent
-    one.transform.translation, one.transform.rotation = Vector3(x, y, 0.0), _turned(theta)
+    one.transform.translation, one.transform.rotation = Vector3(x, y, 0.0), _quaternion(theta)
     return one
 
 
-def _turned(theta):
+def _quaternion(theta):
     return Quaternion(0.0, 0.0, math.sin(theta / 2), math.cos(theta / 2))
 
 

@@ -42,7 +42,7 @@ class Square:
                 self._stopping, self._turning = False, not self._turning
                 self._aim(pose)
             return 0.0, 0.0
-        if self._reached(pose):
+        if self._has_reached(pose):
             self._stopping = True
             return 0.0, 0.0
         return (0.0, TURN_SPEED) if self._turning else (SPEED, 0.0)
@@ -56,7 +56,7 @@ class Square:
         self._goal = (x, y, theta)
         rospy.loginfo("New goal [%f %f, %f]", *self._goal)
 
-    def _reached(self, pose):
+    def _has_reached(self, pose):
         x, y, theta = self._goal
         if self._turning:
             return abs(remainder(pose.theta - theta, 2 * pi)) < NEAR_RAD

@@ -35,7 +35,7 @@ def _last_command(solution: Solution) -> Iterator[tuple[CodePlace, Command]]:
     return ((CodePlace(path=CMAKE, at={}, line=command.line), command) for command in solution.cmake[-1:])
 
 
-def _installed(solution: Solution) -> Iterator[tuple[CodePlace, str, Command, list[Token], Token]]:
+def _find_installed(solution: Solution) -> Iterator[tuple[CodePlace, str, Command, list[Token], Token]]:
     """Find the scripts that catkin_install_python() names: each with its call and the call's scripts."""
     for command in solution.cmake_calls("catkin_install_python"):
         scripts = [a for a in command.args if a.value.endswith(".py")]
@@ -112,7 +112,7 @@ def source_missing(command: Command) -> list[Edit]:
     return [Edit(end, end, "\n\nadd_executable(my_node src/my_node.cpp)")]
 
 
-@operator("install-dropped", each=_installed)
+@operator("install-dropped", each=_find_installed)
 def install_dropped(text: str, command: Command, scripts: list[Token], script: Token) -> list[Edit]:
     """Does not name a script in catkin_install_python().
 

@@ -124,7 +124,7 @@ def other_type(script: Script, endpoint: Endpoint, params: OtherTypeParams) -> l
         if endpoint.type_name == "String":
             edits = _send_time(script, endpoint)
         else:
-            uses += _made(script, endpoint)
+            uses += _constructors(script, endpoint)
     for use in uses:
         name = f"{script.source(use.value)}.{to}" if isinstance(use, ast.Attribute) else to
         edits.append(script.replace(use, name))
@@ -132,7 +132,7 @@ def other_type(script: Script, endpoint: Endpoint, params: OtherTypeParams) -> l
     return [*edits, *imported] if imported is not None else []
 
 
-def _made(script: Script, publisher: Endpoint) -> list[ast.expr]:
+def _constructors(script: Script, publisher: Endpoint) -> list[ast.expr]:
     """The type where the published messages are made: `Int8` of `Int8(5)`."""
     made = [n for value in sources(script, publisher) for n in ast.walk(value) if isinstance(n, ast.Call)]
     return [call.func for call in dict.fromkeys(made) if last_name(call.func) == publisher.type_name]
