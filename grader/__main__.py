@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -12,6 +13,7 @@ def main() -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # to look for plug-ins pydantic reads what every installed package says of itself; the grader has none
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    gc.set_threshold(50_000)  # as in grader.workers
     if "_ARGCOMPLETE" in os.environ:  # a shell asks what may be typed next
         from grader.cli.completion import answer  # noqa: PLC0415 - as below
 

@@ -52,6 +52,8 @@ LEAVE_S = 30.0
 IDLE_CODE = 75
 COPY, STATUS = b"c", b"s"
 REQUEST_BYTES = 16
+COLLECT_AFTER = 50_000
+"""So many new objects until Python looks for cycles: evidence is many small objects without any."""
 QUICK = {"OPENBLAS_NUM_THREADS": "1", "PYDANTIC_DISABLE_PLUGINS": "__all__"}
 """As in `grader/__main__.py`."""
 NUMBER = struct.Struct("<q")
@@ -476,6 +478,7 @@ def _stand_by(warm_up: str) -> bool:
 
 def _work() -> None:
     """Do the jobs. Whatever one prints goes to stderr."""
+    gc.set_threshold(COLLECT_AFTER)
     signal.signal(signal.SIGINT, _stop)
     signal.signal(signal.SIGTERM, _stop)
     jobs = os.fdopen(os.dup(0), "rb", buffering=0)

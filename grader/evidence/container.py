@@ -8,17 +8,21 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections import defaultdict
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from io import BytesIO
-from typing import BinaryIO
+from typing import BinaryIO, TypeAlias
 
 import lz4.frame  # type: ignore[import-untyped] # it has no stubs
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, McapRecord, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, McapRecord, Metadata, Schema
 from mcap.stream_reader import read_magic
+
+from grader.evidence.run import Message
 
 MAX_FILE_BYTES = 1 << 30
 MAX_CHUNK_BYTES = 32 << 20
@@ -29,7 +33,11 @@ MAX_RECORDS = 2_000_000
 _HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 MESSAGE_HEAD_BYTES = _MESSAGE_HEAD.size
+BATCH = 1000
+KEPT_BYTES = 32 << 10
 _Read = Callable[[bytes], McapRecord]
+Messages: TypeAlias = dict[int, list[Message]]
+"""Messages by channel, in file order."""
 
 
 class ContainerError(ValueError):
@@ -40,7 +48,14 @@ def _plain(kind: type[Header | Schema | Channel | Attachment | Metadata]) -> _Re
     return lambda body: kind.read(ReadDataStream(BytesIO(body)))
 
 
-_IN_CHUNK: dict[int, _Read] = {Opcode.SCHEMA: _plain(Schema), Opcode.CHANNEL: _plain(Channel)}
+def _repeated(kind: type[Schema | Channel]) -> _Read:
+    """A file has each of them twice, and many files have the same: those that are small are read once."""
+    read = _plain(kind)
+    known = lru_cache(maxsize=256)(read)
+    return lambda body: known(body) if len(body) <= KEPT_BYTES else read(body)
+
+
+_IN_CHUNK: dict[int, _Read] = {Opcode.SCHEMA: _repeated(Schema), Opcode.CHANNEL: _repeated(Channel)}
 _OUTSIDE: dict[int, _Read] = {
     **_IN_CHUNK,
     Opcode.HEADER: _plain(Header),
@@ -49,8 +64,9 @@ _OUTSIDE: dict[int, _Read] = {
 }
 
 
-def records(stream: BinaryIO) -> Iterator[McapRecord]:
-    """Yield every record that carries content, those inside chunks included; indexes are passed over.
+def records(stream: BinaryIO) -> Iterator[McapRecord | Messages]:
+    """Yield every record that carries content, those inside chunks included; indexes are passed over. Messages come
+    many at a time, before any other record that stands behind them.
 
     All checksums are verified, and so is the end of the file. Raises ContainerError, and whatever `mcap`,
     `zstandard` and `lz4` raise for a damaged file.
@@ -60,7 +76,7 @@ def records(stream: BinaryIO) -> Iterator[McapRecord]:
     while True:
         checksum = source.checksum()
         opcode, body = _next(source, meter)
-        if isinstance(body, Message):
+        if isinstance(body, dict):
             yield body
         elif opcode == Opcode.CHUNK:
             yield from _inside(Chunk.read(ReadDataStream(BytesIO(body))), meter)
@@ -82,11 +98,14 @@ class _Meter:
         self._records = self._unpacked_bytes = 0
 
     def record(self, size_bytes: int) -> None:
-        self._records += 1
-        if self._records > MAX_RECORDS:
-            raise ContainerError(f"more than {MAX_RECORDS} records")
+        self.records(1)
         if size_bytes > MAX_CHUNK_BYTES:
             raise ContainerError(f"a record of more than {MAX_CHUNK_BYTES >> 20} MiB")
+
+    def records(self, count: int) -> None:
+        self._records += count
+        if self._records > MAX_RECORDS:
+            raise ContainerError(f"more than {MAX_RECORDS} records")
 
     def unpacked(self, size_bytes: int) -> None:
         self._unpacked_bytes += size_bytes
@@ -94,7 +113,7 @@ class _Meter:
             raise ContainerError(f"more than {MAX_UNPACKED_BYTES >> 20} MiB unpacked")
 
 
-def _next(source: ReadDataStream, meter: _Meter) -> tuple[int, bytes | Message]:
+def _next(source: ReadDataStream, meter: _Meter) -> tuple[int, bytes | Messages]:
     """Return the next record's kind and content. Nothing is read past its end, whatever lengths it holds.
 
     Messages, which may be many and large, are read at once.
@@ -102,37 +121,51 @@ def _next(source: ReadDataStream, meter: _Meter) -> tuple[int, bytes | Message]:
     opcode, length = _HEAD.unpack(source.read(_HEAD.size))
     meter.record(length)
     if opcode == Opcode.MESSAGE and length >= MESSAGE_HEAD_BYTES:
-        message = Message.read(source, length)
-        if len(message.data) < length - MESSAGE_HEAD_BYTES:
+        channel_id, sequence, time_ns, _ = _MESSAGE_HEAD.unpack(source.read(MESSAGE_HEAD_BYTES))
+        data = source.read(length - MESSAGE_HEAD_BYTES)
+        if len(data) < length - MESSAGE_HEAD_BYTES:
             raise EndOfFile
-        return opcode, message
+        return opcode, {channel_id: [Message(time_ns, sequence, data)]}
     body = source.read(length)
     if len(body) < length:
         raise EndOfFile
     return opcode, body
 
 
-def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord]:
+def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord | Messages]:
     """Most of a file's records are messages in chunks: they are taken from the unpacked bytes where they lie."""
     plain = _unpack(chunk)
     meter.unpacked(len(plain))
     _verify(chunk.uncompressed_crc, zlib.crc32(plain), "a chunk")
     begin, size_bytes = _HEAD.size, len(plain)
+    read_head, read_message_head, message_op = (
+        _HEAD.unpack_from,
+        _MESSAGE_HEAD.unpack_from,
+        int(Opcode.MESSAGE),
+    )
+    messages: Messages = defaultdict(list)
+    count = 0
     while begin <= size_bytes:
-        opcode, length = _HEAD.unpack_from(plain, begin - _HEAD.size)
-        meter.record(length)
+        opcode, length = read_head(plain, begin - _HEAD.size)
         end = begin + length
         if end > size_bytes:
+            meter.record(length)
             raise EndOfFile
-        if opcode == Opcode.MESSAGE and length >= MESSAGE_HEAD_BYTES:
-            channel_id, sequence, log_time, publish_time = _MESSAGE_HEAD.unpack_from(plain, begin)
-            data = plain[begin + MESSAGE_HEAD_BYTES : end]
-            yield Message(channel_id, log_time, data, publish_time, sequence)
-        elif opcode in _IN_CHUNK:
+        count += 1
+        if opcode == message_op and length >= MESSAGE_HEAD_BYTES:
+            channel_id, sequence, time_ns, _ = read_message_head(plain, begin)
+            messages[channel_id].append(Message(time_ns, sequence, plain[begin + MESSAGE_HEAD_BYTES : end]))
+        if count == BATCH or opcode in _IN_CHUNK:
+            meter.records(count)
+            yield messages
+            messages, count = defaultdict(list), 0
+        if opcode in _IN_CHUNK:
             yield _IN_CHUNK[opcode](plain[begin:end])
         begin = end + _HEAD.size
     if begin != size_bytes + _HEAD.size:
         raise EndOfFile
+    meter.records(count)
+    yield messages
 
 
 def _verify(said: int, found: int, what: str) -> None:

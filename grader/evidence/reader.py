@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from io import BytesIO
+from operator import itemgetter
 from pathlib import Path, PurePath
 from typing import Any, BinaryIO
 
@@ -43,6 +44,7 @@ BAG_MAGIC = b"#ROSBAG V"
 SQLITE_MAGIC = b"SQLite format 3\0"
 SCHEMAS = {"ros1": "ros1msg", "cdr": "ros2msg"}
 """By the encoding of messages, that of their definitions: of ROS 1, and of ROS 2."""
+ARRIVAL = itemgetter(Message._fields.index("log_time_ns"))
 _DAMAGE = (
     McapError,
     ZstdError,
@@ -235,18 +237,17 @@ class _RunBuilder:
 
     def read(self, stream: BinaryIO) -> Run:
         """Raises EvidenceError for another format, BudgetExceeded, and what `container.records` and pydantic raise."""
-        for record in records(stream):
-            if isinstance(record, mcap.Message):
-                self._hold_message(record)
-                self._messages[record.channel_id].append(
-                    Message(record.log_time, record.sequence, record.data)
-                )
+        for found in records(stream):
+            if isinstance(found, dict):
+                for number, messages in found.items():
+                    self._hold_messages(number, messages)
+                    self._messages[number] += messages
             else:
-                self._describe(record)
+                self._describe(found)
         if unknown := self._messages.keys() - self._channels.keys():
             raise ContainerError(f"messages on {len(unknown)} channels that are not there")
         for messages in self._messages.values():
-            messages.sort(key=lambda message: message.log_time_ns)
+            messages.sort(key=ARRIVAL)
         return self._run()
 
     def _describe(self, record: mcap.McapRecord) -> None:
@@ -265,11 +266,12 @@ class _RunBuilder:
         elif isinstance(record, mcap.Metadata) and record.name == METADATA_NAME and self._metadata is None:
             self._metadata = record.metadata
 
-    def _hold_message(self, message: mcap.Message) -> None:
+    def _hold_messages(self, number: int, messages: list[Message]) -> None:
         """The arena has limits of its own for its events."""
-        channel, foreign = self._channels.get(message.channel_id), self._metadata is None
+        channel, foreign = self._channels.get(number), self._metadata is None
         if foreign or channel is None or channel.message_encoding != "json":
-            self._budget.hold(len(message.data), foreign=foreign)
+            size_bytes = sum(len(message.data) for message in messages)
+            self._budget.hold(size_bytes, foreign=foreign, count=len(messages))
 
     def _attach(self, record: mcap.Attachment) -> None:
         """Another tool's attachments are of no use; the grader's own come behind its metadata."""
@@ -368,7 +370,7 @@ class _RunBuilder:
             and self._has_json_schema(channel)
             for message in self._messages.get(number, ())
         ]
-        return sorted(found, key=lambda message: message.log_time_ns)
+        return sorted(found, key=ARRIVAL)
 
     def _has_json_schema(self, channel: mcap.Channel) -> bool:
         schema = self._schemas.get(channel.schema_id)

@@ -45,9 +45,9 @@ class MemoryBudget:
         self._decoded_bytes_max = decoded_bytes
         self._held_bytes = self._decoded_bytes = 0
 
-    def hold(self, size_bytes: int, *, foreign: bool) -> None:
-        """Count a record as it lies in the file. Raises BudgetExceeded."""
-        self._held_bytes += RECORD_BYTES + size_bytes
+    def hold(self, size_bytes: int, *, foreign: bool, count: int = 1) -> None:
+        """Count records (how many, and their size together) as they lie in the file. Raises BudgetExceeded."""
+        self._held_bytes += count * RECORD_BYTES + size_bytes
         most_bytes = FOREIGN_BYTES_MAX if foreign else HELD_BYTES_MAX
         if self._held_bytes > most_bytes:
             raise BudgetExceeded(f"it holds more than {most_bytes >> 20} MiB of messages")
