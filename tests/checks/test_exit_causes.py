@@ -44,3 +44,46 @@ def test_the_hint_is_the_line_as_it_should_be(tmp_path, line, source, error, hin
     ]
     (found,) = tracebacks(said)
     assert explain_traceback(found, package).hint == hint
+
+
+def said(package, *frames, error):
+    lines = ["Traceback (most recent call last):"]
+    for file, line, source in frames:
+        own = "/home/student/catkin_ws/src/" + package.name + "/"
+        lines += [
+            f'  File "{file if file.startswith("/") else own + file}", line {line}, in <module>',
+            f"    {source}",
+        ]
+    return tracebacks([*lines, error])[0]
+
+
+LIBRARY = "/opt/ros/noetic/lib/python3/dist-packages/rospy/__init__.py"
+IMPORTS = ("src/talker.py", 1, "import rospy")
+INSIDE = (LIBRARY, 47, "from .client import spin")
+
+
+@pytest.mark.parametrize(
+    ("files", "frames", "error", "of_machine"),
+    [
+        ((), (IMPORTS, INSIDE), "ImportError: cannot import name 'spin' from 'rospy.client'", True),
+        ((), (IMPORTS, INSIDE), "ModuleNotFoundError: No module named 'rosgraph_'", True),
+        ((), (IMPORTS, (LIBRARY, 9, "x = (")), "SyntaxError: '(' was never closed", True),
+        ((), (IMPORTS, INSIDE), "AttributeError: module 'yaml' has no attribute 'load'", True),
+        ((), (INSIDE,), "ImportError: cannot import name 'spin' from 'rospy.client'", True),
+        # the package's own yaml.py is what is imported
+        (("src/yaml.py",), (IMPORTS, INSIDE), "AttributeError: module 'yaml' has no attribute 'load'", False),
+        # a call, not an import
+        ((), (("src/talker.py", 4, "rospy.spin()"), INSIDE), "TypeError: spin() takes no arguments", False),
+        ((), (("src/talker.py", 1, "import rospi"),), "ModuleNotFoundError: No module named 'rospi'", False),
+        ((), (INSIDE,), "ROSException: publish() to a closed topic", False),
+    ],
+)  # fmt: skip
+def test_a_broken_module_of_the_machine_is_not_the_students(tmp_path, files, frames, error, of_machine):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "src").mkdir()
+    for file in ("src/talker.py", *files):
+        (tmp_path / file).write_text(SCRIPT)
+    package = facts_of(tmp_path)
+    end = explain_traceback(said(package, *frames, error=error), package)
+    assert end.of_machine == of_machine
+    assert (LIBRARY in end.cause) == of_machine

@@ -370,6 +370,11 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         where = f" ({place.file}, line {place.line})" if place else ""
         cause = f"{shown(found.text)}{where}: this grading machine lacks {lacking}"
         return Ending(cause, install_hint(lacking), (place,) if place else (), of_machine=True)
+    if broken := _broken(found, package):
+        where = f" ({place.file}, line {place.line})" if place else ""
+        cause = f"{shown(found.text)}{where}: raised by a file of this grading machine, {broken}"
+        hint = f"repair the grading machine: {shown(_imported(found)) or 'what is imported'} fails there by itself"
+        return Ending(cause, hint, (place,) if place else (), of_machine=True)
     source = package.file(place.file) if place and found.kind in SYNTAX else None
     if place is not None and source is not None and source.python_fault is not None:
         cause = source.python_fault.cause or cause
@@ -542,6 +547,41 @@ def _lacking(found: Traceback, package: PackageFacts) -> str:
     }
     declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
     return name if name not in own | ROS_2 and (name in known_packages() or name in declared) else ""
+
+
+def _broken(found: Traceback, package: PackageFacts) -> str:
+    """Return the file of ROS's or of the machine's that cannot be imported; "" where the student takes part in it.
+
+    Someone else's file raised it while a line of the student's imported it, and nothing of the package has the name of
+    a module that takes part.
+    """
+    last = found.frames[-1] if found.frames else None
+    imports = _imported(found) or not found.own_frames
+    kinds = (*IMPORT_ERRORS, *SYNTAX) if not found.own_frames else ()
+    if last is None or not last.in_library or not imports or (kinds and found.kind not in kinds):
+        return ""
+    words = set(
+        re.findall(r"\w+", " ".join([found.message, *(f"{f.file} {f.source}" for f in found.frames)]))
+    )
+    own = {
+        name.partition(".")[0]
+        for one in (package, *package.also)
+        for file in one.files
+        for name in file.path.split("/")[-2:]
+        if file.python and not name.startswith("__init__")
+    }
+    shadowed = own - {_stem(f.file) for f in found.own_frames} - {"src", "scripts", "nodes", "bin"}
+    return "" if shadowed & words else f"{last.file}, line {last.line}"
+
+
+def _imported(found: Traceback) -> str:
+    """Return the student's line that imports something, if it was the last of the student's to be run."""
+    source = found.own_frames[-1].source if found.own_frames else ""
+    return source if re.match(r"(import|from)\s", source) else ""
+
+
+def _stem(path: str) -> str:
+    return path.rpartition("/")[2].partition(".")[0]
 
 
 def process_tracebacks(
