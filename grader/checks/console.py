@@ -140,7 +140,8 @@ def _not_printed(
         return end.verdict(unjudged, f"it ended before it printed {params.words}: {end.cause}")
     own = [line for line in lines if one.interrupt_ns is None or line.at_ns < one.interrupt_ns]
     if not own:
-        return unjudged(f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True").once()
+        nothing = unjudged(f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True").once()
+        return nothing.model_copy(update={"silent": True})
     return failed(f"it never prints {params.words}; it prints {shown(own[0].text)!r}", hint=hint).once()
 
 

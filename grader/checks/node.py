@@ -67,7 +67,7 @@ class NodeNameParams(Record):
     """Only this process's nodes count; empty: each of the student's."""
 
 
-@check("node-lives", params=NodeLivesParams)
+@check("node-lives", params=NodeLivesParams, of_lives=True)
 def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verdict:
     """The script is one node, stays alive and ends on Ctrl-C.
 
@@ -109,7 +109,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
     return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
-@check("node-name", params=NodeNameParams)
+@check("node-name", params=NodeNameParams, of_lives=True)
 def node_name(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdict:
     """The node has the name of the handout.
 
@@ -182,7 +182,7 @@ def _early_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
 def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None:
     if not nodes:
         hint = f"call {INIT} before anything that waits"
-        return failed(f"{_script(one)} runs, but never registers as a node", hint=hint).once()
+        return unjudged(f"{_script(one)} runs, but never registers as a node", hint=hint).once()
     if len(nodes) > (1 if are_noted(run) else max(1, len(lives(run)))):
         hint = f"one script is one node: call {INIT} once, and start no other process"
         return failed(f"{_script(one)} registers as {len(nodes)} nodes: {join_words(nodes)}", hint=hint)

@@ -83,9 +83,11 @@ class Check:
 
     `messages_only` checks ask a run for its messages alone, so they judge another tool's recording too. For such a
     run `package` is empty where there is none. `heeds_losses` checks look for themselves at what the recorder lost.
-    What a check of `run_anyway` finds wrong with files is repaired before anything is run, so it explains no empty run,
-    unless the file is not there at all. `of_callbacks` checks judge what a node does upon what it hears: an exception
-    in a callback explains what they miss. `source` is the file of an instructor's own check.
+    What a check of `run_anyway` finds wrong with files is repaired before anything is run, so it explains no empty
+    run, unless the file is not there at all. `of_callbacks` checks judge what a node does upon what it hears: an
+    exception in a callback explains what they miss. `of_lives` checks judge how a node is called, lives and ends:
+    where it was there, its name or its end on Ctrl-C explains nothing that did not come. `source` is the file of an
+    instructor's own check.
     """
 
     name: str
@@ -98,6 +100,7 @@ class Check:
     heeds_losses: bool = False
     run_anyway: bool = False
     of_callbacks: bool = False
+    of_lives: bool = False
     source: str = ""
 
     @property
@@ -178,6 +181,7 @@ def check(
     heeds_losses: bool = False,
     run_anyway: bool = False,
     of_callbacks: bool = False,
+    of_lives: bool = False,
 ) -> Callable[[Callable[..., Verdict]], Callable[..., Verdict]]:
     """Register a function under a name. Raises ValueError for a name that is taken or a fact that no one has."""
 
@@ -202,6 +206,7 @@ def check(
             heeds_losses=heeds_losses,
             run_anyway=run_anyway,
             of_callbacks=of_callbacks,
+            of_lives=of_lives,
             source=own.source if own else "",
         )
         return function

@@ -254,7 +254,17 @@ class Requirements:
         named = verdict.unjudged and any(text in found.message for text in _paths(self._criteria[required]))
         if beside and not named and not _lines(verdict) & _lines(found):
             return False
+        there = found.silent or (
+            check is not None and check.of_lives and not self._is_below(required, criterion)
+        )
+        if there and not verdict.unjudged and not verdict.cause and _cause(verdict) not in found.message:
+            return False
         return verdict.status.is_lost and (verdict.unjudged or not repaired)
+
+    def _is_below(self, required: str, criterion: Criterion) -> bool:
+        """Return whether the criterion asks for a private name of the node that the required one names."""
+        parts = {part for text in texts_in(criterion.parameters) for part in text.split("/")[:-1] if part}
+        return bool(parts.intersection(texts_in(self._criteria[required].parameters.get("names"))))
 
     def _is_compiled(self, criterion: Criterion) -> bool:
         """Return whether it is about a program that only a build makes: a script runs from its source."""

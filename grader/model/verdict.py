@@ -77,11 +77,12 @@ Citations = tuple[Citation, ...]
 class Verdict(Record):
     """One check's judgement.
 
-    `score` is the share of the points, 0 to 1. `unjudged` marks a verdict that rests on the absence of
-    evidence: the judge turns it into `blocked` where a required criterion explains the absence; `unbuilt`: what is
-    absent is made by the build alone. `timing` marks a loss that one run's timing could have made: it counts only if it
-    is seen twice. `cause` is what a process ended of, in words that are the same in every verdict that rests on it.
-    `blocked_by` is the criterion that explains the absence.
+    `score` is the share of the points, 0 to 1. `unjudged` marks a verdict that rests on the absence of evidence: the
+    judge turns it into `blocked` where a required criterion explains the absence; `unbuilt`: what is absent is made
+    by the build alone; `silent`: a process was there and alive, and only something that is absent explains it.
+    `timing` marks a loss that one run's timing could have made: it counts only if it is seen twice. `cause` is what a
+    process ended of, in words that are the same in every verdict that rests on it. `blocked_by` is the criterion that
+    explains the absence.
     """
 
     status: Status
@@ -93,6 +94,7 @@ class Verdict(Record):
     citations: Citations = ()
     unjudged: bool = False
     unbuilt: bool = False
+    silent: bool = False
     timing: bool = False
     cause: str = ""
     blocked_by: str = ""

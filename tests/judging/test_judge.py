@@ -241,6 +241,49 @@ def test_what_else_is_wrong_with_a_node_is_no_reason_for_its_end() -> None:
     assert found["rate"].message.count("EOFError") == 1
 
 
+def test_another_name_is_no_reason_for_silence() -> None:
+    named = {
+        "id": "node",
+        "check": "node-name",
+        "with": {"process": "talker", "names": ["talker"]},
+        "scenario": "talker",
+    }
+    says = {
+        "id": "says",
+        "check": "prints",
+        "with": {"process": "talker", "text": "done"},
+        "scenario": "talker",
+    }
+    asked = [{**RATE, "requires": ["node"]}, {**says, "requires": ["node"]}]
+    silent = {"processes": [{"name": "talker", "nodes": ["/other"], "stopped_by": "INT", "exit_s": 9}]}
+    runs = build_runs({"runs": {"talker": silent | {"actors": GOOD_RUN["actors"]}}, "package": PACKAGE})
+    found = {c.id: c for c in judge(rubric(named, *asked), runs)}
+    assert {c.status.value for c in found.values()} == {"fail"}
+    assert found["says"].message == "it prints nothing, not 'done'"
+    gone = build_runs({"runs": {"talker": {"outcome": "ended"}}, "package": PACKAGE})
+    found = {c.id: c for c in judge(rubric(named, *asked), gone)}
+    assert found["rate"].blocked_by == found["says"].blocked_by == "node"
+
+
+def test_what_was_seen_of_a_call_is_no_reason_for_a_program_that_prints_nothing() -> None:
+    other = {
+        "id": "other",
+        "check": "rate",
+        "with": {"topic": "/chatter", "rate_hz": 50},
+        "scenario": "talker",
+    }
+    says = {
+        "id": "says",
+        "check": "prints",
+        "with": {"process": "talker", "text": "done"},
+        "scenario": "talker",
+    }
+    found = results(
+        {"runs": {"talker": GOOD_RUN}, "package": PACKAGE}, other, {**says, "requires": ["other"]}
+    )
+    assert statuses(found) == {"other": "fail", "says": "fail"}
+
+
 def test_a_node_that_ended_tells_what_its_script_would_lose_next() -> None:
     """As far as it is plain in the source: rates, topics, types and names behind the error that came first."""
     script = "src/numeric_talker.py"
