@@ -156,7 +156,11 @@ def _missing(
         return failed(f"{name} has no value", hint=f"write a value after `{name.rpartition('/')[2]}:`")
     if slip := _in_its_place(found, name, path):
         return slip
-    more = f", and {len(missing) - 1} more names are missing" if len(missing) > 1 else ""
+    more = (
+        f", and {plural(len(missing) - 1, 'more name is', 'more names are')} missing"
+        if len(missing) > 1
+        else ""
+    )
     above, _, last = name.rpartition("/")
     shallow = f"{above.rpartition('/')[0]}/{last}"
     moved = _column(name, shallow, keys)

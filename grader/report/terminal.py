@@ -64,6 +64,10 @@ PLAIN_MARKS = {
 """In place of `SIGNS` where an encoding has no ✓."""
 
 
+PLAIN_LETTERS = str.maketrans({"…": "...", "→": "->", "±": "+/-", MINUS: "-"})
+"""What stands for the grader's own signs where an encoding lacks them."""
+
+
 def open_console(file: IO[str]) -> Console:
     """A console that takes no text for markup. Colour on a terminal only; 80 columns where there is none."""
     terminal = file.isatty()
@@ -231,8 +235,7 @@ class Terminal:
         """`-5`; `0/5` where the points are not lost for good."""
         if criterion.status.is_open:
             return points_of(criterion)
-        minus = MINUS if self._fit_encoding(MINUS) == MINUS else "-"
-        return f"{minus}{number(criterion.missing)}"
+        return self._fit_encoding(f"{MINUS}{number(criterion.missing)}")
 
     def _advice(self, criterion: CriterionResult) -> RenderableType:
         words = self._words(criterion.message or criterion.title)
@@ -305,7 +308,11 @@ class Terminal:
         return self._fit_encoding(line(text, limit))
 
     def _fit_encoding(self, text: str) -> str:
-        return text.encode(self.console.encoding, "backslashreplace").decode(self.console.encoding)
+        """Return the text in characters that the terminal's encoding has."""
+        encoding = self.console.encoding
+        if not _can_encode(text, encoding):
+            text = text.translate(PLAIN_LETTERS)
+        return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def wrap(text: str, width: int) -> list[str]:
@@ -326,8 +333,12 @@ def mark(status: Status, encoding: str) -> str:
 
 
 def _has_marks(encoding: str) -> bool:
+    return _can_encode("".join(SIGNS.values()), encoding)
+
+
+def _can_encode(text: str, encoding: str) -> bool:
     try:
-        "".join(SIGNS.values()).encode(encoding)
+        text.encode(encoding)
     except (UnicodeEncodeError, LookupError):
         return False
     return True

@@ -17,10 +17,12 @@ from grader.classes.gradebook import Book, Row, write_gradebook
 from grader.classes.gradebook.table import Form
 from grader.model.batch import Entry
 from grader.model.result import GradingResult
+from grader.model.verdict import Status
 from grader.report.files import result_bytes
 from grader.report.forms import FORMS, ReportInput
 from grader.report.terminal import open_console, print_report
 from grader.report.view import without_hidden
+from tests.report import hostile
 from tests.report.hostile import ESCAPES
 from tests.report.worst import COMMANDS, DOCS, FORMULA, LINKS, WIDE, figures, rubric, worst
 
@@ -161,3 +163,21 @@ def test_every_status_has_its_word_in_the_table():
         "o .*  manual",
     ):
         assert re.search(rf"^{re.escape(word[0])}{word[1:]}  ", text, re.MULTILINE), word
+
+
+def test_in_an_encoding_without_them_dots_and_arrows_are_spelt_out() -> None:
+    update = {
+        "status": Status.FAIL,
+        "points": 0.0,
+        "hint": 'add name="…", 5 → 6',
+        "message": "9 ± 1",
+        "citations": (),
+    }
+    shown = hostile.result().model_copy(
+        update={"criteria": (hostile.result().criteria[0].model_copy(update=update),)}
+    )
+    out = io.TextIOWrapper(io.BytesIO(), encoding="ascii", write_through=True)
+    print_report(shown, hostile.rubric(), open_console(out))
+    text = out.buffer.getvalue().decode("ascii")
+    assert 'name="...", 5 -> 6' in text
+    assert "9 +/- 1" in text
