@@ -28,8 +28,12 @@ _LEADING = re.compile(r"^\W+")
 _TIME = re.compile(r"(?P<words>.*?)(?P<seconds>\d+(?:\.\d+)?)")
 
 
+EARLY_NS = 20_000_000
+"""So much earlier an answer may arrive than the arena has noted what it sent."""
+
+
 class Topic(Record):
-    """One published topic. `rate_hz` is None where it is not periodic.
+    """One published topic, `silent` where no message came on it. `rate_hz` is None where it is not periodic.
 
     `counts_from` is the first value of a counter, None where it does not count. `template` is the text of messages that
     tell the time, with `{seconds}`.
@@ -39,6 +43,7 @@ class Topic(Record):
     type: str
     rate_hz: float | None = None
     latched: bool = False
+    silent: bool = False
     counts_from: int | None = None
     template: str = ""
 
@@ -102,6 +107,20 @@ def heard_template(run: Run, topic: str) -> str | None:
     return f"{words} {{value}}".strip() if words and not re.search(r"\d", words) else "{value}"
 
 
+def answers_to(run: Run, topic: str, within_s: float) -> tuple[str, ...]:
+    """Return the topics on which a message of the student's follows each one that the grader sent on `topic`."""
+    sent = [t - EARLY_NS for t, e in run.actors if e.action == "publish" and e.topic == topic]
+    found = []
+    for channel in run.student_channels():
+        ends = [*sent[1:], sent[-1] + round(within_s * 1e9)] if sent else []
+        answered = [
+            any(begin <= t < end for t in channel.times_ns) for begin, end in zip(sent, ends, strict=True)
+        ]
+        if answered and all(answered) and channel.topic not in SYSTEM_TOPICS:
+            found.append(channel.topic)
+    return tuple(dict.fromkeys(found))
+
+
 def _topic(channel: Channel) -> Topic:
     values = channel.data
     return Topic(
@@ -109,6 +128,7 @@ def _topic(channel: Channel) -> Topic:
         type=channel.type.replace("/msg/", "/"),
         rate_hz=nice_rate(channel.times_ns),
         latched=channel.latching,
+        silent=not channel.times_ns,
         counts_from=_counts_from(values) if channel.type.replace("/msg/", "/") in INTEGER_TYPES else None,
         template=_template(values, channel.times_ns),
     )

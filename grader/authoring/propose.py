@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 from grader import pipeline
-from grader.authoring.observe import Observed, Topic, heard_template, observe, wraps_of
+from grader.authoring.observe import Observed, Topic, answers_to, heard_template, observe, wraps_of
 from grader.authoring.rubric_draft import (
+    ANSWERS_S,
     INTEGER_PROBES,
     STRING,
     TEXT_PROBES,
@@ -16,6 +17,7 @@ from grader.authoring.rubric_draft import (
     Sheet,
     assign_points,
     drop_empty,
+    dump_flow,
     find_parts,
     first_look,
     format_number,
@@ -23,6 +25,7 @@ from grader.authoring.rubric_draft import (
     probe_for,
     rubric_text,
     second_look,
+    step_for,
 )
 from grader.checks.package_files import RUNTIME_KINDS
 from grader.errors import RosMissing, SubmissionError
@@ -163,10 +166,21 @@ class Proposal(Sheet):
 
     def _topic(self, name: str, topic: Topic, node: str, fast: Run | None) -> None:
         label = self._label(name, topic)
+        answered = any(topic.name in self._answers(name, heard) for heard in self._seen[name].listens)
+        if topic.silent and not answered:
+            self.notes.append(
+                f"no message came on {topic.name}, which is not covered: what makes the node publish?"
+            )
+            return
         kind = self.add(
-            label, f"{topic.name} carries {topic.type}", "topic-type", {"topic": topic.name, "type": topic.type},
-            scenario=name, requires=[node], reproduce=f"rostopic info {topic.name}",
-        )  # fmt: skip
+            label,
+            f"{topic.name} carries {topic.type}",
+            "topic-type",
+            {"topic": topic.name, "type": topic.type},
+            scenario=f"{name}-answers" if topic.silent else name,
+            requires=[node],
+            reproduce=f"rostopic info {topic.name}",
+        )
         needs: Entry = {"scenario": name, "requires": [kind, node]}
         if topic.rate_hz:
             parameters: Entry = {"topic": topic.name, "rate_hz": format_number(topic.rate_hz)}
@@ -231,11 +245,7 @@ class Proposal(Sheet):
         run = self._runs.get(f"{name}-hears")
         found = {t: k for t, k in seen.listens.items() if run and probe_for(t, k)}
         heard = {t: template for t in found if run and (template := heard_template(run, t))}
-        self.notes += [
-            f"{script} listens to {t} ({k}), which is not covered"
-            for t, k in seen.listens.items()
-            if t not in heard
-        ]
+        self._answering(name, script, {t: k for t, k in seen.listens.items() if t not in heard}, requires)
         if not heard:
             return
         scenario = f"{name}-hears"
@@ -257,6 +267,42 @@ class Proposal(Sheet):
                 parameters,
                 scenario=scenario,
                 requires=requires,
+            )
+
+    def _answers(self, name: str, topic: str) -> set[str]:
+        """Return the topics on which a node was seen to answer what it heard on one."""
+        run = self._runs.get(f"{name}-answers")
+        periodic = {one.name for one in self._seen[name].topics if one.rate_hz}
+        return set(answers_to(run, topic, ANSWERS_S)) - periodic if run else set()
+
+    def _answering(self, name: str, script: str, listens: Mapping[str, str], requires: list[str]) -> None:
+        """What it publishes upon what it hears and does not print."""
+        scenario, steps = f"{name}-answers", []
+        for topic, kind in listens.items():
+            found = self._answers(name, topic)
+            if not found:
+                step = step_for(topic, kind)["publish"]
+                words = f"{script} listens to {topic} ({kind}), which is not covered: a step can send it something, "
+                self.notes.append(f"{words}- publish: {dump_flow(step)}")
+                continue
+            steps.append(step_for(topic, kind))
+            for answer in sorted(found):
+                parameters = {"cause": {"topic": topic}, "effect": {"topic": answer}, "within_s": ANSWERS_S}
+                file = PurePosixPath(script).name
+                self.add(
+                    f"{name}-answers-{label_of(topic)}-{label_of(answer)}",
+                    f"{file} publishes on {answer} upon each message on {topic}",
+                    "reacts",
+                    parameters,
+                    scenario=scenario,
+                    requires=requires,
+                )
+        if steps:
+            wait = {"wait": {"seconds": ANSWERS_S}}
+            title = f"{PurePosixPath(script).name}, with messages of the grader's"
+            start = [{"name": name, "script": script}]
+            self.scenarios[scenario] = self._with_params(
+                {"title": title, "start": start, "steps": [*steps, wait]}
             )
 
     def _launch(self, name: str, launch: str, seen: Observed) -> None:

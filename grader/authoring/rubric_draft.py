@@ -21,13 +21,13 @@ from grader.model.record import Record
 from grader.rubric.consistency import TOTAL_POINTS
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Criterion, Rubric
-from grader.rubric.scenario import Param, Probe, Scenario, Start, Until
+from grader.rubric.scenario import Param, Probe, Scenario, Start, Step, Until
 from grader.untrusted_text import line, visible, without_ci_commands
 
 WEIGHTS = {
     "manifest": 1, "cmake": 1, "build": 1, "executable": 1, "node-lives": 1, "node-name": 1, "topic-type": 2, "rate": 3,
     "counter-start": 1, "counter-step": 1, "counter-wrap": 3, "message": 1, "hears": 2, "service": 2, "latched": 1,
-    "cmake-install": 2, "launch-xml": 2, "launch-runs": 2,
+    "cmake-install": 2, "launch-xml": 2, "launch-runs": 2, "reacts": 2,
 }  # fmt: skip
 
 Entry = dict[str, Any]
@@ -153,6 +153,11 @@ def _dump(data: object, *, flow: bool | None) -> str:
     return text if visible(text, lines=True) == text else without_ci_commands(dump(letters=False))
 
 
+def dump_flow(data: object) -> str:
+    """Return it as YAML on one line: `{topic: /in, count: 3}`."""
+    return " ".join(_dump(data, flow=True).split())
+
+
 def _one_line(text: str) -> str:
     return line(re.sub(r"\s+", " ", text), NOTE_CHARS)
 
@@ -164,6 +169,13 @@ WARPED_MESSAGES = 300
 TEXT_PROBES = 8
 INTEGER_PROBES = 9
 STRING = "std_msgs/String"
+ANSWERS_S, MESSAGES = 0.5, 3
+SAMPLES: Mapping[str, tuple[bool | float, ...]] = {
+    "std_msgs/Float32": (1.5, -2.25, 3.0),
+    "std_msgs/Float64": (1.5, -2.25, 3.0),
+    "std_msgs/Bool": (True, False, True),
+}
+"""What is sent to a node that does not print what it hears, and how soon it is to answer."""
 
 
 class Parts(Record):
@@ -224,6 +236,17 @@ def second_look(package: str, parts: Parts, seen: Mapping[str, Observed]) -> Loa
                 probes=probes,
                 until=Until(heard=True, messages={}),
             )
+        steps = [
+            step_for(topic, kind) for topic, kind in seen[name].listens.items() if not probe_for(topic, kind)
+        ]
+        if steps:
+            scenarios[f"{name}-answers"] = Scenario(
+                title=f"{PurePosixPath(script).name}, with messages of the grader's",
+                params=parts.params,
+                start=(Start(name=name, script=script),),
+                steps=tuple(Step.model_validate(step) for step in (*steps, {"wait": {"seconds": ANSWERS_S}})),
+                until=Until(messages={}),
+            )
         counting = {
             topic.name: WARPED_MESSAGES for topic in seen[name].topics if topic.counts_from is not None
         }
@@ -245,6 +268,13 @@ def probe_for(topic: str, kind: str) -> Probe | None:
     if kind in INTEGER_TYPES:
         return Probe(topic=topic, type=kind, integers=INTEGER_PROBES, among=(0,))
     return None
+
+
+def step_for(topic: str, kind: str) -> Entry:
+    """Return a step that sends some messages of that type: numbers, or zeros where it has other fields than `data`."""
+    values = SAMPLES.get(kind)
+    sent: Entry = {"values": list(values)} if values else {"value": {}, "count": MESSAGES}
+    return {"publish": {"topic": topic, "type": kind, **sent, "rate_hz": 1 / ANSWERS_S}}
 
 
 def only_runs(package: str, scenarios: Mapping[str, Scenario]) -> LoadedRubric:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.authoring.observe import heard_template, nice_rate, observe, wraps_of
+from grader.authoring.observe import answers_to, heard_template, nice_rate, observe, wraps_of
 from grader.authoring.propose import Proposal
 from grader.authoring.rubric_draft import Parts, assign_points, find_parts, rubric_text, second_look
 from grader.evidence.reader import package_facts
@@ -112,6 +112,40 @@ def test_a_node_that_failed_is_named_in_a_note(tmp_path):
 def test_nothing_to_see_twice():
     seen = {"node": observe(run_of(topics=[{"topic": "/c", "callerid": "/node"}]))}
     assert second_look("lab1", Parts(nodes={"node": "src/node.py"}, launches={}), seen) is None
+
+
+def test_a_node_that_answers_what_it_hears_gets_a_step_for_it() -> None:
+    types = {"/in": "std_msgs/Float32", "/cmd": "geometry_msgs/Twist", "/out": "std_msgs/Float32"}
+    listens = [{"at_s": 0.5, "nodes": ["/node"], "subscribers": {"/in": ["/node"], "/cmd": ["/node"]},
+                "publishers": {"/out": ["/node"]}, "processes": {"/node": "node"},
+                "topic_types": types}]  # fmt: skip
+    out = {"topic": "/out", "type": "std_msgs/Float32", "callerid": "/node"}
+    first = run_of(graph=listens, topics=[{**out, "count": 0}])
+    parts = Parts(nodes={"node": "src/node.py"}, launches={})
+    again = second_look("lab1", parts, {"node": observe(first)})
+    assert again is not None
+    sent = [step.publish for step in again.rubric.scenarios["node-answers"].steps if step.publish]
+    assert [(one.topic, one.total) for one in sent] == [("/in", 3), ("/cmd", 3)]
+
+    def noted(topic: str, begin_s: float) -> list[dict[str, Any]]:
+        return [{"action": "publish", "topic": topic, "at_s": begin_s + 0.5 * n} for n in range(3)]
+
+    answers = run_of(
+        graph=listens,
+        actors=[*noted("/in", 1.0), *noted("/cmd", 3.0)],
+        topics=[{**out, "count": 3, "rate_hz": 2, "start_s": 1.1}],
+    )
+    assert answers_to(answers, "/in", 0.5) == ("/out",)
+    assert answers_to(answers, "/cmd", 0.5) == ()
+    runs = build_runs({"runs": {}, "package": {}}) | {"node": first, "node-answers": answers}
+    proposal = Proposal(package_facts(runs["package"]), parts, {"node": observe(first)}, runs)
+    judged = {one["check"]: one for one in proposal.criteria if one.get("scenario") == "node-answers"}
+    assert judged["topic-type"]["with"]["topic"] == "/out"
+    assert judged["reacts"]["with"]["cause"] == {"topic": "/in"}
+    (note,) = proposal.notes
+    assert note.endswith(
+        "publish: {topic: /cmd, type: geometry_msgs/Twist, value: {}, count: 3, rate_hz: 2.0}"
+    )
 
 
 def test_nodes_are_found_by_reading_alone(tmp_path):
