@@ -211,12 +211,17 @@ class ProcessEnvironment:
         found = (f"{path.parent.parent.name}/{path.stem}" for path in islice(files, SERVICE_TYPES_MAX))
         return tuple(dict.fromkeys(found))
 
-    def has_line(self, pattern: re.Pattern[bytes]) -> bool:
-        """Return whether a script or a source file of the lab's packages has it."""
+    def has_line(self, pattern: re.Pattern[bytes], script: str | None = None) -> bool:
+        """Return whether a script or a source file of the lab's packages has it, or this script of theirs."""
         packages = (self.workspace, *self.workspace.others.values())
-        found = (path for one in packages for path in (one.repaired / one.folder).rglob("*"))
-        paths = (path for path in found if path.suffix in SOURCE_ENDINGS)
-        files = [path for path in islice(paths, SOURCES_MAX) if path.is_file()]
+        folders = [one.repaired / one.folder for one in packages]
+        if script is None:
+            found = (
+                path for folder in folders for path in folder.rglob("*") if path.suffix in SOURCE_ENDINGS
+            )
+        else:
+            found = (folder / script for folder in folders)
+        files = [path for path in islice(found, SOURCES_MAX) if path.is_file()]
         return any(pattern.search(read_untrusted(path, SOURCE_BYTES_MAX) or b"") for path in files)
 
     def package_file(self, file: str) -> Path | None:

@@ -66,17 +66,17 @@ class RunState:
     sent a message, `owners` the processes of all nodes so far. `lost_s` is what others took of the run's time while
     they filled the machine: so much longer a node is waited for. Of that, `lost_before_s` was gone at `started_s`,
     `lost_before_last_s` at `last_start_s`.
-    `serves` are the services and actions that the grader offers, `sought` the services that nodes looked for,
-    `refused` topics of the grader's to which a node wanted to subscribe with another type. Until `answers_s`, the
-    grader works on what they asked for.
+    `serves` are the services and actions that the grader offers to programs that wait for them without end, `sought`
+    the services that nodes looked for, `refused` topics of the grader's to which a node wanted to subscribe with
+    another type. Until `answers_s`, the grader works on what they asked for.
     `sent_s`: when the grader last sent a message, `last_sent_s` one that is to be printed. `waited_s`: how long steps
     had waited by `started_s` for what never came. `least_s` is how long nodes are watched, even where nothing more is
     to come. `naps`: the package's programs sleep for times of their own or have timers, which may look like `spin()`
-    from outside. `endless`: one of them has a loop that does nothing and never ends."""
+    from outside. `endless`: the processes whose script has a loop that does nothing and never ends."""
 
     least_s: float = 0.0
     naps: bool = False
-    endless: bool = False
+    endless: frozenset[str] = frozenset()
     started_s: float = 0.0
     topics: dict[str, TopicSeen] = field(default_factory=lambda: defaultdict(TopicSeen))
     running: set[str] = field(default_factory=set)
@@ -181,7 +181,7 @@ class RunState:
         """Take note that a process with so many programs has come to rest, of one kind or another, or moves again
         (None). One that computes is at rest where it can have nothing else to do."""
         known = self.at_rest.pop(process, None)
-        if rest is not None and (rest != "computes" or self.endless):
+        if rest is not None and (rest != "computes" or process in self.endless):
             same = known is not None and known.programs == programs
             since_s, lost_s = (known.since_s, known.lost_before_s) if known and same else (now_s, self.lost_s)
             self.at_rest[process] = Rest(since_s, lost_s, programs, rest)
@@ -273,10 +273,15 @@ def is_silent(live: RunState, topics: tuple[str, ...], until: Until, now_s: floa
 
 def _is_fed(live: RunState, now_s: float) -> bool:
     """Return whether messages come to the student's nodes, or are to come of a simulator that has not begun yet."""
-    if live.helper_nodes and not live.helper_nodes & live.talking.keys():
+    if _is_awaited(live):
         return True
     last_s = max((live.topics[topic].last_s for topic in live.listened & live.topics.keys()), default=0.0)
     return last_s > 0 and now_s < last_s + SPINNING_S
+
+
+def _is_awaited(live: RunState) -> bool:
+    """Return whether a program that runs beside the student's has yet to send its first message."""
+    return bool(live.helper_nodes) and not live.helper_nodes & live.talking.keys()
 
 
 def _at_rest_since(live: RunState, now_s: float) -> float | None:
@@ -288,6 +293,8 @@ def _at_rest_since(live: RunState, now_s: float) -> float | None:
     for process, rest in zip(live.running, rests, strict=True):
         if rest is None or (owners.count(process) < rest.programs and not _computes(live, process)):
             return None
+    if _is_awaited(live) and any(_computes(live, process) for process in live.running):
+        return None
     first_s = max([live.first_node_s, *(live.talking[node] for node in live.nodes & live.talking.keys())])
     if now_s < first_s + live.least_s:
         return None

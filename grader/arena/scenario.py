@@ -28,8 +28,13 @@ from grader.rubric.scenario import Param, Scenario, Start
 
 NAPS = re.compile(rb"\bsleep\(\s*[^)\s]|Timer\(")
 """A sleep of so many seconds, `rospy.sleep(0.5)` and not `rate.sleep()`, or a timer."""
-IDLE = re.compile(rb"^[ \t]*while\b[^\n]*:\s*(?:#[^\n]*\n\s*)*(?:pass|continue)\b", re.MULTILINE)
-"""A loop that does nothing: `while True: pass`."""
+GIVES_UP = re.compile(rb"[wW]ait_?[fF]or_?[sS]erv(?:er|ice)\([^)\n]*(?:,|timeout|Duration|\b\d)")
+"""A wait for a service or an action's server that ends without it."""
+ENDLESS = rb"(?:True|1|not\s+(?:rospy\.)?is_shutdown\(\))"
+IDLE = re.compile(
+    rb"^[ \t]*while\s*\(?\s*" + ENDLESS + rb"\s*\)?\s*:\s*(?:#[^\n]*\n\s*)*(?:pass|continue)\b", re.MULTILINE
+)
+"""A loop that does nothing and never ends: `while True: pass`."""
 CLOCK_STEP_S = 0.05
 UNFOLLOWED_S = 2.0
 UNFOLLOWED_HZ = 15.0
@@ -98,8 +103,11 @@ async def run_scenario(
             return RunCost(cpu_s=0, student_cpu_s=0)
         try:
             session.live.watch_rates(rates)
-            session.live.serves = frozenset(one.service or one.action or "" for one in scenario.serves)
-            session.live.naps, session.live.endless = place.has_line(NAPS), place.has_line(IDLE)
+            if not place.has_line(GIVES_UP):
+                session.live.serves = frozenset(one.service or one.action or "" for one in scenario.serves)
+            session.live.naps = place.has_line(NAPS)
+            idle = {spec["name"] for _, spec in starts if place.has_line(IDLE, spec["script"])}
+            session.live.endless = frozenset(idle)
             session.live.least_s = max(watched_s + WATCHED_MORE_S, expected_s(scenario) - STARTING_S)
             async with admission.start() as leave, session as arena:
                 arena.course(ScenarioEvent(event="begin"))

@@ -391,13 +391,13 @@ def test_who_works_on_and_on_is_at_rest_once_it_can_do_nothing_else() -> None:
     assert is_settled(live, 2.6)
     live.note_rest("node", "computes", 1, 3.0)  # it may yet come to an end
     assert not is_settled(live, 60.0)
-    live.endless = True
+    live.endless = frozenset({"node"})
     live.note_rest("node", "computes", 1, 3.0)
     assert is_settled(live, 3.6)
 
 
 def test_who_computes_before_it_is_a_node_is_no_longer_starting() -> None:
-    live, until = RunState(endless=True), Until(messages={"/a": 10})
+    live, until = RunState(endless=frozenset({"node"})), Until(messages={"/a": 10})
     live.note_start("node", 0.0, helper=False)
     assert find_outcome(live, until, 3.0) is None
     live.note_rest("node", "computes", 1, 2.0)
