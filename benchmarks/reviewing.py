@@ -64,6 +64,8 @@ def _pages(tab: _Tab, times: int) -> Iterator[Row]:
     for what, path in {
         "list of the class": "/",
         "one filter of it": "/?show=inconclusive",
+        "last page of it": "/?page=999",
+        "search in it": "/?q=7",
         "list by criterion": "/criteria",
         "one criterion across the class": "/?c=style&show=open",
         "a submission": f"/s/{tab.keys[1]}/",
@@ -126,8 +128,17 @@ class _Tab:
         self._port, self._headers = parts.port, dict[str, str]()
         answer, _ = self._ask("GET", f"{parts.path}?{parts.query}", None)
         self._headers["Cookie"] = str(answer.getheader("Set-Cookie")).partition(";")[0]
-        self.keys = list(dict.fromkeys(re.findall(r'href="/s/([^"/]+)/', self.get("/"))))
+        self.keys = list(dict.fromkeys(self._all()))
         self.csrf = self._form(self.keys[0])["csrf"]
+
+    def _all(self) -> Iterator[str]:
+        """Yield the keys of all submissions, page by page of the list."""
+        path: str | None = "/"
+        while path:
+            text = self.get(path)
+            yield from re.findall(r'class="row" href="/s/([^"/]+)/', text)
+            found = re.search(r'rel="next" href="([^"]+)"', text)
+            path = found[1] if found else None
 
     def get(self, path: str) -> str:
         answer, text = self._ask("GET", path, None)
