@@ -11,7 +11,6 @@ folder.
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,7 +32,7 @@ from grader.classes.roster.entries import known_columns
 from grader.classes.roster.table import read_table
 from grader.errors import UsageError
 from grader.files import make_folder
-from grader.judging.settle import unsettled
+from grader.judging.settle import settle, unsettled
 from grader.judging.summary import round_half_up, total_fields
 from grader.model.batch import Entry, Roster
 from grader.model.result import (
@@ -49,6 +48,7 @@ from grader.model.verdict import Status
 from grader.results import read_result
 from grader.rubric.course import Counts, CourseFile
 from grader.rubric.load import LoadedRubric, load_rubric
+from grader.rubric.model import Rubric
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -368,45 +368,61 @@ class _Bringing:
     counts: Counts
 
     def bring(self, entry: Entry, attempts: Sequence[Attempt]) -> Entry:
-        """Copy the chosen attempt's folder, unless it is there already, and write the reports of what counts; return
-        that attempt's row of the roster."""
+        """Put the chosen attempt's evidence and the reports of what counts into the student's folder, unless they are
+        there already; return that attempt's row of the roster."""
         if not attempts:
             return entry
-        one = counting_attempt(attempts, self.counts)
+        lab = self.rubric.rubric
+        one = counting_attempt(attempts, self.counts, lab)
         target = self.folder.folder_of(one.entry)
         earlier = read_result(target)
-        automatic = unsettled(counting_result(attempts, self.counts, self.rubric), self.rubric.rubric)
+        automatic = unsettled(counting_result(attempts, one, self.counts, lab), lab)
         now = self.settler.settle(automatic, one.entry.id, one.result.handed_in, earlier or automatic)
         if now != earlier:
-            shutil.rmtree(target, ignore_errors=True)
-            shutil.copytree(one.folder, target, symlinks=True)
-            rewrite(target, now, self.rubric.rubric, self.rubric.docs)
+            rewrite(target, now, lab, self.rubric.docs, of=one.folder)
         return one.entry
 
 
-def counting_attempt(attempts: Sequence[Attempt], counts: Counts) -> Attempt:
+def counting_attempt(attempts: Sequence[Attempt], counts: Counts, rubric: Rubric) -> Attempt:
     """Return the attempt that counts; of several with as many points the first, which took the fewest late days. One
-    that could not be graded counts only where none could."""
+    that could not be graded counts only where none could.
+
+    By criterion, it is the one up to which the best of each criterion comes to most, after what it costs that this one
+    was late: what a late attempt earned is not had at the price of an earlier one.
+    """
     graded = [one for one in attempts if one.result.status != "error"] or attempts
-    return graded[-1] if counts == "last" else max(graded, key=lambda one: (one.result.points, -one.number))
+    if counts == "last":
+        return graded[-1]
+
+    def points(one: Attempt) -> float:
+        if counts == "best":
+            return one.result.points
+        best = _best_so_far(attempts, one, rubric)
+        return settle(best, rubric, overrides={}, handed_in=one.result.handed_in).points
+
+    return max(graded, key=lambda one: (points(one), -one.number))
 
 
-def counting_result(attempts: Sequence[Attempt], counts: Counts, rubric: LoadedRubric) -> GradingResult:
+def counting_result(
+    attempts: Sequence[Attempt], chosen: Attempt, counts: Counts, rubric: Rubric
+) -> GradingResult:
     """Return the automatic result that counts, with what became of all attempts.
 
     By criterion, each one is taken from the attempt in which it earned most, and says from which.
     """
-    number, _, result, _ = counting_attempt(attempts, counts)
     points = tuple(one.result.points if one.result.status != "error" else None for one in attempts)
-    lab = rubric.rubric
-    if counts == "by-criterion":
-        judged = [(one.number, {c.id: c for c in unsettled(one.result, lab).criteria}) for one in attempts]
-        criteria = tuple(_best(c, number, judged) for c in unsettled(result, lab).criteria)
-        result = result.model_copy(
-            update={"criteria": criteria, **total_fields(lab, criteria), "overrides": ()}
-        )
-    told = Attempts(counts=counts, chosen=number, points=points)
+    result = _best_so_far(attempts, chosen, rubric) if counts == "by-criterion" else chosen.result
+    told = Attempts(counts=counts, chosen=chosen.number, points=points)
     return result.model_copy(update={"attempts": told})
+
+
+def _best_so_far(attempts: Sequence[Attempt], last: Attempt, rubric: Rubric) -> GradingResult:
+    """Return an attempt's result with the best of each criterion in it and in the attempts before."""
+    until = [one for one in attempts if one.number <= last.number]
+    judged = [(one.number, {c.id: c for c in unsettled(one.result, rubric).criteria}) for one in until]
+    automatic = unsettled(last.result, rubric)
+    criteria = tuple(_best(c, last.number, judged) for c in automatic.criteria)
+    return automatic.model_copy(update={"criteria": criteria, **total_fields(rubric, criteria)})
 
 
 def _best(

@@ -121,7 +121,9 @@ def attempt_words(result: GradingResult) -> str:
         return ""
     points = ", ".join("not graded" if one is None else number(one) for one in attempts.points)
     if attempts.counts == "by-criterion":
-        return f"For each criterion its best attempt counts; the {len(attempts.points)} attempts: {points} points"
+        many = len(attempts.points)
+        until = f" up to attempt {attempts.chosen}" if attempts.chosen < many else ""
+        return f"For each criterion its best attempt{until} counts; the {many} attempts: {points} points"
     which = "the last one" if attempts.counts == "last" else "the one with the most points"
     return f"Attempt {attempts.chosen} of {len(attempts.points)} counts, {which}: {points} points"
 

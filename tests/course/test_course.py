@@ -176,6 +176,36 @@ def test_by_criterion_each_takes_its_best_attempt(course: Path) -> None:
     assert found["points"] > max(sum(one.values()) for one in each)
 
 
+@pytest.mark.parametrize(("day", "chosen"), [("2026-11-02", 2), ("2026-11-12", 1)])
+def test_what_a_late_attempt_earned_costs_what_it_was_late(course: Path, day: str, chosen: int) -> None:
+    rows = ("ada,wrong,2026-10-29T12:00:00Z", f"ada,right,{day}T12:00:00Z")
+    found = attempts(course, "by-criterion", *rows)["ada"]
+    first, second = found["attempts"]["points"]
+    assert (second > first) == (chosen == 2)
+    assert found["points"] == max(first, second)
+    assert found["attempts"]["chosen"] == chosen
+    report = (course / "results/lab1/ada/report.md").read_text()
+    assert ("best attempt up to attempt 1 counts" in report) == (chosen == 1)
+
+
+@pytest.mark.full
+def test_a_decision_on_attempts_says_what_the_check_said_after_a_kill(course: Path) -> None:
+    """What the check said when a person decided is in the result that is replaced: it is replaced as a whole."""
+    rows = ["ada,wrong,2026-10-28T12:00:00Z"]
+    attempts(course, "best", *rows)
+    name = next(c["id"] for c in results("lab1")["ada"]["criteria"] if c["status"] == "fail")
+    (course / "results/lab1/overrides.yaml").write_text(f"ada: {{{name}: {{points: 1}}}}\n")
+    before = attempts(course, "best", *rows)["ada"]["overrides"][0]
+    evidence = course / "results/lab1/ada/evidence"
+    found = attempts(course, "best", *rows, "ada,right,2026-10-29T12:00:00Z")["ada"]["overrides"][0]
+    assert (found["was"], found["changed"]) == (before["was"], True)
+    assert found["automatic"] != before["automatic"]
+    chosen = course / "results/lab1/.attempts/2/ada/evidence"
+    assert {p.name: p.read_bytes() for p in evidence.iterdir()} == {
+        p.name: p.read_bytes() for p in chosen.iterdir()
+    }
+
+
 @pytest.mark.full
 def test_decisions_stay_when_an_attempt_comes(course: Path) -> None:
     criterion = load_rubric(str(RUBRIC)).rubric.criteria[0]

@@ -6,6 +6,7 @@ submissions are done at a time, in worker processes. None of it needs ROS.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from functools import partial
 from pathlib import Path
 
 from grader.checks import CHECKS
-from grader.errors import EvidenceError, GraderError, UsageError
+from grader.errors import EvidenceError, GraderError, OutputError, UsageError
 from grader.evidence.reader import SUFFIXES, load_evidence
 from grader.evidence.run import Run
 from grader.files import new_file, unwritable
@@ -242,18 +243,37 @@ class Settler:
 
 
 def rewrite(
-    folder: Path, result: GradingResult, rubric: Rubric, docs: Mapping[str, Mapping[str, str]] | None = None
+    folder: Path,
+    result: GradingResult,
+    rubric: Rubric,
+    docs: Mapping[str, Mapping[str, str]] | None = None,
+    *,
+    of: Path | None = None,
 ) -> None:
-    """Write the result's reports; its evidence stays. Raises as `Results` does.
+    """Write the result's reports; its evidence and its log stay, or are those of the folder `of`. Raises as `Results`
+    does.
 
     `docs` has the sections of the checks' docstrings; by default those of the grader's own checks.
     """
     with Results(folder) as results:
-        figures = figures_in(folder, result, rubric)
+        figures = figures_in(of or folder, result, rubric)
         docs = docs or {name: check.sections for name, check in CHECKS.items()}
         write_reports(result, results.new, console="", rubric=rubric, figures=figures, docs=docs)
         (results.new / CONSOLE).unlink()
-        results.commit(keep=(EVIDENCE, CONSOLE))
+        if of is not None:
+            _copy(of, results)
+        results.commit(keep=(EVIDENCE, CONSOLE) if of is None else ())
+
+
+def _copy(folder: Path, results: Results) -> None:
+    results.evidence.rmdir()
+    try:
+        if (folder / EVIDENCE).is_dir():
+            shutil.copytree(folder / EVIDENCE, results.evidence, symlinks=True)
+        if (folder / CONSOLE).is_file():
+            shutil.copy(folder / CONSOLE, results.new / CONSOLE)
+    except (OSError, shutil.Error) as error:
+        raise OutputError(f"cannot copy {folder}: {error}") from error
 
 
 @dataclass(frozen=True, kw_only=True)
