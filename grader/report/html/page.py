@@ -107,6 +107,7 @@ def render_html(
 
 def load_template() -> Template:
     """Return the page's template; to compile it takes longer than to fill it in."""
+    environment().get_template("card.html")  # which it uses
     return environment().get_template("report.html")
 
 
