@@ -248,7 +248,10 @@ def _rubric_findings(result: GradingResult, rubric: LoadedRubric) -> Iterator[Fi
         return
     origin = RUBRIC_FROM[result.rubric_origin]
     words = f"it was judged by {used.id} with digest sha256:{used.digest}{f' ({origin})' if origin else ''}"
-    yield Finding(about="rubric", text=f"{words}, not by {lab.id} with digest sha256:{rubric.digest}")
+    other = (
+        f"{lab.id} with digest sha256:{rubric.digest}; give the course's own with --rubric, if it is another"
+    )
+    yield Finding(about="rubric", text=f"{words}, not by {other}")
 
 
 def _signature_findings(folder: Path, allowed: Path | None) -> Iterator[Finding]:

@@ -56,23 +56,39 @@ def test_the_template_of_gitlab_is_plain_shell(tmp_path):
         assert _faults(PROGRAMS / "shellcheck", "--shell", "sh", script) == ""
 
 
+def _workflows_in_docs(folder: Path) -> list[Path]:
+    """Write the whole workflows that pages show into a folder."""
+    folder.mkdir()
+    for page in (ROOT / "docs").rglob("*.md"):
+        blocks = re.findall(
+            r"^```yaml\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
+        )
+        for number, block in enumerate(blocks):
+            if re.search(r"^on:", block, re.MULTILINE) and "\njobs:" in block:
+                (folder / f"{page.stem}-{number}.yml").write_text(block, encoding="utf-8")
+    return sorted(folder.iterdir())
+
+
 def test_no_security_fault_is_known_of_the_workflows(tmp_path):
     """The examples name this action by its tag: users of hashes are told how. Everything else is pinned."""
     (tmp_path / "zizmor.yml").write_text(
         "rules:\n  unpinned-uses:\n    config:\n      policies:\n"
         "        OWNER/ros-lab-grader: ref-pin\n        '*': hash-pin\n"
     )
-    assert (
-        _faults(
-            PROGRAMS / "zizmor",
-            "--offline",
-            "--config",
-            tmp_path / "zizmor.yml",
-            ROOT / "action.yml",
-            *EXAMPLES,
-        )
-        == ""
-    )
+    shown = _workflows_in_docs(tmp_path / "docs")
+    assert len(shown) > 1
+    zizmor = (PROGRAMS / "zizmor", "--offline", "--config", tmp_path / "zizmor.yml")
+    assert _faults(*zizmor, ROOT / "action.yml", *EXAMPLES, *shown) == ""
+    schema = ("--builtin-schema", "vendor.github-workflows")
+    assert _faults(PROGRAMS / "check-jsonschema", *schema, *shown) == ""
+
+
+def test_what_the_docs_use_of_others_is_pinned_to_commits():
+    docs = {path: path.read_text(encoding="utf-8") for path in (ROOT / "docs").rglob("*.md")}
+    used = [(path.name, use) for path, text in docs.items() for use in re.findall(r"\buses: *(\S+)", text)]
+    others = [(name, use) for name, use in used if not use.startswith(("OWNER/", "./"))]
+    assert others
+    assert [one for one in others if not re.search(r"@[0-9a-f]{40}$", one[1])] == []
 
 
 def test_no_input_is_pasted_into_a_script():
