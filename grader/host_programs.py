@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 import sys
 from collections.abc import Mapping
 from functools import lru_cache
@@ -24,6 +25,9 @@ _SUFFIXES = (".exe", "") if sys.platform == "win32" else ("",)
 _MODULE = "import sys; sys.path[:] = filter(None, sys.path); from {} import main; sys.exit(main())"
 HOST_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 HOST_ENV = {"PATH": HOST_PATH, "LANG": "C.UTF-8"}
+RESOLVE_S = 5
+LOCALHOST, LOCALHOST_HINT = "localhost", "echo '127.0.0.1 localhost' >> /etc/hosts"
+"""Without a sandbox, which has a file of its own, roslaunch asks the machine for its address, and ends without one."""
 
 
 LOADING = {
@@ -69,6 +73,28 @@ def module_command(name: str) -> list[str]:
     """Return the command that calls `main` of one of the grader's modules. `python -m` would look in the current
     folder first, for Python's own modules too."""
     return [sys.executable, "-c", _MODULE.format(name)]
+
+
+@lru_cache(maxsize=4)
+def resolves(name: str) -> bool:
+    """Return whether this machine knows an address of the host; by `getent`, since the resolver has no time limit.
+    Where there is none, nothing is known, and that says yes."""
+    command = [find_host_program("getent") or "/usr/bin/getent", "hosts", name]
+    try:
+        done = subprocess.run(
+            command,
+            env=HOST_ENV,
+            cwd="/",
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=RESOLVE_S,
+        )
+    except subprocess.TimeoutExpired:
+        return False
+    except OSError:
+        return True
+    return done.returncode == 0
 
 
 @lru_cache(maxsize=32)

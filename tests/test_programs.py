@@ -42,7 +42,7 @@ STARTS = {
     ),
     "ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
     "arena/arena_process.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
-    "cli/doctor.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
+    "host_programs.py:resolves": Start("HOST_ENV", "'/'", "nothing"),
     "cli/doctor.py:_modules": Start("ros.env", "'/'", "nothing"),
     "arena/control_groups.py:_move_to_scope": Start(
         "_environment()", "'/'", "nothing: systemd is asked for this process's number"

@@ -26,7 +26,7 @@ from typing_extensions import Self
 from grader.arena.control_groups import Cgroups, find_cgroups
 from grader.arena.sandbox_files import HOME, RECORD, RECORD_INSIDE, RECORD_SHIM, SHIMS, STANDINS
 from grader.errors import HostError, SandboxMissing
-from grader.host_programs import HOST_ENV, find_host_program
+from grader.host_programs import HOST_ENV, LOCALHOST, LOCALHOST_HINT, find_host_program, resolves
 from grader.model import SandboxMode
 from grader.model.record import Record
 from grader.ros_env import RosInstallation
@@ -312,7 +312,8 @@ def choose(mode: SandboxMode) -> Sandbox:
     """Return the sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so.
 
     Raises SandboxMissing where it cannot be known whether there is one, and HostError where the limits that were
-    inherited are too short, or those of students' processes cannot be set: every one would fail.
+    inherited are too short, or those of students' processes cannot be set: every one would fail. So would a launch
+    file without a sandbox where the machine does not know `localhost`.
     """
     from grader.arena.inherited_limits import make_room  # noqa: PLC0415 - elsewhere than on Linux nothing is run
 
@@ -324,6 +325,9 @@ def choose(mode: SandboxMode) -> Sandbox:
     reason = "--sandbox none" if mode == "none" else why_no_sandbox()
     if reason and mode == "require":
         raise SandboxMissing(f"no sandbox on this machine: {reason}", hint=INSTALL_HINT)
+    if reason and not resolves(LOCALHOST):
+        detail = "localhost does not resolve on this machine, and without it roslaunch starts nothing"
+        raise HostError(detail, hint=LOCALHOST_HINT)
     can_drop = os.geteuid() == 0 and find_host_program("setpriv") is not None
     uid = _unprivileged_uid() if can_drop else None
     nesting = not reason and _walls()[1]

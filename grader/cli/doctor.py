@@ -21,7 +21,7 @@ from grader.arena.sandbox import is_shown
 from grader.arena.sandbox_files import missing_packages
 from grader.cli.host_support import Row, platform_rows, sandbox_rows
 from grader.errors import RosMissing
-from grader.host_programs import HOST_ENV, LISTS, find_host_program
+from grader.host_programs import LISTS, LOCALHOST, LOCALHOST_HINT, resolves
 from grader.installable import install_command
 from grader.portable import cores, system, user_id
 from grader.report.terminal import emit, open_console
@@ -245,23 +245,12 @@ def _amount(name: str, size_bytes: int, least_bytes: int, unit: str) -> Row:
 
 
 def _hostname() -> Row:
-    """Look up this host, as ROS nodes do; with getent, since the resolver has no time limit."""
+    """Look up the names by which ROS nodes look for their own machine."""
     name = socket.gethostname()
-    command = [find_host_program("getent") or "/usr/bin/getent", "hosts", name]
-    try:
-        done = subprocess.run(
-            command,
-            env=HOST_ENV,
-            cwd="/",
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            check=False,
-            timeout=5,
-        )
-        found = done.returncode == 0
-    except (OSError, subprocess.TimeoutExpired):
-        found = False
-    if found:
+    if not resolves(LOCALHOST):
+        detail = "localhost does not resolve: without a sandbox, roslaunch cannot start anything"
+        return Row(name="host name", state="limited", detail=detail, fix=LOCALHOST_HINT)
+    if resolves(name):
         return Row(name="host name", state="ok", detail=f"{name} resolves")
     fix = f"echo '127.0.1.1 {name}' >> /etc/hosts"
     return Row(name="host name", state="limited", detail=f"{name} does not resolve", fix=fix)

@@ -183,3 +183,12 @@ def test_limits_are_asked_for_as_the_user_who_gets_them(monkeypatch) -> None:
     finally:
         sandbox.refused_limits.cache_clear()
     assert asked[0][: len(command)] == command
+
+
+def test_without_a_sandbox_the_machine_has_to_know_localhost(monkeypatch) -> None:
+    """`roslaunch` asks for its address; in a sandbox there is a file of its own."""
+    monkeypatch.setattr(sandbox, "resolves", lambda name: name != "localhost")
+    assert sandbox.choose("require").bubblewrap
+    with pytest.raises(HostError, match="localhost does not resolve") as caught:
+        sandbox.choose("none")
+    assert caught.value.hint == "echo '127.0.0.1 localhost' >> /etc/hosts"

@@ -235,6 +235,15 @@ def test_diagnosis_without_ros_names_the_command_that_mends_it(monkeypatch):
     assert {"Python", "git", "sandbox", "memory", "disk", "host name", "encoding"} <= set(rows)
 
 
+def test_doctor_names_a_machine_that_does_not_know_its_own_name(monkeypatch):
+    monkeypatch.setattr(doctor, "resolves", lambda name: name != "localhost")
+    rows = {row.name: row for row in doctor.diagnose()}
+    assert (rows["host name"].state, rows["host name"].fix) == (
+        "limited",
+        "echo '127.0.0.1 localhost' >> /etc/hosts",
+    )
+
+
 def ros_of(*prefixes, env=None):
     """A ROS that a setup.bash brings."""
     about = {"kind": "setup", "where": "x", "distro": "noetic", "python": "python3"}
