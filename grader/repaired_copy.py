@@ -15,7 +15,14 @@ from functools import partial
 from pathlib import Path
 
 from grader.files import temporary_folder
-from grader.judging.repeats_and_repairs import BUILD, DONE_BEFORE_RUNS, concerns, is_used_by, needs_build
+from grader.judging.repeats_and_repairs import (
+    BUILD,
+    DONE_BEFORE_RUNS,
+    concerns,
+    is_used_by,
+    launched_in,
+    needs_build,
+)
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.repair import Repair
@@ -58,19 +65,25 @@ def choose_repairs(
             for one in find_repairs(package.folder, own, wanted_of(rubric, own.asked))
         ]
     counting = [one for one in found if rubric.share_of(one.kind) > 0]
-    built = built or not needs_build(facts)
+    built, launched = built or not needs_build(facts), launched_in(facts)
 
     def helps(one: Repair) -> bool:
-        used = any(is_used_by(rubric.scenarios[name], one, rubric, built=built) for name in lost)
-        return used or any(concerns(one, c, rubric, by_id, built=built) for c in blocked)
+        used = any(
+            is_used_by(rubric.scenarios[name], one, rubric, built=built, launched=launched) for name in lost
+        )
+        return used or any(concerns(one, c, rubric, by_id, built=built, launched=launched) for c in blocked)
 
     chosen = [one for one in counting if one.kind not in DONE_BEFORE_RUNS and helps(one)][:REPAIRS_MAX]
     scenarios = {
         name
         for name in lost
-        if any(is_used_by(rubric.scenarios[name], one, rubric, built=built) for one in chosen)
+        if any(
+            is_used_by(rubric.scenarios[name], one, rubric, built=built, launched=launched) for one in chosen
+        )
     }
-    unblocks = any(concerns(one, c, rubric, by_id, built=built) for c in blocked for one in chosen)
+    unblocks = any(
+        concerns(one, c, rubric, by_id, built=built, launched=launched) for c in blocked for one in chosen
+    )
     before = [one for one in counting if one.kind in DONE_BEFORE_RUNS]
     return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios or unblocks else ((), ())
 

@@ -136,7 +136,14 @@ def _slip_for(package: PackageFacts, node: LaunchNode, name: str) -> Slip | None
     if slip is None and node.type == name and node.pkg != package.name:
         why = f'pkg="{node.pkg}" is another package than that of {name}'
         return Slip(node.file, node.line, why, f'write pkg="{package.name}"')
+    written = PurePosixPath(node.type or "")
+    if slip is None and written.suffix in SOURCES and written.stem == PurePosixPath(name).stem:
+        why = f'type="{written}" is a source of C++, which nothing can start'
+        return Slip(node.file, node.line, why, f'write type="{name}"')
     return slip
+
+
+SOURCES = (".cpp", ".cc", ".cxx", ".c")
 
 
 def _is_meant(node: LaunchNode, name: str) -> bool:
@@ -152,6 +159,14 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
         cited = (FileCitation(file=test.file, line=test.line),)
         message = f"{message}: a <test> is started by rostest only"
         return failed(message, hint="write <node …>", citations=cited)
+    commented = (line for kind, line in file.commented if kind in {name, PurePosixPath(name).stem})
+    if line := next(commented, None):
+        cited = (FileCitation(file=file.path, line=line),)
+        message = f"{message}: the one in line {line} stands in a comment, which roslaunch skips"
+        written = f'<node pkg="{pkg}" type="{name}" name="…" output="screen"/>'
+        return failed(
+            message, hint=f"take it out of the comment (`<!--` and `-->`): {written}", citations=cited
+        )
     unknown = (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node")
     for tag, line in unknown:
         cited = (FileCitation(file=file.path, line=line),)

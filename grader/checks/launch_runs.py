@@ -381,6 +381,10 @@ def _in_namespace(
     lines = sorted({(n.file or file.path, n.line) for n in nodes if n.namespace != "/"})
     cited = tuple(FileCitation(file=path, line=line) for path, line in lines)
     hint = f"{move}: in it, {name} becomes /{first}/{name}"
+    moved = sorted(
+        {new for n in nodes for old, new in n.remaps if old.lstrip("/") == name and new.lstrip("/") != name}
+    )
+    hint += f"; then remove the <remap>s of {name}, which call it {join_words(moved)}" if moved else ""
     return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited[:4]})
 
 

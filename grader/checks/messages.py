@@ -107,15 +107,16 @@ def _no_text(package: PackageFacts, run: Run, heard: Sequence[Channel], params: 
 def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict | None:
     """The first message that does not have the template's words, or no number where the time belongs."""
     fits, loose = (message_pattern(params.template, value) for value in (NUMBER, ".*?"))
-    wrong = (
+    wrong = [
         (t, text)
         for c in heard
         for t, text in zip(c.times_ns, c.data, strict=True)
         if not fits.fullmatch(text)
-    )
-    at_ns, text = next(wrong, (0, ""))
-    if not at_ns:
+    ]
+    if not wrong:
         return None
+    at_ns, text = wrong[0]
+    count = sum(len(c.data) for c in heard)
     found = loose.fullmatch(text)
     part = in_one_line(found[1]) if found and found.groups() else ""
     wanted = in_words(params.template)
@@ -128,6 +129,7 @@ def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdic
         message = f"a message says {part!r} where the time in seconds belongs: {in_one_line(text)!r}, not '{wanted}'"
     else:
         message = f"a message reads {in_one_line(text)!r}, not '{wanted}'"
+    message += f" ({len(wrong)} of {count} are wrong)" if len(wrong) < count else ""
     cited = cite(run, params.topic, at_ns, at_ns)
     value = TIMED if SECONDS in params.template else ""
     hint = f'publish "{form}"{value}'

@@ -19,7 +19,7 @@ from grader.checks.support.text import LOOP, both, loop_rate
 from grader.checks.support.topics import Sender, cite, nothing_sent, sent_by, whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
-from grader.model.package import PackageFacts
+from grader.model.package import PackageFacts, PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import hertz, plural, seconds, significant
@@ -128,7 +128,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     verdict = (
         _flood(found, run, package, params)
         or _short(found, run, package, params)
-        or _excuse_lateness(_uneven(found, run, package, params), found, run, params)
+        or _excuse_lateness(_uneven(found, run, package, params), found, run, package, params)
         or passed(f"{params.topic} runs at {hertz(found.mean_hz)}, evenly")
     )
     citations = (*verdict.citations, cite(run, params.topic, found.times_ns[0], found.times_ns[-1]))
@@ -138,10 +138,12 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
-def _excuse_lateness(uneven: Verdict | None, found: Rhythm, run: Run, params: RateParams) -> Verdict | None:
-    """The verdict, unless the machine was late itself."""
-    if uneven is None:
-        return None
+def _excuse_lateness(
+    uneven: Verdict | None, found: Rhythm, run: Run, package: PackageFacts, params: RateParams
+) -> Verdict | None:
+    """The verdict, unless the machine was late itself: a rate that a script asks for is none of the machine's."""
+    if uneven is None or _asked_number(found.mean_hz, run, package, params) is not None:
+        return uneven
     why = partial(_why_late, found, params=params)
     return excused(uneven, run, found.times_ns[0], found.until_ns, why)
 
@@ -252,9 +254,7 @@ def _by_number(
     verdict: Verdict, mean_hz: float, run: Run, package: PackageFacts, params: RateParams
 ) -> Verdict | None:
     """Name the line where the node's script asks for the rate that was measured."""
-    channels = run.student_channels(params.topic)
-    asked = [s for c in channels for s in slips_of(package, run, c.callerid, "rate-number")]
-    slip = next((s for s in asked if abs(float(s.message) - mean_hz) < NUMBER_SHARE * mean_hz), None)
+    slip = _asked_number(mean_hz, run, package, params)
     if slip is None:
         return None
     where = f"{slip.file}, line {slip.line}"
@@ -264,6 +264,14 @@ def _by_number(
     )
     cited = (FileCitation(file=slip.file, line=slip.line),)
     return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+
+
+def _asked_number(mean_hz: float, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
+    """Return where a script asks for the rate that was measured, which is not the right one."""
+    channels = run.student_channels(params.topic)
+    asked = [s for c in channels for s in slips_of(package, run, c.callerid, "rate-number")]
+    wrong = (s for s in asked if not params.low_hz <= float(s.message) <= params.high_hz)
+    return next((s for s in wrong if abs(float(s.message) - mean_hz) < NUMBER_SHARE * mean_hz), None)
 
 
 def _by_parameter(verdict: Verdict, run: Run, package: PackageFacts, params: RateParams) -> Verdict:

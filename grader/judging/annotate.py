@@ -41,6 +41,8 @@ from grader.rubric.scenario import Scenario
 from grader.wording import join_words, significant
 
 POINTS_MAX = 3
+OF_TOPICS = ("hears", "topic-type")
+"""Checks that say by themselves that a node is on another topic, and not of which type."""
 RATE_SHARE = 0.05
 """By so much a rate that a script asks for may differ from the right one."""
 OF_FILES = ("build", "cmake", "manifest")
@@ -115,20 +117,21 @@ def _cites(criterion: CriterionResult, place: FileCitation) -> bool:
 
 
 def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Facts) -> dict[str, Verdict]:
-    """Return the verdicts; where a node ended of an error, the hint goes on with what its script shows of the criteria
-    that were not reached."""
+    """Return the verdicts; where there was nothing to judge of a node, the hint goes on with what its script shows of
+    the criteria that were not reached."""
     later: dict[str, list[str]] = {}
     for criterion in rubric.criteria:
         verdict = verdicts[criterion.id]
-        ended = verdict.status.is_lost and verdict.unjudged and bool(verdict.cause)
+        unreached = verdict.status.is_lost and (verdict.unjudged or criterion.check in OF_TOPICS)
         package = facts.package_of(criterion)
         if package is None or criterion.visibility != "visible":
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
         if verdict.blocked_by and criterion.check == "launch-runs":
             told += _later_in_launch(criterion, package, facts)
-        elif ended:
-            told += [one for one in _later_faults(criterion, rubric, package) if one not in told]
+        elif unreached:
+            found = _later_faults(criterion, rubric, package, known=not verdict.cause)
+            told += [one for one in found if one not in told]
     return {
         name: verdict.model_copy(update={"hint": f"{verdict.hint}; then {join_words(later[name])}"})
         if later.get(name) and verdict.status.is_lost and verdict.hint
@@ -137,8 +140,13 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
     }
 
 
-def _later_faults(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> Iterator[str]:
-    """Yield what the criterion would be lost by next, as far as its scripts say so in plain values."""
+def _later_faults(
+    criterion: Criterion, rubric: Rubric, package: PackageFacts, *, known: bool
+) -> Iterator[str]:
+    """Yield what the criterion would be lost by next, as far as its scripts say so in plain values.
+
+    `known`: the node ran, so that names are told already, and only what is behind them is not.
+    """
     wanted, scripts = criterion.parameters, _scripts(criterion, rubric, package)
     found = [slip for slip in package.slips if slip.file in scripts]
     topic, of_kind = (
@@ -151,15 +159,25 @@ def _later_faults(criterion: Criterion, rubric: Rubric, package: PackageFacts) -
         hz, numbers = float(str(wanted["rate_hz"])), of_kind.get("rate-number", [])
         if len(numbers) == 1 and abs(float(numbers[0].message) - hz) > RATE_SHARE * hz:
             yield f"make it {significant(hz)} Hz in {_line(numbers[0])}, which asks for {numbers[0].message} Hz"
-    elif criterion.check == "node-name":
+    elif criterion.check == "node-name" and not known:
         own, names = of_kind.get("node-name", []), [str(name) for name in _listed(wanted.get("names"))]
         if len(own) == 1 and names and own[0].message.lstrip("/") not in names:
             yield f"name the node {names[0]} in {_line(own[0])}, not {own[0].message}"
+    elif criterion.check == "hears":
+        scenario = rubric.scenarios.get(criterion.scenario or "")
+        sent = (
+            [probe.type for probe in scenario.probes if probe.topic == topic] if scenario is not None else []
+        )
+        heard, types = of_kind.get("subscriber", []), of_kind.get("subscriber-type", [])
+        elsewhere = len(heard) == len(types) == 1 and f"/{heard[0].message.lstrip('/')}" != topic
+        if sent and elsewhere and types[0].message != sent[0].rpartition("/")[2]:
+            yield f"subscribe with {sent[0]} in {_line(types[0])}, not {types[0].message}"
     elif criterion.check == "topic-type":
         kind = str(wanted.get("type", ""))
-        if len(published) == 1 and not lines:
+        if len(published) == 1 and not lines and not known:
             yield f"publish on {topic} in {_line(published[0])}, not on {published[0].message}"
         types = [one for one in of_kind.get("publisher-type", []) if one.line in lines or len(published) == 1]
+        types = types if not (known and lines) else []
         if len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
             yield f"publish {kind} in {_line(types[0])}, not {types[0].message}"
 
@@ -171,7 +189,8 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     names = {PurePosixPath(str(script)).name for script in _listed(wanted.get("scripts"))}
     if file is None or file.fault is not None:
         return
-    if isinstance(run, Run) and (refused := refusal(run)) and not any(refusals(package, file)):
+    refused = refusal(run) if isinstance(run, Run) else None
+    if refused is not None and "first line" not in refused.hint and not any(refusals(package, file)):
         yield f"{refused.hint}: {refused.why}"
     spaces = {one.namespace.strip("/"): one for one in reversed(file.brings) if one.type in names}
     spaces.pop("", None)

@@ -33,6 +33,7 @@ from grader.judging.facts import NOT_RUN, PACKAGE_RUN, Facts, try_facts, views_o
 from grader.judging.repeats_and_repairs import (
     apply_repaired_copy,
     drop_unrepeated_losses,
+    launched_in,
     needs_build,
     repairs_of,
     split_runs,
@@ -92,7 +93,9 @@ def judge_all_runs(
         on_copy, repairs = judge_facts(rubric, of_copy, checks), repairs_of(rubric, repaired)
         needed = needs_build(of_copy.package)
         built = not needed or was_built(first) or not was_built(repaired)
-        verdicts, uses = apply_repaired_copy(rubric, verdicts, on_copy, repairs, built=built)
+        verdicts, uses = apply_repaired_copy(
+            rubric, verdicts, on_copy, repairs, built=built, launched=launched_in(of_copy.package)
+        )
     verdicts = add_later_faults(verdicts, rubric, facts)
     build = first.get(PACKAGE_RUN)
     shown = {name: show_lines(verdict, build) for name, verdict in verdicts.items()} if build else verdicts

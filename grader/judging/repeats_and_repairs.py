@@ -103,6 +103,7 @@ def apply_repaired_copy(
     repairs: tuple[Repair, ...],
     *,
     built: bool,
+    launched: Collection[str],
 ) -> tuple[dict[str, Verdict], dict[str, Repaired]]:
     """Return the verdicts with what the copy shows, and for each criterion that it changes the repairs behind it.
 
@@ -111,7 +112,7 @@ def apply_repaired_copy(
     """
     verdicts, uses = dict(first), dict[str, Repaired]()
     needs = {
-        c.id: tuple(one for one in repairs if concerns(one, c, rubric, first, built=built))
+        c.id: tuple(one for one in repairs if concerns(one, c, rubric, first, built=built, launched=launched))
         for c in rubric.criteria
     }
     better = {
@@ -143,6 +144,7 @@ def concerns(
     found: Mapping[str, Verdict] | Mapping[str, CriterionResult],
     *,
     built: bool,
+    launched: Collection[str],
 ) -> bool:
     """Return whether the criterion may depend on what was repaired: its run or build uses it, or it, or what blocks it,
     cites the file. What the files of the build lack stays lost, though: the criteria of these files ask for just that.
@@ -151,7 +153,9 @@ def concerns(
     needs no build.
     """
     if criterion.scenario is not None:
-        return is_used_by(rubric.scenarios[criterion.scenario], repair, rubric, built=built)
+        return is_used_by(
+            rubric.scenarios[criterion.scenario], repair, rubric, built=built, launched=launched
+        )
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         wrong = _words(repair.before) - _words(repair.after)
         return bool(wrong & _words(found[criterion.id].message)) or _cites(found[criterion.id], repair)
@@ -162,8 +166,18 @@ def concerns(
     return repair.kind not in OF_BUILDS | SEEN_IN_RUNS and _cites(found[criterion.id], repair)
 
 
-def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric, *, built: bool) -> bool:
-    """Return whether the scenario runs the repaired file, as far as the rubric says. A launch file may run any."""
+def launched_in(package: PackageFacts | None) -> frozenset[str]:
+    """Return the names of the programs that launch files start: what they run is no module of another script."""
+    packages = (package, *package.also) if package is not None else ()
+    files = (file for one in packages for file in one.launch_files)
+    return frozenset(node.type for file in files for node in file.nodes if node.type)
+
+
+def is_used_by(
+    scenario: Scenario, repair: Repair, rubric: Rubric, *, built: bool, launched: Collection[str] = ()
+) -> bool:
+    """Return whether the scenario runs the repaired file, as far as the rubric says. A launch file may run any, and a
+    script may import what is not in `launched`."""
     name, launches = PurePosixPath(repair.file).name, any(start.launch for start in scenario.start)
     known = any(name in _started_files(one) for one in rubric.scenarios.values())
     if repair.kind in DONE_BEFORE_RUNS:
@@ -176,7 +190,7 @@ def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric, *, built: boo
         return True
     if name.endswith((".launch", ".launch.xml")):
         return launches and not known
-    return repair.kind != "launch-type" and (launches or not known)
+    return repair.kind != "launch-type" and (launches or not (known or name in launched))
 
 
 def _started_files(scenario: Scenario) -> set[str]:

@@ -259,6 +259,7 @@ SlipKind = Literal[
     "publisher",
     "publisher-type",
     "subscriber",
+    "subscriber-type",
     "outside-method",
 ]
 
@@ -280,7 +281,7 @@ class PythonSlip(Record):
     a clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C, and behind `: ` how to repair it.
     `outside-method`: a call in a class that stands in none of its methods and uses a name that is not there.
     `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a topic; `message` is
-    the name as written. `publisher-type`: the message type in the line of a `publisher`.
+    the name as written. `publisher-type` and `subscriber-type`: the message type in that line.
     """
 
     file: str
@@ -348,7 +349,8 @@ class LaunchFile(Record):
     file's own. What `roslaunch` makes of it all, with the package's own included files and with `$(arg …)`,
     `$(dirname)` and namespaces resolved: `brings` (nodes), `tests` (`<test>`, which only rostest runs), `params`,
     `loads`, `include_faults` (own files that cannot be included). A path below the package reads
-    `$(find <package>)/…`. `unknown_tags` are tags, with their lines, that roslaunch skips.
+    `$(find <package>)/…`. `unknown_tags` are tags, with their lines, that roslaunch skips, `commented` the `type`s of
+    nodes that stand in a comment.
     """
 
     path: str
@@ -362,6 +364,7 @@ class LaunchFile(Record):
     loads: tuple[LaunchLoad, ...] = ()
     include_faults: tuple[Fault, ...] = ()
     unknown_tags: tuple[tuple[str, int], ...] = ()
+    commented: tuple[tuple[str, int], ...] = ()
 
 
 class InterfaceField(Record):

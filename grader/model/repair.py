@@ -99,7 +99,9 @@ def advice_of(repair: Repair) -> str:
     """Return where and how the repair is done by hand: ``package.xml: below line 9 add `<depend>rospy</depend>` ``."""
     new, added = repair.after.split("\n"), _added(repair.before, repair.after)
     if repair.fix != "; ".join(added):
-        return f"{place_of(repair)}: {repair.fix}"
+        below = len(new) > 1 and new[0] == repair.before and repair.line is not None
+        where = f"{repair.file}: below line {repair.line}," if below else f"{place_of(repair)}:"
+        return f"{where} {repair.fix}"
     code = join_words([line if "`" in line else f"`{line}`" for line in added])
     if repair.before not in (new[0], new[-1]):
         return f"{place_of(repair)}: write {code}"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +18,8 @@ from grader.package.xml import line_of, parse_xml
 _FILES_MAX = 100
 _TAGS_MAX = 20_000
 _VALUE_CHARS_MAX = 4_000
+_COMMENTED_MAX = 50
+_TYPE = re.compile(r"""\btype\s*=\s*["']([^"'\s]{1,200})["']""")
 _SUFFIXES = (".launch", ".launch.xml", ".test")
 _TAGS = frozenset(
     {"arg", "env", "group", "include", "machine", "master", "node", "param", "remap", "rosparam", "test"}
@@ -131,7 +135,16 @@ def _record(path: str, parsed: _Parsed, own: tuple[str, ...], find: Find) -> Lau
         loads=tuple(loaded.loads),
         include_faults=tuple(loaded.faults),
         unknown_tags=tuple(_unknown(parsed.element)),
+        commented=tuple(islice(_commented(parsed.element), _COMMENTED_MAX)),
     )
+
+
+def _commented(root: etree._Element) -> Iterator[tuple[str, int]]:
+    """Yield the `type` of each node that stands in a comment, with its line."""
+    for comment in root.iter(etree.Comment):
+        text, ends = comment.text or "", line_of(comment) or 1  # libxml2 gives a comment's last line
+        for found in _TYPE.finditer(text) if "node" in text else ():
+            yield found[1], ends - text.count("\n", found.start())
 
 
 def _unknown(parent: etree._Element) -> Iterator[tuple[str, int]]:

@@ -49,6 +49,7 @@ NAMES_OF_ROSPY = (
     "wait_for_service"
 )
 ROSPY = frozenset(NAMES_OF_ROSPY.split())
+GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "logerr")
 LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
 CALLED = frozenset({"is_shutdown", "sleep", "spin"})
 ROLES = {
@@ -87,6 +88,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             lambda t: _with_modules(t, types),
             lambda t: _with_imports(t, types),
             _with_attributes,
+            _with_values_called,
             _with_calls,
             _with_callbacks,
             _with_main,
@@ -256,6 +258,8 @@ def _with_attributes(text: str) -> Iterator[Step]:
         if not isinstance(node, ast.Attribute) or _last(node.value) != "rospy" or node.attr in ROSPY:
             continue
         plain = {name.lower(): name for name in ROSPY}
+        if isinstance(node.ctx, ast.Store):
+            continue  # a value is given to it: `rospy.rate = 10`
         meant = plain.get(node.attr.lower()) or next(iter(get_close_matches(node.attr, ROSPY, 1, 0.85)), "")
         span = _span(lines, node)
         if meant and span is not None and not node.attr.startswith("_"):
@@ -264,6 +268,28 @@ def _with_attributes(text: str) -> Iterator[Step]:
             for step in _step("attribute", line + 1, text, after, f"rospy.{node.attr}"):
                 text, lines = step["text"], step["text"].split("\n")
                 yield step
+
+
+def _with_values_called(text: str) -> Iterator[Step]:
+    """`rate = rospy.rate = 10`, for `rate = rospy.Rate(10)`: a value is given to what takes it as an argument."""
+    lines = text.split("\n")
+    for node in ast.walk(ast.parse(text)):
+        target = node.targets[-1] if isinstance(node, ast.Assign) else None
+        if (
+            not isinstance(target, ast.Attribute)
+            or _last(target.value) != "rospy"
+            or not isinstance(node, ast.Assign)
+        ):
+            continue
+        meant = {name.lower(): name for name in GIVEN_ONE}.get(target.attr.lower(), "")
+        begin, value = _span(lines, target), _span(lines, node.value)
+        if meant and begin is not None and value is not None and begin[0] == value[0]:
+            line, start, end = value
+            call = f"rospy.{meant}({lines[line][start:end]})"
+            yield from _step(
+                "value", line + 1, text, _edit(text, [(line, begin[1], end, call)]), f"rospy.{meant}"
+            )
+            return
 
 
 def _with_calls(text: str) -> Iterator[Step]:

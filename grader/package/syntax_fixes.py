@@ -76,6 +76,8 @@ _HABITS = (
     _Habit(r"^\s*(\$|sudo |rosrun |roslaunch |cd |chmod )",
            "this is a command for the terminal, not Python: delete this line"),
     _Habit(r"^\s*(using\s+namespace\b|#\s*include\b)", "this is C++, not Python: delete this line"),
+    _Habit(r"(?<![\w.])(r[^\w\s]spy|ro[^\w\s]py|ros[^\w\s]y|rosp[^\w\s.])\.", "`rospy` is misspelt as `{0}`",
+           ((r"(?<![\w.])(?:r[^\w\s]spy|ro[^\w\s]py|ros[^\w\s]y|rosp[^\w\s.])(?=\.)", "rospy"),)),
     _Habit(r"^\s*>>>", "`>>>` is printed by Python's prompt: leave it out", ((r">>>\s?", ""),)),
     _Habit(r"^\s*//", "a comment begins with `#` in Python", ((r"//+\s*", "# "),)),
     _Habit(r"^\s*/\*", "a comment begins with `#` in Python",

@@ -260,3 +260,18 @@ def test_a_repair_concerns_the_runs_that_use_its_file(file: str, runs: set[str])
     asked = rubric(*ALL, scenarios={"talker": SCENARIO, **launched})
     name = Repair(kind="node-name", file=file, line=1, before="a", after="b", message="m", fix="b")
     assert {s for s, one in asked.scenarios.items() if is_used_by(one, name, asked, built=True)} == runs
+
+
+def test_what_a_launch_file_starts_is_no_module_of_another_script() -> None:
+    launched = {**SCENARIO, "start": [{"name": "all", "launch": "lab.launch"}]}
+    asked = rubric(*ALL, scenarios={"talker": SCENARIO, "lab": launched})
+    repair = Repair(
+        kind="python-syntax", file="src/other.py", line=1, before="a", after="b", message="m", fix="b"
+    )
+    for names, runs in (((), {"talker", "lab"}), (("other.py",), {"lab"})):
+        used = {
+            name
+            for name, one in asked.scenarios.items()
+            if is_used_by(one, repair, asked, built=True, launched=names)
+        }
+        assert used == runs

@@ -197,6 +197,7 @@ def test_what_never_runs_is_known(tmp_path, text, found):
         "publisher",
         "publisher-type",
         "subscriber",
+        "subscriber-type",
     )
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind not in others]
     assert [(s.kind, s.line) for s in slips] == [one[:2] for one in found]
@@ -214,6 +215,7 @@ def test_where_names_of_the_graph_are_written_is_known(tmp_path):
         ("publisher", 3, "/chatter"),
         ("publisher-type", 3, "String"),
         ("subscriber", 5, "~scan"),
+        ("subscriber-type", 5, "LaserScan"),
     ]
 
 

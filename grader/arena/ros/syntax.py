@@ -255,9 +255,9 @@ def graph_names(tree):
         if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
             yield {"line": names[0].lineno, "kind": kind, "message": names[0].value[:TEXT_LIMIT]}
             types = node.args[1:2] or [k.value for k in node.keywords if k.arg == "data_class"]
-            name = dotted(types[0]).rpartition(".")[2] if types and kind == "publisher" else ""
+            name = dotted(types[0]).rpartition(".")[2] if types and kind != "node-name" else ""
             if name.isidentifier():
-                yield {"line": names[0].lineno, "kind": "publisher-type", "message": name}
+                yield {"line": names[0].lineno, "kind": kind + "-type", "message": name}
 
 
 def never_run(tree):

@@ -73,6 +73,8 @@ SLIPS = {
      "write the node's name without a slash"),
     "init_node() has already been called with different arguments": ("`rospy.init_node(…)` is called a second time",
      "one script is one node: call `rospy.init_node(…)` once"),
+    "Inappropriate ioctl for device": ("it reads keys from its terminal, and a node that is started for you has none",
+     "leave the keys out: publish in the loop by itself, or read keys in a node of their own"),
     "not enough arguments for format string": ("the string has more `%` than there are values after it",
      "give one value for each `%` in the string, or remove one"),
     "not all arguments converted during string formatting": ("the string has fewer `%` than there are values after it",

@@ -23,6 +23,7 @@ EXAMINE = "grader.package.source_repair:examine"
 LIMITS = {"memory_bytes": 1 << 30, "cpu_s": 20, "file_bytes": 32 << 20, "answer_bytes": 16 << 20}
 WALL_S = 10.0
 INDENTED_SHOWN = 12
+LINES_SHOWN = 4
 ATTEMPTS = 3
 """A source that crashes Python costs its own repairs, not those of the others."""
 
@@ -40,13 +41,14 @@ Cause = Literal[
     "module",
     "import",
     "attribute",
+    "value",
     "call",
     "callback",
     "guard",
     "main",
     "spin",
 ]
-CALLS = ("attribute", "call", "callback", "guard", "main", "spin")
+CALLS = ("attribute", "value", "call", "callback", "guard", "main", "spin")
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "import"), "missing-import"),
     **dict.fromkeys(CALLS, "missing-call"),
@@ -167,6 +169,17 @@ def _required_indentation(before: str, after: str, first: str = "replace the tab
     return f"{first}start {join_words(begun)}"
 
 
+def _rewritten(before: str, after: str) -> str:
+    """Return how each of several lines is written instead; "" for one line, which the change itself shows."""
+    pairs = list(zip(before.split("\n"), after.split("\n"), strict=False))
+    found = [(number, new.strip()) for number, (old, new) in enumerate(pairs, start=1) if old != new]
+    if len(found) < 2 or before.count("\n") != after.count("\n"):
+        return ""
+    written = [f"in line {number}, write {new}" for number, new in found[1:LINES_SHOWN]]
+    more = f"; {len(found) - LINES_SHOWN} more lines alike" if len(found) > LINES_SHOWN else ""
+    return "; ".join([f"write {found[0][1]}", *written]) + more
+
+
 def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[str, str]:
     """Return what is wrong, and how it is repaired; "" where the changed line says it."""
     first = steps[0]
@@ -207,6 +220,7 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
         "import": (f"{place} uses {word}, which is not imported", ""),
         "module": (f"{place}: messages are not imported from {word}", ""),
         "attribute": (f"{place}: there is no {word}", ""),
+        "value": (f"{place}: {word} is given a value with `=`, and has to be called", ""),
         "call": (f"{place}: {word} is named but not called", f"write {calls}"),
         "callback": (f"{place}: {calls} is called where the function itself is meant", ""),
         "guard": (f"{place}: `__name__` is never {word!r}", ""),
@@ -223,5 +237,6 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
         return said[cause]
     error = first.error
     told = cause_of(error.message, error.text, column=error.column) if error else ""
-    fix = f"delete line {first.line}" if told.endswith("delete this line") else ""
+    fix = _rewritten(before, steps[-1].text) if cause == "python2" else ""
+    fix = f"delete line {first.line}" if told.endswith("delete this line") else fix
     return f"{place}: {told or (error.message if error else 'not Python 3')}", fix
