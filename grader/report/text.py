@@ -172,6 +172,7 @@ _CODE = re.compile(
       | \$\{{\w+\}}\)*
       | (?<![\w./-])[\w./-]*\w\.(?:py|launch|xml|ya?ml|txt|msg|srv|action|cpp|h|hpp|sh|bag|test|csv)(?![\w(/])
       | (?<![\w./])[a-z]\w*/[A-Z]\w*(?![\w/])              # a type: std_msgs/Int8
+      | (?<![\w./])[\w.]+\ [-+*/%]?=\ (?:'[^']*'|\"[^\"]*\"|-?\d[\w.]*)   # an assignment
       | (?<![\w./@-])(?:[A-Za-z]\w*\.)+[A-Za-z_]\w*(?<!e\.g)(?<!i\.e)(?![\w(/])
       | (?<![\w./])\w*[^\W\d]_\w+(?![\w/])
       | \bfrom\ [\w.]+\ import\ \w+

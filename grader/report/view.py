@@ -249,7 +249,7 @@ STEPS = re.compile(r"; (?:and )?(?:then )?")
 ORDERS = re.compile(
     r"""(\S+\ line\ \d+:\ |in\ line\ \d+,\ |first\ )?
     (add|begin|call|change|check|chmod|correct|create|declare|delete|dos2unix|end|fill|fix|git|give|hand|indent|install|keep|let
-    |list|look|make|move|name|open|pass|print|publish|put|remove|rename|replace|run|send|set|start|stop|subscribe|take|try|use|write)\b
+    |list|look|make|move|name|open|pass|print|publish|put|remove|rename|replace|run|send|set|start|stop|subscribe|take|test_\w+|try|use|write)\b
     """,
     re.VERBOSE,
 )

@@ -42,6 +42,7 @@ FLOOD = "`/chatter` runs at about 5,500 Hz instead of 10 Hz; the loop does not s
             'write <node pkg="lab1" type="talker.py" name="t"/>; then build',
             ['<node pkg="lab1" type="talker.py" name="t"/>'],
         ),
+        ("set header.frame_id = 'odom' and x = 5, so it is", ["header.frame_id = 'odom'", "x = 5"]),
         ("/chatter carries std_msgs/String", ["/chatter", "std_msgs/String"]),
         ("a `:` of src/talker.py", [":", "src/talker.py"]),
         ("write #!/usr/bin/env python3 first", ["#!/usr/bin/env python3"]),
@@ -74,6 +75,7 @@ def test_a_fix_with_several_steps_is_told_step_by_step() -> None:
         "src/a.py line 2: write f(1; 2)",
         "add g()",
     ]
+    assert len(steps("test_a[1]: f(1) is 2; test_b: g() is 3")) == 2, "each test that failed for itself"
     assert steps("it is late; grade it") == ["it is late; grade it"], "a reason is no step"
 
 

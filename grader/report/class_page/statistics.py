@@ -67,6 +67,8 @@ def _add(cost: Cost, place: int, line: Line) -> None:
 BINS_MAX = 20
 STEPS = (0.1, 0.2, 0.25, 0.5, 1, 2, 2.5, 5, 10, 20, 25, 50, 100, 200, 250, 500, 1000)
 WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 520, 330, 8, 24, 20
+PHONE = 300
+"""So wide is what a phone has room for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +149,9 @@ def histogram(found: Spread) -> Markup:
             bars.append(svg.text(middle, TOP + room - height - 4, str(one.count), text_anchor="middle"))
     words = "; ".join(one.words for one in bins if one.count)
     title = f"Points of {found.count} submissions"
-    return svg.drawing("histogram", (WIDTH, HEIGHT), title, words, *bars, *_scale(bins, step))
+    return svg.drawing(
+        "histogram", (WIDTH, HEIGHT), title, words, *bars, *_scale(bins, step), shrinks=PHONE / WIDTH
+    )
 
 
 def _scale(bins: Sequence[Bin], step: float) -> list[Markup]:

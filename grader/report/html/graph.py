@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ MOST = 40
 HEIGHT, ROW, COLUMN_GAP, EDGE = 44.0, 66.0, 40.0, 8.0
 LETTER, SMALL_LETTER = 8.2, 6.6
 NAME_CHARS = 32
+ANONYMOUS = re.compile(r"_\d+_\d{10,}$")
 Place = tuple[float, float, float]
 
 
@@ -66,7 +68,8 @@ def _arrow(edge: tuple[str, str, bool]) -> Arrow:
 
 
 def _clip_name(name: str) -> str:
-    return shorten(name, NAME_CHARS)
+    """Return the name, without the number that makes an anonymous node's unique: it only takes room."""
+    return shorten(ANONYMOUS.sub("_…", name), NAME_CHARS)
 
 
 def _width(vertex: str, figure: GraphFigure) -> float:

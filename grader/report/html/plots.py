@@ -69,10 +69,10 @@ def counter_words(figure: CounterFigure) -> str:
 
 
 def wrong_steps(figure: CounterFigure) -> Iterator[str]:
-    """`1, at 12.8 s: …`, as the circles are numbered; the first few."""
+    """`#1, at 12.8 s: …`, as the circles are numbered; the first few."""
     texts = (*figure.texts, *[""] * len(figure.wrong))
     for index, (i, said) in enumerate(zip(figure.wrong[:LABELS_MAX], texts, strict=False), start=1):
-        yield f"{index}, at {number(figure.times_s[i], 2)} s: {said or _step(figure, i)}"
+        yield f"#{index}, at {number(figure.times_s[i], 2)} s: {said or _step(figure, i)}"
     more = len(figure.wrong) - LABELS_MAX
     if more > 0 or figure.more_wrong:
         yield f"… and {max(more, 0) + figure.more_wrong} more"
@@ -176,7 +176,7 @@ def _wrong(figure: CounterFigure, frame: Frame, at: dict[int, tuple[float, float
         x, y = at[i]
         yield element("circle", cx=x, cy=y, r=10, class_="wrong")
         turns = i == 0 or abs(figure.values[i] - figure.values[i - 1]) != 1
-        words = f"{index}: {_step(figure, i)}" if turns and len(figure.wrong) <= TEXTS_MAX else str(index)
+        words = f"#{index}: {_step(figure, i)}" if turns and len(figure.wrong) <= TEXTS_MAX else f"#{index}"
         end = "end" if x > frame.right - 110 else "start"
         above = y - 24 if y - 24 > TOP else y + 28
         yield text(x + (-8 if end == "end" else 8), above, words, class_="alarm", text_anchor=end)

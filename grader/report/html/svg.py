@@ -45,10 +45,12 @@ SHRINKS = 0.72
 """To such a part of its size a drawing shrinks where there is little room; its letters can still be read then."""
 
 
-def drawing(name: str, size: tuple[float, float], title: str, words: str, *children: Markup) -> Markup:
+def drawing(
+    name: str, size: tuple[float, float], title: str, words: str, *children: Markup, shrinks: float = SHRINKS
+) -> Markup:
     """Return the whole `<svg>`: an image to those who cannot see it, with its title and what it shows in words.
 
-    `name` is unique on the page.
+    `name` is unique on the page. Where there is little room, it `shrinks` to such a part of its size.
     """
     width, height = size
     return element(
@@ -59,7 +61,7 @@ def drawing(name: str, size: tuple[float, float], title: str, words: str, *child
         viewBox=f"0 0 {short(width)} {short(height)}",
         width=width,
         height=height,
-        style=f"min-width:{short(SHRINKS * width)}px",
+        style=f"min-width:{short(shrinks * width)}px",
         role="img",
         class_="plot",
         aria_labelledby=f"{name}-title {name}-desc",

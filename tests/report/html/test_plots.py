@@ -129,10 +129,10 @@ def test_a_counter_is_a_sawtooth_with_wraps_marked_and_wrong_steps_circled_and_z
     assert "wrap 127 → 0" in texts(whole)
     for plot in (whole, close):
         assert len(classed(plot, "wrong")) == 1
-        assert "1: 127 → 1" in texts(plot)
+        assert "#1: 127 → 1" in texts(plot)
     assert classed(close, "dots")[0].get("d").count("M") == 13
     assert {"126", "127", "2"} <= set(texts(close))
-    assert list(wrong_steps(counter())) == ["1, at 25.6 s: after 127 comes 1"]
+    assert list(wrong_steps(counter())) == ["#1, at 25.6 s: after 127 comes 1"]
     assert "wraps once correctly (127 → 0); 1 step is wrong" in counter_words(counter())
 
 
@@ -195,6 +195,12 @@ def test_what_is_wrong_in_a_graph_is_drawn_and_named():
     assert len(classed(plot, "missing")) == 1
     assert len(classed(plot, "wrong")) == 2
     assert {"nobody publishes", "not /sender"} <= set(texts(plot))
+
+
+def test_the_number_of_an_anonymous_node_takes_no_room_in_a_graph():
+    edge = Edge(node="/talker_4711_1700000000000", topic="/chatter", publishes=True)
+    plot = graph_plot(graph(nodes=(edge.node,), topics=("/chatter",), edges=(edge,)), "f")
+    assert "/talker_…" in texts(plot)
 
 
 def test_a_flood_has_a_column_for_each_tenth_of_a_second_and_a_line_that_passes():
