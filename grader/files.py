@@ -100,7 +100,7 @@ def _new_beside(target: Path, folder: Path, *, public: bool = False) -> Iterator
         beside = folder / f"{prefix}{secrets.token_hex(6)}"
         file = new_file(beside, public=public)
         if (
-            _try_lock(file.fileno()) and beside.exists()
+            try_lock(file.fileno()) and beside.exists()
         ):  # else another writer has swept it before it was locked
             break
         file.close()
@@ -324,7 +324,7 @@ def _new(prefix: str, place: Path) -> tuple[Path, int]:
             folder = Path(tempfile.mkdtemp(prefix=prefix, dir=place))
             with suppress(FileNotFoundError):
                 descriptor = os.open(folder / MARK, os.O_RDWR | os.O_CREAT | os.O_EXCL | CLOEXEC, 0o600)
-                if _try_lock(descriptor) and (folder / MARK).exists():
+                if try_lock(descriptor) and (folder / MARK).exists():
                     return folder, descriptor
                 os.close(descriptor)
     except OSError as error:
@@ -336,10 +336,12 @@ def _new(prefix: str, place: Path) -> tuple[Path, int]:
     raise HostError(f"temporary folders in {place} do not stay", hint="set TMPDIR to another folder")
 
 
-def _try_lock(descriptor: int) -> bool:
+def try_lock(descriptor: int) -> bool:
+    """Lock a descriptor as `lock` does; True on a file system without locks: there nothing is swept, and its users must
+    not grade the same submission at once."""
     try:
         return lock(descriptor)
-    except OSError:  # a file system without locks: there nothing is swept either
+    except OSError:
         return True
 
 

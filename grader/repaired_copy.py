@@ -95,7 +95,7 @@ def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator
     with temporary_folder("repaired") as folder:
         try:
             main = _repair_copy(
-                submission.package, folder / "main", [r for r in repairs if not _is_of_other(r)]
+                submission.package, folder / "main", [r for r in repairs if not r.file.startswith("../")]
             )
             also = tuple(
                 _repair_copy(package, folder / package.asked, _of(submission, package, repairs))
@@ -105,10 +105,6 @@ def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator
             yield None
             return
         yield submission.model_copy(update={"package": main, "also": also})
-
-
-def _is_of_other(repair: Repair) -> bool:
-    return repair.file.startswith("../")
 
 
 def _of(submission: Submission, package: SourcePackage, repairs: Sequence[Repair]) -> list[Repair]:

@@ -21,7 +21,7 @@ from pydantic import ValidationError
 from typing_extensions import Self
 
 from grader.errors import Busy, EvidenceError
-from grader.files import lock, make_folder, sync, sync_tree, unwritable
+from grader.files import lock, make_folder, sync, sync_tree, try_lock, unwritable
 from grader.model.result import GradingResult
 from grader.model.version import RESULT as FORMAT
 from grader.model.version import UPDATE
@@ -154,7 +154,7 @@ def _locked(folder: Path) -> int:
             descriptor = open_folder(folder)
         except FileNotFoundError:
             continue
-        held = _try_lock(descriptor)
+        held = try_lock(descriptor)
         if held and _is_at(descriptor, folder):
             return descriptor
         close(descriptor)
@@ -173,13 +173,6 @@ def _is_at(descriptor: int, folder: Path) -> bool:
         return os.path.samestat(os.fstat(descriptor), folder.stat())
     except FileNotFoundError:
         return False
-
-
-def _try_lock(descriptor: int) -> bool:
-    try:
-        return lock(descriptor)
-    except OSError:  # a file system without locks: its users must not grade the same submission at once
-        return True
 
 
 def _recover(folder: Path) -> None:

@@ -430,10 +430,6 @@ def next_look_s(live: RunState, until: Until, now_s: float) -> float:
     return min([*ahead, 1.0]) + 0.001
 
 
-def _seen_topics(live: RunState, topics: Iterable[str]) -> list[TopicSeen]:
-    return [live.topics[t] for t in topics if live.topics[t].count]
-
-
 def _talking(live: RunState) -> list[TopicSeen]:
     """Return the topics with messages; log messages do not count, as they say nothing of what else may come."""
     return [seen for topic, seen in live.topics.items() if seen.count and topic != "/rosout"]
@@ -443,7 +439,7 @@ def _window(live: RunState, until: Until, now_s: float) -> bool:
     if until.window_s is None:
         return True
     topics = until.topics or tuple(live.topics)
-    seen = _seen_topics(live, topics)
+    seen = [live.topics[t] for t in topics if live.topics[t].count]
     if not seen:
         return _talks_elsewhere(live, until, now_s)
     if _rates_are_clear(live, until.topics):

@@ -15,6 +15,7 @@ from typing import Any
 
 import yaml
 
+from grader.authoring.mutation.rospy_code import last_name
 from grader.authoring.observe import INTEGER_TYPES, Observed
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -124,15 +125,11 @@ def rubric_text(
         "version": "1",
         "package": package,
     }
-    parts = [HEAD + "".join(f"# NOTE: {_one_line(note)}\n" for note in notes), _block(about)]
+    parts = [HEAD + "".join(f"# NOTE: {_one_line(note)}\n" for note in notes), _dump(about, flow=False)]
     runs = [_indent({name: scenario}) for name, scenario in scenarios.items()]
     parts.append("scenarios:\n" + "\n".join(runs) if runs else "scenarios: {}\n")
     parts.append("criteria:\n" + "\n".join(_indent([criterion]) for criterion in criteria))
     return "\n".join(parts)
-
-
-def _block(data: object) -> str:
-    return _dump(data, flow=False)
 
 
 def _indent(data: object) -> str:
@@ -297,18 +294,12 @@ def _is_node(path: Path) -> bool:
     except (SyntaxError, ValueError, RecursionError):
         return False
     calls = (node.func for node in ast.walk(tree) if isinstance(node, ast.Call))
-    return "init_node" in {_last_name(function) for function in calls}
+    return "init_node" in {last_name(function) for function in calls}
 
 
 def _holds_parameters(path: str) -> bool:
     """By its folder: other YAML files are someone else's, a CI's for instance."""
     return {"config", "cfg", "param", "params", "yaml"} & set(PurePosixPath(path).parts[:-1]) != set()
-
-
-def _last_name(function: ast.expr) -> str:
-    if isinstance(function, ast.Attribute):
-        return function.attr
-    return function.id if isinstance(function, ast.Name) else ""
 
 
 def _name(path: str, taken: set[str]) -> str:

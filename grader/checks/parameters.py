@@ -87,7 +87,7 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
     elif one is None or one.end is None:
         verdict = inconclusive(f"rosparam load {source.path} was not run to its end", hint="grade again")
     else:
-        missing = [name for name in wanted if _is_empty(found, name)]
+        missing = [name for name in wanted if found.get(name) in (None, {})]
         moved = f"the handout puts it at {params.file}; move it there" if source.path != params.file else ""
         verdict = (
             _error(run, one, source.path)
@@ -242,10 +242,6 @@ def _in_its_place(found: dict[str, object], name: str, path: str) -> Verdict | N
             why = f"{above} is the text {shown(value)!r}, so there is no {name}"
             return failed(f"{path} loads, but {why}", hint=f"write a space after each colon: `{last}: …`")
     return None
-
-
-def _is_empty(found: dict[str, object], name: str) -> bool:
-    return found.get(name) in (None, {})
 
 
 class ParamsReadParams(Record):

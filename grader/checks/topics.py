@@ -323,7 +323,10 @@ def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
 
 def _judge_misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:
     """The node is there under another name."""
-    wanted, there = params.name(end), [n for n in _nodes(run) if not is_grader_node(n)]
+    wanted, there = (
+        params.name(end),
+        [n for n in dict.fromkeys(n for _, event in run.graph for n in event.nodes) if not is_grader_node(n)],
+    )
     if not wanted or not there or any(is_called(n, wanted) for n in there):
         return None
     near = near_names(f"/{wanted.lstrip('/')}", there)
@@ -346,10 +349,6 @@ def _not_on_topic(run: Run, end: End, params: ConnectedParams) -> Verdict:
 def _on(run: Run, topic: str, end: End, params: ConnectedParams) -> tuple[str, ...]:
     """Return the nodes that fit this end and were ever on the topic."""
     return nodes_on(run, topic, end, lambda node: _fits(run, node, params.name(end)))
-
-
-def _nodes(run: Run) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(node for _, event in run.graph for node in event.nodes))
 
 
 def _wanted_text(name: str, end: End) -> str:

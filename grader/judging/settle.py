@@ -191,16 +191,13 @@ def _late_by(at: datetime | None, deadline: datetime, policy: Late | None) -> ti
     if at is None:
         return timedelta()
     by = _between(deadline, at)
-    return by if by > _grace(policy) else timedelta()
+    grace = timedelta(minutes=policy.grace_minutes) if policy else timedelta()
+    return by if by > grace else timedelta()
 
 
 def _between(earlier: datetime, later: datetime) -> timedelta:
     """In absolute time: two times of one time zone are subtracted by its clocks otherwise."""
     return later.astimezone(timezone.utc) - earlier.astimezone(timezone.utc)
-
-
-def _grace(policy: Late | None) -> timedelta:
-    return timedelta(minutes=policy.grace_minutes) if policy else timedelta()
 
 
 def _cost(points: float, rubric: Rubric, late: timedelta) -> tuple[float, str]:

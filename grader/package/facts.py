@@ -284,7 +284,9 @@ def read_package(
     """
     entries = read_files(package, interpreters)
     with ThreadPoolExecutor(1) as beside:
-        asked = beside.submit(check_syntax, package.folder, _python_paths(entries))
+        asked = beside.submit(
+            check_syntax, package.folder, [entry.path for entry in entries if _to_check(entry.file)]
+        )
         # the parsers are slow to load, and are loaded while the child reads the scripts
         from grader.package.cmake import read_cmake  # noqa: PLC0415
         from grader.package.launch import read_launch_files  # noqa: PLC0415
@@ -370,10 +372,6 @@ def _interface(folder: Path, entry: Entry) -> Interface:
 
 def _only_here(file: SourceFile) -> bool:
     return "\\udc" in file.path or (file.link or "").startswith("/")
-
-
-def _python_paths(entries: Iterable[Entry]) -> list[str]:
-    return [entry.path for entry in entries if _to_check(entry.file)]
 
 
 def _to_check(file: SourceFile) -> bool:

@@ -123,13 +123,13 @@ def locate(name_or_path: str) -> tuple[Path, str]:
         return path, name_or_path
     found = [lab.path for lab in named_labs(name_or_path)]
     if len(found) > 1:
-        paths = ", ".join(_short(path) for path in found)
+        paths = ", ".join(short_path(path) for path in found)
         raise UsageError(
             f"{len(found)} labs are called {name_or_path}: {paths}",
             hint="give the file, or another id to one of them",
         )
     if found:
-        return found[0], _short(found[0])
+        return found[0], short_path(found[0])
     if path.is_file():
         return path, name_or_path
     known = [lab.id for lab in (*known_labs(), *example_labs())]
@@ -176,7 +176,7 @@ def _write_down(folders: list[Path]) -> None:
     atomic_write(config_file(), "".join(f"{folder}\n" for folder in folders).encode())
 
 
-def _short(path: Path) -> str:
+def short_path(path: Path) -> str:
     """Return the path relative to where the user is, where that is shorter."""
     here = Path.cwd()
     return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)

@@ -36,7 +36,7 @@ from grader.model.mutants import (
 from grader.model.record import Record
 from grader.model.version import MUTANTS
 from grader.rubric.fault_words import model_faults
-from grader.rubric.find import rubrics_folder
+from grader.rubric.find import rubrics_folder, short_path
 from grader.rubric.load import LoadedRubric, refuse_newer
 from grader.rubric.model import Rubric
 from grader.rubric.yaml_lines import Fault, KeyPath, Source, as_map, as_maps, read_source
@@ -82,7 +82,7 @@ def load_mutants(path: Path, rubric: Rubric) -> LoadedMutants:
 
     A criterion that the rubric does not have is not a fault of the file: such a mutant survives.
     """
-    source = read_source(path, _short(path))
+    source = read_source(path, short_path(path))
     if not isinstance(source.data, dict):
         raise RubricError(
             [source.fault((), "a mutants file is a map, beginning with schema: grader.mutants/1")]
@@ -123,11 +123,6 @@ def _operator_faults(path: KeyPath, edit: dict[str, Any]) -> Iterator[Fault]:
         yield (*path, "operator"), f'there is no operator "{name}"{did_you_mean(name, OPERATORS)}'
         return
     yield from model_faults(OPERATORS[name].params, as_map(edit.get("with")), (*path, "with"))
-
-
-def _short(path: Path) -> str:
-    here = Path.cwd()
-    return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)
 
 
 # ---- a first file

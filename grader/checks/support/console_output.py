@@ -263,7 +263,7 @@ def printed_times(run: Run, process: str, texts: Collection[str], template: str)
     Of a flood of texts, some that seem to have been printed are enough to look at.
     """
     streams = [
-        [(_single_spaced(line.text), line.text) for line in lines] for lines in stream_lines(run, process)
+        [(" ".join(line.text.split()), line.text) for line in lines] for lines in stream_lines(run, process)
     ]
     printed_chars = sum(len(line) for lines in streams for _, line in lines)
     most = min(LOOKED_AT, max(LOOKED_AT_LEAST, SEARCHED_CHARS_MAX // (1 + printed_chars)))
@@ -272,10 +272,6 @@ def printed_times(run: Run, process: str, texts: Collection[str], template: str)
         texts = _worth_a_look(texts, streams, most)
     counts = {text: max((_times(lines, text, template) for lines in streams), default=0) for text in texts}
     return Counter({text: count for text, count in counts.items() if count})
-
-
-def _single_spaced(text: str) -> str:
-    return " ".join(text.split())
 
 
 def _worth_a_look(texts: Iterable[str], streams: Iterable[_Lines], most: int) -> list[str]:

@@ -44,7 +44,7 @@ def near_names(wanted: str, names: Iterable[str]) -> tuple[str, ...]:
     """Return those of `names` that look like a slip of `wanted`: case, namespace, separator, a typing error."""
     looked_at = islice(dict.fromkeys(names), NAMES_MAX)
     found = [n for n in looked_at if n != wanted and _is_near(wanted, n)]
-    return tuple(sorted(found, key=lambda n: -_similarity(wanted, n)))
+    return tuple(sorted(found, key=lambda n: -_matcher(wanted, n).ratio()))
 
 
 def _is_near(wanted: str, name: str) -> bool:
@@ -62,10 +62,6 @@ def _is_similar(first: str, second: str) -> bool:
     return all(
         ratio() >= SIMILARITY for ratio in (matcher.real_quick_ratio, matcher.quick_ratio, matcher.ratio)
     )
-
-
-def _similarity(first: str, second: str) -> float:
-    return _matcher(first, second).ratio()
 
 
 def _matcher(first: str, second: str) -> difflib.SequenceMatcher[str]:

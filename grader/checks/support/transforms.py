@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from grader.evidence.run import Channel
 
@@ -90,7 +90,13 @@ class Sent(NamedTuple):
 def sent_on(channels: Sequence[Channel]) -> list[Sent]:
     """Return all transforms of `/tf` and `/tf_static` by time; whose they are says who gives the channels."""
     found = [
-        Sent(time_ns, header["frame_id"], one["child_frame_id"], channel.topic, _transform(one["transform"]))
+        Sent(
+            time_ns,
+            header["frame_id"],
+            one["child_frame_id"],
+            channel.topic,
+            _make_transform(one["transform"]["translation"], one["transform"]["rotation"]),
+        )
         for channel in channels
         if channel.topic in TOPICS
         for time_ns, value in zip(channel.times_ns, channel.values, strict=True)
@@ -98,10 +104,6 @@ def sent_on(channels: Sequence[Channel]) -> list[Sent]:
         if isinstance(one, Mapping) and (header := one.get("header")) and "child_frame_id" in one
     ]
     return sorted(found, key=lambda one: one.time_ns)
-
-
-def _transform(value: Mapping[str, Any]) -> Transform | None:
-    return _make_transform(value["translation"], value["rotation"])
 
 
 def _make_transform(at: Mapping[str, float], turn: Mapping[str, float]) -> Transform | None:

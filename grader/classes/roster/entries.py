@@ -45,7 +45,11 @@ def local_fault(source: str, base: Path, local: Local) -> str:
         if places and local.remote_only:
             return REFUSED
         roots = [folder.resolve() for folder in (base, *local.folders)]
-        return "" if all(_is_below(place.resolve(), roots) for place in places) else OUT
+        return (
+            ""
+            if all(any(place.resolve().is_relative_to(root) for root in roots) for place in places)
+            else OUT
+        )
     except (OSError, ValueError, RuntimeError):
         return "is not a path that can be followed"
 
@@ -65,10 +69,6 @@ def _paths_written(source: str) -> list[Path]:
         path = f"/{rest.partition('/')[2]}"
         return [Path(path), Path(unquote(path))]
     return [Path(source)] if Path(source).is_absolute() else []
-
-
-def _is_below(place: Path, roots: Sequence[Path]) -> bool:
-    return any(place.is_relative_to(root) for root in roots)
 
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://|[^/\s@]+@[^/\s:]+:|[\w.-]{2,}:(?!//)\S")

@@ -306,7 +306,8 @@ def heard_figures(run: Run, params: HearsParams) -> Iterator[HeardFigure]:
     in_turn = chosen(places)
     find = line_finder(probes, lines, params.template)
     found = [
-        None if not own else find(own[0] if turn is None else turn) for own, turn in _both(places, in_turn)
+        None if not own else find(own[0] if turn is None else turn)
+        for own, turn in zip(places, in_turn, strict=True)
     ]
     kept = _shown_probes(found)
     yield HeardFigure(
@@ -315,12 +316,6 @@ def heard_figures(run: Run, params: HearsParams) -> Iterator[HeardFigure]:
         left_out=len(probes) - len(kept),
         out_of_order=all(places) and None in in_turn,
     )
-
-
-def _both(
-    places: Sequence[tuple[int, ...]], in_turn: Sequence[int | None]
-) -> Iterator[tuple[tuple[int, ...], int | None]]:
-    return zip(places, in_turn, strict=True)
 
 
 def _row(run: Run, topic: str, probe: Probe, line: Line | None) -> Heard:

@@ -28,7 +28,11 @@ def graph_plot(figure: GraphFigure, name: str) -> Markup | None:
     if not vertices or len(vertices) > MOST or not (figure.edges or figure.wrong):
         return None
     known = set(vertices)
-    arrows = [arrow for arrow in map(_arrow, _edges(figure)) if known.issuperset(arrow)]
+    arrows = [
+        arrow
+        for arrow in map(_arrow, ((edge.node, edge.topic, edge.publishes) for edge in figure.edges))
+        if known.issuperset(arrow)
+    ]
     layers = layered(vertices, arrows)
     places, size = _places(layers, figure)
     children = [_heads(name)]
@@ -56,10 +60,6 @@ def graph_rows(figure: GraphFigure) -> Iterator[tuple[str, str, str, str]]:
             ", ".join(publishers) or "none",
             ", ".join(listeners) or "none",
         )
-
-
-def _edges(figure: GraphFigure) -> Iterator[tuple[str, str, bool]]:
-    return ((edge.node, edge.topic, edge.publishes) for edge in figure.edges)
 
 
 def _arrow(edge: tuple[str, str, bool]) -> Arrow:
