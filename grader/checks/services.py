@@ -13,12 +13,20 @@ from grader.checks.support.exit_causes import HEADING, Traceback, explain_end, e
 from grader.checks.support.fields import differences, fields_text
 from grader.checks.support.processes import GlobalName, TypeName, life_of, plain_type
 from grader.checks.support.text import SERVICE, SPIN, imports, near_names, service_call, shown
-from grader.checks.support.topics import cite, no_node
+from grader.checks.support.topics import cite, no_node, why_unreached
 from grader.evidence.events import MISFIT
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import (
+    EvidenceCitation,
+    FileCitation,
+    Verdict,
+    failed,
+    inconclusive,
+    passed,
+    unjudged,
+)
 from grader.wording import join_words, plural
 
 LOGGERS = ("/get_loggers", "/set_logger_level")
@@ -246,6 +254,10 @@ def not_offered(package: PackageFacts, run: Run, service: str) -> Verdict:
         return failed(message, hint=_rename_hint(service, near[0], found[near[0]].node))
     if absent := no_node(package, run, f"there is no service {service}"):
         return absent
+    if (slip := why_unreached(package, run)) and not found:
+        hint = f"write {service_call(service, '…, callback')} where the script comes to: before the loop or {SPIN}"
+        verdict = failed(f"no node offers {service}: {slip.message}", hint=hint)
+        return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
     others = f"; it offers {join_words(found)}" if found else ""
     hint = f"add {service_call(service, '…, callback')} before the loop or {SPIN}"
     return failed(f"no node offers {service}{others}", hint=hint)

@@ -163,7 +163,8 @@ def _reference(test: RubricTest) -> Iterator[Text]:
 def _open(mutant: MutantResult) -> Iterator[Text]:
     """A mutant that was not killed."""
     yield Text(f"{mutant.state}: {visible(mutant.label)}", "bold red")
-    yield Text(f"  {visible(mutant.mistake)}")
+    if mutant.mistake:
+        yield Text(f"  {visible(mutant.mistake)}")
     if mutant.error:
         yield Text(f"  not graded: {line(mutant.error, TEXT_CHARS)}")
     for words, names in (
@@ -223,7 +224,7 @@ def write_example(lab: str, folder: Path, mistake: str | None) -> None:
     if wanted is None:
         say(f"{package}: a correct package for {loaded.rubric.id}")
     else:
-        say(f"{package}: a package for {loaded.rubric.id} with a mistake: {wanted.mistake}")
+        say(f"{package}: a package for {loaded.rubric.id} with a mistake: {wanted.mistake or wanted.label}")
 
 
 def list_mistakes(lab: str) -> None:

@@ -177,7 +177,9 @@ class Planned:
         """What is wrong with the package, in a sentence."""
         if self.mutant.summary:
             return self.mutant.summary
-        mistakes = (OPERATORS[name].mistake for name in self.mutant.operators)
+        mistakes = [OPERATORS[name].mistake for name in self.mutant.operators]
+        if not mistakes:
+            return ""
         return "The student " + " and ".join(words[:1].lower() + words[1:] for words in mistakes) + "."
 
 

@@ -134,7 +134,7 @@ def _namespaced_node(package: PackageFacts, run: Run, topic: str) -> LaunchNode 
 def _not_advertised(package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict]) -> Verdict:
     published, what = published_topics(run), f"no message came on {topic}"
     measured = join_words(published) or "no topic"
-    if slip := _why_unreached(package, run):
+    if slip := why_unreached(package, run):
         verdict = of_node(f"{what}: {slip.message}", measured=measured, hint=_reach_hint(slip))
         return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
     hint = f"add {publisher(topic)} and publish in the loop"
@@ -152,7 +152,7 @@ def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Calla
     message = f"{what}, although it is advertised"
     if end := explain_error(package, run):
         return end.verdict(of_node, f"{message}: an error comes first: {end.cause}", measured="no message")
-    if slip := _why_unreached(package, run):
+    if slip := why_unreached(package, run):
         verdict = of_node(f"{message}: {slip.message}", measured="no message", hint=_reach_hint(slip))
         return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
     if deaf := unheard(run):
@@ -205,8 +205,8 @@ def explain_by_unheard_topic(
     return verdict.model_copy(update={**update, "citations": (*verdict.citations, cited)})
 
 
-def _why_unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
-    """Return why a script that runs does not come to its `publish(…)`."""
+def why_unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
+    """Return why a script that runs does not come to its `publish(…)`, or to what it offers."""
     scripts = {one.start.script for one in lives(run)}
     kinds = ("never-reached", "never-called", "spin-in-loop")
     return next((s for s in package.slips if s.file in scripts and s.kind in kinds), None)
