@@ -257,7 +257,7 @@ class Requirements:
         named = verdict.unjudged and any(text in found.message for text in _paths(self._criteria[required]))
         if beside and not named and not _lines(verdict) & _lines(found):
             return False
-        there = found.silent or (
+        there = (found.silent and self._criteria[required].scenario == criterion.scenario) or (
             check is not None and check.of_lives and not self._is_below(required, criterion)
         )
         if there and not verdict.unjudged and not verdict.cause and _cause(verdict) not in found.message:

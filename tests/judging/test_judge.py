@@ -265,6 +265,28 @@ def test_another_name_is_no_reason_for_silence() -> None:
     assert found["rate"].blocked_by == found["says"].blocked_by == "node"
 
 
+def test_what_another_run_lost_is_a_reason_for_a_program_that_prints_nothing() -> None:
+    """A client prints nothing where the server, judged in a run of its own, offers no service."""
+    offers = {
+        "id": "offers",
+        "check": "service",
+        "with": {"service": "/add", "type": "a/Add"},
+        "scenario": "server",
+    }
+    says = {
+        "id": "says",
+        "check": "prints",
+        "with": {"process": "client", "text": "sum"},
+        "scenario": "client",
+    }
+    runs = {
+        name: {"processes": [{"name": name, "nodes": [f"/{name}"], "stopped_by": "INT", "exit_s": 9}]}
+        for name in ("server", "client")
+    }
+    found = results({"runs": runs, "package": PACKAGE}, offers, {**says, "requires": ["offers"]})
+    assert statuses(found) == {"offers": "fail", "says": "blocked"}
+
+
 def test_what_was_seen_of_a_call_is_no_reason_for_a_program_that_prints_nothing() -> None:
     other = {
         "id": "other",
