@@ -18,8 +18,9 @@ from grader.checks.build import explain_by_build
 from grader.checks.registry import NotRecorded
 from grader.checks.support.exit_causes import SYNTAX, explain_by_exception
 from grader.checks.support.parameters import explain_by_unread_parameter
-from grader.checks.support.text import texts_in
-from grader.checks.support.topics import account_for_losses, explain_by_unheard_topic
+from grader.checks.support.processes import plain_type
+from grader.checks.support.text import near_names, texts_in
+from grader.checks.support.topics import SYSTEM_TOPICS, account_for_losses, explain_by_unheard_topic
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judging.annotate import (
@@ -116,8 +117,37 @@ def judge_facts(rubric: Rubric, facts: Facts, checks: Mapping[str, Check] = CHEC
     requirements = Requirements(rubric, checks)
     for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
         verdict = _with_made_up(rubric, criteria[name], verdict_of(criteria[name], facts, checks))
-        requirements.verdicts[name] = requirements.apply(criteria[name], verdict)
+        applied = requirements.apply(criteria[name], verdict)
+        requirements.verdicts[name] = (
+            _seen_elsewhere(rubric, criteria[name], applied, facts, checks) or applied
+        )
     return requirements.verdicts
+
+
+def _seen_elsewhere(
+    rubric: Rubric, criterion: Criterion, verdict: Verdict, facts: Facts, checks: Mapping[str, Check]
+) -> Verdict | None:
+    """Return what is wrong besides with the messages of a topic that is missing, where they come on another topic;
+    None where nothing is, or where it is not plain which topic that is."""
+    root = next((c for c in rubric.criteria if c.id == verdict.blocked_by), None)
+    run = facts.runs.get(criterion.scenario or "")
+    topic = root.parameters.get("topic") if root is not None else None
+    if run is None or not isinstance(topic, str) or criterion.parameters.get("topic") != topic:
+        return None
+    known = {text for one in rubric.criteria for text in texts_in(one.parameters)}
+    sent = {c.topic: plain_type(c.type) for c in run.student_channels() if c.messages}
+    others = [name for name in sent if name not in known | SYSTEM_TOPICS]
+    wanted = str(root.parameters.get("type")) if root is not None else ""
+    others = [name for name in others if sent[name] == wanted] or others
+    if topic in sent or len(others) != 1 or near_names(topic, others):  # a slip is repaired on a copy
+        return None
+    elsewhere = criterion.model_copy(update={"parameters": {**criterion.parameters, "topic": others[0]}})
+    seen = _with_made_up(rubric, criterion, verdict_of(elsewhere, facts, checks))
+    if seen.unjudged or seen.status not in {Status.FAIL, Status.PARTIAL}:
+        return None
+    message = f"on {others[0]}, which comes in place of {topic}: {seen.message}"
+    update = {"status": Status.FAIL, "score": 0.0, "message": message, "timing": False}
+    return seen.model_copy(update={**update, "expected": verdict.expected})
 
 
 def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Verdict:

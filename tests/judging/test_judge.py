@@ -306,6 +306,28 @@ def test_what_was_seen_of_a_call_is_no_reason_for_a_program_that_prints_nothing(
     assert statuses(found) == {"other": "fail", "says": "fail"}
 
 
+@pytest.mark.parametrize(
+    ("topics", "status", "message"),
+    [
+        ([{"topic": "/blabla", "count": 13, "rate_hz": 2}], "fail",
+         "on /blabla, which comes in place of /chatter: /blabla is too slow"),
+        ([{"topic": "/blabla", "count": 61}], "blocked", "blocked by chatter"),
+        ([{"topic": "/blabla", "count": 13, "rate_hz": 2}, {"topic": "/other", "count": 13}], "blocked", "blocked by"),
+        ([{"topic": "/blabla", "count": 13, "rate_hz": 2},
+          {"topic": "/number", "type": "std_msgs/Int8", "count": 9, "values": {"count_from": 0}}], "fail", "on "),
+        ([{"topic": "/chater", "count": 13, "rate_hz": 2}], "blocked", "blocked by chatter"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_on_another_topic_is_named_behind_the_topic(
+    topics: list[dict[str, Any]], status: str, message: str
+) -> None:
+    found = results({"runs": {"talker": {**GOOD_RUN, "topics": topics}}, "package": PACKAGE})
+    assert found["chatter"].status is Status.FAIL
+    assert found["rate"].status.value == status
+    assert found["rate"].message.startswith(message)
+    assert found["rate"].points == 0
+
+
 def test_a_node_that_ended_tells_what_its_script_would_lose_next() -> None:
     """As far as it is plain in the source: rates, topics, types and names behind the error that came first."""
     script = "src/numeric_talker.py"
