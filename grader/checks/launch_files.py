@@ -11,6 +11,7 @@ from grader.checks.registry import LaunchName, ProgramName, check
 from grader.checks.support.launch import (
     Slip,
     died,
+    find_launch,
     has_program,
     illegal_name,
     node_slip,
@@ -73,7 +74,7 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
     expected = f"{params.launch}: <launch> at its root, and {nodes}"
     file = read_launch(package, params.launch, wanted)
     if isinstance(file, Verdict):
-        return file.about(expected=expected)
+        return _with_next(file, package, params).about(expected=expected)
     refused = next(refusals(package, file), None)
     verdict = _all_lacking(package, file, params, refused) or passed(
         f"{file.path} has a <node> for {join_words(wanted)}", hint=_advice(package, file)
@@ -82,6 +83,30 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
     citations = verdict.citations or (FileCitation(file=file.path, line=1),)
     measured = seen if file.brings else "no <node>"
     return verdict.about(expected=expected, measured=measured, citations=citations)
+
+
+def _with_next(verdict: Verdict, package: PackageFacts, params: LaunchXmlParams) -> Verdict:
+    """Return the verdict on a file that is not well-formed with what is wrong besides, as far as nodes can be read."""
+    file = find_launch(package, params.launch)
+    names = [PurePosixPath(script).name for script in params.scripts]
+    found = (
+        _slip_for(package, node.model_copy(update={"file": node.file or file.path}), name)
+        for node in (file.readable if file is not None else ())
+        for name in names
+        if file is not None
+        and file.fault is not None
+        and node.line != file.fault.line
+        and _is_meant(node, name)
+    )
+    slips = list(dict.fromkeys(slip for slip in found if slip is not None))
+    if not slips:
+        return verdict
+    message = f"{verdict.message}; with that repaired, {'; '.join(f'line {s.line}: {s.why}' for s in slips)}"
+    hint = "; then ".join((verdict.hint, *dict.fromkeys(f"in line {s.line} {s.fix}" for s in slips)))
+    cited = tuple(FileCitation(file=s.file, line=s.line) for s in slips)
+    return verdict.model_copy(
+        update={"message": message, "hint": hint, "citations": (*verdict.citations, *cited)}
+    )
 
 
 def _all_lacking(

@@ -134,6 +134,9 @@ def _seen_elsewhere(
     topic = root.parameters.get("topic") if root is not None else None
     if run is None or not isinstance(topic, str) or criterion.parameters.get("topic") != topic:
         return None
+    package = facts.package_of(criterion)
+    if criterion.check == "rate" and package and any(s.kind == "rate-number" for s in package.slips):
+        return None  # the script tells it, however briefly the run was watched
     known = {text for one in rubric.criteria for text in texts_in(one.parameters)}
     sent = {c.topic: plain_type(c.type) for c in run.student_channels() if c.messages}
     others = [name for name in sent if name not in known | SYSTEM_TOPICS]

@@ -350,7 +350,7 @@ class LaunchFile(Record):
     `$(dirname)` and namespaces resolved: `brings` (nodes), `tests` (`<test>`, which only rostest runs), `params`,
     `loads`, `include_faults` (own files that cannot be included). A path below the package reads
     `$(find <package>)/…`. `unknown_tags` are tags, with their lines, that roslaunch skips, `commented` the `type`s of
-    nodes that stand in a comment.
+    nodes that stand in a comment. `readable` are the nodes that can be read of a file that is not well-formed.
     """
 
     path: str
@@ -365,6 +365,7 @@ class LaunchFile(Record):
     include_faults: tuple[Fault, ...] = ()
     unknown_tags: tuple[tuple[str, int], ...] = ()
     commented: tuple[tuple[str, int], ...] = ()
+    readable: tuple[LaunchNode, ...] = ()
 
 
 class InterfaceField(Record):

@@ -13,7 +13,7 @@ from lxml import etree
 from grader.model.package import Fault, LaunchFile, LaunchNode
 from grader.package.launch_loader import Find, Scope, load, unknown_attributes, wanted
 from grader.package.reading import read_markup
-from grader.package.xml import line_of, parse_xml
+from grader.package.xml import line_of, parse_what_is_left, parse_xml
 
 _FILES_MAX = 100
 _TAGS_MAX = 20_000
@@ -29,11 +29,12 @@ Remaps = tuple[tuple[str, str], ...]
 
 
 class _Parsed(NamedTuple):
-    """`element` is the root where there is no fault, `root` its tag."""
+    """`element` is the root where there is no fault, `root` its tag. `left` is what can be read of a faulty file."""
 
     element: etree._Element | None
     fault: Fault | None
     root: str | None = None
+    left: etree._Element | None = None
 
 
 def is_launch_file(path: str) -> bool:
@@ -102,7 +103,8 @@ class _Library:
 def _parse(data: bytes, path: str) -> _Parsed:
     element, fault = parse_xml(data, path, root="launch")
     if element is None:
-        return _Parsed(None, fault)
+        broken = fault is not None and fault.kind == "XMLSyntaxError"
+        return _Parsed(None, fault, left=parse_what_is_left(data) if broken else None)
     for tag in element.iter(etree.Element):
         for name, value in tag.attrib.items():
             if len(value) > _VALUE_CHARS_MAX:
@@ -120,7 +122,10 @@ def _record(path: str, parsed: _Parsed, own: tuple[str, ...], find: Find) -> Lau
     nodes: list[LaunchNode] = []
     includes: list[str] = []
     if parsed.element is None:
-        return LaunchFile(path=path, root=parsed.root, nodes=(), includes=(), fault=parsed.fault)
+        left = [_node(e, ()) for e in parsed.left.iter("node")] if parsed.left is not None else ()
+        return LaunchFile(
+            path=path, root=parsed.root, nodes=(), includes=(), fault=parsed.fault, readable=tuple(left)
+        )
     if wanted(parsed.element):
         _walk(parsed.element, (), nodes, includes)
     loaded = load(parsed.element, Scope(file=path, own=own), find)

@@ -14,26 +14,27 @@ _TYPOGRAPHIC = re.compile("[\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u2033\u00
 
 # libxml2's message and what it means ({0}, {1}: the pattern's groups, {root}: the root tag)
 _CAUSES = (
-    (r"Document is empty", "the file is empty"),
+    (r"Document is empty", "the file is empty: write `<{root}>` and `</{root}>` into it"),
     (r"Start tag expected", "there is something before the first tag: the file must start with `<{root}>`"),
     (r"Premature end of data in tag (\S+) line (\d+)", "`<{0}>` of line {1} is never closed: add `</{0}>`"),
-    (r"hyphen|must not contain '--'", "`--` is not allowed inside a comment `<!-- ... -->`"),
-    (r"Comment not terminated", "a comment is opened by `<!--` and never closed by `-->`"),
-    (r"Extra content at the end", "there is text after the first block: only one `<{root}>` is allowed"),
-    (r"XML declaration allowed only", "delete what comes before `<?xml ... ?>`, blank lines too"),
-    (r"Attribute (\S+) redefined", "the attribute `{0}` is given twice in one tag"),
-    (r"Unescaped '<' not allowed in attr", "a closing quote is missing: the value runs on into the next tag"),
-    (r"AttValue: ['\"] expected", "a closing quote is missing"),
-    (r"AttValue: \" or ' expected", 'the value of an attribute needs quotes: name="value"'),
+    (r"hyphen|must not contain '--'", "`--` is not allowed inside a comment `<!-- ... -->`: delete it there"),
+    (r"Comment not terminated", "a comment is opened by `<!--` and never closed: write `-->` where it ends"),
+    (r"Extra content at the end", "text comes after the first block: delete it, since only one `<{root}>` is allowed"),
+    (r"XML declaration allowed only", "something comes before `<?xml ... ?>`: delete it, blank lines too"),
+    (r"Attribute (\S+) redefined", "the attribute `{0}` is given twice in one tag: delete one of the two"),
+    (r"Unescaped '<' not allowed in attr",
+     'a closing quote is missing, so that the value runs on into the next tag: write `"` where it ends'),
+    (r"AttValue: ['\"] expected", 'a closing quote is missing: write `"` where the value ends'),
+    (r"AttValue: \" or ' expected", 'the value of an attribute has no quotes around it: write name="value"'),
     (r"Specification mandates value for attribute (\S+)", '`{0}` has no value: write {0}="..."'),
-    (r"invalid element name", "a `<` begins no tag: no space after `<`, and a plain `<` is written `&lt;`"),
-    (r"EntityRef|Entity '.*' not defined", "a plain `&` is written `&amp;`"),
+    (r"invalid element name", "a `<` begins no tag: delete the space after it, or write `&lt;` for a plain `<`"),
+    (r"EntityRef|Entity '.*' not defined", "a plain `&` is not allowed: write `&amp;`"),
     (r"character encoding|not proper UTF-8|Unsupported encoding|switch encoding",
      "the file is not saved in the encoding that it names: save it as UTF-8"),
     (r"Invalid character|invalid Char|xmlChar", "an invisible control character: type the line again"),
     (r"[Ee]ntity", "entities are not read: write the text out"),
     (r"Excessive depth", "tags are nested more than 250 deep"),
-    (r"Namespace prefix (\S+)", "`{0}:` is in front of a name: tags and attributes have no colons in their names"),
+    (r"Namespace prefix (\S+)", "`{0}:` is in front of a name: take it out, since names have no colons"),
 )  # fmt: skip
 
 
@@ -60,15 +61,7 @@ def parse_xml(
     """
     if data.count(b"<") > _OPENERS_A_TAG * max_tags:
         return None, _too_many(file, max_tags)
-    parser = etree.XMLParser(
-        resolve_entities=False,
-        load_dtd=False,
-        dtd_validation=False,
-        attribute_defaults=False,
-        no_network=True,
-        huge_tree=False,
-        encoding=encoding,
-    )
+    parser = _parser(encoding)
     try:
         element = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
@@ -81,6 +74,29 @@ def parse_xml(
         return None, _too_many(file, max_tags)
     _set_first_lines(element, data)
     return element, None
+
+
+def parse_what_is_left(data: bytes, *, max_tags: int = 2_000) -> etree._Element | None:
+    """Return what a lenient parser makes of a file that is not well-formed; None where that is nothing, or too much."""
+    try:
+        element = etree.fromstring(data, _parser(None, recover=True))
+    except etree.XMLSyntaxError:
+        return None
+    few = element is not None and sum(1 for _ in element.iter(etree.Element)) <= max_tags
+    return element if few else None
+
+
+def _parser(encoding: str | None, *, recover: bool = False) -> etree.XMLParser:
+    return etree.XMLParser(
+        resolve_entities=False,
+        load_dtd=False,
+        dtd_validation=False,
+        attribute_defaults=False,
+        no_network=True,
+        huge_tree=False,
+        encoding=encoding,
+        recover=recover,
+    )
 
 
 def _too_many(file: str, max_tags: int) -> Fault:
@@ -177,11 +193,13 @@ def cause_of(message: str, log: list[str], line: str, *, root: str) -> str:
 
 def _mismatch(opened: str, line: str, closed: str, root: str) -> str:
     if opened.lower() == closed.lower():
-        return f"`<{opened}>` of line {line} is closed by `</{closed}>`: upper and lower case must match"
+        return (
+            f"`<{opened}>` of line {line} is closed by `</{closed}>`, in other letters: write `</{opened}>`"
+        )
     if get_close_matches(closed, [opened], cutoff=0.7):
         return f"`<{opened}>` of line {line} is closed by `</{closed}>`: write `</{opened}>`"
     if opened == root:
-        return f"`</{closed}>` closes nothing: `<{opened}>` of line {line} is the only tag that is open here"
+        return f"`</{closed}>` closes nothing, since only `<{opened}>` of line {line} is open here: delete it"
     return (
         f"`<{opened}>` of line {line} is still open where `</{closed}>` comes: "
         f"end it with `/>` or with `</{opened}>`"

@@ -49,7 +49,7 @@ def test_attributes_that_are_not_there_are_none():
         ("", 1, "the file is empty"),
         ("hello <launch/>", 1, "there is something before the first tag"),
         ("<launch>\n<!-- a -- b -->\n</launch>", 2, "`--` is not allowed inside a comment"),
-        ("<launch>\n<!-- a\n</launch>", 3, "never closed by `-->`"),
+        ("<launch>\n<!-- a\n</launch>", 3, "never closed: write `-->`"),
         (
             '<launch>\n<node pkg="a">\n</launch>',
             2,
@@ -59,7 +59,7 @@ def test_attributes_that_are_not_there_are_none():
         ("<launch>\n<node/>\n", 1, "`<launch>` of line 1 is never closed"),
         ('<launch\n<node pkg="a"/></launch>', 1, "the tag `<launch` is not finished"),
         ('<launch>\n<node pkg="a"type="b"/>\n</launch>', 2, "a space before each attribute"),
-        ("<launch>\n<node pkg=a/></launch>", 2, "needs quotes"),
+        ("<launch>\n<node pkg=a/></launch>", 2, "no quotes around it"),
         ("<launch>\n<node pkg=\u201ca\u201d/></launch>", 2, "typographic quote \u201c"),
         ('<launch>\n<node pkg="a/>\n<node/></launch>', 2, "closing quote is missing"),
         ("<launch>\n<group>\n</gruop>\n</launch>", 3, "write `</group>`"),
@@ -71,9 +71,9 @@ def test_attributes_that_are_not_there_are_none():
         ("<robot/>", 1, "`<robot>`; roslaunch wants `<launch>`"),
         ("<launch>\n<launch/></launch>", 2, "a second `<launch>`"),
         ("<launch>a & b</launch>", 1, "`&amp;`"),
-        ("<launch>\n< node/></launch>", 2, "no space after `<`"),
+        ("<launch>\n< node/></launch>", 2, "delete the space after it"),
         ("<launch>\n<<<<<<< HEAD\n</launch>", 2, "merge markers"),
-        ("\n<?xml version='1.0'?><launch/>", 2, "delete what comes before"),
+        ("\n<?xml version='1.0'?><launch/>", 2, "comes before `<?xml ... ?>`: delete it"),
         ("<launch>" + "<group>" * 400, None, "nested"),
     ],
 )
@@ -119,3 +119,12 @@ def test_never_raises(noise, at):
     for data in (noise, text[:at] + noise + text[at:]):
         launch = parse_launch(data, "a.launch")
         assert launch.fault is not None or launch.root == "launch"
+
+
+def test_nodes_of_a_file_that_is_not_well_formed_can_be_read():
+    file = parse_launch(
+        b'<launch>\n  <node pkg="a" type="b">\n  <node pkg="c" type="d"/>\n</launch>', "a.launch"
+    )
+    assert file.fault is not None
+    assert [(node.line, node.type) for node in file.readable] == [(2, "b"), (3, "d")]
+    assert parse_launch(b"", "a.launch").readable == file.nodes == file.brings == ()

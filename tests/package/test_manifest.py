@@ -68,9 +68,9 @@ def test_what_catkin_warns_of_is_advice(old, new, advice, capfd):
         ('format="2"', 'format="9"', 2, "format must be 1, 2 or 3"),
         ("<depend>rospy</depend>", "<depend>rospy", 9, "`<depend>` of line 9 is still open"),
         ("</package>", "", 2, "`<package>` of line 2 is never closed"),
-        ("<?xml", "\n<?xml", 2, "delete what comes before"),
+        ("<?xml", "\n<?xml", 2, "comes before `<?xml ... ?>`: delete it"),
         ("<depend>rospy</depend>", "<<<<<<< HEAD", 9, ""),
-        ("<package format", "<Package format", 10, "upper and lower case"),
+        ("<package format", "<Package format", 10, "in other letters"),
     ],
 )
 def test_what_catkin_refuses_is_a_fault(old, new, line, cause):
