@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 from collections.abc import Mapping
@@ -47,6 +48,12 @@ class RosInstallation(Record):
     @property
     def label(self) -> str:
         return f"{self.distro} ({self.where})"
+
+    @property
+    def python_version(self) -> tuple[int, ...]:
+        """Return the version of ROS's interpreter as its file is named, (3, 11); empty where that does not say."""
+        found = re.fullmatch(r"python(\d+)\.(\d+)", Path(self.python).resolve().name)
+        return tuple(map(int, found.groups())) if found else ()
 
     def program(self, name: str) -> str | None:
         """Return the path of one of ROS's programs, or None."""

@@ -70,14 +70,17 @@ async def build(
     answers_of: Mapping[str, Iterable[str]] = MappingProxyType({}),
 ) -> tuple[ProcessEnvironment, BuildOutcome]:
     """Run `catkin_make`, then `rosrun` on each script of `answers` as handed in (`answers_of`: of the lab's other
-    packages); what they print is evidence. `python_files` are compiled by ROS's own Python, and not run.
+    packages); what they print is evidence. `python_files`, where there are any, are compiled by ROS's own Python, and
+    not run.
 
     Returns the place with the built workspace's environment. Raises ArenaError where the arena fails.
     """
     wants_base = place.sandbox.bubblewrap and not has_base(place) and len(os.sched_getaffinity(0)) > 1
-    (place.folder / "bin" / "python-files.json").write_text(json.dumps(list(python_files)))
+    to_compile = list(python_files)
+    (place.folder / "bin" / "python-files.json").write_text(json.dumps(to_compile))
     async with ArenaSession(place, writer, master=False, last_run=last_run) as arena:
-        ended = await _run_catkin_make(place, arena, with_base=wants_base)
+        beside = [_syntax_spec(place)] if to_compile else []
+        ended = await _run_catkin_make(place, arena, beside, with_base=wants_base)
         ok = arena.exit_codes.get("catkin_make") == 0
         built = await _with_setup(place, arena) if ok else place.from_source()
         for package, scripts in ((None, answers), *answers_of.items()):
@@ -100,7 +103,7 @@ async def build(
         ok=ok,
         trace=trace,
         root=place.package_folder,
-        syntax=_kept_file(place, SYNTAX),
+        syntax=_kept_file(place, SYNTAX) if to_compile else None,
         others={
             name: CMakeTrace(trace=_trace(one)[0], root=one.package_folder) for name, one in others.items()
         },
@@ -109,17 +112,20 @@ async def build(
     )
 
 
-async def _run_catkin_make(place: ProcessEnvironment, arena: ArenaSession, *, with_base: bool) -> bool:
-    """Build the workspace, and beside it read the Python files; return whether the build ended by itself."""
+async def _run_catkin_make(
+    place: ProcessEnvironment, arena: ArenaSession, beside: list[dict[str, Any]], *, with_base: bool
+) -> bool:
+    """Build the workspace, with other processes beside it; return whether the build ended by itself."""
     arena.course(ScenarioEvent(event="begin"))
     arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True, collect=ARCHIVE))
-    arena.start(_syntax_spec(place))
+    for spec in beside:
+        arena.start(spec)
     if with_base:  # beside the build, on another core
         arena.start(base_spec(place))
     ended = await arena.wait(lambda: "catkin_make" in arena.exit_codes, BUILD_S)
     if not ended:
         await arena.interrupt("catkin_make", int_s=2.0, term_s=1.0)
-    await arena.wait(lambda: "syntax" in arena.exit_codes, STEP_S)
+    await arena.wait(lambda: all(spec["name"] in arena.exit_codes for spec in beside), STEP_S)
     return ended
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import sys
 import threading
 import time
 from collections import Counter
@@ -295,8 +296,15 @@ def _above(place: ProcessEnvironment, facts: PackageFacts) -> str:
 
 
 def _python_files(place: ProcessEnvironment, facts: PackageFacts) -> list[str]:
-    """Return the files that ROS's Python is to compile, from the main package's folder in the workspace."""
-    return [_above(place, one) + path for one in (facts, *facts.also) for path in python_paths(one)]
+    """Return the files that ROS's Python is to compile, from the main package's folder in the workspace.
+
+    None where this Python is of the same version and had nothing to say against any: ROS's would find the same.
+    """
+    packages = (facts, *facts.also)
+    clean = not any(file.python_fault for one in packages for file in one.files)
+    if clean and place.ros.python_version == sys.version_info[:2]:
+        return []
+    return [_above(place, one) + path for one in packages for path in python_paths(one)]
 
 
 def _with_build_facts(
