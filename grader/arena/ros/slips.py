@@ -1,0 +1,590 @@
+"""Finds what compiles in a student's Python and is not meant: `slips` of a syntax tree, for `syntax.py`.
+
+Names that are not called or not there, loops that never end or never wait, callbacks that do not fit; besides, where a
+script names its node, its topics and its rates. Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+import builtins
+import difflib
+
+TEXT_LIMIT = 300
+SLIPS_LIMIT = 100
+"""Of a file."""
+CLOCKS = {
+    "get_time", "get_rostime", "now", "time", "time_ns", "monotonic", "monotonic_ns", "perf_counter",
+    "perf_counter_ns", "process_time", "clock", "clock_gettime", "utcnow", "today", "localtime", "gmtime",
+    "ctime", "asctime", "strftime", "times", "stamp", "header", "eval", "exec", "getattr", "__import__",
+    "import_module", "system", "popen", "Popen", "run", "check_output", "current_real",
+    "current_expected", "last_real", "last_expected", "last_time", "remaining", "wait_for_message",
+    "get_param", "get_param_cached", "Subscriber", "Timer", "vars", "globals", "__dict__", "modules",
+}  # fmt: skip
+"""Names by which a script may come to know the time, or something that it cannot be seen to be."""
+PLAIN_MODULES = {
+    "__future__", "itertools", "math", "numpy", "os", "random", "roslib", "rospy", "signal", "string",
+    "sys", "threading", "time",
+}  # fmt: skip
+NAMES_LIMIT = 500
+MODULE_NAMES = {"__file__", "__builtins__", "__annotations__", "WindowsError"}
+
+
+def slips(tree):
+    """What compiles and is not meant: names that are not called or not there, questions that wait for a keyboard."""
+    functions = {n.name for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
+    found = []
+    for node in ast.walk(tree):
+        name = uncalled(node, functions)
+        if name:
+            message = "`%s` is named but not called: write `%s()`" % (name, name)
+            found.append({"line": node.lineno, "kind": "not-called", "message": message})
+        name = asked(node, functions)
+        if name:
+            message = "`%s()` waits for someone to type, and a graded node gets no input" % name
+            found.append({"line": node.lineno, "kind": "input", "message": message})
+    finders = (misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops)
+    for find in (*finders, callbacks, graph_names, deaf_loops, clock_values):
+        found += find(tree)
+    published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
+    if published is not None and counts(tree):
+        message = "" if knows_time(tree) else "the script counts, and reads no clock"
+        message = message or sends_no_time(tree)
+        if message:
+            found.append({"line": published.lineno, "kind": "no-clock", "message": message})
+    return sorted(found, key=lambda slip: slip["line"])[:SLIPS_LIMIT]
+
+
+def loop_rates(tree):
+    """Rates of loops and timers: a parameter that is read there, its name as written; or a number, in Hz as text.
+
+    Either may have been given to a name once.
+    """
+    bound, looped = {}, set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign) and len(node.targets) == 1:
+            bound.setdefault(ast.dump(node.targets[0]).replace("Store()", "Load()"), []).append(node.value)
+
+        elif isinstance(node, (ast.While, ast.For)):
+            looped.update(id(inner) for inner in ast.walk(node) if is_call(inner, "sleep"))
+
+    def given(node):
+        values = bound.get(ast.dump(node), [node])
+        return values[0] if len(values) == 1 else node
+
+    for node in ast.walk(tree):
+        timed = next((name for name in ("Rate", "sleep", "Timer") if is_call(node, name)), None)
+        if timed is None or not node.args or (timed == "sleep" and id(node) not in looped):
+            continue
+        value = given(node.args[0])
+        if is_call(value, "Duration") and value.args:
+            value = given(value.args[0])
+        name, number = read_parameter(value) if timed == "Rate" else None, constant(value, given)
+        if name:
+            yield {"line": value.lineno, "kind": "rate-parameter", "message": name[:TEXT_LIMIT]}
+        elif number:
+            hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
+            yield {"line": value.lineno, "kind": "rate-number", "message": hz}
+
+
+NAMED = {"init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber"}
+"""Calls whose first argument is a name, and the kind of slip that tells where."""
+
+
+def graph_names(tree):
+    """Where a script names its node, and the topics that it publishes and subscribes to, as written; and the types that
+    it publishes."""
+    for node in ast.walk(tree):
+        kind = NAMED.get(called_name(node))
+        if not kind:
+            continue
+        names = node.args[:1] or [k.value for k in node.keywords if k.arg == "name"]
+        if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
+            yield {"line": names[0].lineno, "kind": kind, "message": names[0].value[:TEXT_LIMIT]}
+            types = node.args[1:2] or [k.value for k in node.keywords if k.arg == "data_class"]
+            name = dotted(types[0]).rpartition(".")[2] if types and kind != "node-name" else ""
+            if name.isidentifier():
+                yield {"line": names[0].lineno, "kind": kind + "-type", "message": name}
+
+
+def never_run(tree):
+    """Functions that make a node, publish or wait, and that nothing names; and `__name__` beside another word than
+    `__main__`.
+    """
+    named = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+    named |= {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
+            works = any(
+                is_call(inner, work) for inner in ast.walk(node) for work in ("init_node", "publish", "spin")
+            )
+            if works and not node.name.startswith("__"):
+                message = "nothing calls `%s()`" % node.name[:TEXT_LIMIT]
+                yield {"line": node.lineno, "kind": "never-called", "message": message}
+        elif isinstance(node, ast.Compare) and isinstance(node.left, ast.Name) and node.left.id == "__name__":
+            word = node.comparators[0]
+            if (
+                isinstance(word, ast.Constant)
+                and isinstance(node.ops[0], (ast.Eq, ast.Is))
+                and word.value != "__main__"
+            ):
+                message = "`__name__` is never %r" % (word.value,)
+                yield {"line": node.lineno, "kind": "main-guard", "message": message[:TEXT_LIMIT]}
+
+
+MAKES = ("Publisher", "Subscriber", "Service")
+
+
+def never_reached(tree):
+    """Loops without an end before the first `publish(…)`, `Publisher(…)` and the like that comes behind them in the
+    same block, in a function or class of this file too.
+    """
+    own = {
+        n.name
+        for n in ast.walk(tree)
+        if isinstance(n, (ast.FunctionDef, ast.ClassDef))
+        and any(is_call(inner, name) for inner in ast.walk(n) for name in MAKES)
+    }
+
+    def word(node):
+        name = called_name(node)
+        return name if name in own or (is_call(node, name) and name in ("publish", *MAKES)) else None
+
+    for node in ast.walk(tree):
+        for block in (getattr(node, "body", None), getattr(node, "orelse", None)):
+            for index, loop in enumerate(block if isinstance(block, list) else ()):
+                spins = isinstance(loop, ast.Expr) and is_call(loop.value, "spin")
+                if not spins and not (isinstance(loop, ast.While) and is_endless(loop)):
+                    continue
+                within = {word(n) for n in ast.walk(loop) if isinstance(n, ast.Call)}
+                behind = [
+                    n for later in block[index + 1 :] for n in ast.walk(later) if isinstance(n, ast.Call)
+                ]
+                behind = [n for n in behind if word(n) and word(n) not in within]
+                if behind and "publish" not in within:
+                    what = "spin()" if spins else "loop"
+                    message = "the %s in line %d never ends, so the %s(…) in line %d is never reached"
+                    message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
+                    yield {"line": loop.lineno, "kind": "never-reached", "message": message}
+
+
+def stopped_loops(tree):
+    """`spin()` in a loop that publishes: the loop does not come round. And `break` or `return` in each of its turns."""
+    for loop in ast.walk(tree):
+        inside = list(ast.walk(loop)) if isinstance(loop, (ast.While, ast.For)) else []
+        if not any(is_call(n, "publish") for n in inside):
+            continue
+        spin = next((n for n in inside if is_call(n, "spin")), None)
+        if spin is not None:
+            message = "the loop stops at the spin() in line %d, which waits until the node ends" % spin.lineno
+            yield {"line": spin.lineno, "kind": "spin-in-loop", "message": message}
+        left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None)
+        if left is not None:
+            word = "break" if isinstance(left, ast.Break) else "return"
+            message = "the loop ends the first time around, at the %s in line %d" % (word, left.lineno)
+            yield {"line": left.lineno, "kind": "loop-left", "message": message}
+
+
+WAITS = ("sleep", "spin", "spin_once", "wait_for_message", "wait_for_service", "wait", "join", "input")
+
+
+def sleepless_loops(tree):
+    """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them: after them, or around them."""
+    loops = [n for n in ast.walk(tree) if isinstance(n, (ast.While, ast.For))]
+    sleeps = [n for n in ast.walk(tree) if is_call(n, "sleep") and isinstance(n.func, ast.Attribute)]
+    for loop in loops:
+        inside = list(ast.walk(loop))
+        waits = any(is_call(n, name) for n in inside for name in WAITS)
+        inner = [
+            n
+            for n in inside
+            if n is not loop and n in loops and any(is_call(m, "publish") for m in ast.walk(n))
+        ]
+        outside = [n for n in sleeps if n.lineno > loop.lineno and n.func.attr == "sleep"]
+        if waits or inner or not outside or not any(is_call(n, "publish") for n in inside):
+            continue
+        name = dotted(outside[0].func) or "sleep"
+        message = "`%s()` is outside the loop of line %d" % (name, loop.lineno)
+        yield {"line": outside[0].lineno, "kind": "sleep-outside", "message": message}
+
+
+def is_endless(loop):
+    """Whether it asks for nothing but the node's end, and nothing in it leaves it."""
+    test = loop.test
+    inverted = isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not)
+    asks = (isinstance(test, ast.Constant) and bool(test.value)) or (
+        inverted and is_call(test.operand, "is_shutdown")
+    )
+    return asks and not any(isinstance(n, (ast.Break, ast.Return, ast.Raise)) for n in ast.walk(loop))
+
+
+CALLBACKS = {"Subscriber": ("callback", 2, 1), "Timer": ("callback", 1, 1), "Service": ("handler", 2, 1)}
+"""What takes a function: the argument's name, its place, and with how many values ROS calls it."""
+
+
+def callbacks(tree):
+    """Functions that ROS calls with another number of values than they take, and those that are called where the
+    function itself is meant.
+    """
+    functions = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+    for node in ast.walk(tree):
+        name = called_name(node)
+        if name not in CALLBACKS:
+            continue
+        keyword, place, values = CALLBACKS[name]
+        given = [k.value for k in node.keywords if k.arg == keyword] + node.args[place : place + 1]
+        values += any(k.arg == "callback_args" for k in node.keywords) or len(node.args) > place + 1
+        for one in given[:1]:
+            called = isinstance(one, ast.Call)
+            meant = one.func if called else one
+            own = functions.get(dotted(meant).rpartition(".")[2])
+            least, most = takes(own, isinstance(meant, ast.Attribute)) if own else (values, values)
+            if own and called and least:
+                message = "`{0}()` is called here: write `{0}`, without brackets".format(dotted(meant))
+                yield {"line": one.lineno, "kind": "callback-called", "message": message}
+            elif own and not called and not least <= values <= most:
+                what = {"Service": "the request", "Timer": "the event"}.get(name, "the message")
+                message = "`%s` takes %d arguments, but ROS passes it %s"
+                message %= (own.name[:TEXT_LIMIT], least, what)
+                yield {"line": own.lineno, "kind": "callback-values", "message": message}
+
+
+def takes(function, bound):
+    """Return with how many values a function can be called at least and at most; of a method without `self`."""
+    given = function.args.posonlyargs + function.args.args
+    of_class = any(getattr(d, "id", "") == "staticmethod" for d in function.decorator_list)
+    own = 1 if bound and not of_class else 0
+    least = len(given) - len(function.args.defaults) - own
+    return least, 99 if function.args.vararg else len(given) - own
+
+
+def constant(node, given, depth=4):
+    """Return the positive number that an expression of numbers comes to, None where it is something else."""
+    node = given(node)
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float) and 0 < node.value < 1e9:
+        return float(node.value)
+    if depth and isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Div, ast.Mult)):
+        left, right = constant(node.left, given, depth - 1), constant(node.right, given, depth - 1)
+        if left and right:
+            return left / right if isinstance(node.op, ast.Div) else left * right
+    return None
+
+
+def resets(tree):
+    """Where a counter goes back: the number that it is set to in an `if` that asks for it, and the number in that `if`,
+    or behind a `%`.
+    """
+    for node in ast.walk(tree):
+        value, done, asked = None, (), []
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
+            asked = [node.right]
+        elif isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Mod):
+            asked = [node.value]
+        elif isinstance(node, ast.If):
+            done = [(one.targets[0], one.value) for one in node.body if isinstance(one, ast.Assign)]
+        elif isinstance(node, ast.Assign) and isinstance(node.value, ast.IfExp):
+            done = [(node.targets[0], node.value.body), (node.targets[0], node.value.orelse)]
+        if done:
+            test = list(ast.walk(node.test if isinstance(node, ast.If) else node.value.test))
+            names = {ast.dump(part) for part in test if isinstance(part, (ast.Name, ast.Attribute))}
+            values = [value for name, value in done if ast.dump(name).replace("Store()", "Load()") in names]
+            value = next((value for value in values if whole(value) is not None), None)
+            asked = test if value is not None else []
+        for part in asked:
+            if whole(part) is not None:
+                yield {"line": part.lineno, "kind": "reset-limit", "message": "%d" % whole(part)}
+        if value is not None:
+            yield {"line": value.lineno, "kind": "reset-value", "message": "%d" % whole(value)}
+
+
+def whole(node):
+    """Return a whole number as it is written, without a sign."""
+    number = isinstance(node, ast.Constant) and type(node.value) is int and node.value < 1 << 31
+    return node.value if number else None
+
+
+def read_parameter(node):
+    """Return the name in `get_param('name')`, also within `float(…)`."""
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
+        node = node.args[0] if node.func.id in ("float", "int") else node
+    if is_call(node, "get_param") and node.args and isinstance(node.args[0], ast.Constant):
+        return node.args[0].value if isinstance(node.args[0].value, str) else None
+    return None
+
+
+def misspelt(tree):
+    """Names that are used and nowhere bound, where one that is bound is spelt alike, or `self` has one of that name."""
+    names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
+    own = {n.id for n in names if not isinstance(n.ctx, ast.Load)}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.keyword):
+            bound = [getattr(node, key, None) for key in ("name", "asname", "arg", "rest")]
+            own.update(part for text in bound if isinstance(text, str) for part in text.split("."))
+        if isinstance(node, (ast.Global, ast.Nonlocal)):
+            own.update(node.names)
+    if "*" in own or len(own) > NAMES_LIMIT:
+        return
+    attributes = {
+        dotted(n) for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)
+    }
+    known = own | set(dir(builtins)) | MODULE_NAMES
+    outside = {id(n) for n in outside_methods(tree)}
+    for node in names:
+        if id(node) in outside and (node.id == "self" or node.id not in known):
+            message = (
+                "line %d stands in the class and in none of its methods, so it runs before them" % node.lineno
+            )
+            yield {"line": node.lineno, "kind": "outside-method", "message": message}
+            continue
+        if node.id in known:
+            continue
+        near = ["self." + node.id] if "self." + node.id in attributes else []
+        near = near or difflib.get_close_matches(node.id[:TEXT_LIMIT], sorted(own), 1, 0.8)
+        near = near or [name for name in sorted(own) if sorted(name) == sorted(node.id)]
+        if near:
+            message = "`%s` is not defined anywhere: did you mean `%s`?" % (
+                node.id[:TEXT_LIMIT],
+                near[0][:TEXT_LIMIT],
+            )
+            yield {"line": node.lineno, "kind": "misspelt", "message": message}
+
+
+def outside_methods(tree):
+    """Yield the nodes of statements that stand in a class and call something, in none of its methods."""
+    for node in ast.walk(tree):
+        for statement in node.body if isinstance(node, ast.ClassDef) else ():
+            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call):
+                yield from ast.walk(statement)
+
+
+def counts(tree):
+    return any(
+        (isinstance(n, (ast.AugAssign, ast.BinOp)) and isinstance(n.op, ast.Add))
+        or (isinstance(n, ast.Call) and getattr(n.func, "id", "") in ("next", "range", "count"))
+        or is_call(n, "count")
+        for n in ast.walk(tree)
+    )
+
+
+def knows_time(tree):
+    """Whether a script may read a clock: by name, or in a module that is not the standard one."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            if not all(is_plain(alias.name) and alias.asname is None for alias in node.names):
+                return True
+        elif isinstance(node, ast.ImportFrom):
+            names = {alias.name for alias in node.names}
+            if node.level or not is_plain(node.module or "") or names & (CLOCKS | {"*"}):
+                return True
+        elif (isinstance(node, ast.Attribute) and node.attr in CLOCKS) or (
+            isinstance(node, ast.Name) and node.id in CLOCKS - {"time"}
+        ):
+            return True
+    return False
+
+
+PLAIN_CALLS = {
+    "str", "int", "float", "repr", "round", "format", "next", "count", "iter", "len", "String", "join",
+}  # fmt: skip
+
+
+CLOCK_METHODS = {"to_sec", "to_nsec"}
+
+
+def sends_no_time(tree):
+    """Return what is to be said where what is published comes from counting alone, though the script may read a clock
+    for something else, or for the value that it counts on from; "" otherwise."""
+    source = Source(tree)
+    found = source.reached([arg for n in ast.walk(tree) if is_call(n, "publish") for arg in n.args])
+    if found.clock or found.unknown or not found.counts:
+        return ""
+    if source.reached(source.starts).clock:
+        return "the script reads the clock once, and counts on from there"
+    return "the script counts, and reads no clock for what it publishes"
+
+
+def clock_values(tree):
+    """Topics whose values are read from a clock in each turn, and not counted."""
+    source = Source(tree)
+    for node in ast.walk(tree):
+        if not is_call(node, "publish"):
+            continue
+        makers = source.bound.get(dotted(node.func.value), [])
+        named = [
+            m.args[0] for m in makers if isinstance(m, ast.Call) and m.args and called_name(m) == "Publisher"
+        ]
+        found = source.reached(node.args)
+        name = named[0].value if len(named) == 1 and isinstance(named[0], ast.Constant) else None
+        if found.clock and not found.counts and not found.unknown and isinstance(name, str):
+            yield {"line": node.lineno, "kind": "clock-value", "message": name[:TEXT_LIMIT]}
+
+
+class Source:
+    """Where values come from. `bound` has what names are given; what a counter starts with is in `starts` instead."""
+
+    def __init__(self, tree):
+        self.bound, self.starts = {}, []
+        self.functions = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+        places = dict(turns(tree))
+        given = []
+        for node in ast.walk(tree):
+            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+            value = getattr(node, "iter", None) or getattr(node, "value", None)
+            given += [(node, t, value) for t in targets if value is not None and t is not None]
+        self.counted = {dotted(t) for n, t, value in given if is_increment(n, t, value)}
+        added = {dotted(t): places[n] for n, t, value in given if is_increment(n, t, value)}
+        for node, target, value in given:
+            function, again = places[node]
+            name, begins = dotted(target), not again and isinstance(node, ast.Assign)
+            where = added.get(name)
+            once = (
+                function is None or getattr(function, "name", "") == "__init__" or where == (function, True)
+            )
+            if begins and where and once:
+                self.starts.append(value)
+            elif begins and called_name(value) == "count":
+                self.starts += value.args
+                self.bound.setdefault(name, []).append(value.func)
+            else:
+                part = target
+                while part is not None and dotted(part) != "self":
+                    self.bound.setdefault(dotted(part), []).append(value)
+                    part = getattr(part, "value", None)  # `msg.data = …` is a part of `msg`
+
+    def reached(self, values):
+        """Return what the values are made of."""
+        found, left, seen = Reached(), list(values), set()
+        while left:
+            for node in ast.walk(left.pop()):
+                name = dotted(node.func if isinstance(node, ast.Call) else node)
+                last = called_name(node) or name
+                if name.rpartition(".")[2] in CLOCKS and name != "time":
+                    found.clock = True
+                elif isinstance(node, ast.Call) and last not in CLOCK_METHODS and not last[:1].isupper():
+                    found.unknown = found.unknown or (last not in PLAIN_CALLS and name not in self.functions)
+                counting = isinstance(node, ast.Call) and last in ("next", "count", "len", "range")
+                found.counts = found.counts or counting or name in self.counted
+                if name and name not in seen:
+                    seen.add(name)
+                    left += self.bound.get(name, [])
+                    left += [self.functions[name]] if name in self.functions else []
+        return found
+
+
+class Reached:
+    """Whether a clock, something that counts, or a call of unknown doings is among what a value is made of."""
+
+    clock = counts = unknown = False
+
+
+def turns(tree):
+    """Yield each node with its function, and whether a loop in there does it again and again."""
+    left = [(tree, None, False)]
+    while left:
+        node, function, again = left.pop()
+        yield node, (function, again)
+        for child in ast.iter_child_nodes(node):
+            own = isinstance(child, (ast.FunctionDef, ast.Lambda))
+            looped = again or isinstance(node, (ast.While, ast.For))
+            left.append((child, child if own else function, looped and not own))
+
+
+def is_increment(node, target, value):
+    """Whether a name is given what it was before, and something more: `n += 1`, `n = (n + 1) % 128`."""
+    if isinstance(node, ast.AugAssign):
+        return isinstance(node.op, ast.Add) and isinstance(value, ast.Constant)
+    return any(dotted(part) == dotted(target) for part in ast.walk(value) if isinstance(part, type(target)))
+
+
+SWALLOWS = {"KeyboardInterrupt", "ROSInterruptException", "ROSException", "Exception", "BaseException"}
+ENDS = (ast.Break, ast.Return, ast.Raise)
+
+
+def deaf_loops(tree):
+    """Why a node goes on after Ctrl-C: loops that do not ask for it, an `except` within them, signals put off."""
+    catching, endless, others = [], [], []
+    for loop in ast.walk(tree):
+        inside = list(ast.walk(loop)) if isinstance(loop, ast.While) or is_counted_for(loop) else []
+        if not inside or any(map(is_shutdown, inside)):
+            continue
+        caught = [h for n in inside if isinstance(n, ast.Try) for h in n.handlers if goes_on(h)]
+        wakes = any(is_call(n, "sleep") and dotted(n.func) != "time.sleep" for n in inside)
+        asks = "ask `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
+        for handler in caught[:1]:
+            message = (
+                "the `except` in line %d catches what Ctrl-C raises, and the loop in line %d goes on: %s"
+            )
+            catching.append((loop.lineno, message % (handler.lineno, loop.lineno, asks)))
+        if not caught and not wakes:
+            known = isinstance(loop, ast.While) and isinstance(loop.test, ast.Constant)
+            message = "the loop in line %d never asks whether the node is to end: %s" % (loop.lineno, asks)
+            (endless if known else others).append((loop.lineno, message))
+    off = "`disable_signals=True` in line %d keeps Ctrl-C from rospy: leave it out"
+    taken = "line %d gives Ctrl-C another meaning: delete it"
+    for node in ast.walk(tree):
+        if is_call(node, "init_node") and any(k.arg == "disable_signals" for k in node.keywords):
+            yield {"line": node.lineno, "kind": "deaf", "message": off % node.lineno}
+        if is_call(node, "signal") and node.args and dotted(node.args[0]).endswith("SIGINT"):
+            yield {"line": node.lineno, "kind": "deaf", "message": taken % node.lineno}
+    for line, message in catching or endless or others:
+        yield {"line": line, "kind": "deaf", "message": message}
+
+
+def is_counted_for(loop):
+    return isinstance(loop, ast.For) and called_name(loop.iter) == "count"
+
+
+def goes_on(handler):
+    """Whether an `except` catches what Ctrl-C raises, and leaves neither the loop nor the script."""
+    kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
+    catches = any(kind is None or dotted(kind).rpartition(".")[2] in SWALLOWS for kind in kinds)
+    left = (n for n in ast.walk(handler) if isinstance(n, ENDS) or called_name(n) in ("exit", "_exit"))
+    return catches and next(left, None) is None
+
+
+def is_plain(module):
+    return module in PLAIN_MODULES or module.endswith((".msg", ".srv", "_msgs"))
+
+
+def is_call(node, name):
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == name
+
+
+def called_name(node):
+    """Return `b` of the calls `a.b()` and `b()`, "" of all else."""
+    if not isinstance(node, ast.Call):
+        return ""
+    return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+
+
+def uncalled(node, functions):
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Attribute):
+        return dotted(node.value)
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Name) and node.value.id in functions:
+        return node.value.id
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        return dotted(node.operand) if is_shutdown(node.operand) else None
+    if isinstance(node, (ast.While, ast.If)) and is_shutdown(node.test):
+        return dotted(node.test)
+    return None
+
+
+def is_shutdown(node):
+    return getattr(node, "attr", getattr(node, "id", "")) == "is_shutdown"
+
+
+def asked(node, functions):
+    if not isinstance(node, ast.Call):
+        return None
+    name = dotted(node.func)
+    if name in ("input", "raw_input"):
+        return None if name in functions else name
+    return name if name in ("sys.stdin.read", "sys.stdin.readline", "sys.stdin.readlines") else None
+
+
+def dotted(node):
+    """Return `a.b.c` as it is written; what stands before the dots and is no name becomes an ellipsis."""
+    parts = []
+    while isinstance(node, ast.Attribute):
+        parts.append(node.attr)
+        node = node.value
+    parts.append(node.id if isinstance(node, ast.Name) else "...")
+    return ".".join(reversed(parts))[:TEXT_LIMIT]
