@@ -9,7 +9,8 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.exit_causes import HEADING, Traceback, explain_end, explain_traceback, tracebacks
+from grader.checks.support.exceptions import HEADING, Traceback, tracebacks
+from grader.checks.support.exit_causes import explain_end, explain_traceback
 from grader.checks.support.fields import differences, fields_text
 from grader.checks.support.processes import GlobalName, TypeName, life_of, plain_type
 from grader.checks.support.text import SERVICE, SPIN, imports, near_names, service_call, shown

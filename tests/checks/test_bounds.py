@@ -10,7 +10,8 @@ import pytest
 from grader.arena.sandbox import RunLimits
 from grader.checks.support.build_errors import first_error
 from grader.checks.support.console_output import console_log, printed_lines, printed_times
-from grader.checks.support.exit_causes import _refused_name, tracebacks
+from grader.checks.support.exceptions import tracebacks
+from grader.checks.support.exit_causes import _refused_name
 from grader.checks.support.launch import died, finished, name_pattern, refusal
 from grader.checks.support.processes import lives
 from grader.checks.support.text import NAMES_MAX, near_names

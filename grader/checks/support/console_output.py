@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from itertools import accumulate
 from typing import Literal, NamedTuple
 
-from grader.checks.support.exit_causes import HEADING, tracebacks
+from grader.checks.support.exceptions import HEADING, tracebacks
 from grader.checks.support.text import VALUE, bare, line_pattern, words_pattern
 from grader.evidence.run import Run
 
