@@ -65,7 +65,7 @@ def finished(process: subprocess.Popen[bytes]) -> list[str]:
         out, _ = process.communicate()
     finally:
         process.kill()
-        process.communicate()
+        process.wait()
     assert process.returncode == 0
     wrong: list[str] = json.loads(out)
     return wrong
