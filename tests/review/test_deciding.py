@@ -59,11 +59,12 @@ def test_a_check_is_overridden_with_a_reason_only(page, out) -> None:
     assert "The check says fail, 0 of" in page.text("/s/dana/")
 
 
-def test_taking_back_gives_the_checks_points(page, out) -> None:
+def test_taking_back_gives_the_checks_points(page, out, review) -> None:
     before = points_of(out, "dana", "counter-wrap")
     page.save("dana", "counter-wrap", points="5", comment="x")
     page.save("dana", "counter-wrap", do="remove")
     assert overrides_of(out) == {}
+    assert review.background.wait(60)
     assert points_of(out, "dana", "counter-wrap") == before
     assert result_of(out, "dana").overrides == ()
 
