@@ -439,10 +439,15 @@ def _window(live: RunState, until: Until, now_s: float) -> bool:
     if until.window_s is None:
         return True
     topics = until.topics or tuple(live.topics)
+    if until.topics:  # others whose rates are judged have their window too, once they are there
+        topics = (
+            *topics,
+            *(t for t in live.rates if t not in topics and t in live.topics and live.topics[t].count),
+        )
     seen = [live.topics[t] for t in topics if live.topics[t].count]
     if not seen:
         return _talks_elsewhere(live, until, now_s)
-    if _rates_are_clear(live, until.topics):
+    if until.topics and _rates_are_clear(live, topics):
         return True
     if len(seen) == len(topics):
         return now_s >= max(s.first_s for s in seen) + until.window_s

@@ -492,3 +492,11 @@ def test_a_call_is_given_up_where_all_programs_compute() -> None:
     assert computes(_resting(node=("stuck", 1)))
     assert not computes(_resting(node=("stuck", 1), other=("spins", 1)))
     assert not computes(RunState())
+
+
+def test_a_rate_on_another_topic_has_its_window_too() -> None:
+    live, until = _live(a=(50, 1.0, 6.0), b=(45, 1.5, 6.0)), Until(window_s=5, topics=("/a",))
+    assert find_outcome(live, until, 6.1) == ("complete", "")
+    live.watch_rates([TEN_HZ.model_copy(update={"topic": "/b"})])
+    assert find_outcome(live, until, 6.4) is None
+    assert find_outcome(live, until, 6.6) == ("complete", "")
