@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -208,7 +208,7 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
         return other
     wrong = _wrong_mean(found, params)
     by_number = _by_number(wrong, found.mean_hz, run, package, params)
-    return by_number or _by_parameter(wrong, run, package, params)
+    return by_number or _by_parameter(wrong, run, package, params, mean_hz)
 
 
 def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
@@ -274,14 +274,28 @@ def _asked_number(mean_hz: float, run: Run, package: PackageFacts, params: RateP
     return next((s for s in wrong if abs(float(s.message) - mean_hz) < NUMBER_SHARE * mean_hz), None)
 
 
-def _by_parameter(verdict: Verdict, run: Run, package: PackageFacts, params: RateParams) -> Verdict:
+def _by_parameter(
+    verdict: Verdict, run: Run, package: PackageFacts, params: RateParams, mean_hz: float
+) -> Verdict:
     """Say where the value comes from, if the rate of the node's loop is a parameter with another value than the asked
-    one."""
+    one: by the script's line, or because the node reads one that is the rate which was measured."""
     for channel in run.student_channels(params.topic):
         slip = next(iter(slips_of(package, run, channel.callerid, "rate-parameter")), None)
-        name = resolved_param(slip.message, channel.callerid) if slip else ""
+        if slip is None:
+            read = {
+                e.topic or "" for _, e in run.actors if e.action == "read" and e.actor == channel.callerid
+            }
+            verdict = _by_read_parameter(
+                verdict,
+                {n: v for n, v in params_on_server(run).items() if n in read},
+                package,
+                params,
+                mean_hz,
+            )
+            continue
+        name = resolved_param(slip.message, channel.callerid)
         value = params_on_server(run).get(name)
-        if slip is None or value == params.rate_hz:
+        if value == params.rate_hz:
             continue
         given = where_given(package, name) if value is not None else None
         place = given or slip
@@ -294,6 +308,23 @@ def _by_parameter(verdict: Verdict, run: Run, package: PackageFacts, params: Rat
         message = f"{verdict.message}; the node takes its rate from {slip.message}, {told}"
         cited = (FileCitation(file=place.file, line=place.line),)
         return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+    return verdict
+
+
+def _by_read_parameter(
+    verdict: Verdict, read: Mapping[str, Any], package: PackageFacts, params: RateParams, mean_hz: float
+) -> Verdict:
+    """Say it where the package's launch file gives a parameter that the node reads and that is the rate it has."""
+    for name, value in read.items():
+        given = where_given(package, name)
+        if given is None or isinstance(value, bool) or not isinstance(value, int | float):
+            continue
+        if value != params.rate_hz and abs(value - mean_hz) < NUMBER_SHARE * mean_hz:
+            where = f"{given.file}, line {given.line}"
+            message = f"{verdict.message}; the node reads {name}, which is {value_text(value)} in {where}"
+            hint = f"set {name} to {significant(params.rate_hz)} in {where}"
+            cited = (FileCitation(file=given.file, line=given.line),)
+            return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
     return verdict
 
 

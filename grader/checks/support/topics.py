@@ -8,7 +8,16 @@ from typing import Literal
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end, explain_error
 from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives, named_at, plain_type
-from grader.checks.support.text import INIT, LOOP, PUBLISHER, near_names, publisher, subscriber, texts_in
+from grader.checks.support.text import (
+    INIT,
+    LOOP,
+    PUBLISHER,
+    both,
+    near_names,
+    publisher,
+    subscriber,
+    texts_in,
+)
 from grader.evidence.events import MISFIT, UNHEARD
 from grader.evidence.run import Channel, Run
 from grader.model.package import LaunchNode, PackageFacts, PythonSlip
@@ -158,8 +167,28 @@ def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Calla
     if deaf := unheard(run):
         verdict = of_node(f"{message}: {deaf.message}", measured="no message", hint=deaf.hint)
         return verdict.model_copy(update={"cause": deaf.message})
+    if heard := _heard_topics(run):
+        answering = f"publish in the callback of {join_words(heard)}, or in the loop"
+        hint = both(
+            answering,
+            f"{answering}, and call ros::spinOnce() in it, or ros::spin(): else no callback is ever called",
+        )
+        return of_node(
+            f"{message}: nothing follows what the run publishes on {join_words(heard)}",
+            measured="no message",
+            hint=hint,
+        )
     hint = f"call publish(…) inside the loop `{LOOP}`"
     return of_node(message, measured="no message", hint=hint)
+
+
+def _heard_topics(run: Run) -> list[str]:
+    """Return the topics on which the grader published, and to which a node of the student's subscribes."""
+    sent = dict.fromkeys(
+        e.topic or "" for _, e in run.actors if e.actor == "grader" and e.action == "publish"
+    )
+    others = topics_with(run, "subscribers")
+    return [topic for topic in sent if topic in others]
 
 
 def refused_type(run: Run, topic: str) -> Verdict | None:
