@@ -21,8 +21,8 @@ ROS_2 = {
     "rosidl_runtime_py",
 }
 """No machine for ROS 1 has these."""
-ON_THE_MACHINE = "on the grading machine: "
-"""How every hint begins that only who keeps the machine can follow: grading again changes nothing before."""
+ON_THE_MACHINE = "nothing for you to do: tell your instructor. On the grading machine: "
+"""How every hint begins that only the instructor can follow: grading again changes nothing before."""
 _PREFIX = re.compile(r"/opt/ros/([a-z]+)\b")
 
 

@@ -190,7 +190,8 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
         return absent.model_copy(update={"cause": NO_FILE})
     all_named = list(installed(package))
     of_python = [one for one in all_named if one.call.name == PYTHON]
-    measured = f"named: {join_words(dict.fromkeys(shown(one.path) for one in of_python)) or 'none'}"
+    named = join_words(dict.fromkeys(shown(one.path) for one in of_python))
+    measured = f"catkin_install_python installs {named or 'no script'}"
     calls = tuple(FileCitation(file=o.call.file, line=o.call.line) for o in of_python)
     lacks = {s: lack for s in params.scripts if (lack := _lack(package, all_named, s))}
     if not lacks:

@@ -98,9 +98,10 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
         verdict = passed(f"prints each of the {len(probes)} messages on {params.topic}")
     first, last = (missing[0], missing[-1]) if missing else (probes[0], probes[-1])
     sent = cite(run, "/grader/actor", first.at_ns, last.at_ns)
+    count = f"{len(probes) - len(missing)} of {plural(len(probes), 'message')} printed"
     return verdict.about(
         expected=expected,
-        measured=f"{len(probes) - len(missing)} of {plural(len(probes), 'message')} printed",
+        measured=verdict.measured or count,
         citations=(*verdict.citations, sent),
     )
 
@@ -123,7 +124,10 @@ def _other_words(
         hint = f"print '{wanted}': of the message only its .data, which is the text"
     elif blank and said and all(text_places(missing, lines, glued)):
         hint = f"put a space between the words and the message: '{wanted}'"
-    return partial(1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes), message, hint=hint)
+    share = 1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes)
+    all_of = plural(len(probes), "message")
+    measured = f"{len(probes)} of {all_of} printed, {len(missing)} of them in other words"
+    return partial(share, message, hint=hint, measured=measured)
 
 
 def _how_many(missing: Sequence[Probe], probes: Sequence[Probe]) -> str:

@@ -120,7 +120,6 @@ def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdic
     found = loose.fullmatch(text)
     part = in_one_line(found[1]) if found and found.groups() else ""
     wanted = in_words(params.template)
-    form = params.template.replace(SECONDS, "%s")
     if any(mark in text for mark in UNFILLED):
         message = f"a message reads {in_one_line(text)!r}: its placeholder was never filled in"
     elif more := _behind(part):
@@ -132,10 +131,15 @@ def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdic
     message += f" ({len(wrong)} of {count} are wrong)" if len(wrong) < count else ""
     cited = cite(run, params.topic, at_ns, at_ns)
     value = TIMED if SECONDS in params.template else ""
-    hint = f'publish "{form}"{value}'
+    hint = f"publish {code_of(params.template)}"
     if value and _tells_time(run, heard):
         return partial(OTHER_WORDS_SHARE, f"{message}; its time is right", hint=hint, citations=(cited,))
     return failed(message, hint=hint, citations=(cited,))
+
+
+def code_of(template: str) -> str:
+    """Return the expression that makes such a text."""
+    return f'"{template.replace(SECONDS, "%s")}"{TIMED if SECONDS in template else ""}'
 
 
 def _tells_time(run: Run, heard: Sequence[Channel]) -> bool:

@@ -346,12 +346,15 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     only = f"; {join_words(dict.fromkeys(d.name for d in at_build))} only for building" if at_build else ""
     near = [n for name in missing for n in near_names(name, declared) if n not in names]
     slip = f"; it declares {join_words(near)}" if near else ""
+    # a new line goes below the last of its kind
+    last = max((d.line for d in found.dependencies), default=found.name_line)
     lines = tuple(FileCitation(file=found.file, line=d.line) for d in at_build)
+    below = f" below line {last}" if not lines and found.dependencies else ""
     return failed(
         f"{found.file} does not declare {join_words(missing)} for run time{only or slip}",
         measured=_declared_text(found),
-        hint="add " + " ".join(f"<{tag}>{n}</{tag}>" for n in missing),
-        citations=lines or (FileCitation(file=found.file, line=found.name_line),),
+        hint=f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in missing)}{below}",
+        citations=lines or (FileCitation(file=found.file, line=last),),
     )
 
 

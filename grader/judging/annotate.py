@@ -11,7 +11,8 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 
-from grader.checks.support.exit_causes import SYNTAX, syntax_hint
+from grader.checks.messages import code_of
+from grader.checks.support.exit_causes import NO_INPUT, RATE, SYNTAX, syntax_hint
 from grader.checks.support.launch import (
     find_launch,
     node_slip,
@@ -276,6 +277,23 @@ def _written_in(package: PackageFacts, path: str) -> Language:
         return "python"
     built = any(name.stem == one.target or one.is_called(name.name) for one in programs(package))
     return "cpp" if built or name.suffix in SOURCES else "python"
+
+
+def fill_input_hint(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:
+    """Return the verdict; a hint on a node that asks for input has the text and the rate that the lab wants of it."""
+    if NO_INPUT not in verdict.hint:
+        return verdict
+    asked = {
+        one.check: one.parameters
+        for one in rubric.criteria
+        if one.scenario == criterion.scenario and one.visibility == "visible"
+    }
+    hint = verdict.hint
+    if template := str(asked.get("message", {}).get("template", "")):
+        hint = hint.replace("a value in the code", f"`{in_language(code_of(template), 'python')}`")
+    if hz := asked.get("rate", {}).get("rate_hz"):
+        hint = hint.replace(RATE, f"rospy.Rate({significant(float(str(hz)))})")
+    return verdict.model_copy(update={"hint": hint})
 
 
 LINE_CHARS = 200

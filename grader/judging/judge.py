@@ -27,6 +27,7 @@ from grader.judging.annotate import (
     add_advice,
     add_later_faults,
     choose_hint_language,
+    fill_input_hint,
     name_unchanged_files,
     show_lines,
 )
@@ -183,7 +184,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
             for explain in (explain_by_exception, explain_by_unheard_topic, explain_by_unread_parameter):
                 found = explain(check, package, run, found)
             found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found)
-        return _with_package_name(choose_hint_language(found, criterion, facts), criterion, facts)
+        found = fill_input_hint(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
+        return _with_package_name(found, criterion, facts)
     except NotRecorded as missing:
         return missing.verdict
     except EvidenceError as error:

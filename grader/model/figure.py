@@ -69,13 +69,16 @@ class CounterFigure(Record):
 
 
 class Heard(Record):
-    """One probe: what was sent on which topic, and the line that the listener printed of it, if any."""
+    """One probe: what was sent on which topic, and the line that the listener printed of it, if any.
+
+    `other_words`: the line has the message, in other words than those that the lab asks for."""
 
     topic: str
     sent: str
     at_s: float
     heard: str | None = None
     after_s: float | None = None
+    other_words: bool = False
 
 
 class HeardFigure(Record):

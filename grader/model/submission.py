@@ -24,8 +24,8 @@ def chmod_hint(source: ModeSource | None, *paths: str, only_git_lacks_it: bool =
     if source == "git":
         return f"chmod +x {files}, then git add --chmod=+x {files}, commit and push"
     if source == "archive":
-        return f"chmod +x {files}, then pack it again with tar or zip, which keep the bit"
-    return f"chmod +x {files}, and hand it in with git, tar or zip, which keep the bit"
+        return f"chmod +x {files}, then pack it again with tar or zip, which keep that permission"
+    return f"chmod +x {files}, and hand it in with git, tar or zip, which keep that permission"
 
 
 class SourcePackage(Record):

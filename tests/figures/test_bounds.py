@@ -218,5 +218,17 @@ def test_of_very_many_probes_those_that_were_not_heard_stay() -> None:
     assert [row.sent for row in figure.rows if row.heard is None] == ["word0444"]
 
 
+def test_what_is_printed_in_other_words_is_shown_beside_what_is_not_printed() -> None:
+    run = {
+        "processes": [{"name": "listener"}],
+        "actors": [{"action": "publish", "topic": TOPIC, "values": ["one", "two"], "every_s": 0.5}],
+        "console": [{"process": "listener", "lines": ["I heard one", "got two"], "at_s": 3, "every_s": 0.5}],
+    }
+    figures, results = drawn(run, criterion("hears", topic=TOPIC, template="I heard {value}"))
+    rows = only(figures, "hears", HeardFigure).rows
+    assert [(row.heard, row.other_words) for row in rows] == [("I heard one", False), ("got two", True)]
+    assert results["hears"].measured == "2 of 2 messages printed, 1 of them in other words"
+
+
 def test_every_check_that_is_drawn_is_tried_here() -> None:
     assert {c["check"] for c in ALL} == set(DRAWN)

@@ -257,8 +257,8 @@ def test_the_package_is_at_hand_after_opening(tmp_path):
         ("tracked", "chmod +x src/node.py, then git add --chmod=+x src/node.py, commit and push"),
         ("only git lacks it", "git update-index --chmod=+x src/node.py, then commit and push"),
         ("new", "chmod +x src/node.py, then git add --chmod=+x src/node.py, commit and push"),
-        ("archive", "chmod +x src/node.py, then pack it again with tar or zip, which keep the bit"),
-        ("folder", "chmod +x src/node.py, and hand it in with git, tar or zip, which keep the bit"),
+        ("archive", "chmod +x src/node.py, then pack it again with tar or zip, which keep that permission"),
+        ("folder", "chmod +x src/node.py, and hand it in with git, tar or zip, which keep that permission"),
     ],
 )
 def test_how_a_script_becomes_executable_is_true_for_how_it_was_handed_in(handed_in, by_hand, tmp_path):

@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 from grader.checks import CHECKS
+from grader.checks.support.exit_causes import CAUSES
 from grader.checks.support.text import LOOP, in_language, init, publisher, set_param
 from grader.integrations.bundle import Bundle, add_lab
 from grader.judging import judge
-from grader.judging.annotate import LINE_CHARS, add_advice, choose_hint_language, show_lines
+from grader.judging.annotate import LINE_CHARS, add_advice, choose_hint_language, fill_input_hint, show_lines
 from grader.judging.facts import Facts
 from grader.judging.judge import judge_files
 from grader.model.package import PackageFacts
@@ -20,7 +21,8 @@ from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status, failed, passed
 from grader.package import read_package
 from grader.rubric.load import load_rubric, read_beside_rubric
-from tests.judging.rubrics import ALL, EXECUTABLE, GOOD_RUN, SCRIPT, rubric
+from tests.judging.rubrics import ALL, CHATTER, EXECUTABLE, GOOD_RUN, RATE, SCRIPT, rubric
+from tests.judging.rubrics import NODE as LIVES
 from tests.package.trees import CMAKE, MANIFEST, NODE, make_package
 from tests.rubric.samples import faults, spoiled
 from tests.support.timeline import build_runs
@@ -53,6 +55,35 @@ def criterion(
         reproduce="",
         citations=(),
     )
+
+
+@pytest.mark.parametrize(
+    ("visibility", "hint"),
+    [
+        (
+            "visible",
+            (
+                'write `"hello world %s" % rospy.get_time()` in place of `input()`, and pause in the loop: '
+                "write `rate = rospy.Rate(5)` above it and `rate.sleep()` as its last line"
+            ),
+        ),
+        ("hidden", CAUSES["EOFError"][1]),
+    ],
+)
+def test_a_node_that_asks_for_input_is_told_what_the_lab_wants_of_it(visibility: str, hint: str) -> None:
+    message = {"topic": "/chatter", "template": "hello world {seconds}"}
+    lab = rubric(
+        CHATTER,
+        LIVES,
+        EXECUTABLE,
+        {**RATE, "with": {"topic": "/chatter", "rate_hz": 5}, "visibility": visibility},
+        {"id": "words", "check": "message", "with": message, "scenario": "talker", "visibility": visibility},
+    )
+    lost = failed("talker ended before", hint=CAUSES["EOFError"][1])
+    chatter = next(c for c in lab.criteria if c.id == "chatter")
+    assert fill_input_hint(lost, chatter, lab).hint == hint
+    other = failed("no message came", hint="publish in the loop")
+    assert fill_input_hint(other, chatter, lab) == other
 
 
 def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:

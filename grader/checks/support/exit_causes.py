@@ -33,11 +33,14 @@ RACE = "publish() to a closed topic"
 ARGUMENT_HINT = (
     "put the value in the code, or use a default where `len(sys.argv)` is 1: nothing passes arguments"
 )
+NO_INPUT = "write a value in the code in place of `input()`"
+RATE = "rospy.Rate(10)"
+PAUSE = f"write `rate = {RATE}` above it and `rate.sleep()` as its last line"
 LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
 CAUSES = {
-    "EOFError": ("it waits for input (`input()`), but a node gets none",
-     "put a value in the code in place of `input()`, and call `rate.sleep()` in the loop: nobody types for a node"),
-    "BdbQuit": ("the debugger (`set_trace()`, `breakpoint()`) waits for input, but a node gets none",
+    "EOFError": ("it waits for input (`input()`), and a graded node gets no input",
+     f"{NO_INPUT}, and pause in the loop: {PAUSE}"),
+    "BdbQuit": ("the debugger (`set_trace()`, `breakpoint()`) waits for input, and a graded node gets no input",
      "remove `set_trace()` or `breakpoint()`, and its import"),
     "ROSInterruptException": ("ROS was told to shut down while the node slept, and nothing caught it",
      "call your main function in `try: … except rospy.ROSInterruptException: pass`"),
@@ -282,7 +285,7 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     """Explain one traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
-    slip = _slip(found, package)
+    slip = _slip(found, package) or _asks_for_input(found, place, package)
     cause, hint = slip or CAUSES.get(
         found.kind, ("", "look at that line: the last words say what Python cannot do there")
     )
@@ -319,6 +322,16 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(said.rstrip('.'))}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else (), unbuilt=maker is not None)
+
+
+def _asks_for_input(
+    found: Traceback, place: FileCitation | None, package: PackageFacts
+) -> tuple[str, str] | None:
+    """Return the cause and the hint of a script that asks for input and has a Rate already."""
+    rated = {one.file for one in package.slips if one.kind.startswith("rate-")}
+    if found.kind != "EOFError" or place is None or place.file not in rated:
+        return None
+    return CAUSES["EOFError"][0], f"{NO_INPUT}, and make sure that the loop calls `sleep()` of its Rate"
 
 
 def _makes(package: PackageFacts, message: str) -> bool:

@@ -130,8 +130,8 @@ def _unreadable(
         movable = [p for p in near if can_be_moved(p, launch) and (not wanted or started.get(p, wanted))]
         movable += full[:1] if len(full) == 1 else []
         hint = f"git mv {movable[0]} launch/{launch}" if movable else add_hint(f"launch/{launch}")
-        cited = tuple(FileCitation(file=p) for p in (near or others)[:3])
-        return failed(message, hint=hint, citations=cited or (FileCitation(file="package.xml"),))
+        place = movable[0] if movable else f"launch/{launch}"
+        return failed(message, hint=hint, citations=(FileCitation(file=place),))
     if file.fault is None:
         return None
     line = f", line {file.fault.line}" if file.fault.line else ""

@@ -213,7 +213,7 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
         ),
         "old-name": (
             f"{place}: {word} is Python 2",
-            "put a value in the code in place of `raw_input(…)`: nobody types for a node"
+            "put a value in the code in place of `raw_input(…)`: a node cannot ask for input"
             if word == "raw_input"
             else "",
         ),

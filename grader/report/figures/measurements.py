@@ -33,6 +33,7 @@ from grader.checks.support.console_output import (
     places_of,
     printed_lines,
     probes_on,
+    text_places,
 )
 from grader.checks.support.counters import (
     Count,
@@ -49,6 +50,7 @@ from grader.checks.support.counters import (
 from grader.checks.support.exit_causes import process_tracebacks
 from grader.checks.support.geometry import Polyline, Pose, followed, relative, shown_walls, track
 from grader.checks.support.processes import how_it_ended, life_of
+from grader.checks.support.text import VALUE
 from grader.checks.support.topics import sent_by
 from grader.evidence.events import ProcessEvent
 from grader.evidence.run import Channel, Run
@@ -303,28 +305,37 @@ def heard_figures(run: Run, params: HearsParams) -> Iterator[HeardFigure]:
     places = places_of(run, probes, lines, params.template) if probes else None
     if places is None:
         return
-    in_turn = chosen(places)
-    find = line_finder(probes, lines, params.template)
-    found = [
-        None if not own else find(own[0] if turn is None else turn)
-        for own, turn in zip(places, in_turn, strict=True)
-    ]
+    found = _lines_of(probes, lines, places, params.template)
+    other: list[Line | None] = [None] * len(probes)
+    if params.template != VALUE and None in found and all(isinstance(p.value, str) for p in probes):
+        other = _lines_of(probes, lines, text_places(probes, lines, VALUE), VALUE)
     kept = _shown_probes(found)
     yield HeardFigure(
         scenario=short_name(run.scenario),
-        rows=tuple(_row(run, params.topic, probes[i], found[i]) for i in kept),
+        rows=tuple(_row(run, params.topic, probes[i], found[i], other[i]) for i in kept),
         left_out=len(probes) - len(kept),
-        out_of_order=all(places) and None in in_turn,
+        out_of_order=all(places) and None in chosen(places),
     )
 
 
-def _row(run: Run, topic: str, probe: Probe, line: Line | None) -> Heard:
+def _lines_of(
+    probes: Sequence[Probe], lines: Sequence[Line], places: Sequence[tuple[int, ...]], template: str
+) -> list[Line | None]:
+    """Return for each probe the line in which it was printed, in the order in which they were sent where they are."""
+    find = line_finder(probes, lines, template)
+    in_turn = zip(places, chosen(places), strict=True)
+    return [None if not own else find(own[0] if turn is None else turn) for own, turn in in_turn]
+
+
+def _row(run: Run, topic: str, probe: Probe, right: Line | None, other: Line | None) -> Heard:
+    line = right or other
     return Heard(
         topic=short_name(topic),
         sent=short(probe.value, TEXT_LETTERS),
         at_s=second(run, probe.at_ns),
         heard=None if line is None else _message_words(line),
         after_s=None if line is None else max(0.0, round((line.at_ns - probe.at_ns) / 1e9, 6)),
+        other_words=right is None and line is not None,
     )
 
 

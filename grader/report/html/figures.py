@@ -161,6 +161,8 @@ def _draw_heard(figure: HeardFigure, name: str) -> Drawn:
     rows = _first(figure.rows, missed)
     many = len(figure.rows)
     said = f"{many - len(missed)} of {plural(many, 'message')} {'was' if many == 1 else 'were'} printed."
+    if other := sum(row.other_words for row in figure.rows):
+        said = f"{said[:-1]}, {other} of them in other words."
     if figure.out_of_order:
         said += " All of them came, but not in the order in which they were sent."
     return Drawn(
