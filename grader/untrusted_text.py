@@ -28,12 +28,18 @@ CITATIONS_MAX = 20
 _NAMED = {"\n": "\\n", "\r": "\\r", "\t": "\\t"}
 # `##[error]`, `##vso[…]`, `##teamcity[…]` count anywhere in a line, GitHub's `::error::` at a line's start only.
 _COMMAND = re.compile(r"#(?=#[A-Za-z]{0,20}\[)")
+_COLOUR = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 _COMMAND_AT_START = re.compile(r"^((?:[^\S\n]|\x1b\[[0-9;]*m)*):(?=:)", re.MULTILINE)
 
 
 def steers(character: str) -> bool:
     """Return whether it is no sign that can be seen: a control, format, private, unassigned or invisible character."""
     return unicodedata.category(character) in HIDDEN_CATEGORIES or ord(character) in INVISIBLE
+
+
+def without_colours(text: str) -> str:
+    """Return the text without the codes that colour a terminal."""
+    return _COLOUR.sub("", text)
 
 
 def visible(text: str, *, lines: bool = False) -> str:

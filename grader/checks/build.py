@@ -16,12 +16,13 @@ from grader.checks.support.build_errors import (
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.processes import Life, lives
 from grader.checks.support.scripts import cmake_calls, is_elsewhere, paths_by_name, programs
-from grader.checks.support.text import bare, near_names, shown
+from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import Executable, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.untrusted_text import without_colours
 from grader.wording import join_words, seconds
 
 CATKIN_MAKE = "catkin_make"
@@ -301,7 +302,7 @@ def _last_words(run: Run, one: Life) -> str:
     """Return the loader's complaint, or ROS's, or that of an exception where there is one, or else the last line."""
     lines = [line.line for _, line in run.lines(one.name) if line.line.strip()]
     complaints = [line for line in lines if any(mark in line for mark in (*LOADER, *TELLING))]
-    return shown(bare((complaints or lines[-1:] or [""])[0]))
+    return shown(without_colours((complaints or lines[-1:] or [""])[0]))
 
 
 def _how_they_went(programs: list[Life]) -> str:

@@ -27,12 +27,13 @@ from grader.checks.support.launch import (
     why_not_up,
 )
 from grader.checks.support.scripts import RIGHT_SHEBANG, add_hint, find_script, programs
-from grader.checks.support.text import bare, near_names, shown
+from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, passed, unjudged
+from grader.untrusted_text import without_colours
 from grader.wording import join_words, plural
 
 
@@ -368,12 +369,12 @@ def _blanks(run: Run, pages: list[Page]) -> re.Match[str] | None:
     """Return what the shell said of `URL = …`, where no address came to the program because of that."""
     if any(re.search(r"[./]", argument) for page in pages for argument in page.arguments):
         return None
-    return next(filter(None, (ASSIGNED.search(bare(c.line)) for _, c in run.console)), None)
+    return next(filter(None, (ASSIGNED.search(without_colours(c.line)) for _, c in run.console)), None)
 
 
 def _words(package: PackageFacts, file: LaunchFile, run: Run) -> str:
     """Return what the script or roslaunch said instead."""
-    lines = [bare(c.line) for _, c in run.console]
+    lines = [without_colours(c.line) for _, c in run.console]
     shell = re.compile(
         r"command not found|No such file|[Ss]yntax error|not found$|bad interpreter|cannot launch node"
     )

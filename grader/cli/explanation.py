@@ -41,9 +41,10 @@ SLIPS: tuple[tuple[tuple[str, ...], tuple[RepairKind, ...]], ...] = (
 
 
 def print_explanation(name: str, rubric: str | None) -> None:
-    """Print what, why, how it is measured and how to fix it. Raises UsageError for an unknown name.
+    """Print how to fix it, what, why and how it is measured. Raises UsageError for an unknown name.
 
-    The name is looked up in `rubric` beside the grader's own checks; `LAB/criterion` says the same.
+    What a rubric can set is told of a check alone: who asks for a criterion has a package, not a rubric. The name is
+    looked up in `rubric` beside the grader's own checks; `LAB/criterion` says the same.
     """
     lab, slash, criterion = ("", "", name) if rubric is not None else name.rpartition("/")
     loaded = [load_rubric(rubric or lab)] if rubric is not None or slash else list(all_rubrics())
@@ -60,7 +61,7 @@ def print_explanation(name: str, rubric: str | None) -> None:
         _print(_criterion_lines(each.rubric, item))
         if item.check in each.checks and item.check not in told:
             told.add(item.check)
-            _print(_check_lines(each.checks[item.check]))
+            _print(_check_lines(each.checks[item.check], parameters_too=False))
 
 
 def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]) -> UsageError:
@@ -102,24 +103,33 @@ def worth_of(criterion: Criterion, rubric: Rubric) -> str:
     return ", ".join(said)
 
 
-def _check_lines(check: Check) -> Iterator[Line]:
+def _check_lines(check: Check, *, parameters_too: bool = True) -> Iterator[Line]:
     yield f"{check.name}: {check.title}", 0
-    for heading in HEADINGS:
-        if heading in check.sections:
-            yield "", 0
-            yield heading, 0
-            for paragraph in check.sections[heading].split("\n\n"):
-                yield paragraph, 2
+    *measured, fix = HEADINGS
+    yield from _section(check, fix)
     slips = next((kinds for names, kinds in SLIPS if check.name.startswith(names)), ())
     if slips:
         yield "", 0
-        yield "Slips that cost it, and how to repair them by hand", 0
+        yield "Common mistakes, and how to repair them by hand", 0
         for kind in slips:
             yield BY_HAND[kind], 2
+    for heading in measured:
+        yield from _section(check, heading)
+    if not parameters_too:
+        yield "", 0
+        return
     yield from _parameter_lines(check.params, "What a rubric can set")
     for record, words in inner_records(check.params).items():
         yield from _parameter_lines(record, f"Keys of a {words}")
     yield "", 0
+
+
+def _section(check: Check, heading: str) -> Iterator[Line]:
+    if heading in check.sections:
+        yield "", 0
+        yield heading, 0
+        for paragraph in check.sections[heading].split("\n\n"):
+            yield paragraph, 2
 
 
 def _parameter_lines(record: type[Record], heading: str) -> Iterator[Line]:

@@ -19,6 +19,7 @@ from grader.evidence.events import (
     RecorderEvent,
     ScenarioEvent,
 )
+from grader.untrusted_text import without_colours
 
 if TYPE_CHECKING:
     from grader.evidence.decode import Decoder
@@ -284,15 +285,16 @@ class Run:
 
 
 def console_log(runs: Mapping[str, Run]) -> str:
-    """Return what the build and the student's processes printed, by scenario, with seconds since the run began."""
+    """Return what the build and the student's processes printed: the build first, then each scenario in the order in
+    which they ran, with seconds since the run began and without the codes that colour a terminal."""
     lines = []
-    for name, run in runs.items():
+    for name, run in sorted(runs.items(), key=lambda item: item[1].start_ns):
         lines += [f"== {name}"] if run.console else []
         own = {event.name for _, event in run.processes if event.role == "grader"}
         for time_ns, line in run.console:
             if line.process in own:
                 continue
-            text = line.line.replace("\n", "\\n")  # a line is one, whatever a recording says
+            text = without_colours(line.line).replace("\n", "\\n")  # a line is one, whatever a recording says
             lines.append(f"{(time_ns - run.start_ns) / 1e9:8.3f} {line.process} {line.stream}: {text}")
     return "".join(f"{line}\n" for line in lines)
 

@@ -169,7 +169,9 @@ def test_logic_is_left_to_the_student(kind, before, after, fixed, tmp_path):
 def test_an_explanation_says_how_it_is_done_by_hand(capsys):
     assert run(["explain", "mcr2-basic-comms/talker-executable"]) == 0
     shown = capsys.readouterr().out
-    assert "Slips that cost it, and how to repair them by hand" in shown
+    assert "Common mistakes, and how to repair them by hand" in shown
+    assert shown.index("How to fix") < shown.index("What it checks")
+    assert "What a rubric can set" not in shown
     assert "chmod +x FILE" in shown
     assert run(["explain", "manifest"]) == 0
     assert capsys.readouterr().out.count("manifest: The manifest names the package.\n") == 1

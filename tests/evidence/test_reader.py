@@ -15,6 +15,7 @@ from grader.errors import EvidenceError
 from grader.evidence import container, reader
 from grader.evidence.events import ConsoleLine
 from grader.evidence.reader import load_evidence, load_run, package_facts
+from grader.evidence.run import Run, console_log
 from grader.evidence.writer import EvidenceStream
 from tests.evidence.samples import ABOUT, METADATA, T0, identity, sample
 
@@ -247,3 +248,20 @@ def test_an_unfinished_recording_has_no_outcome():
     stream.seek(0)
     run = load_run(stream)
     assert (run.outcome, run.channels, run.start_ns, run.end_ns) == (None, (), 0, 0)
+
+
+def test_the_console_is_told_in_the_order_of_the_runs_and_without_colours() -> None:
+    def run_of(start_ns: int, text: str) -> Run:
+        line = ConsoleLine(process="node", stream="stderr", line=text)
+        return Run(
+            evidence="x.mcap", scenario="x", clock="real", warp=1.0, metadata={}, start_ns=start_ns,
+            end_ns=start_ns + 1, console=((start_ns + 500_000_000, line),),
+        )  # fmt: skip
+
+    runs = {
+        "listener": run_of(9_000_000_000, "\x1b[31mlate\x1b[0m"),
+        "package": run_of(1_000_000_000, "built"),
+    }
+    assert console_log(runs) == (
+        "== package\n   0.500 node stderr: built\n== listener\n   0.500 node stderr: late\n"
+    )

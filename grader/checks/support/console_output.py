@@ -13,8 +13,9 @@ from itertools import accumulate
 from typing import Literal, NamedTuple
 
 from grader.checks.support.exceptions import HEADING, tracebacks
-from grader.checks.support.text import VALUE, bare, line_pattern, words_pattern
+from grader.checks.support.text import VALUE, line_pattern, words_pattern
 from grader.evidence.run import Run
+from grader.untrusted_text import without_colours
 
 OTHER_NUMBERS_PER_LINE = 6
 """Besides those that were sent: a line with more of them hears nothing."""
@@ -106,7 +107,7 @@ def _without_tracebacks(lines: Sequence[tuple[int, str]]) -> list[tuple[int, str
 
 
 def _bare(text: str, names: Iterable[str]) -> str:
-    text = _LOG_PREFIX.sub("", bare(text))
+    text = _LOG_PREFIX.sub("", without_colours(text))
     for name in names:
         text = text.replace(name, " ")
     return _WORD.sub(_without_anonymous, text) if _ANONYMOUS_END.search(text) else text
@@ -331,5 +332,5 @@ def logged_by(run: Run, nodes: Collection[str]) -> tuple[Logged, ...]:
 
 def console_log(line: str) -> tuple[str, str] | None:
     """Return the level and text of a line as rospy and roscpp print what they log; None for any other line."""
-    match = _CONSOLE.match(bare(line))
+    match = _CONSOLE.match(without_colours(line))
     return (match[1].lower(), match[2]) if match else None

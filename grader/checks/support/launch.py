@@ -20,11 +20,12 @@ from grader.checks.support.scripts import (
     programs,
     shebang_obstacles,
 )
-from grader.checks.support.text import INIT, bare, near_names, shown
+from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.submission import chmod_hint
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, unjudged
+from grader.untrusted_text import without_colours
 from grader.wording import join_words
 
 OTHER_ATTRIBUTES = {"package": "pkg", "exec": "type", "executable": "type", "script": "type"}
@@ -356,7 +357,7 @@ def refusal(run: Run) -> Absence | None:
 def died(run: Run, node: LaunchNode) -> int | None:
     """Return the exit code with which roslaunch saw it die before Ctrl-C; None where it did not."""
     until_ns = observed_until_ns(run) or run.end_ns
-    lines = _join_required(bare(c.line) for t, c in run.console if t <= until_ns)
+    lines = _join_required(without_colours(c.line) for t, c in run.console if t <= until_ns)
     codes = [int(m[2]) for line in lines if (m := _DIED.search(line)) and _is(node, m[1])]
     return codes[-1] if codes else None
 
@@ -516,4 +517,4 @@ def _join_required(lines: Iterable[str]) -> Iterator[str]:
 
 
 def _lines(run: Run) -> list[str]:
-    return [bare(c.line) for _, c in run.console]
+    return [without_colours(c.line) for _, c in run.console]

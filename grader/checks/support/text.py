@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from typing import Literal
 
-from grader.untrusted_text import visible
+from grader.untrusted_text import visible, without_colours
 from grader.wording import is_one_edit, shorten
 
 SIMILARITY = 0.8
@@ -21,7 +21,6 @@ NAMES_MAX, NAME_CHARS_MAX = 1_000, 60
 """Of names that students may give by the thousand: so many are looked at, and so much of each."""
 SHOWN_CHARS = 160
 SHOWN_BEFORE_CHARS = 10_000
-_ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 SECONDS = "{seconds}"
 VALUE = "{value}"
 NUMBER = r"[-+]?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?"
@@ -77,14 +76,9 @@ def _joined_words(name: str) -> str:
     return "".join(_words(name))
 
 
-def bare(text: str) -> str:
-    """Return the text without the terminal's colours."""
-    return _ANSI.sub("", text)
-
-
 def shown(text: str) -> str:
     """One line of someone's output, without colours, what cannot be seen written out, cut to fit a report."""
-    return in_one_line(bare(text[:SHOWN_BEFORE_CHARS]))
+    return in_one_line(without_colours(text[:SHOWN_BEFORE_CHARS]))
 
 
 def in_one_line(text: str) -> str:

@@ -14,7 +14,7 @@ from difflib import get_close_matches
 from typing import NamedTuple
 
 from grader.checks.support.processes import how_it_ended
-from grader.checks.support.text import SHOWN_BEFORE_CHARS, bare
+from grader.checks.support.text import SHOWN_BEFORE_CHARS
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.evidence.events import ActorEvent, GraphEvent, ProcessEvent
 from grader.evidence.run import BARE_NAME, Run, is_grader_node
@@ -29,6 +29,7 @@ from grader.model.figure import (
     TimelineFigure,
 )
 from grader.model.verdict import Citation, FileCitation
+from grader.untrusted_text import without_colours
 from grader.wording import shorten
 
 NAME_LETTERS = 200
@@ -202,7 +203,7 @@ def console_of(run: Run) -> ConsoleFigure | None:
         return None
     many = len(printed) > FIRST_LINES + LAST_LINES
     kept = [*printed[:FIRST_LINES], *printed[-LAST_LINES:]] if many else printed
-    texts = [bare(line.line[:SHOWN_BEFORE_CHARS]) for _, line in kept]
+    texts = [without_colours(line.line[:SHOWN_BEFORE_CHARS]) for _, line in kept]
     large = sum(min(len(text), LINE_LETTERS) for text in texts) > LETTERS_MAX
     letters = LETTERS_MAX // len(texts) if large else LINE_LETTERS
     lines = tuple(
@@ -382,7 +383,7 @@ def _join_close(times: Sequence[int], size_ns: int) -> Iterator[tuple[int, int, 
 def _errors(run: Run) -> Iterator[Stretch]:
     own = {event.name for _, event in run.processes if event.role == "grader"}
     for time_ns, line in run.console:
-        text = bare(line.line[:SHOWN_BEFORE_CHARS]).strip()
+        text = without_colours(line.line[:SHOWN_BEFORE_CHARS]).strip()
         if line.stream == "stderr" and line.process not in own and text:
             yield _stretch(run, time_ns, time_ns, f"{line.process}: {text}", wrong=True)
 

@@ -37,7 +37,7 @@ from grader.report.html.plots import (
 )
 from grader.report.html.svg import element, escaped, short, ticks
 from grader.report.text import clip
-from grader.wording import number, plural
+from grader.wording import join_words, number, plural
 
 CONSOLE_FIRST, CONSOLE_LAST = 35, 25
 LINE_CHARS = 500
@@ -205,11 +205,12 @@ def _graph(figure: GraphFigure, name: str) -> Drawn:
 
 
 def _code(figure: CodeFigure, name: str) -> Drawn:
-    marked = ", ".join(str(i) for i in figure.marked[:5])
+    lines = [str(i) for i in figure.marked[:5]]
+    marked = f"line{'s' if len(lines) > 1 else ''} {join_words(lines)}"
     return Drawn(
         name=name,
         kind="code",
-        title=f"{figure.file}, line {marked}" if marked else figure.file,
+        title=f"{figure.file}, {marked}" if lines else figure.file,
         points=len(figure.lines),
         rows=[
             (
