@@ -202,9 +202,9 @@ def hint_beside(criterion: CriterionResult, place: str) -> str:
 
 
 WHOLE_LINE = re.compile(
-    r"write (?!.*( at | above| below| before| after| inside| every| each))(?=\S)", re.DOTALL
+    r"write (?=\S*[^\w\s])(?!.*( at | above| below| before| after| inside| every| each))", re.DOTALL
 )
-"""A hint that says what to write, and not where."""
+"""A hint that says which code to write, and not where."""
 
 
 def without_place(text: str, place: str) -> str:

@@ -86,6 +86,8 @@ def test_a_fix_with_several_steps_is_told_step_by_step() -> None:
         ("src/a.py line 3: indent line 3 by four spaces", "indent line 3 by four spaces"),
         ("write f()", "in line 3, write f()"),
         ("write f() after the loop", "write f() after the loop"),
+        ("write the names one below the other", "write the names one below the other"),
+        ('write pkg="lab1"', 'in line 3, write pkg="lab1"'),
         (
             "src/a.py line 3: write f(); src/b.py line 4: write g()",
             "in line 3, write f(); src/b.py line 4: write g()",
