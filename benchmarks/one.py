@@ -105,7 +105,12 @@ def _table(turns: list[Turn]) -> str:
             Row("whole lab, the grader's own CPU", "s", [g.own_cpu_s for g in gradings]),
             Row("whole lab, CPU of the student's processes", "s", [g.student_cpu_s for g in gradings]),
             Row("whole lab, CPU of the build", "s", [g.build_cpu_s for g in gradings]),
-            Row("the grader's own CPU / student's processes and build", "", [g.ratio for g in gradings]),
+            Row(
+                "the grader's own CPU / student's processes and build",
+                "",
+                [g.ratio for g in gradings],
+                "at most 0.45",
+            ),
             Row("memory of the largest arena", "MB", [g.arena_bytes / 1e6 for g in gradings]),
             Row("first verdict of `grader check`, wall", "s", [t.first_s for t in turns], "at most 1"),
             Row("judging the evidence again, wall", "s", [j.wall_s for j in judged]),
