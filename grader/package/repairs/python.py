@@ -182,11 +182,25 @@ def _rewritten(before: str, after: str) -> str:
 
 def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[str, str]:
     """Return what is wrong, and how it is repaired; "" where the changed line says it."""
+    said = _words_by_cause(file, steps, before)
+    if cause in said:
+        return said[cause]
+    error = steps[0].error
+    told = cause_of(error.message, error.text, column=error.column) if error else ""
+    fix = _rewritten(before, steps[-1].text) if cause == "python2" else ""
+    fix = f"delete line {steps[0].line}" if told.endswith("delete this line") else fix
+    what = told or (error.message if error else "not Python 3")
+    return f"line {steps[0].line} of {file}: {what}", fix
+
+
+def _words_by_cause(file: str, steps: list[_Step], before: str) -> dict[Cause, tuple[str, str]]:
+    """Return the words for each cause whose mistake is known without Python's own message."""
     first = steps[0]
     place, word = f"line {first.line} of {file}", first.word
     names = ", ".join(dict.fromkeys(step.word for step in steps))
     calls = ", ".join(f"{one}()" for one in word.split(", "))
-    said: dict[Cause, tuple[str, str]] = {
+    below = f"{place}: `global {word}` stands below a line that uses {word}"
+    return {
         "tabs": (
             f"{place}: tabs and spaces are mixed in the indentation",
             _required_indentation(before, steps[-1].text),
@@ -204,13 +218,10 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
             "end the first line of each block with `:` in place of `{`, and delete each `}` that ends a block",
         ),
         "global": (
-            f"{place}: `global {word}` stands below a line that uses {word}",
+            below,
             f"write `global {names}` as the first line of the function, and nowhere else in it",
         ),
-        "outside": (
-            f"{place}: `global {word}` stands below a line that uses {word}",
-            f"take line {first.line} out: outside of a function `global` does nothing",
-        ),
+        "outside": (below, f"take line {first.line} out: outside of a function `global` does nothing"),
         "old-name": (
             f"{place}: {word} is Python 2",
             "put a value in the code in place of `raw_input(…)`: a node cannot ask for input"
@@ -233,10 +244,3 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
             f"write {word} as the last line of what makes the node",
         ),
     }
-    if cause in said:
-        return said[cause]
-    error = first.error
-    told = cause_of(error.message, error.text, column=error.column) if error else ""
-    fix = _rewritten(before, steps[-1].text) if cause == "python2" else ""
-    fix = f"delete line {first.line}" if told.endswith("delete this line") else fix
-    return f"{place}: {told or (error.message if error else 'not Python 3')}", fix
