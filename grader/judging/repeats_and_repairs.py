@@ -203,7 +203,8 @@ def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], crit
     one, copy = first[criterion.id], on_copy[criterion.id]
     if copy.status.is_lost and copy.score <= one.score:
         return not one.unjudged or (copy.unjudged and copy.cause == one.cause)
-    return copy.status is Status.ERROR
+    # what was judged before, and could not be on the copy, shows nothing of the repair
+    return copy.status is Status.ERROR or (copy.status.is_open and not one.unjudged)
 
 
 def _is_next(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> bool:

@@ -196,7 +196,8 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
         return Explained(f"it needs the package {name}, which is not here", f"hand in {name} too")
     if name in ROS_2:
         return Explained(f"it needs {name}, which is from ROS 2", f"take {name} out: this lab is for ROS 1")
-    if name in known_packages() or (name in declared and not near):
+    placeholder = re.fullmatch(r"dep(end)?\d", name) is not None
+    if name in known_packages() or (name in declared and not near and not placeholder):
         return Explained(
             f"it needs the package {name}, which this grading machine lacks",
             install_hint(name, lines),
@@ -206,7 +207,8 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
     hint = (
         f"{meant} in find_package(…) and in package.xml; a package of your own must be pushed with this one"
     )
-    return Explained(f"find_package(…) names {name}, but there is no package of that name", hint)
+    why = f"find_package(…) names {name}, but there is no package of that name"
+    return Explained(f"{why}: the help of catkin_create_pkg calls a package so" if placeholder else why, hint)
 
 
 def _missing_library(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:

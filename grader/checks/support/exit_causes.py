@@ -48,7 +48,8 @@ CAUSES = {
      "call `rospy.init_node(…)` before the first publish, Rate or sleep"),
     "KeyboardInterrupt": ("Ctrl-C came at a point where nothing handles it",
      "loop with `while not rospy.is_shutdown():` and sleep with `rospy.Rate`"),
-    "ModuleNotFoundError": ("", "check the spelling of the import; a message package is imported as `std_msgs.msg`"),
+    "ModuleNotFoundError": ("",
+     "check the spelling of the import (messages: `std_msgs.msg`), and push it if it is a file or package of your own"),
     "ImportError": ("", "check the spelling of the import: the message types are at http://wiki.ros.org/std_msgs"),
     "ResourceNotFound": ("there is no such ROS package", "remove `roslib.load_manifest(…)`: catkin needs no such line"),
     "NameError": ("", "check the spelling, and that it is imported or assigned before it is used"),
@@ -485,7 +486,11 @@ def _lacking(found: Traceback, package: PackageFacts) -> str:
         *(f.path.rpartition("/")[2].removesuffix(".py") for f in package.files),
     }
     declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
-    return name if name not in own | ROS_2 and (name in known_packages() or name in declared) else ""
+    messages = name.endswith(("_msgs", "_srvs")) and not near_names(
+        name, (*known_packages(), *noetic_messages(), *own)
+    )
+    exists = name in known_packages() or name in declared or messages
+    return name if exists and name not in own | ROS_2 else ""
 
 
 def _broken(found: Traceback, package: PackageFacts) -> str:

@@ -176,7 +176,8 @@ def _rewritten(before: str, after: str) -> str:
     if len(found) < 2 or before.count("\n") != after.count("\n"):
         return ""
     written = [f"in line {number}, write {new}" for number, new in found[1:LINES_SHOWN]]
-    more = f"; {len(found) - LINES_SHOWN} more lines alike" if len(found) > LINES_SHOWN else ""
+    left = len(found) - LINES_SHOWN
+    more = f"; {plural(left, 'more line')} alike" if left > 0 else ""
     return "; ".join([f"write {found[0][1]}", *written]) + more
 
 
