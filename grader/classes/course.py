@@ -253,7 +253,7 @@ def rows_of(course: CourseFile, marks: tuple[Marks, ...]) -> Iterator[Row]:
 
 
 def _lab(marks: Marks, row: Row | None) -> CriterionResult:
-    """Return a lab's row as a criterion: open where it is not settled, not published, or not handed in at all."""
+    """Return a lab's row as a criterion: open where it is, not published, or not handed in at all."""
     result = row.result if row else None
     known = result is not None and result.status == "graded"
     return CriterionResult(

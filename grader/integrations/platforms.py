@@ -177,7 +177,7 @@ def _invalid(message: str, hint: str) -> dict[str, Any]:
 def _message(result: GradingResult, shown: list[CriterionResult]) -> Iterator[str]:
     waiting = sum(c.missing for c in shown if c.status.is_open)
     if waiting:
-        yield f"{LOOK}: {number(waiting)} points are not settled yet; no points are lost for good."
+        yield f"{LOOK}: {number(waiting)} points are still open; no points are lost for good."
     yield f"{number(result.points)} of {number(result.max_points)} points"
     yield from (line(words, LIMIT) for words in score_words(result))
 

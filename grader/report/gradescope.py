@@ -77,7 +77,7 @@ class _Writer:
         waiting = [c for c in shown if c.status.is_open and c.counts]
         if any(c.status.is_open and c.counts for c in result.criteria):
             points = number(sum(c.missing for c in waiting))
-            what = f": {points} points are not settled yet" if waiting else ""
+            what = f": {points} points are still open" if waiting else ""
             yield f"{LOOK}{what}; no points are lost for good."
         hidden = len(result.criteria) - len(shown) + missing_hidden(result, self._rubric)
         if hidden:

@@ -142,7 +142,7 @@ class _Writer:
             yield from ([] if not_graded(result) else ["It could not be graded automatically:", ""])
             yield from (self._text(result.error.message), "", self._text(result.error.hint), "")
         if result.status == "inconclusive":
-            yield from (f"**Not settled yet:** {NOT_SETTLED}", "")
+            yield from (f"**Still open:** {NOT_SETTLED}", "")
         for words in (verdict_words(result, rubric, hidden), visible_words(result, hidden)):
             yield from (words, "") if words else ()
         version = self._text(result.rubric.version)

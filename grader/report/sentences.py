@@ -336,7 +336,7 @@ def verdict(result: GradingResult, rubric: Rubric, hidden: int, to_fix: int) -> 
     if not hidden and passed(rubric, result):
         return "pass", "Passed"
     if result.status != "graded":
-        return "inconclusive", "Not settled yet"
+        return "inconclusive", "Still open"
     if hidden:
         reached = all(c.status is Status.PASS for c in result.criteria if c.is_required)
         return ("pass", "So far, so good") if reached else ("partial", "There is something to fix")

@@ -126,7 +126,7 @@ def check_only(folder: BatchFolder, only: Sequence[str]) -> frozenset[str]:
 def plan(folder: BatchFolder, published: Published, only: Sequence[str] = ()) -> Iterator[Step]:
     """Yield what publishing does with each submission, in the roster's order; with `only`, with these.
 
-    What is not settled, or could not be graded for no fault of the student's, stays a draft unless it is named.
+    What is still open, or could not be graded for no fault of the student's, stays a draft unless it is named.
     """
     names = check_only(folder, only)
     for entry in folder.run.entries:
@@ -154,7 +154,7 @@ def _draft(result: GradingResult | None, *, named: bool) -> str:
     if result.error is not None:
         return f"could not be graded: {result.error.message}"
     waiting = [c.id for c in result.criteria if c.status.is_open and c.counts]
-    return f"not settled: {join_words(waiting)}"
+    return f"still open: {join_words(waiting)}"
 
 
 def digest_of(result: GradingResult) -> str:
@@ -344,7 +344,7 @@ def changes_between(
 def _total(result: GradingResult) -> str:
     if not_graded(result):
         return "not graded"
-    return number(result.points) + (" (not settled)" if result.status == "inconclusive" else "")
+    return number(result.points) + (" (still open)" if result.status == "inconclusive" else "")
 
 
 def _criteria(before: GradingResult, after: GradingResult, hidden: Collection[str]) -> Iterator[str]:
