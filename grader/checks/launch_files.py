@@ -360,8 +360,8 @@ def _page(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams
         return failed(message, hint=hint, citations=cited)
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
-    if absence := refusal(run):
-        return failed(absence.why, hint=absence.hint)
+    if absence := refusal(run, package):
+        return failed(absence.why, hint=absence.hint, citations=absence.citations)
     return failed(f"the script opens nothing in {params.program}{_words(package, file, run)}", hint=hint)
 
 

@@ -29,6 +29,7 @@ from grader.checks.support.launch import (
     why_died,
     why_not_up,
 )
+from grader.checks.support.launch_names import find_renaming
 from grader.checks.support.processes import GlobalName
 from grader.checks.support.scripts import shebang_obstacles
 from grader.checks.support.text import near_names
@@ -366,26 +367,18 @@ def _judge_deaths(package: PackageFacts, run: Run, wanted: list[Wanted], when: s
     return None
 
 
-def _in_namespace(
-    file: LaunchFile, verdict: Verdict, nodes: list[LaunchNode], spaces: list[str], topic: str
-) -> Verdict:
-    """Name the namespaces of a launch file, in which a topic has another name, and the nodes in them."""
-    first, name = spaces[0].strip("/"), topic.lstrip("/")
-    which = "namespace" if len(spaces) == 1 else "namespaces"
-    message = (
-        f"{verdict.message}: it puts its nodes in the {which} {join_words(s.strip('/') for s in spaces)}"
-    )
-    move = f'remove ns="{first}"'
-    if len(spaces) > 1:
-        move = f'write one <node> of each outside of <group ns="{first}">'
-    lines = sorted({(n.file or file.path, n.line) for n in nodes if n.namespace != "/"})
-    cited = tuple(FileCitation(file=path, line=line) for path, line in lines)
-    hint = f"{move}: in it, {name} becomes /{first}/{name}"
-    moved = sorted(
-        {new for n in nodes for old, new in n.remaps if old.lstrip("/") == name and new.lstrip("/") != name}
-    )
-    hint += f"; then remove the <remap>s of {name}, which call it {join_words(moved)}" if moved else ""
-    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited[:4]})
+def _in_namespaces(file: LaunchFile, verdict: Verdict, nodes: list[LaunchNode], topic: str) -> Verdict:
+    """Name the namespaces of a launch file that starts the same nodes in several, and the lines that make them."""
+    spaces = list(dict.fromkeys(node.namespace.strip("/") for node in nodes if node.namespace != "/"))
+    found = [line for n in nodes for line in n.renaming if line.tag != "remap"]
+    places = {(line.file, line.line) for line in found} or {(n.file or file.path, n.line) for n in nodes}
+    update = {
+        "message": f"{verdict.message}: it puts its nodes in the namespaces {join_words(spaces)}",
+        "hint": f'write one <node> of each outside of <group ns="{spaces[0]}">: in it, {topic.lstrip("/")} '
+        f"becomes /{spaces[0]}{topic}",
+        "citations": tuple(FileCitation(file=path, line=line) for path, line in sorted(places))[:4],
+    }
+    return verdict.model_copy(update=update)
 
 
 def _not_connected(
@@ -396,8 +389,15 @@ def _not_connected(
         return dead
     other = over_another_topic(run, topic)
     moved = [w.node for w in wanted if w.node.remaps or w.node.namespace != "/"]
-    if spaces := list(dict.fromkeys(node.namespace for node in moved if node.namespace != "/")):
-        return _in_namespace(file, other, moved, spaces, topic)
+    if renaming := find_renaming(package, [w.node for w in wanted], topic, run):
+        update = {
+            "message": f"{other.message}: it {renaming.why}",
+            "hint": renaming.fix,
+            "citations": renaming.citations,
+        }
+        return other.model_copy(update=update)
+    if len({node.namespace for node in moved} - {"/"}) > 1:
+        return _in_namespaces(file, other, moved, topic)
     if moved or not all(w.own for w in wanted):
         return other
     return other.model_copy(update={"unjudged": True})

@@ -21,6 +21,7 @@ from grader.checks.support.launch import (
     refusal,
     refusals,
 )
+from grader.checks.support.launch_names import find_renaming
 from grader.checks.support.scripts import (
     BACKUPS,
     PYTHON,
@@ -190,14 +191,13 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     names = {PurePosixPath(str(script)).name for script in _listed(wanted.get("scripts"))}
     if file is None or file.fault is not None:
         return
-    refused = refusal(run) if isinstance(run, Run) else None
+    refused = refusal(run, package) if isinstance(run, Run) else None
     if refused is not None and "first line" not in refused.hint and not any(refusals(package, file)):
         yield f"{refused.hint}: {refused.why}"
-    spaces = {one.namespace.strip("/"): one for one in reversed(file.brings) if one.type in names}
-    spaces.pop("", None)
-    for space, node in spaces.items() if wanted.get("topic") else ():
-        where = f"line {node.line} of {node.file or file.path}"
-        yield f'remove ns="{space}", in which {where} stands: in it, topics have other names'
+    nodes = [one for one in file.brings if one.type in names]
+    if topic := wanted.get("topic"):
+        renaming = find_renaming(package, nodes, str(topic))
+        yield from [f"in {file.path} {renaming.fix}"] if renaming else []
 
 
 def _line(slip: PythonSlip) -> str:

@@ -290,6 +290,25 @@ class PythonSlip(Record):
     message: str
 
 
+class LaunchLine(Record):
+    """A tag that gives the topics of nodes other names: a `<remap>`, `value` its `from`; any other by its `ns`."""
+
+    tag: str
+    value: str
+    file: str
+    line: int
+
+
+class LaunchArg(Record):
+    """An `<arg>` that has no value where `$(arg …)` asks for it. `declared`: there is an `<arg>`, without a default,
+    and `line` is its own; else the line that asks."""
+
+    name: str
+    declared: bool
+    file: str
+    line: int
+
+
 class LaunchNode(Record):
     """One `<node>`, its attributes as written; an attribute that is not there is None.
 
@@ -315,6 +334,8 @@ class LaunchNode(Record):
     uncertain: bool = False
     unknown: tuple[str, ...] = ()
     """Attributes that roslaunch does not know."""
+    renaming: tuple[LaunchLine, ...] = ()
+    """What is in force of `<remap>` and `ns`, each in the file's order."""
 
     @property
     def full_name(self) -> str:
@@ -348,7 +369,7 @@ class LaunchFile(Record):
     Nodes and includes that a literal `if="false"` or `unless="true"` switches off are left out. `nodes` are the
     file's own. What `roslaunch` makes of it all, with the package's own included files and with `$(arg …)`,
     `$(dirname)` and namespaces resolved: `brings` (nodes), `tests` (`<test>`, which only rostest runs), `params`,
-    `loads`, `include_faults` (own files that cannot be included). A path below the package reads
+    `loads`, `include_faults` (own files that cannot be included), `unset_args`. A path below the package reads
     `$(find <package>)/…`. `unknown_tags` are tags, with their lines, that roslaunch skips, `commented` the `type`s of
     nodes that stand in a comment. `readable` are the nodes that can be read of a file that is not well-formed.
     """
@@ -365,6 +386,7 @@ class LaunchFile(Record):
     include_faults: tuple[Fault, ...] = ()
     unknown_tags: tuple[tuple[str, int], ...] = ()
     commented: tuple[tuple[str, int], ...] = ()
+    unset_args: tuple[LaunchArg, ...] = ()
     readable: tuple[LaunchNode, ...] = ()
 
 

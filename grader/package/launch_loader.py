@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Protocol
@@ -15,7 +15,7 @@ from lxml import etree
 from pydantic import Field
 
 from grader.installable import known_packages
-from grader.model.package import Fault, LaunchLoad, LaunchNode, LaunchParam
+from grader.model.package import Fault, LaunchArg, LaunchLine, LaunchLoad, LaunchNode, LaunchParam
 from grader.model.record import Record
 from grader.package.xml import line_of
 
@@ -25,6 +25,8 @@ WORK_MAX = 10_000
 _TOO_MUCH = "launch files that hold more than a robot can start"
 _FOUND = re.compile(r"\$\(find\s+([^()\s]+)\s*\)/+(.+)")
 _SUBSTITUTION = re.compile(r"\$\(([^()]*)\)")
+_ARGUMENT = re.compile(r"\$\(arg\s+([^()\s]+)\s*\)")
+_UNSET_MAX = 20
 _SLASHES = re.compile(r"//+")
 # Of one value: arguments that name each other can double at every step.
 _VALUE_CHARS_MAX = 4_000
@@ -65,6 +67,7 @@ class Loaded:
     params: list[LaunchParam] = field(default_factory=list)
     loads: list[LaunchLoad] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
+    unset_args: dict[tuple[str, str], LaunchArg] = field(default_factory=dict)
     included: int = 0
     work: int = 0
 
@@ -82,8 +85,11 @@ def load(root: etree._Element, scope: Scope, find: Find) -> Loaded:
     return loader.loaded
 
 
-def node_of(element: etree._Element, scope: Scope, remaps: Remaps) -> LaunchNode:
-    """Return one `<node>` as it stands in this scope."""
+def node_of(element: etree._Element, scope: Scope, remapping: Sequence[etree._Element] = ()) -> LaunchNode:
+    """Return one `<node>` as it stands in this scope, with its own `<remap>`s."""
+    below = scope.below(scope.get(element, "ns"), element)
+    remaps = (*scope.remaps, *(_remap(one, scope) for one in remapping))
+    renaming = (*below.renaming, *(_line(one, scope, scope.get(one, "from")) for one in remapping))
     return LaunchNode(
         pkg=scope.get(element, "pkg"),
         type=scope.get(element, "type"),
@@ -98,7 +104,8 @@ def node_of(element: etree._Element, scope: Scope, remaps: Remaps) -> LaunchNode
         remaps=remaps,
         line=line_of(element) or 0,
         file=scope.file,
-        namespace=scope.below(scope.get(element, "ns")).namespace,
+        namespace=below.namespace,
+        renaming=renaming,
         uncertain=scope.uncertain,
         unknown=unknown_attributes(element),
     )
@@ -114,11 +121,12 @@ class _Loader:
         for child in parent:
             if not isinstance(child.tag, str) or not wanted(child, scope):
                 continue
-            if self.loaded.full(len(scope.args) // 10 + len(scope.remaps) // 10 + len(scope.private)):
+            if self.loaded.full(len(scope.args) // 10 + len(scope.renaming) // 10 + len(scope.private)):
                 self._stop(child, scope)
                 return
+            self._note_unset(child, scope)
             if child.tag == "group":
-                self.walk(child, scope.of(child).below(scope.get(child, "ns")), depth)
+                self.walk(child, scope.of(child).below(scope.get(child, "ns"), child), depth)
             elif child.tag == "include":
                 self._include(child, scope.of(child), depth)
             elif child.tag in {"arg", "remap", "param"}:
@@ -134,7 +142,9 @@ class _Loader:
         if child.tag == "arg":
             return _with_arg(child, scope)
         if child.tag == "remap":
-            return scope.model_copy(update={"remaps": (*scope.remaps, _remap(child, scope))})
+            line = _line(child, scope, scope.get(child, "from"))
+            remaps = (*scope.remaps, _remap(child, scope))
+            return scope.model_copy(update={"remaps": remaps, "renaming": (*scope.renaming, line)})
         return self._param(child, scope)
 
     def _add(self, child: etree._Element, scope: Scope) -> None:
@@ -143,20 +153,34 @@ class _Loader:
         elif child.tag == "rosparam":
             self._load(child, scope)
         elif child.tag == "test":
-            self.loaded.tests.append(node_of(child, scope, scope.remaps))
+            self.loaded.tests.append(node_of(child, scope))
 
     def _node(self, element: etree._Element, scope: Scope) -> None:
         own = [c for c in element if isinstance(c.tag, str) and wanted(c, scope)]
-        remaps = (*scope.remaps, *(_remap(c, scope) for c in own if c.tag == "remap"))
-        node = node_of(element, scope, remaps)
+        node = node_of(element, scope, [c for c in own if c.tag == "remap"])
         self.loaded.nodes.append(node)
         inside = scope.model_copy(update={"namespace": f"{node.full_name}/"})
         for child in own:
+            self._note_unset(child, scope)
             if child.tag == "rosparam":
                 self._load(child, inside)
             elif child.tag == "param":
                 self.loaded.params.append(_private(_param(child, inside), inside))
         self.loaded.params += [_private(param, inside) for param in scope.private]
+
+    def _note_unset(self, element: etree._Element, scope: Scope) -> None:
+        """Note what the tag asks for by `$(arg …)` and nothing gives: roslaunch starts nothing then."""
+        found, place = self.loaded.unset_args, (scope.file, line_of(element) or 0)
+        name = element.get("name") or ""
+        if element.tag == "arg" and _with_arg(element, scope) is scope and name not in scope.args:
+            found[scope.file, name] = LaunchArg(name=name, declared=True, file=place[0], line=place[1])
+        for value in element.attrib.values():
+            for asked in _ARGUMENT.findall(str(value)):
+                if asked not in scope.args and len(found) < _UNSET_MAX:
+                    found.setdefault(
+                        (scope.file, asked),
+                        LaunchArg(name=asked, declared=False, file=place[0], line=place[1]),
+                    )
 
     def _param(self, element: etree._Element, scope: Scope) -> Scope:
         param = _param(element, scope)
@@ -218,7 +242,7 @@ def _included(element: etree._Element, scope: Scope, path: str) -> Scope:
             value = scope.get(child, "value") or scope.get(child, "default") or ""
             given = given.model_copy(update={"args": {**given.args, child.get("name") or "": value}})
     args = {**scope.args, **given.args} if passed else given.args
-    inside = scope.below(scope.get(element, "ns"))
+    inside = scope.below(scope.get(element, "ns"), element)
     return inside.model_copy(update={"file": path, "args": args})
 
 
@@ -228,6 +252,10 @@ def _with_arg(element: etree._Element, scope: Scope) -> Scope:
     if value is None and (default is None or name in scope.args):
         return scope
     return scope.model_copy(update={"args": {**scope.args, name: value if value is not None else default}})
+
+
+def _line(element: etree._Element, scope: Scope, value: str | None) -> LaunchLine:
+    return LaunchLine(tag=str(element.tag), value=value or "", file=scope.file, line=line_of(element) or 0)
 
 
 def _remap(element: etree._Element, scope: Scope) -> tuple[str, str]:
@@ -264,6 +292,7 @@ class Scope(Record):
     namespace: str = "/"
     args: Mapping[str, str] = Field(default_factory=dict)
     remaps: Remaps = ()
+    renaming: tuple[LaunchLine, ...] = ()
     private: tuple[LaunchParam, ...] = ()
     uncertain: bool = False
 
@@ -284,12 +313,17 @@ class Scope(Record):
         conditions = f"{self.get(element, 'if') or ''}{self.get(element, 'unless') or ''}"
         return self.model_copy(update={"uncertain": True}) if "$(" in conditions else self
 
-    def below(self, namespace: str | None) -> Scope:
-        """Return the scope in a group, node or include with this `ns`."""
+    def below(self, namespace: str | None, element: etree._Element | None = None) -> Scope:
+        """Return the scope in a group, node or include with this `ns`, which is noted where the element is given."""
         if not namespace:
             return self
         whole = namespace if namespace.startswith("/") else f"{self.namespace}{namespace}"
-        return self.model_copy(update={"namespace": _SLASHES.sub("/", f"/{whole[:_VALUE_CHARS_MAX]}/")})
+        noted = () if element is None else (_line(element, self, namespace),)
+        update = {
+            "namespace": _SLASHES.sub("/", f"/{whole[:_VALUE_CHARS_MAX]}/"),
+            "renaming": (*self.renaming, *noted),
+        }
+        return self.model_copy(update=update)
 
     def resolved(self, name: str) -> str:
         """Return a parameter's whole name."""

@@ -45,6 +45,7 @@ _ERRORS = (
 )
 _SUBSTITUTION = re.compile(r"\\\$\\\(([^)]*)\\\)")
 # Students print such lines too: between brackets is no other bracket, so that a line is looked through once.
+_UNSET = re.compile(r"requires the '(\w+)' arg to be set")
 _STARTED = re.compile(r"process\[([^\s\[\]]+)-\d+\]: started with pid")
 _DIED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has died \[pid \d+, exit code (-?\d+)")
 _FINISHED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has finished cleanly")
@@ -344,14 +345,39 @@ def nodes_up(run: Run, node: LaunchNode) -> tuple[str, ...]:
     return tuple(name for name in run.student_nodes() if pattern.fullmatch(name))
 
 
-def refusal(run: Run) -> Absence | None:
-    """Return why roslaunch started nothing, or broke off."""
+def refusal(run: Run, package: PackageFacts | None = None) -> Absence | None:
+    """Return why roslaunch started nothing, or broke off. `package` has the file's own lines."""
     text = "\n".join(line for line in _lines(run))
+    if unset := _unset_args(text, package):
+        return unset
     for pattern, why, hint in _REFUSALS:
         if match := re.search(pattern, text):
             words = [shown(PurePosixPath(g).name if "/" in g.strip("/") else g) for g in match.groups()]
             return Absence(f"roslaunch starts nothing: {why.format(*words)}", hint.format(*words))
     return None
+
+
+def _unset_args(text: str, package: PackageFacts | None) -> Absence | None:
+    """Return all the arguments that the launch file asks for and that no `<arg>` declares: roslaunch names only one."""
+    asked = _UNSET.search(text)
+    files = package.launch_files if package is not None and asked else ()
+    lacking = [
+        [arg for arg in file.unset_args if not arg.declared]
+        for file in files
+        if asked and any(arg.name == asked[1] for arg in file.unset_args)
+    ]
+    if len(lacking) != 1 or asked is None or asked[1] not in {arg.name for arg in lacking[0]}:
+        return None
+    args = lacking[0]
+    lines = sorted({arg.line for arg in args})
+    names = join_words(f"$(arg {arg.name})" for arg in args)
+    where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))} of {args[0].file}"
+    declares = join_words(f'<arg name="{arg.name}" default="…"/>' for arg in args)
+    verb = "uses" if len(lines) == 1 else "use"
+    why = f"roslaunch starts nothing: {where} {verb} {names}, which no <arg> declares"
+    hint = f"below <launch>, add {declares}, with {'its value' if len(args) == 1 else 'their values'} in place of …"
+    cited = tuple(FileCitation(file=arg.file, line=arg.line) for arg in args)
+    return Absence(why, hint, citations=tuple(dict.fromkeys(cited)))
 
 
 def died(run: Run, node: LaunchNode) -> int | None:
@@ -372,7 +398,7 @@ def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
     return (
         _not_found(package, run, node)
         or why_died(package, run, node)
-        or refusal(run)
+        or refusal(run, package)
         or _silent(run, node)
         or Absence(
             f"roslaunch did not start it{quoted(run)}", "run roslaunch by hand and read what it prints"

@@ -1,0 +1,116 @@
+"""What a launch file makes of a topic's name by `ns` and `<remap>`, and which of them to remove so that it is right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from grader.checks.support.launch import nodes_up, own_script
+from grader.evidence.run import Run
+from grader.model.package import LaunchLine, LaunchNode, PackageFacts
+from grader.model.verdict import FileCitation
+from grader.wording import join_words
+
+UNRESOLVED = "$("
+
+
+class Renaming(NamedTuple):
+    """What renames a topic, a clause after `it`; what to remove, so that the topic has its name; and the lines."""
+
+    why: str
+    fix: str
+    citations: tuple[FileCitation, ...]
+
+
+class _Use(NamedTuple):
+    """A node, and how its script writes the topic's name."""
+
+    node: LaunchNode
+    name: str
+
+    def topic(self, *, drop_ns: bool = False, drop_remaps: bool = False) -> str:
+        """Return the topic's whole name, as ROS resolves it: first by the namespace, then by the remaps."""
+        namespace = "/" if drop_ns else self.node.namespace
+        whole = _whole(self.name, namespace)
+        table = {} if drop_remaps else {_whole(old, namespace): new for old, new in self.node.remaps}
+        return _whole(table.get(whole, whole), namespace)
+
+    @property
+    def remaps(self) -> Iterator[tuple[str, LaunchLine | None]]:
+        """The new names that `<remap>`s give the topic, with their lines where they are known."""
+        lines = [line for line in self.node.renaming if line.tag == "remap"]
+        known = len(lines) == len(self.node.remaps)
+        for index, (old, new) in enumerate(self.node.remaps):
+            if _whole(old, self.node.namespace) == _whole(self.name, self.node.namespace):
+                yield new, lines[index] if known else None
+
+
+def find_renaming(
+    package: PackageFacts, nodes: Sequence[LaunchNode], topic: str, run: Run | None = None
+) -> Renaming | None:
+    """Return what gives the topic another name in these nodes. None unless it has the right one in all of them once
+    that is removed, and the nodes have names of their own still. `run` shows which topics the nodes had."""
+    uses = [use for node in nodes if (use := _use_of(package, node, topic, run))]
+    if len(uses) < 2 or all(use.topic() == topic for use in uses):
+        return None
+    for drop_ns, drop_remaps in ((True, False), (False, True), (True, True)):
+        names = {use.node.name if drop_ns else use.node.full_name for use in uses}
+        right = all(use.topic(drop_ns=drop_ns, drop_remaps=drop_remaps) == topic for use in uses)
+        if right and len(names) == len(uses):
+            return _described(uses, topic, drop_ns=drop_ns, drop_remaps=drop_remaps)
+    return None
+
+
+def _use_of(package: PackageFacts, node: LaunchNode, topic: str, run: Run | None) -> _Use | None:
+    """Return how the node's script writes the name, if that gives a topic that the node had."""
+    script = own_script(package, node)
+    written = {
+        slip.message
+        for slip in package.slips
+        if script is not None and slip.file == script.path and slip.kind in {"publisher", "subscriber"}
+    }
+    had = _topics(run, node) if run is not None else None
+    resolvable = UNRESOLVED not in f"{node.namespace}{node.remaps}"
+    for name in (topic.lstrip("/"), topic) if resolvable else ():
+        use = _Use(node, name)
+        if (not written or name in written) and (had is None or use.topic() in had):
+            return use
+    return None
+
+
+def _topics(run: Run, node: LaunchNode) -> set[str]:
+    names = set(nodes_up(run, node))
+    ends = (ends for _, event in run.graph for ends in (event.publishers, event.subscribers))
+    return {topic for topics in ends for topic, there in topics.items() if names & set(there)}
+
+
+def _whole(name: str, namespace: str) -> str:
+    return name if name.startswith("/") else f"{namespace}{name}"
+
+
+def _described(uses: Sequence[_Use], topic: str, *, drop_ns: bool, drop_remaps: bool) -> Renaming:
+    name = topic.lstrip("/")
+    why, fixes, lines = list[str](), list[str](), list[LaunchLine]()
+    if drop_ns:
+        spaces = dict.fromkeys(use.node.namespace.strip("/") for use in uses if use.node.namespace != "/")
+        found = [line for use in uses for line in use.node.renaming if line.tag != "remap"]
+        why.append(f"puts its nodes in the namespace{'s' * (len(spaces) > 1)} {join_words(spaces)}")
+        values = dict.fromkeys(line.value for line in found) or spaces
+        given = [f'ns="{value}"' for value in values]
+        fixes.append(f"{join_words(given)}{_in_lines(found)}")
+        lines += found
+    if drop_remaps:
+        remaps = [remap for use in uses for remap in use.remaps]
+        found = [line for _, line in remaps if line is not None]
+        why.append(f"remaps {name} to {join_words(dict.fromkeys(new for new, _ in remaps))}")
+        fixes.append(f"the <remap>{'s' * (len(set(found)) != 1)} of {name}{_in_lines(found)}")
+        lines += found
+    moved = (use.node for use in uses if use.topic() != topic)
+    places = sorted({(one.file, one.line) for one in (lines or moved)})
+    cited = tuple(FileCitation(file=file, line=line) for file, line in places)
+    return Renaming(" and ".join(why), f"remove {' and '.join(fixes)}: then {name} is {topic}", cited[:8])
+
+
+def _in_lines(found: Sequence[LaunchLine]) -> str:
+    numbers = sorted({line.line for line in found})
+    return f" in line{'s' * (len(numbers) > 1)} {join_words(map(str, numbers))}" if numbers else ""
