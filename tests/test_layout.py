@@ -29,11 +29,12 @@ NO_MODULES = {"copydetect", "params", "run", "sarif"}
 BASE = {"model", "errors", "portable", "untrusted_text", "wording"}
 ALLOWED = {
     "__init__": {"api", "errors", "model", "rubric"},
-    "model": set[str](),
+    "model": {"wording"},
     "errors": set[str](),
     "untrusted_text": set[str](),
     "wording": set[str](),
     "installable": set[str](),
+    "syntax_fixes": set[str](),
     "portable": {"errors"},
     "ros_env": {"errors", "model", "portable"},
     "ros_packages": {"errors", "host_programs", "installable", "ros_env", "wording"},
@@ -47,9 +48,11 @@ ALLOWED = {
     },
     "faults": BASE | {"files", "intake", "judging", "report", "results", "rubric"},
     "evidence": BASE | {"files", "installable"},
-    "package": BASE | {"files", "host_programs", "limited_child", "rubric.model", "rubric.scenario"},
+    "package": BASE | {
+        "files", "host_programs", "installable", "limited_child", "rubric.model", "rubric.scenario", "syntax_fixes"
+    },
     "intake": BASE | {"files", "host_programs", "limited_child"},
-    "checks": BASE | {"evidence", "installable"},
+    "checks": BASE | {"evidence", "installable", "syntax_fixes"},
     "rubric": BASE | {"checks", "evidence", "files", "installable", "ros_packages"},
     "judging": BASE | {"checks", "evidence", "rubric"},
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},

@@ -17,7 +17,7 @@ from grader.limited_child import ChildLimits, run_limited
 from grader.model.package import Fault, PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.package.reading import printable
-from grader.package.syntax_fixes import BLOCK, MERGE_MARKER, cause_of_line
+from grader.syntax_fixes import BLOCK, MERGE_MARKER, cause_of_line
 
 CHECK = "grader.arena.ros.syntax:check_all"
 MEMORY_BYTES, CPU_S = 1 << 30, 20

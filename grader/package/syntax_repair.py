@@ -1,7 +1,8 @@
 """Repairs of Python sources that do not parse, step by step: tabs, Python 2, braces, a token that is missing.
 
-A text comes in, and the steps go out after which it parses; what one line could mean is known to `syntax_fixes.py`. It
-runs in a child process as `source_repair.py` does: the standard library and fissix only, and nothing is executed.
+A text comes in, and the steps go out after which it parses; what one line could mean is known to
+`grader/syntax_fixes.py`. It runs in a child process as `source_repair.py` does: the standard library and fissix only,
+and nothing is executed.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from grader.package.syntax_fixes import PLAIN, cause_of_line, corrections, without_brace
+from grader.syntax_fixes import PLAIN, cause_of_line, corrections, without_brace
 
 STEPS_MAX = 60
 STATEMENT_LINES_MAX = 12

@@ -9,7 +9,7 @@ import pytest
 
 from grader.checks.support.exit_causes import syntax_hint
 from grader.package.python import cause_of, check_syntax, read_syntax_report
-from grader.package.syntax_fixes import corrected
+from grader.syntax_fixes import corrected
 
 # Each text, the line of its fault, and words of its cause; all hold under Python 3.8 as under the newest.
 CASES = {

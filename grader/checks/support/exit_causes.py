@@ -19,7 +19,7 @@ from grader.evidence.run import Run
 from grader.installable import ROS_2, install_hint, known_packages, noetic_messages
 from grader.model.package import Fault, PackageFacts, PythonSlip
 from grader.model.verdict import Citations, FileCitation, Verdict, inconclusive
-from grader.package.syntax_fixes import corrected, without_brace
+from grader.syntax_fixes import corrected, without_brace
 from grader.wording import join_words, seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
