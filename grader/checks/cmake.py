@@ -17,6 +17,7 @@ from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words
 
+NOT_CALLED = "no catkin_install_python(…) is called"
 NO_FILE = "there is no CMakeLists.txt"
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 
@@ -296,8 +297,7 @@ def _without_call(all_named: Sequence[Installed], path: str) -> Lack:
         other = "install(DIRECTORY …)"
         why = f"line {folder.call.line}: {other} names {{}}, where catkin_install_python(PROGRAMS …) should"
         return Lack(why, f"{fix} below it", _line(folder), path)
-    why = "no catkin_install_python(…) is called, so nothing installs {}"
-    return Lack(why, f"{fix}, without # before it", None, path)
+    return Lack(f"{NOT_CALLED}, so nothing installs {{}}", f"{fix} below catkin_package()", None, path)
 
 
 def _folder_above(all_named: Sequence[Installed], path: str) -> Installed | None:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 
+from grader.checks.cmake import NOT_CALLED
 from grader.checks.messages import code_of
 from grader.checks.support.exit_causes import NO_INPUT, RATE, SYNTAX, syntax_hint
 from grader.checks.support.launch import (
@@ -294,6 +295,76 @@ def fill_input_hint(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> V
     if hz := asked.get("rate", {}).get("rate_hz"):
         hint = hint.replace(RATE, f"rospy.Rate({significant(float(str(hz)))})")
     return verdict.model_copy(update={"hint": hint})
+
+
+SAYS = {
+    "hears": r"\b(?:print|log\w+|write)\s*\(",
+    "logs": r"\blog\w+\s*\(",
+    "message": r"\bpublish\s*\(",
+}
+"""The checks of a node's words, and what a line of Python calls that says them."""
+_LITERAL = re.compile(r"""(["'])([^"'\\]+)\1""")
+_FILLED_IN = re.compile(r"%[-+ 0-9.]*[a-z]|\{[^{}]*\}")
+_WORD = re.compile(r"\w+")
+_LINES_READ = 2_000
+
+
+def cite_words(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
+    """Return the verdict; one on other words than the lab's with the line of the script that makes them, if it is plain
+    which one does."""
+    package = facts.package_of(criterion)
+    placed = any(isinstance(one, FileCitation) for one in verdict.citations)
+    lost = verdict.status in {Status.PARTIAL, Status.FAIL} and not verdict.unjudged
+    if criterion.check not in SAYS or placed or not lost or package is None or package is not facts.package:
+        return verdict
+    said = f"{verdict.measured} {verdict.message.partition(', not ')[0]} {verdict.message.partition(' it prints ')[2]}"
+    lines = [
+        (path, number, text)
+        for path in sorted(_scripts(criterion, facts.rubric, package))
+        for number, text in enumerate(build.file_lines(path)[:_LINES_READ], 1)
+        if len(text) <= LINE_CHARS and not text.lstrip().startswith("#")
+    ]
+    alike = [(_words_of(text, said), path, number) for path, number, text in lines]
+    most = max((words for words, _, _ in alike), default=0)
+    found = [(path, number) for words, path, number in alike if words == most > 0]
+    if not found and verdict.status is Status.PARTIAL:
+        found = [(path, number) for path, number, text in lines if re.search(SAYS[criterion.check], text)]
+    if len(found) != 1:
+        return verdict
+    place = FileCitation(file=found[0][0], line=found[0][1])
+    return verdict.model_copy(update={"citations": (place, *verdict.citations)})
+
+
+def _words_of(line: str, said: str) -> int:
+    """Return how many letters of a string in the line are in what was said; 0 unless all its words are."""
+    strings = [_WORD.findall(_FILLED_IN.sub(" ", found[2])) for found in _LITERAL.finditer(line)]
+    spoken = set(_WORD.findall(said))
+    return max((sum(map(len, words)) for words in strings if spoken.issuperset(words)), default=0)
+
+
+_COMMENTED_CALL = re.compile(rf"\s*#[#\s]*{PYTHON}\s*\(")
+
+
+def cite_commented_call(verdict: Verdict, build: Run) -> Verdict:
+    """Return the verdict; one on a missing catkin_install_python(…) says in which lines it is commented out."""
+    file = "CMakeLists.txt"
+    if NOT_CALLED not in verdict.message or verdict.citations != (FileCitation(file=file),):
+        return verdict
+    lines = build.file_lines(file)[:_LINES_READ]
+    first = next((i for i, text in enumerate(lines) if _COMMENTED_CALL.match(text[:LINE_CHARS])), None)
+    if first is None:
+        return verdict
+    last = first
+    while ")" not in lines[last] and last + 1 < len(lines) and lines[last + 1].lstrip().startswith("#"):
+        last += 1
+    place = f"line {first + 1}" if last == first else f"lines {first + 1} to {last + 1}"
+    called = f"{NOT_CALLED}: it is commented out in {place}"
+    update = {
+        "message": verdict.message.replace(NOT_CALLED, called, 1),
+        "hint": f"in place of {place} {verdict.hint.removesuffix(' below catkin_package()')}, without # before it",
+        "citations": (FileCitation(file=file, line=first + 1),),
+    }
+    return verdict.model_copy(update=update)
 
 
 LINE_CHARS = 200

@@ -27,6 +27,8 @@ from grader.judging.annotate import (
     add_advice,
     add_later_faults,
     choose_hint_language,
+    cite_commented_call,
+    cite_words,
     fill_input_hint,
     name_unchanged_files,
     show_lines,
@@ -100,7 +102,11 @@ def judge_all_runs(
         )
     verdicts = add_later_faults(verdicts, rubric, facts)
     build = first.get(PACKAGE_RUN)
-    shown = {name: show_lines(verdict, build) for name, verdict in verdicts.items()} if build else verdicts
+    shown = dict(verdicts)
+    if build is not None:
+        for criterion in rubric.criteria:
+            placed = cite_words(verdicts[criterion.id], criterion, facts, build)
+            shown[criterion.id] = show_lines(cite_commented_call(placed, build), build)
     results = tuple(
         result_of(c, shown[c.id], rubric.digits, uses.get(c.id), values_of(rubric, c))
         for c in rubric.criteria

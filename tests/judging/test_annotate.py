@@ -13,12 +13,20 @@ from grader.checks.support.exit_causes import CAUSES
 from grader.checks.support.text import LOOP, in_language, init, publisher, set_param
 from grader.integrations.bundle import Bundle, add_lab
 from grader.judging import judge
-from grader.judging.annotate import LINE_CHARS, add_advice, choose_hint_language, fill_input_hint, show_lines
-from grader.judging.facts import Facts
+from grader.judging.annotate import (
+    LINE_CHARS,
+    add_advice,
+    choose_hint_language,
+    cite_commented_call,
+    cite_words,
+    fill_input_hint,
+    show_lines,
+)
+from grader.judging.facts import Facts, try_facts
 from grader.judging.judge import judge_files
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult
-from grader.model.verdict import FileCitation, Status, failed, passed
+from grader.model.verdict import FileCitation, Status, failed, partial, passed
 from grader.package import read_package
 from grader.rubric.load import load_rubric, read_beside_rubric
 from tests.judging.rubrics import ALL, CHATTER, EXECUTABLE, GOOD_RUN, RATE, SCRIPT, rubric
@@ -84,6 +92,68 @@ def test_a_node_that_asks_for_input_is_told_what_the_lab_wants_of_it(visibility:
     assert fill_input_hint(lost, chatter, lab).hint == hint
     other = failed("no message came", hint="publish in the loop")
     assert fill_input_hint(other, chatter, lab) == other
+
+
+@pytest.mark.parametrize(
+    ("line", "said", "cited"),
+    [
+        ('    rospy.loginfo("In a galaxy, %s", m.data)', "In a galaxy, abc", True),
+        ('    print(f"got {m.data}!")', "got abc!", True),
+        ('    text = "hi =) %s" % m.data; show(text)', "hi =) abc", True),
+        ("    print(m.data)", "abc", True),
+        ('    print("other words", m.data)', "abc", True),
+        ('    # print("got", m.data)', "got abc", False),
+        ('    show("else", m.data)', "got abc", False),
+    ],
+)
+def test_other_words_are_shown_where_the_script_makes_them(line: str, said: str, cited: bool) -> None:
+    lab = rubric(
+        {
+            "id": "hears",
+            "check": "hears",
+            "with": {"topic": "/chatter", "template": "I heard {value}"},
+            "scenario": "talker",
+        }
+    )
+    script = f"#!/usr/bin/env python3\nimport rospy\ndef heard(m):\n{line}\nrospy.spin()\n"
+    runs = build_runs(
+        {"runs": {"package": {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: script}}}}
+    )
+    facts_ = try_facts(lab, runs)
+    verdict = partial(0.5, f"each message is printed, but not as 'I heard <message>': it prints '{said}'")
+    found = cite_words(verdict, lab.criteria[0], facts_, runs["package"])
+    place = FileCitation(file=SCRIPT["path"], line=4)
+    assert found.citations == ((place,) if cited else ())
+    assert cite_words(passed("right"), lab.criteria[0], facts_, runs["package"]) == passed("right")
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "line"),
+    [
+        (
+            "project(lab1)\n# catkin_install_python(PROGRAMS\n#   scripts/a\n#   DESTINATION x\n# )\n",
+            "lines 2 to 5",
+            2,
+        ),
+        ("  ##catkin_install_python(PROGRAMS a DESTINATION b)\n# )\n", "line 1", 1),
+        ("# then call catkin_install_python(…)\n", "", None),
+    ],
+)
+def test_a_call_that_is_commented_out_is_named_by_its_lines(text: str, place: str, line: int | None) -> None:
+    build = build_runs({"runs": {"package": {"attachments": {"CMakeLists.txt": text}}}})["package"]
+    lost = failed(
+        "CMakeLists.txt: no catkin_install_python(…) is called, so nothing installs a.py",
+        hint="write catkin_install_python(PROGRAMS a.py DESTINATION b) below catkin_package()",
+        citations=(FileCitation(file="CMakeLists.txt"),),
+    )
+    found = cite_commented_call(lost, build)
+    assert found.citations == (FileCitation(file="CMakeLists.txt", line=line),)
+    if not place:
+        assert found == lost
+        return
+    assert f"is called: it is commented out in {place}, so nothing installs a.py" in found.message
+    call = "write catkin_install_python(PROGRAMS a.py DESTINATION b)"
+    assert found.hint == f"in place of {place} {call}, without # before it"
 
 
 def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
