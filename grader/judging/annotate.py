@@ -367,6 +367,36 @@ def cite_commented_call(verdict: Verdict, build: Run) -> Verdict:
     return verdict.model_copy(update=update)
 
 
+_UNDECLARED = re.compile(r" does not declare (\w+) for run time")
+_LACKED = re.compile(r": it needs the package (\w+), which this grading machine lacks")
+
+
+def cite_name(verdict: Verdict, build: Run) -> Verdict:
+    """Return the verdict; one on a dependency cites the line that has its name: a tag that is commented out, or that of
+    a `find_package(…)` over several lines."""
+    place = next((one for one in verdict.citations if isinstance(one, FileCitation) and one.line), None)
+    undeclared, lacked = _UNDECLARED.search(verdict.message), _LACKED.search(verdict.message)
+    if place is None or place.line is None or not (undeclared or lacked):
+        return verdict
+    lines = [text[:LINE_CHARS] for text in build.file_lines(place.file)[:_LINES_READ]]
+    if undeclared:
+        tag = re.compile(rf"\s*<!--\s*<(depend|exec_depend|run_depend)>\s*{undeclared[1]}\s*</\1>\s*-->")
+        line = next((number for number, text in enumerate(lines, 1) if tag.match(text)), None)
+        message = f"{verdict.message}: line {line} has it in a comment"
+        hint = f"remove `<!--` and `-->` from line {line}"
+    else:
+        name = re.compile(rf"[^#]*\b{lacked[1] if lacked else ''}\b")
+        inside = enumerate(lines[place.line - 1 :], place.line)
+        line = next((number for number, text in inside if name.match(text)), None)
+        message, hint = verdict.message, verdict.hint
+    if line is None:
+        return verdict
+    cited = tuple(
+        FileCitation(file=place.file, line=line) if one is place else one for one in verdict.citations
+    )
+    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+
+
 LINE_CHARS = 200
 """A longer line stays out of the result."""
 

@@ -28,6 +28,7 @@ from grader.judging.annotate import (
     add_later_faults,
     choose_hint_language,
     cite_commented_call,
+    cite_name,
     cite_words,
     fill_input_hint,
     name_unchanged_files,
@@ -106,7 +107,7 @@ def judge_all_runs(
     if build is not None:
         for criterion in rubric.criteria:
             placed = cite_words(verdicts[criterion.id], criterion, facts, build)
-            shown[criterion.id] = show_lines(cite_commented_call(placed, build), build)
+            shown[criterion.id] = show_lines(cite_name(cite_commented_call(placed, build), build), build)
     results = tuple(
         result_of(c, shown[c.id], rubric.digits, uses.get(c.id), values_of(rubric, c))
         for c in rubric.criteria

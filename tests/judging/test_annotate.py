@@ -18,6 +18,7 @@ from grader.judging.annotate import (
     add_advice,
     choose_hint_language,
     cite_commented_call,
+    cite_name,
     cite_words,
     fill_input_hint,
     show_lines,
@@ -154,6 +155,37 @@ def test_a_call_that_is_commented_out_is_named_by_its_lines(text: str, place: st
     assert f"is called: it is commented out in {place}, so nothing installs a.py" in found.message
     call = "write catkin_install_python(PROGRAMS a.py DESTINATION b)"
     assert found.hint == f"in place of {place} {call}, without # before it"
+
+
+MANIFEST_LINES = (
+    "<package>\n  <exec_depend>rospy</exec_depend>\n  <!-- <exec_depend>std_msgs</exec_depend> -->\n"
+)
+UNDECLARED = "package.xml does not declare {} for run time"
+LACKED = "catkin_make failed: CMakeLists.txt:2: it needs the package {}, which this grading machine lacks"
+
+
+@pytest.mark.parametrize(
+    ("file", "message", "line", "hint"),
+    [
+        ("package.xml", UNDECLARED.format("std_msgs"), 3, "remove `<!--` and `-->` from line 3"),
+        ("package.xml", UNDECLARED.format("nav_msgs"), 2, "do"),
+        ("CMakeLists.txt", LACKED.format("rostest"), 4, "do"),
+        ("CMakeLists.txt", LACKED.format("tf2_ros"), 2, "do"),
+        ("CMakeLists.txt", "catkin_make failed: rostest", 2, "do"),
+    ],
+)
+def test_a_dependency_is_shown_in_the_line_that_has_its_name(
+    file: str, message: str, line: int, hint: str
+) -> None:
+    texts = {
+        "package.xml": MANIFEST_LINES,
+        "CMakeLists.txt": "project(lab1)\nfind_package(catkin REQUIRED COMPONENTS # rostest\n  rospy\n  rostest\n)\n",
+    }
+    build = build_runs({"runs": {"package": {"attachments": texts}}})["package"]
+    lost = failed(message, hint="do", citations=(FileCitation(file=file, line=2),))
+    found = cite_name(lost, build)
+    assert (found.citations, found.hint) == ((FileCitation(file=file, line=line),), hint)
+    assert found.message == message + (": line 3 has it in a comment" if hint != "do" else "")
 
 
 def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
