@@ -148,7 +148,7 @@ def test_every_rubric_fits_but_for_checks_of_its_own(path: Path) -> None:
         ("result", {}),
         ("result", {"schema": "grader.result/2"}),
         ("run", {"schema": "grader.run/1"}),
-        ("overrides", {"ada": {"build": {"comment": "no points"}}}),
+        ("overrides", {"ada": {"build": {"author": "who decides nothing"}}}),
         ("overrides", {"ada": {"build": 5}}),
         ("overrides", {"schema": "grader.overrides/2"}),
         ("rubric", {"schema": "grader.rubric/1"}),
