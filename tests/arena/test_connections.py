@@ -73,7 +73,7 @@ def both(tmp_path: Path, talker: str, listener: str, *, sandbox: str = "auto") -
     """Two programs until they are connected over `/chatter`, or their graph has not changed for some seconds."""
     files = {"scripts/talker.py": SCRIPT + talker, "scripts/listener.py": SCRIPT + listener}
     starts = (Start(name="talker", script="talker.py"), Start(name="listener", script="listener.py"))
-    until = Until(connected=("/chatter",), silent_s=3, first_message_s=3, limit_s=20)
+    until = Until(connected=("/chatter",), silent_s=6, first_message_s=6, limit_s=30)
     with make_place(files, sandbox=sandbox) as place:
         return run(place, Scenario(title="two", start=starts, until=until), tmp_path / "run.mcap")
 

@@ -57,6 +57,12 @@ def hand_in(path: Path) -> None:
                 Path(folder, name).chmod(0o644)
 
 
+TEMPLATES = (
+    "from grader.report.html.shell import environment as made; "
+    "[made().get_template(name) for name in made().list_templates()]"
+)
+
+
 def document() -> Any:
     """What Gradescope is told; None where it cannot be read."""
     try:
@@ -73,3 +79,4 @@ def _environment(wheel: Path) -> None:
     run(ENVIRONMENT / "bin" / "python", "-I", "-m", "compileall", "-q", packages)  # as pip does
     (others,) = Path(sys.prefix).glob("lib/python*/site-packages")
     (packages / "machine.pth").write_text(f"{others}\n", encoding="utf-8")
+    run(ENVIRONMENT / "bin" / "python", "-I", "-c", TEMPLATES)  # as the first grading does
