@@ -103,12 +103,7 @@ async def run_scenario(
             return RunCost(cpu_s=0, student_cpu_s=0)
         try:
             session.live.watch_rates(rates)
-            if not place.has_line(GIVES_UP):
-                session.live.serves = frozenset(one.service or one.action or "" for one in scenario.serves)
-            session.live.naps = place.has_line(NAPS)
-            idle = {spec["name"] for _, spec in starts if place.has_line(IDLE, spec["script"])}
-            session.live.endless = frozenset(idle)
-            session.live.least_s = max(watched_s + WATCHED_MORE_S, expected_s(scenario) - STARTING_S)
+            _tell_what_is_known(session, scenario, place, starts, watched_s)
             async with admission.start() as leave, session as arena:
                 arena.course(ScenarioEvent(event="begin"))
                 at_once = {spec["name"] for start, spec in starts if start.name not in scenario.started_later}
@@ -120,6 +115,21 @@ async def run_scenario(
         except ArenaError as error:
             session.course(ScenarioEvent(event="end", outcome="host", detail=error.message))
     return RunCost(cpu_s=session.cpu_s, student_cpu_s=session.student_cpu_s)
+
+
+def _tell_what_is_known(
+    session: ArenaSession,
+    scenario: Scenario,
+    place: ProcessEnvironment,
+    starts: list[tuple[Start, Spec]],
+    watched_s: float,
+) -> None:
+    """Set what the scenario and the package's sources say of how long anything may yet come."""
+    if not place.has_line(GIVES_UP):
+        session.live.serves = frozenset(one.service or one.action or "" for one in scenario.serves)
+    session.live.naps = place.has_line(NAPS)
+    session.live.endless = frozenset(s["name"] for _, s in starts if place.has_line(IDLE, s["script"]))
+    session.live.least_s = max(watched_s + WATCHED_MORE_S, expected_s(scenario) - STARTING_S)
 
 
 async def _run(

@@ -11,7 +11,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from grader.checks.registry import ProcessName, check
-from grader.checks.support.console_output import Level, Line, Logged, console_log, logged_by, stream_lines
+from grader.checks.support.console_output import Level, Line, Logged, logged_by, split_log_line, stream_lines
 from grader.checks.support.exit_causes import (
     explain_end,
     explain_traceback,
@@ -284,7 +284,7 @@ def _only_printed(run: Run, params: LogsParams) -> Verdict | None:
     said = [line for _, line in _asked_lines(run, params) if _has(line.line, params)]
     if not said:
         return None
-    of_logger = next((log for log in map(console_log, (line.line for line in said)) if log), None)
+    of_logger = next((log for log in map(split_log_line, (line.line for line in said)) if log), None)
     if of_logger is None:
         message = f"{shown(said[0].line)!r} is only printed, not logged"
         return failed(message, hint=f"{_call(params)} instead of {both('print(…)', 'std::cout')}")
@@ -319,7 +319,7 @@ def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | No
     for texts, how in ((logged, "is logged"), (printed, "is printed")):
         alike = max(texts, key=lambda text: _likeness(text, params.text), default="")
         if _likeness(alike, params.text) >= ALIKE:
-            text = (console_log(alike) or ("", alike))[1]
+            text = (split_log_line(alike) or ("", alike))[1]
             message, hint = f"{shown(text)!r} {how}, not {params.text!r}", _call(params)
             return (
                 partial(OTHER_WORDS_SHARE, message, hint=hint)
@@ -330,7 +330,7 @@ def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | No
 
 
 def _likeness(text: str, wanted: str) -> float:
-    plain = " ".join((console_log(text) or ("", text))[1].casefold().split())
+    plain = " ".join((split_log_line(text) or ("", text))[1].casefold().split())
     matcher = SequenceMatcher(None, plain, " ".join(wanted.casefold().split()), autojunk=False)
     return matcher.ratio()
 

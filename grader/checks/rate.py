@@ -19,7 +19,7 @@ from grader.checks.support.text import LOOP, both, loop_rate
 from grader.checks.support.topics import Sender, cite, nothing_sent, sent_by, whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
-from grader.model.package import PackageFacts, PythonSlip
+from grader.model.package import LaunchParam, PackageFacts, PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import hertz, plural, seconds, significant
@@ -262,8 +262,7 @@ def _by_number(
     hint = (
         f"make it {significant(params.rate_hz)} Hz in {where}: use {loop_rate(significant(params.rate_hz))}"
     )
-    cited = (FileCitation(file=slip.file, line=slip.line),)
-    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+    return _explained(verdict, slip, message, hint)
 
 
 def _asked_number(mean_hz: float, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
@@ -306,8 +305,7 @@ def _by_parameter(
             told = f"which nothing sets in this run: the default in {where} counts"
             hint = f"make {significant(params.rate_hz)} the default in {where}, or {hint}"
         message = f"{verdict.message}; the node takes its rate from {slip.message}, {told}"
-        cited = (FileCitation(file=place.file, line=place.line),)
-        return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+        return _explained(verdict, place, message, hint)
     return verdict
 
 
@@ -323,9 +321,14 @@ def _by_read_parameter(
             where = f"{given.file}, line {given.line}"
             message = f"{verdict.message}; the node reads {name}, which is {value_text(value)} in {where}"
             hint = f"set {name} to {significant(params.rate_hz)} in {where}"
-            cited = (FileCitation(file=given.file, line=given.line),)
-            return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+            return _explained(verdict, given, message, hint)
     return verdict
+
+
+def _explained(verdict: Verdict, place: PythonSlip | LaunchParam, message: str, hint: str) -> Verdict:
+    """Return the verdict with what the line at that place explains."""
+    cited = (FileCitation(file=place.file, line=place.line),)
+    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
 
 
 def _rate_hint(ratio: float, nominal: str, *, even: bool) -> str:

@@ -9,7 +9,7 @@ import pytest
 
 from grader.arena.sandbox import RunLimits
 from grader.checks.support.build_errors import first_error
-from grader.checks.support.console_output import console_log, printed_lines, printed_times
+from grader.checks.support.console_output import printed_lines, printed_times, split_log_line
 from grader.checks.support.exceptions import tracebacks
 from grader.checks.support.exit_causes import _refused_name
 from grader.checks.support.launch import died, finished, name_pattern, refusal
@@ -82,7 +82,8 @@ def test_errors_of_a_build(part: str) -> None:
 def test_lines_that_a_node_printed(part: str) -> None:
     lines = lines_of(part)
     assert (
-        cpu_s_of(lambda: printed_lines(run_of(lines)), lambda: [console_log(line) for line in lines]) < CPU_S
+        cpu_s_of(lambda: printed_lines(run_of(lines)), lambda: [split_log_line(line) for line in lines])
+        < CPU_S
     )
 
 

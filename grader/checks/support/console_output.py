@@ -330,7 +330,7 @@ def logged_by(run: Run, nodes: Collection[str]) -> tuple[Logged, ...]:
     return tuple(sorted(found, key=lambda one: one.at_ns))
 
 
-def console_log(line: str) -> tuple[str, str] | None:
+def split_log_line(line: str) -> tuple[str, str] | None:
     """Return the level and text of a line as rospy and roscpp print what they log; None for any other line."""
     match = _CONSOLE.match(without_colours(line))
     return (match[1].lower(), match[2]) if match else None
