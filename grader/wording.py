@@ -9,6 +9,7 @@ import difflib
 from collections.abc import Iterable, Sequence
 
 LISTED_MAX = 6
+PART_CHARS_MIN = 3
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -63,9 +64,15 @@ def closest(word: str, candidates: Iterable[str], *, cutoff: float = 0.6) -> str
 
 
 def did_you_mean(word: str, candidates: Iterable[str]) -> str:
-    """Return ` (did you mean "rate"?)` for the end of a message, or ""."""
-    near = closest(word, candidates)
-    return f' (did you mean "{near}"?)' if near else ""
+    """Return ` (did you mean "rate"?)` for the end of a message, or "".
+
+    A part of one name alone means that name (`leeds`); the dashes of options do not make them alike.
+    """
+    known = {candidate.lstrip("-"): candidate for candidate in candidates}
+    plain = word.lstrip("-")
+    inside = [name for name in known if len(plain) >= PART_CHARS_MIN and plain.lower() in name.lower()]
+    near = inside[0] if len(inside) == 1 else closest(plain, known)
+    return f' (did you mean "{known[near]}"?)' if near else ""
 
 
 def is_one_edit(one: str, other: str) -> bool:

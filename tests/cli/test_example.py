@@ -45,7 +45,7 @@ def test_without_a_folder_the_mistakes_are_listed_with_what_they_cost(
         (["example", LAB, "new", "--mistake", "reset-to-on"], 'there is no mistake "reset-to-on"'),
         (["example", LAB, "new", "--mistake", "bit-removed"], "bit-removed can be made in 2 ways"),
         (["example", LAB, "--mistake", "reset-to-one"], "--mistake needs a folder"),
-        (["example", "leeds", "new"], 'there is no rubric "leeds"'),
+        (["example", "leeds", "new"], 'there is no rubric "leeds" (did you mean "leeds-comp3631-lab1"?)'),
         (["rubric", "copy", LAB, "--out", "file"], "file exists"),
         (["rubric", "copy", "leeds"], 'there is no rubric "leeds"'),
     ],

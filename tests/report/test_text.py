@@ -16,7 +16,7 @@ from lxml import html as parser
 from markdown_it import MarkdownIt
 
 from grader.report.text import csv_text, html, html_address, markdown, markdown_code, visible
-from grader.wording import number
+from grader.wording import did_you_mean, number
 from tests.report.nasty import STEERING, TEXTS
 
 MARKDOWN = MarkdownIt("gfm-like", {"linkify": True})
@@ -269,3 +269,20 @@ def test_a_number_of_ours_stays_a_number_and_text_stays_text(cell, shown):
 
 def test_numbers_carry_no_idle_zeros():
     assert [number(x) for x in (10, 100.0, 87.5, 0, 0.1 + 0.2)] == ["10", "100", "87.5", "0", "0.3"]
+
+
+@pytest.mark.parametrize(
+    ("word", "near"),
+    [
+        ("leeds", "leeds-lab1"),
+        ("LAB7", "york-lab7"),
+        ("yrok-lab7", "york-lab7"),
+        ("--exchang", "--exchange"),
+        ("--worker", ""),
+        ("lab", ""),
+        ("la", ""),
+    ],
+)
+def test_a_part_of_one_name_or_a_likeness_is_suggested(word, near):
+    said = f' (did you mean "{near}"?)' if near else ""
+    assert did_you_mean(word, ["leeds-lab1", "york-lab7", "--exchange", "--before"]) == said
