@@ -20,13 +20,13 @@ from rich.text import Text
 
 from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.job import Outcome
-from grader.classes.batch.regrade import CHANGES, Change, Regraded
+from grader.classes.batch.regrade import CHANGES, Regraded, State
 from grader.classes.batch.run import GRADEBOOK, INDEX, RESULTS, Watcher
 from grader.classes.gradebook import Row
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.cli.output import say, say_json
 from grader.model.batch import MISSING, ROSTER
-from grader.model.result import CriterionResult, GradingResult
+from grader.model.result import CriterionResult
 from grader.model.verdict import Status
 from grader.untrusted_text import line
 from grader.wording import first_few, number, plural
@@ -284,16 +284,16 @@ def print_regraded(batch: BatchFolder, regraded: Sequence[Regraded], *, as_json:
 
 def _regraded_json(one: Regraded) -> dict[str, object]:
     return {
-        "id": one.entry.id,
-        "points_before": one.before.points if one.before else None,
-        "points": one.after.points if one.after else None,
+        "id": one.id,
+        "points_before": one.points_before,
+        "points": one.points,
         "missing": list(one.missing),
         "error": one.error,
         "changes": [
             {
                 "criterion": change.criterion,
-                "before": _state(change, "before"),
-                "after": _state(change, "after"),
+                "before": _state_json(change.before),
+                "after": _state_json(change.after),
                 "why": change.why,
             }
             for change in one.changes
@@ -301,9 +301,8 @@ def _regraded_json(one: Regraded) -> dict[str, object]:
     }
 
 
-def _state(change: Change, which: str) -> dict[str, object] | None:
-    criterion = change.before if which == "before" else change.after
-    return {"status": criterion.status.value, "points": criterion.points} if criterion else None
+def _state_json(state: State | None) -> dict[str, object] | None:
+    return {"status": state.status.value, "points": state.points} if state else None
 
 
 def _regraded_lines(batch: BatchFolder, regraded: Sequence[Regraded]) -> Iterator[str]:
@@ -311,39 +310,38 @@ def _regraded_lines(batch: BatchFolder, regraded: Sequence[Regraded]) -> Iterato
     same: dict[tuple[str, str], dict[str, str]] = {}
     for one in regraded:
         for change in one.changes:
-            before, after = (_status_and_points(change, which) for which in ("before", "after"))
-            same.setdefault((change.criterion, f"{before} -> {after}"), {})[one.entry.id] = change.why
+            before, after = map(_status_and_points, (change.before, change.after))
+            same.setdefault((change.criterion, f"{before} -> {after}"), {})[one.id] = change.why
     for (criterion, what), reasons in islice(same.items(), CHANGES_SHOWN):
         names = first_few(list(reasons), NAMES_SHOWN)
         yield f"{criterion}: {what}, {plural(len(reasons), 'submission')}: {names}"
         yield from (f"    {why}" for why in islice(dict.fromkeys(reasons.values()), REASONS_SHOWN))
-    moved = [(one, one.after.points - one.before.points) for one in regraded if one.before and one.after]
-    up, down = ([one for one, by in moved if by * sign > 0] for sign in (1, -1))
-    for word, found in (("more", up), ("fewer", down)):
-        points = [f"{one.entry.id} {_points(one.before)} -> {_points(one.after)}" for one in found]
+    for word, sign in (("more", 1), ("fewer", -1)):
+        points = [
+            f"{one.id} {number(one.points_before)} -> {number(one.points)}"
+            for one in regraded
+            if one.points_before is not None
+            and one.points is not None
+            and (one.points - one.points_before) * sign > 0
+        ]
         if points:
             yield f"{word} points for {len(points)}: {first_few(points, NAMES_SHOWN)}"
     errors: dict[str, list[str]] = {}
     for one in regraded:
         if one.error:
-            errors.setdefault(one.error, []).append(one.entry.id)
+            errors.setdefault(one.error, []).append(one.id)
     yield from (f"{first_few(names, NAMES_SHOWN)}: unchanged: {error}" for error, names in errors.items())
     missing = [one for one in regraded if one.missing]
     if missing:
-        names = first_few([one.entry.id for one in missing], NAMES_SHOWN)
+        names = first_few([one.id for one in missing], NAMES_SHOWN)
         scenarios = ", ".join(dict.fromkeys(name for one in missing for name in one.missing))
         yield f"{len(missing)} must run again, since there is no recording of {scenarios}: {names}"
         yield "  hint: --run-missing runs them"
     changed = sum(bool(one.changes) for one in regraded)
-    judged = sum(one.after is not None for one in regraded)
+    judged = sum(one.points is not None for one in regraded)
     yield f"{judged} of {len(regraded)} judged again, {changed} changed"
     yield f"{batch.path / GRADEBOOK}  {batch.path / CHANGES}"
 
 
-def _points(result: GradingResult | None) -> str:
-    return number(result.points) if result else "-"
-
-
-def _status_and_points(change: Change, which: str) -> str:
-    criterion = change.before if which == "before" else change.after
-    return f"{criterion.status.value} {number(criterion.points)}" if criterion else "-"
+def _status_and_points(state: State | None) -> str:
+    return f"{state.status.value} {number(state.points)}" if state else "-"

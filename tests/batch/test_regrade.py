@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+from collections.abc import Iterator
 from datetime import datetime, timezone
-from itertools import count
 from pathlib import Path
+from typing import Any
 
 import pytest
 from mcap.reader import make_reader
@@ -15,7 +16,7 @@ from mcap.writer import CompressionType, Writer
 
 from grader import __version__
 from grader.classes.batch.folder import open_batch, write_run
-from grader.classes.batch.renew_results import rewrite
+from grader.classes.batch.regrade import Regraded
 from grader.classes.batch.run import describe_rubric
 from grader.cli.main import run
 from grader.evidence.reader import load_evidence
@@ -23,6 +24,7 @@ from grader.judging import judge
 from grader.model.batch import BatchRun, Entry
 from grader.report.files import write_reports
 from grader.rubric.load import LoadedRubric, load_rubric
+from grader.workers import run_each
 from tests.batch.a_class import CORRECT, RUBRIC, WRONG_NAME, batch, handed_in, lines_of, roster_of, run_of
 from tests.batch.repositories import commit, repository
 from tests.support.a_class import judged_result
@@ -90,7 +92,7 @@ def test_one_that_was_stopped_goes_on_and_says_what_all_of_it_changed(tmp_path, 
     out = recorded(tmp_path / "out", kinds())
     rubric = changed(tmp_path / "new.yaml", ("rate_hz: 10", "rate_hz: 20"))
     with monkeypatch.context() as patch:
-        patch.setattr("grader.classes.batch.regrade.rewrite", _stops_at(2))
+        patch.setattr("grader.classes.batch.regrade.run_each", _interrupted)
         assert run(["regrade", str(out), "--rubric", str(rubric)]) == 130
     assert "1 of 2 judged again; the same command continues" in capsys.readouterr().err
     assert run(["regrade", str(out), "--rubric", str(rubric)]) == 1
@@ -100,15 +102,10 @@ def test_one_that_was_stopped_goes_on_and_says_what_all_of_it_changed(tmp_path, 
     assert rows_of(out / "changes.csv") == []
 
 
-def _stops_at(number: int):
-    calls = count(1)
-
-    def rewrites(*given):
-        if next(calls) == number:
-            raise KeyboardInterrupt
-        rewrite(*given)
-
-    return rewrites
+def _interrupted(*given: Any, **more: Any) -> Iterator[Regraded]:
+    """As Ctrl-C does it when one submission is judged again."""
+    yield next(run_each(*given, **more))
+    raise KeyboardInterrupt
 
 
 @pytest.mark.full

@@ -6,17 +6,19 @@ evidence, rubric → criteria → settled → reports and gradebook, and a table
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from pydantic import ValidationError
 
 from grader import __version__
 from grader.classes.batch.folder import BatchFolder, write_run
 from grader.classes.batch.job import Executor
-from grader.classes.batch.renew_results import Judged, Settler, judge_all, rewrite
+from grader.classes.batch.renew_results import Settler, judge_one, rewrite
 from grader.classes.batch.run import (
     BatchOptions,
     Watcher,
@@ -29,105 +31,92 @@ from grader.classes.batch.run import (
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
 from grader.errors import GraderError
-from grader.files import FILE, atomic_write, read_untrusted, unwritable
+from grader.files import FILE, atomic_write, open_untrusted, unwritable
+from grader.intake import safe_name
 from grader.judging.summary import overall_status, total_fields
 from grader.model import SandboxMode
 from grader.model.batch import Entry, Roster
-from grader.model.result import CriterionResult, GradingResult
+from grader.model.result import GradingResult, Override
+from grader.model.verdict import Status
 from grader.portable import CLOEXEC
 from grader.report.text import csv_text
-from grader.results import EVIDENCE
+from grader.results import EVIDENCE, read_result
 from grader.rubric.load import LoadedRubric
+from grader.workers import WorkerEnded, run_each
 
 CHANGES, JOURNAL = "changes.csv", ".regrading.jsonl"
-JOURNAL_BYTES = 1 << 30
+NOTHING, NOT_AGAIN = "nothing was recorded", "it could not be run again"
 COLUMNS = ("id", "criterion", "status before", "status", "points before", "points", "max_points", "why")
+
+
+class State(NamedTuple):
+    """What one criterion came to. `counts` is false where the rubric left it out."""
+
+    status: Status
+    points: float
+    max_points: float
+    counts: bool
 
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """One criterion whose status or points changed. A new one has no `before`, one that is gone no `after`."""
+    """One criterion of two results. A new one has no `before`, one that is gone no `after`. `why` is what the check
+    says now."""
 
     criterion: str
-    before: CriterionResult | None
-    after: CriterionResult | None
-
-    @property
-    def why(self) -> str:
-        """What the check says now."""
-        if self.after is None:
-            return "the rubric no longer has it"
-        return self.after.message or self.after.measured or self.after.title
+    before: State | None
+    after: State | None
+    why: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class Regraded:
-    """One submission: its result before and after, and the scenarios without a recording that fits.
+    """One submission: its points before and after, what changed, in the new rubric's order, and the scenarios without a
+    recording that fits.
 
-    `error` says in one line why it could not be judged: its result stays as it was.
+    `error` says in one line why it could not be judged: its result stays as it was. `first` is what each criterion was
+    before, kept only where scenarios are missing. A class of thousands is kept as these, and never as whole results.
     """
 
-    entry: Entry
-    before: GradingResult | None
-    after: GradingResult | None
+    id: str
+    points_before: float | None
+    points: float | None = None
+    changes: tuple[Change, ...] = ()
     missing: tuple[str, ...] = ()
+    first: Mapping[str, State] = field(default_factory=dict)
     error: str = ""
 
-    @property
-    def changes(self) -> tuple[Change, ...]:
-        """What changed, in the new rubric's order."""
-        if self.before is None or self.after is None:
-            return ()
-        return tuple(filter(_differs, pairs(self.before, self.after)))
+
+def states_of(result: GradingResult) -> dict[str, State]:
+    """Return what each criterion came to."""
+    return {c.id: State(c.status, c.points, c.max_points, c.left_out is None) for c in result.criteria}
 
 
-def pairs(before: GradingResult, after: GradingResult) -> Iterator[Change]:
+def pairs(before: Mapping[str, State], after: GradingResult) -> Iterator[Change]:
     """Yield every criterion of two results, changed or not, in the order of the later one."""
-    old, new = ({c.id: c for c in result.criteria} for result in (before, after))
-    names = [*new, *(name for name in old if name not in new)]
-    return (Change(criterion=name, before=old.get(name), after=new.get(name)) for name in names)
+    now = states_of(after)
+    for one in after.criteria:
+        why = one.message or one.measured or one.title
+        yield Change(criterion=one.id, before=before.get(one.id), after=now[one.id], why=why)
+    for name in (name for name in before if name not in now):
+        yield Change(criterion=name, before=before[name], after=None, why="the rubric no longer has it")
 
 
-def _differs(change: Change) -> bool:
-    before, after = change.before, change.after
-    if before is None or after is None:
-        return True
-    return (before.status, before.points, before.max_points) != (after.status, after.points, after.max_points)
+def _changes(before: Mapping[str, State], after: GradingResult) -> tuple[Change, ...]:
+    return tuple(c for c in pairs(before, after) if (c.before or ())[:3] != (c.after or ())[:3])
 
 
-class _Replaced:
-    """The results that a regrade replaces, kept on the disk until `changes.csv` is written.
+def _replaced_before(journal: Path) -> dict[str, int]:
+    """Return where in the journal the result of each submission begins that a regrade which was stopped has replaced.
 
-    One that was stopped has replaced some already: the next one compares with these, so that no change is missing.
+    They are compared with in place of those that it wrote, so that no change is missing from `changes.csv`.
     """
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._known = path, dict[str, GradingResult]()
-        for row in (read_untrusted(path, JOURNAL_BYTES) or b"").splitlines():
+    places: dict[str, int] = {}
+    with suppress(OSError), open_untrusted(journal) as file:
+        for row in file:
             with suppress(ValidationError):  # the last one was being written
-                result = GradingResult.read_json(row)
-                self._known.setdefault(result.submission.id, result)
-
-    def first(self, result: GradingResult | None) -> GradingResult | None:
-        """Return the result that there was before the first of them."""
-        return self._known.get(result.submission.id, result) if result else None
-
-    def add(self, result: GradingResult) -> None:
-        """Keep a result that is about to be replaced. Raises OutputError."""
-        if self._known.setdefault(result.submission.id, result) is not result:
-            return
-        line = result.model_dump_json(by_alias=True).encode()
-        try:
-            with os.fdopen(
-                os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | CLOEXEC, FILE), "ab"
-            ) as file:
-                file.write(b"\n" + line + b"\n")
-        except OSError as error:
-            raise unwritable(self._path, error) from error
-
-    def forget(self) -> None:
-        """Remove them."""
-        self._path.unlink(missing_ok=True)
+                places.setdefault(GradingResult.read_json(row).submission.id, file.tell() - len(row))
+    return places
 
 
 def regrade(
@@ -148,87 +137,132 @@ def regrade(
         folder.refuse_newer()
         entries = folder.run.entries
         overrides = read_overrides(folder.path / OVERRIDES, rubric.rubric, ids_of(folder.run))
-        one_by_one = _Regrading(
-            folder=folder,
-            rubric=rubric,
-            settler=Settler(rubric.rubric, overrides),
-            replaced=_Replaced(folder.path / JOURNAL),
-        )
-        by_folder = {folder.folder_of(entry): entry for entry in entries if folder.has_evidence(entry)}
-        found = dict[Path, Regraded]()
-        try:
-            for judged in judge_all([path / EVIDENCE for path in by_folder], rubric, jobs, fitting=True):
-                found[judged.folder] = one_by_one.of(by_folder[judged.folder.parent], judged)
-        except KeyboardInterrupt:
-            stopped(len(found), len(by_folder))
-            raise
-        regraded = tuple(
-            found.get(folder.folder_of(entry) / EVIDENCE) or one_by_one.settle_only(entry)
+        journal = folder.path / JOURNAL
+        places = _replaced_before(journal)
+        again = (
+            _Job(
+                id=entry.id,
+                folder=folder.folder_of(entry),
+                recorded=folder.has_evidence(entry),
+                overrides=overrides.get(entry.id, {}),
+                first_at=places.get(safe_name(entry.id)),
+            )
             for entry in entries
         )
+        found = dict[str, Regraded]()
+        regrade_one = partial(_regrade_one, rubric, journal)
+        try:
+            for one in run_each(regrade_one, again, min(jobs, len(entries)), ended=_ended):
+                found[one.id] = one
+        except KeyboardInterrupt:
+            stopped(len(found), len(entries))
+            raise
+        regraded = tuple(found[entry.id] for entry in entries)
         run = folder.run.model_copy(update=describe_rubric(rubric, rubric_source) | {"grader": __version__})
         now = BatchFolder(folder.path, run)
         write_run(now.path, now.run)
         write_changes(folder.path / CHANGES, regraded)
         now = write_books(now, rubric.rubric, run.state, run.counts.kept, ended_at=run.ended_at)
-        one_by_one.replaced.forget()
+        journal.unlink(missing_ok=True)
         return now, regraded
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Regrading:
-    """What is the same for all submissions of a regrade."""
+class _Job:
+    """A submission to be judged again. `first_at` is where the journal has its result, if a regrade that was stopped
+    has replaced it."""
 
-    folder: BatchFolder
-    rubric: LoadedRubric
-    settler: Settler
-    replaced: _Replaced
+    id: str
+    folder: Path
+    recorded: bool
+    overrides: Mapping[str, Override]
+    first_at: int | None
 
-    def of(self, entry: Entry, judged: Judged) -> Regraded:
-        """Write the result that the criteria of today come to."""
-        before, rubric = self.folder.earlier(entry), self.rubric
-        first = self.replaced.first(before)
-        if before is None or judged.criteria is None:
-            return Regraded(entry=entry, before=first, after=None, error=judged.error or "it has no result")
-        automatic = before.model_copy(
-            update={
-                "rubric": describe_rubric(rubric, "")["rubric"],
-                "rubric_origin": before.rubric_origin
-                if rubric.digest == before.rubric.digest
-                else rubric.origin,
-                "criteria": judged.criteria,
-                "status": overall_status(judged.criteria),
-                **total_fields(rubric.rubric, judged.criteria),
-                "max_points": rubric.rubric.max_points,
-                "environment": before.environment.model_copy(update={"grader": __version__}),
-                "overrides": (),
-                "handed_in": None,
-                "late": None,
-                "error": None,
-            }
-        )
-        handed_in = before.handed_in
-        if handed_in is not None:  # the deadline is that of today's rubric
-            handed_in = handed_in.model_copy(update={"deadline": None})
-        after = self.settler.settle(automatic, entry.id, handed_in, before)
-        try:
-            if after != before:
-                self._replace(entry, before, after)
-        except GraderError as error:
-            return Regraded(entry=entry, before=first, after=None, error=error.message)
-        return Regraded(entry=entry, before=first, after=after, missing=judged.missing)
 
-    def settle_only(self, entry: Entry) -> Regraded:
-        """Apply overrides to what could not be graded."""
-        before = self.folder.earlier(entry)
-        error = before.error.message if before is not None and before.error else "nothing was recorded"
-        if before is not None and (self.settler.of(entry.id) or before.overrides):
-            self._replace(entry, before, self.settler.settle_again(before, entry.id, None))
-        return Regraded(entry=entry, before=self.replaced.first(before), after=None, error=error)
+def _ended(job: _Job, _: WorkerEnded) -> Regraded:
+    before = read_result(job.folder)
+    error = f"{job.folder / EVIDENCE}: judging it ended the process"
+    return Regraded(id=job.id, points_before=before.points if before else None, error=error)
 
-    def _replace(self, entry: Entry, before: GradingResult, after: GradingResult) -> None:
-        self.replaced.add(before)
-        rewrite(self.folder.folder_of(entry), after, self.rubric.rubric, self.rubric.docs)
+
+def _regrade_one(rubric: LoadedRubric, journal: Path, job: _Job) -> Regraded:
+    """In a worker: write the result that the criteria of today come to, and return how it differs."""
+    try:
+        before = read_result(job.folder)
+        if before is None:
+            error = "it has no result" if job.recorded else NOTHING
+            return Regraded(id=job.id, points_before=None, error=error)
+        first = before if job.first_at is None else _result_at(journal, job.first_at)
+        after, missing, error = _judge_again(rubric, job, before)
+        if after is not None and after != before:
+            if job.first_at is None:
+                _keep(journal, before)
+            rewrite(job.folder, after, rubric.rubric, rubric.docs)
+    except GraderError as raised:
+        return Regraded(id=job.id, points_before=None, error=raised.message)
+    if error or after is None:
+        return Regraded(id=job.id, points_before=first.points, error=error)
+    return Regraded(
+        id=job.id,
+        points_before=first.points,
+        points=after.points,
+        changes=_changes(states_of(first), after),
+        missing=missing,
+        first=states_of(first) if missing else {},
+    )
+
+
+def _judge_again(
+    rubric: LoadedRubric, job: _Job, before: GradingResult
+) -> tuple[GradingResult | None, tuple[str, ...], str]:
+    """Return the result of today, the scenarios that lack a recording, and why it could not be judged.
+
+    What could not be graded has no criteria of today: overrides are applied to it.
+    """
+    settler = Settler(rubric.rubric, {job.id: job.overrides})
+    if not job.recorded:
+        error = before.error.message if before.error else NOTHING
+        settled = settler.settle_again(before, job.id, None) if job.overrides or before.overrides else None
+        return settled, (), error
+    judged = judge_one(rubric, job.folder / EVIDENCE, fitting=True)
+    if judged.criteria is None:
+        return None, (), judged.error
+    automatic = before.model_copy(
+        update={
+            "rubric": describe_rubric(rubric, "")["rubric"],
+            "rubric_origin": before.rubric_origin if rubric.digest == before.rubric.digest else rubric.origin,
+            "criteria": judged.criteria,
+            "status": overall_status(judged.criteria),
+            **total_fields(rubric.rubric, judged.criteria),
+            "max_points": rubric.rubric.max_points,
+            "environment": before.environment.model_copy(update={"grader": __version__}),
+            "overrides": (),
+            "handed_in": None,
+            "late": None,
+            "error": None,
+        }
+    )
+    handed_in = before.handed_in
+    if handed_in is not None:  # the deadline is that of today's rubric
+        handed_in = handed_in.model_copy(update={"deadline": None})
+    return settler.settle(automatic, job.id, handed_in, before), judged.missing, ""
+
+
+def _result_at(journal: Path, place: int) -> GradingResult:
+    with journal.open("rb") as file:
+        file.seek(place)
+        return GradingResult.read_json(file.readline())
+
+
+def _keep(journal: Path, result: GradingResult) -> None:
+    """Keep a result that is about to be replaced, until `changes.csv` is written. Raises OutputError."""
+    line = result.model_dump_json(by_alias=True).encode()
+    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | CLOEXEC
+    try:
+        with os.fdopen(os.open(journal, flags, FILE), "ab") as file:
+            file.write(b"\n" + line + b"\n")
+    except OSError as error:
+        raise unwritable(journal, error) from error
 
 
 def write_changes(path: Path, regraded: Sequence[Regraded]) -> None:
@@ -241,7 +275,7 @@ def _rows(regraded: Sequence[Regraded]) -> Iterator[tuple[str | float, ...]]:
         for change in one.changes:
             before, after = change.before, change.after
             yield (
-                one.entry.id,
+                one.id,
                 change.criterion,
                 before.status.value if before else "",
                 after.status.value if after else "",
@@ -265,7 +299,7 @@ def run_missing(
 
     Credentials come from the environment or from git: the batch's folder holds none.
     """
-    again = [one.entry.id for one in regraded if one.missing]
+    again = [one.id for one in regraded if one.missing]
     roster = Roster(
         file=folder.run.roster,
         entries=folder.run.entries,
@@ -283,18 +317,21 @@ def run_missing(
         remote_only=folder.run.remote_only,
     )
     now = run_batch(roster, folder.run.rubric_source, rubric, options, executor=executor, watcher=watcher)
-    after = tuple(_compare_run(now, one) if one.missing else one for one in regraded)
+    entries = {entry.id: entry for entry in now.run.entries}
+    after = tuple(_compare_run(now, entries[one.id], one) if one.missing else one for one in regraded)
     write_changes(folder.path / CHANGES, after)
     return now, after
 
 
-def _compare_run(folder: BatchFolder, one: Regraded) -> Regraded:
-    result = folder.earlier(one.entry)
-    failed = result is None or result.status == "error"
-    return Regraded(
-        entry=one.entry,
-        before=one.before,
-        after=result,
+def _compare_run(folder: BatchFolder, entry: Entry, one: Regraded) -> Regraded:
+    result = folder.earlier(entry)
+    if result is None:
+        return replace(one, points=None, changes=(), error=NOT_AGAIN)
+    failed = result.status == "error"
+    return replace(
+        one,
+        points=result.points,
+        changes=_changes(one.first, result),
         missing=one.missing if failed else (),
-        error="it could not be run again" if failed else "",
+        error=NOT_AGAIN if failed else "",
     )

@@ -49,16 +49,12 @@ class Judged:
     hint: str = ""
 
 
-def judge_all(
-    folders: Sequence[Path], rubric: LoadedRubric, jobs: int, *, fitting: bool = False
-) -> Iterator[Judged]:
+def judge_all(folders: Sequence[Path], rubric: LoadedRubric, jobs: int) -> Iterator[Judged]:
     """Judge every submission's evidence again, `jobs` at a time; yield each as it comes.
 
-    With `fitting`, a recording counts only if it was made with the rubric's present scenario. What is wrong with one
-    submission is in its `error` and stops no other, even if it ends the process.
+    What is wrong with one submission is in its `error` and stops no other, even if it ends the process.
     """
-    judge_one = partial(_judge_one, rubric, fitting)
-    return run_each(judge_one, folders, min(jobs, len(folders)), ended=_judging_ended)
+    return run_each(partial(judge_one, rubric), folders, min(jobs, len(folders)), ended=_judging_ended)
 
 
 def _judging_ended(folder: Path, _: WorkerEnded) -> Judged:
@@ -66,8 +62,11 @@ def _judging_ended(folder: Path, _: WorkerEnded) -> Judged:
     return Judged(folder=folder, criteria=None, error=f"{folder}: judging it ended the process", hint=hint)
 
 
-def _judge_one(rubric: LoadedRubric, fitting: bool, folder: Path) -> Judged:
-    """In a worker."""
+def judge_one(rubric: LoadedRubric, folder: Path, *, fitting: bool = False) -> Judged:
+    """Judge one submission's evidence again, in a worker.
+
+    With `fitting`, a recording counts only if it was made with the rubric's present scenario.
+    """
     lab = rubric.rubric
     try:
         runs = load_evidence([folder])

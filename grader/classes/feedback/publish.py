@@ -17,7 +17,7 @@ from typing import Literal
 from pydantic import ValidationError
 
 from grader.classes.batch.folder import BatchFolder
-from grader.classes.batch.regrade import Change, pairs
+from grader.classes.batch.regrade import pairs, states_of
 from grader.classes.batch.renew_results import figures_in
 from grader.classes.batch.run import hold_folder
 from grader.classes.gradebook import Row
@@ -350,9 +350,9 @@ def _total(result: GradingResult) -> str:
 def _criteria(before: GradingResult, after: GradingResult, hidden: Collection[str]) -> Iterator[str]:
     overrides = [{o.criterion: o for o in result.overrides} for result in (before, after)]
     unseen = 0
-    for change in pairs(before, after):
+    for change in pairs(states_of(before), after):
         was, now = (found.get(change.criterion) for found in overrides)
-        decided, same = _decision(was) != _decision(now), _state(change, "before") == _state(change, "after")
+        decided, same = _decision(was) != _decision(now), change.before == change.after
         if not decided and same:
             continue
         if change.criterion in hidden:
@@ -365,13 +365,6 @@ def _criteria(before: GradingResult, after: GradingResult, hidden: Collection[st
             yield f"judged again ({change.criterion}): {change.why}"
     if unseen:
         yield f"{plural(unseen, 'criterion', 'criteria')} that your course does not show"
-
-
-def _state(change: Change, which: str) -> tuple[object, ...]:
-    criterion = change.before if which == "before" else change.after
-    if criterion is None:
-        return ()
-    return criterion.status, criterion.points, criterion.max_points, criterion.left_out is None
 
 
 def _decision(override: AppliedOverride | None) -> tuple[object, ...]:
