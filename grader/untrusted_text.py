@@ -127,7 +127,7 @@ def _surrogates_written_out(text: str) -> str:
 
 
 def _json_escaped(text: str) -> str:
-    text = text.translate(_JSON)
+    text = text if text.isascii() and text.isprintable() else text.translate(_JSON)
     return _COMMAND.sub(r"\\u0023", text) if "##" in text else text
 
 

@@ -157,7 +157,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
         or passed(f"the counter goes up by one, {plural(right, 'time')}")
     )
     verdict = _of_clock(verdict, count, run, package, params)
-    at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0)
+    at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0, 0)
     return verdict.about(
         expected=expected,
         measured=f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}",

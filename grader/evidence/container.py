@@ -32,6 +32,8 @@ MAX_RECORDS = 2_000_000
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
+_WHOLE_HEAD = struct.Struct("<BQHIQQ")
+"""Both at once."""
 MESSAGE_HEAD_BYTES = _MESSAGE_HEAD.size
 BATCH = 1000
 KEPT_BYTES = 32 << 10
@@ -71,24 +73,44 @@ def records(stream: BinaryIO) -> Iterator[McapRecord | Messages]:
     All checksums are verified, and so is the end of the file. Raises ContainerError, and whatever `mcap`,
     `zstandard` and `lz4` raise for a damaged file.
     """
-    source, meter = ReadDataStream(stream, calculate_crc=True), _Meter()
+    source, meter, known = _Source(stream), _Meter(), _OUTSIDE
     read_magic(source)
     while True:
-        checksum = source.checksum()
+        checksum = source.crc
         opcode, body = _next(source, meter)
         if isinstance(body, dict):
             yield body
         elif opcode == Opcode.CHUNK:
             yield from _inside(Chunk.read(ReadDataStream(BytesIO(body))), meter)
+        elif opcode in known:
+            yield known[opcode](body)
         elif opcode == Opcode.DATA_END:
             _verify(DataEnd.read(ReadDataStream(BytesIO(body))).data_section_crc, checksum, "the data")
+            known = {}  # what comes behind it repeats records, for those who do not read the whole file
         elif opcode == Opcode.FOOTER:
             break
-        elif opcode in _OUTSIDE:
-            yield _OUTSIDE[opcode](body)
     read_magic(source)
     if stream.read(1):
         raise ContainerError("bytes after its end")
+
+
+class _Source(ReadDataStream):
+    """A file from its beginning, and the checksum of what was read. Raises EndOfFile where it is shorter than it says.
+
+    mcap's own does the same, and more work for each of the many small records of an index.
+    """
+
+    def __init__(self, stream: BinaryIO) -> None:
+        super().__init__(stream)
+        self._bytes = stream.read
+        self.crc = 0
+
+    def read(self, length: int) -> bytes:
+        data = self._bytes(length)
+        if len(data) < length:
+            raise EndOfFile
+        self.crc = zlib.crc32(data, self.crc)
+        return data
 
 
 class _Meter:
@@ -113,7 +135,7 @@ class _Meter:
             raise ContainerError(f"more than {MAX_UNPACKED_BYTES >> 20} MiB unpacked")
 
 
-def _next(source: ReadDataStream, meter: _Meter) -> tuple[int, bytes | Messages]:
+def _next(source: _Source, meter: _Meter) -> tuple[int, bytes | Messages]:
     """Return the next record's kind and content. Nothing is read past its end, whatever lengths it holds.
 
     Messages, which may be many and large, are read at once.
@@ -123,13 +145,8 @@ def _next(source: ReadDataStream, meter: _Meter) -> tuple[int, bytes | Messages]
     if opcode == Opcode.MESSAGE and length >= MESSAGE_HEAD_BYTES:
         channel_id, sequence, time_ns, _ = _MESSAGE_HEAD.unpack(source.read(MESSAGE_HEAD_BYTES))
         data = source.read(length - MESSAGE_HEAD_BYTES)
-        if len(data) < length - MESSAGE_HEAD_BYTES:
-            raise EndOfFile
         return opcode, {channel_id: [Message(time_ns, sequence, data)]}
-    body = source.read(length)
-    if len(body) < length:
-        raise EndOfFile
-    return opcode, body
+    return opcode, source.read(length)
 
 
 def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord | Messages]:
@@ -137,33 +154,27 @@ def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord | Messages]:
     plain = _unpack(chunk)
     meter.unpacked(len(plain))
     _verify(chunk.uncompressed_crc, zlib.crc32(plain), "a chunk")
-    begin, size_bytes = _HEAD.size, len(plain)
-    read_head, read_message_head, message_op = (
-        _HEAD.unpack_from,
-        _MESSAGE_HEAD.unpack_from,
-        int(Opcode.MESSAGE),
-    )
+    size_bytes, at, count = len(plain), 0, 0
+    padded = plain + bytes(_WHOLE_HEAD.size)  # so that the head of a message can be read of any record
+    read_head, new, message_op = _WHOLE_HEAD.unpack_from, tuple.__new__, int(Opcode.MESSAGE)
     messages: Messages = defaultdict(list)
-    count = 0
-    while begin <= size_bytes:
-        opcode, length = read_head(plain, begin - _HEAD.size)
-        end = begin + length
-        if end > size_bytes:
+    while at < size_bytes:
+        opcode, length, channel_id, sequence, time_ns, _ = read_head(padded, at)
+        begin = at + _HEAD.size
+        at = begin + length
+        if at > size_bytes:
             meter.record(length)
             raise EndOfFile
         count += 1
         if opcode == message_op and length >= MESSAGE_HEAD_BYTES:
-            channel_id, sequence, time_ns, _ = read_message_head(plain, begin)
-            messages[channel_id].append(Message(time_ns, sequence, plain[begin + MESSAGE_HEAD_BYTES : end]))
+            row = (time_ns, sequence, plain[begin + MESSAGE_HEAD_BYTES : at])
+            messages[channel_id].append(new(Message, row))
         if count == BATCH or opcode in _IN_CHUNK:
             meter.records(count)
             yield messages
             messages, count = defaultdict(list), 0
         if opcode in _IN_CHUNK:
-            yield _IN_CHUNK[opcode](plain[begin:end])
-        begin = end + _HEAD.size
-    if begin != size_bytes + _HEAD.size:
-        raise EndOfFile
+            yield _IN_CHUNK[opcode](plain[begin:at])
     meter.records(count)
     yield messages
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, TypeAlias
 
@@ -37,6 +37,11 @@ Value: TypeAlias = Any
 
 KEPT_LETTERS_MAX = 8_000
 """Longer definitions make much code, which is not kept for later."""
+_LETTERS = {
+    "bool": "?", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q",
+    "uint64": "Q", "float32": "f", "float64": "d",
+}  # fmt: skip
+"""What `struct` calls ROS's numbers."""
 _CLOCK_FIELDS = {"sec": "secs", "nanosec": "nsecs"}
 
 
@@ -105,8 +110,12 @@ class _Plan:
         self._store.register(get_types_from_msg(canonical(self._types), f"{PACKAGE}/{alias(type_)}"))
         self._name = f"{PACKAGE}/msg/{alias(type_)}"
         self._store.get_msgdef(self._name)
+        self._numbers = _as_struct(self._types[type_])
+        self._names = [field.name for field in self._types[type_]]
 
     def decode(self, data: bytes) -> dict[str, Any]:
+        if self._numbers is not None:  # as rosbags would, in half of the time
+            return dict(zip(self._names, self._numbers.unpack(data), strict=True))
         if not self._types[self._type] and not data:
             return {}
         return self._plain(self._type, self._store.deserialize_ros1(data, self._name))
@@ -153,6 +162,16 @@ class _Plan:
         if field.type == "uint8":
             return value.tobytes()
         return value if field.type == "string" else value.tolist()
+
+
+def _as_struct(fields: Sequence[Field]) -> struct.Struct | None:
+    """Return how numbers lie in a message that has nothing else; None for any other."""
+    letters = [_LETTERS.get(field.type, "") for field in fields if not field.array]
+    return (
+        struct.Struct("<" + "".join(letters))
+        if fields and all(letters) and len(letters) == len(fields)
+        else None
+    )
 
 
 def _plan(type_: str, definition: str) -> _Plan | None:

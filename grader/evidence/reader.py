@@ -6,11 +6,12 @@ import os
 import struct
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from io import BytesIO
 from operator import itemgetter
 from pathlib import Path, PurePath
+from stat import S_ISREG
 from typing import Any, BinaryIO
 
 from mcap import records as mcap
@@ -176,9 +177,10 @@ def _first(error: ValidationError) -> str:
 @contextmanager
 def _readable(path: Path) -> Iterator[None]:
     try:
-        if path.exists() and not path.is_file():
+        about = path.stat()
+        if not S_ISREG(about.st_mode):
             raise EvidenceError(f"{path}: not a file")
-        if path.exists() and path.stat().st_size > MAX_FILE_BYTES:
+        if about.st_size > MAX_FILE_BYTES:
             raise EvidenceError(f"{path}: larger than {MAX_FILE_BYTES >> 20} MiB")
         yield
     except OSError as error:
@@ -186,7 +188,7 @@ def _readable(path: Path) -> Iterator[None]:
 
 
 def _files(paths: Iterable[Path]) -> list[Path]:
-    found: dict[Path, Path] = {}
+    found: dict[object, Path] = {}
     for path in paths:
         inside = _recordings(path) if path.is_dir() else [path]
         if not inside:
@@ -194,12 +196,20 @@ def _files(paths: Iterable[Path]) -> list[Path]:
                 f"{path}: no evidence (*.mcap, *.bag, *.db3) in this folder or in evidence/ below it"
             )
         for file in inside:
-            found.setdefault(file.resolve(), file)
+            found.setdefault(_identity(file), file)
     if not found:
         raise EvidenceError(
             "no evidence given", hint="name evidence files or a folder of a graded submission"
         )
     return list(found.values())
+
+
+def _identity(file: Path) -> object:
+    """Return what is equal of two names of one file."""
+    with suppress(OSError, ValueError):  # reading it says so
+        about = file.stat()
+        return about.st_dev, about.st_ino
+    return file
 
 
 def _recordings(folder: Path) -> list[Path]:
@@ -270,7 +280,7 @@ class _RunBuilder:
         """The arena has limits of its own for its events."""
         channel, foreign = self._channels.get(number), self._metadata is None
         if foreign or channel is None or channel.message_encoding != "json":
-            size_bytes = sum(len(message.data) for message in messages)
+            size_bytes = sum([len(message.data) for message in messages])
             self._budget.hold(size_bytes, foreign=foreign, count=len(messages))
 
     def _attach(self, record: mcap.Attachment) -> None:
@@ -377,8 +387,9 @@ class _RunBuilder:
         return schema is not None and schema.encoding == "jsonschema"
 
     def _events(self, topic: str) -> tuple[tuple[int, Any], ...]:
-        read = TOPICS[topic].read_json
-        return tuple((message.log_time_ns, read(message.data)) for message in self._json(topic))
+        messages = self._json(topic)
+        events = TOPICS[topic].read_all([message.data for message in messages])
+        return tuple(zip([message.log_time_ns for message in messages], events, strict=True))
 
     def _package(self) -> bytes | None:
         messages = self._json(PACKAGE_TOPIC)

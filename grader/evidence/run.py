@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import cached_property, wraps
+from typing import TYPE_CHECKING, Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
 from grader.errors import EvidenceError
 from grader.evidence.events import (
@@ -23,6 +23,9 @@ from grader.untrusted_text import without_colours
 
 if TYPE_CHECKING:
     from grader.evidence.decode import Decoder
+
+Params = ParamSpec("Params")
+Found = TypeVar("Found")
 
 HELD_BYTES_MAX = 192 << 20
 """More than the arena records of one submission (`arena/sandbox.py`)."""
@@ -147,11 +150,10 @@ class Channel:
         """
         try:
             decoder = self.decoder(self.budget)
-            for message in self.messages:
-                self.budget.decode(decoder.decoded_bytes(len(message.data)))
+            self.budget.decode(sum([decoder.decoded_bytes(len(message.data)) for message in self.messages]))
         except BudgetExceeded as error:
             raise EvidenceError(f"{self.topic}: {error}", hint="publish less on it") from error
-        return tuple(decoder.decode(m.data) for m in self.messages)
+        return tuple([decoder.decode(m.data) for m in self.messages])
 
     def decoder(self, budget: MemoryBudget) -> Decoder:
         """Return a decoder of its messages, which counts as memory too. Raises BudgetExceeded."""
@@ -216,6 +218,7 @@ class Run:
     """Files that were kept with the run, by name."""
     package_json: bytes | None = None
     """The package's files as they were read; ask for the fact `package` instead."""
+    _known: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def foreign(self) -> bool:
@@ -284,6 +287,21 @@ class Run:
         return next((e for _, e in reversed(self.course) if e.event == "end"), None)
 
 
+def once_for_each_run(
+    function: Callable[Concatenate[Run, Params], Found],
+) -> Callable[Concatenate[Run, Params], Found]:
+    """Let a function of a run and of names answer the same question about the same run once: checks share answers."""
+
+    @wraps(function)
+    def ask(run: Run, /, *args: Params.args, **names: Params.kwargs) -> Found:
+        question = (function, *args, *names.items())
+        if question not in run._known:  # noqa: SLF001 - the run's own
+            run._known[question] = function(run, *args, **names)  # noqa: SLF001
+        return run._known[question]  # type: ignore[no-any-return]  # noqa: SLF001
+
+    return ask
+
+
 def console_log(runs: Mapping[str, Run]) -> str:
     """Return what the build and the student's processes printed: the build first, then each scenario in the order in
     which they ran, with seconds since the run began and without the codes that colour a terminal."""
@@ -312,6 +330,8 @@ def merge_channels(channels: Iterable[Channel], *, renumber: bool) -> tuple[Chan
 
 
 def _merge_group(group: list[Channel], *, renumber: bool) -> Channel:
+    if len(group) == 1 and not renumber:
+        return group[0]
     messages = sorted((m for one in group for m in one.messages), key=lambda message: message.log_time_ns)
     if renumber and any(m.sequence != number for number, m in enumerate(messages)):
         messages = [Message(m.log_time_ns, number, m.data) for number, m in enumerate(messages)]

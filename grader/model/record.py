@@ -5,11 +5,16 @@ from __future__ import annotations
 import ast
 import inspect
 import sys
+from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 from itertools import pairwise
+from typing import TypeVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from typing_extensions import Self
+
+T = TypeVar("T")
 
 
 class Record(BaseModel):
@@ -22,6 +27,20 @@ class Record(BaseModel):
         """Read what a grader wrote. Keys that only a later grader knows are ignored: without a new version of the
         format, no status and no points depend on them (docs/reference/formats.md). Raises ValidationError."""
         return cls.model_validate_json(data, extra="ignore")
+
+    @classmethod
+    def read_all(cls, datas: Sequence[bytes]) -> list[Self]:
+        """Read many in one go, in little more than half of the time. Raises ValidationError for the first that is none."""
+        with suppress(ValidationError):
+            found = _list_of(cls).validate_json(b"[%b]" % b",".join(datas), extra="ignore")
+            if len(found) == len(datas):
+                return found
+        return [cls.read_json(data) for data in datas]
+
+
+@cache
+def _list_of(kind: type[T]) -> TypeAdapter[list[T]]:
+    return TypeAdapter(list[kind])  # type: ignore[valid-type]
 
 
 def field_docstrings(record: type) -> dict[str, str]:

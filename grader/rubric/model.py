@@ -201,7 +201,7 @@ class Rubric(Record):
 
     def package_of(self, one: Criterion | Start) -> str:
         """Return the name of the package that a criterion judges, or that a start's files are of."""
-        if one.package is not None or isinstance(one, Start):
+        if one.package is not None or isinstance(one, Start) or isinstance(self.package_, str):
             return one.package or self.package
         scenario = self.scenarios.get(one.scenario or "")
         starts = [s for s in scenario.start if s.program is None] if scenario is not None else []

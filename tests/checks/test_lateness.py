@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import accumulate
 
 import pytest
@@ -93,7 +94,7 @@ def test_the_timer_counts_where_it_was_later_or_alone() -> None:
 def test_a_student_cannot_be_the_calibration() -> None:
     run = run_of([100] * 60)
     forged = channel(CALIBRATION, [400.0] * 10, "/talker", stamped=True)
-    found = lateness(Run(**{**run.__dict__, "channels": (*run.channels, forged)}), START_NS, run.end_ns)
+    found = lateness(replace(run, channels=(*run.channels, forged)), START_NS, run.end_ns)
     assert found is not None
     assert found.max_ms == 0.2
     assert found.calibration_hz is None
@@ -101,7 +102,7 @@ def test_a_student_cannot_be_the_calibration() -> None:
 
 def test_nothing_is_known_of_another_tools_recording() -> None:
     run = run_of([100] * 60)
-    assert lateness(Run(**{**run.__dict__, "host": ()}), START_NS, run.end_ns) is None
+    assert lateness(replace(run, host=()), START_NS, run.end_ns) is None
 
 
 @pytest.mark.parametrize(
@@ -149,13 +150,13 @@ def test_a_full_machine_lets_a_node_wait_now_and_then(
 ) -> None:
     run = run_of(gaps_ms, IDLE)
     host = tuple((t, e.model_copy(update={"busy": busy})) for t, e in run.host)
-    assert status(Run(**{**run.__dict__, "host": host})) is expected
+    assert status(replace(run, host=host)) is expected
 
 
 def test_how_busy_the_machine_was_is_said() -> None:
     run = run_of([100] * 60, IDLE)
     host = tuple((t, e.model_copy(update={"busy": 0.5 + 0.5 * (i % 2)})) for i, (t, e) in enumerate(run.host))
-    found = lateness(Run(**{**run.__dict__, "host": host}), START_NS, run.end_ns)
+    found = lateness(replace(run, host=host), START_NS, run.end_ns)
     assert found is not None
     assert found.busy == pytest.approx(0.75, abs=0.05)
     assert found.described.startswith("machine 7")

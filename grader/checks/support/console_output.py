@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from grader.checks.support.exceptions import HEADING, tracebacks
 from grader.checks.support.text import VALUE, line_pattern, words_pattern
-from grader.evidence.run import Run
+from grader.evidence.run import Run, once_for_each_run
 from grader.untrusted_text import without_colours
 
 OTHER_NUMBERS_PER_LINE = 6
@@ -63,6 +63,7 @@ def probes_on(run: Run, topic: str) -> tuple[Probe, ...]:
     return tuple(Probe(t, e.value) for t, e in run.actors if e.action == "publish" and e.topic == topic)
 
 
+@once_for_each_run
 def printed_lines(run: Run) -> tuple[Line, ...]:
     """Return all that the student's processes printed and their nodes logged, by time; tracebacks left out."""
     students = {e.name for _, e in run.processes if e.role == "student"}
@@ -126,7 +127,11 @@ def numbers_in(text: str) -> frozenset[int]:
 
 def _numbers(text: str, *, dashes: bool) -> Iterator[tuple[int, int]]:
     """Yield each whole number with its offset. With `dashes`, a `-` after a letter or a dot is no sign."""
-    for match in _NUMBER.finditer(_TIME.sub(_blanks_for, _HEX.sub(_blanks_for, text))):
+    if "x" in text or "X" in text:
+        text = _HEX.sub(_blanks_for, text)
+    if ":" in text or "-" in text:
+        text = _TIME.sub(_blanks_for, text)
+    for match in _NUMBER.finditer(text):
         sign, whole, fraction = match.groups()
         if len(whole) > 18 or (fraction and fraction.strip(".0")):
             continue

@@ -15,7 +15,7 @@ from grader.checks.support.exit_causes import explain_early_end, explain_traceba
 from grader.checks.support.processes import PublishedTopic, lives, observed_until_ns, slips_of
 from grader.checks.support.text import loop_rate
 from grader.checks.support.topics import losses, whole_until_ns
-from grader.evidence.run import Channel, Run
+from grader.evidence.run import Channel, Run, once_for_each_run
 from grader.model.package import PackageFacts, PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
@@ -42,10 +42,7 @@ class Step(NamedTuple):
     from_ns: int
     to_ns: int
     lost_messages: int
-
-    @property
-    def change(self) -> float:
-        return self.after - self.before
+    change: float
 
 
 class Count(Record):
@@ -60,7 +57,7 @@ class Count(Record):
     def steps(self) -> tuple[Step, ...]:
         rows = list(zip(self.values, self.times_ns, self.sequences, strict=True))
         return tuple(
-            Step(i + 1, a[0], b[0], a[1], b[1], max(0, b[2] - a[2] - 1))
+            Step(i + 1, a[0], b[0], a[1], b[1], max(0, b[2] - a[2] - 1), b[0] - a[0])
             for i, (a, b) in enumerate(pairwise(rows))
         )
 
@@ -171,6 +168,7 @@ def steps_to_judge(count: Count, maximum: int) -> tuple[Step, ...]:
     return count.steps[int(count.begins_astray) : len(count.steps) - (count.stuck - 1 if stays else 0)]
 
 
+@once_for_each_run
 def counts(run: Run, topic: str) -> tuple[Count, ...]:
     """What the student's publishers counted on a topic, the earliest first; what is not a number is left out, and what
     came after the recorder had lost something."""

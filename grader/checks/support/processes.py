@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Field
 from grader.checks.registry import Refers
 from grader.checks.support.text import ANONYMOUS, init
 from grader.evidence.events import ProcessEvent
-from grader.evidence.run import Run
+from grader.evidence.run import Run, once_for_each_run
 from grader.model.package import PackageFacts, PythonSlip, SlipKind
 from grader.model.verdict import FileCitation, Verdict, unjudged
 from grader.wording import join_words, seconds, shorten
@@ -60,6 +60,7 @@ def not_started(who: str) -> Verdict:
     return unjudged(f"{who} was not started: there is no script to run", hint=NO_SCRIPT_HINT)
 
 
+@once_for_each_run
 def lives(run: Run) -> tuple[Life, ...]:
     """Return the student's processes in order of their start."""
     starts = [(t, e) for t, e in run.processes if e.role == "student" and e.event == "start"]
