@@ -14,8 +14,8 @@ from mcap.reader import make_reader
 
 from benchmarks.figures import NotMeasured
 from benchmarks.machine import Meter
+from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.sandbox import RunLimits
 from grader.arena.scenario import process_specs
 from grader.arena.session import ArenaSession
 from grader.evidence.writer import EvidenceWriter

@@ -28,9 +28,9 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, TypeAlias, TypeVar, get_args
 
 from grader.errors import EvidenceError, UsageError
+from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.files import check_writable
-from grader.judging.facts import PACKAGE_RUN
 from grader.model import SandboxMode
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.result import NO_TIME, GradingResult, SubmissionInfo

@@ -1,6 +1,6 @@
 r"""Text that others wrote, made visible: what would steer a terminal or command a CI's log is written out.
 
-An escape becomes `\x1b`. Every station may use this; `grader.report.text` has what documents need beyond it.
+An escape becomes `\x1b`. Every room may use this; `grader.report.text` has what documents need beyond it.
 """
 
 from __future__ import annotations

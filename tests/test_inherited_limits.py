@@ -15,7 +15,7 @@ import pytest
 
 from grader.arena import inherited_limits, sandbox
 from grader.arena.inherited_limits import MB, NEEDS, group, limits, make_room, tasks_of
-from grader.arena.sandbox import RunLimits
+from grader.arena.limits import RunLimits
 from grader.errors import ExitCode, HostError
 from grader.model.result import GradingResult
 from tests import ordinary

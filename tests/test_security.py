@@ -10,7 +10,7 @@ import pytest
 
 from grader import files
 from grader.arena import build, process_environment, scenario_inputs, static_recorder, steps, workspace
-from grader.arena.sandbox import SUBMISSION_MESSAGE_BYTES, RunLimits
+from grader.arena.limits import SUBMISSION_MESSAGE_BYTES, RunLimits
 from grader.checks.support import text
 from grader.evidence import container, decode, definitions
 from grader.evidence.run import DECODED_BYTES_MAX, FOREIGN_BYTES_MAX, HELD_BYTES_MAX

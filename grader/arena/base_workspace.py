@@ -27,8 +27,9 @@ from typing import Any
 
 from grader import __version__
 from grader.arena.interruption import run_until_signal
+from grader.arena.limits import RunLimits
 from grader.arena.process_environment import BASE, ProcessEnvironment
-from grader.arena.sandbox import RunLimits, Word, choose, copy_of, scratch, temporary_base
+from grader.arena.sandbox import Word, choose, copy_of, scratch, temporary_base
 from grader.arena.sandbox_files import ANSWERS, COURSE, INSIDE_WORKSPACE, QUESTIONS, SOURCES, prepare
 from grader.arena.session import ArenaSession
 from grader.arena.workspace import Workspace, give_to, read_member

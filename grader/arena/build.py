@@ -18,7 +18,7 @@ from grader.arena.process_environment import ARCHIVE, ProcessEnvironment
 from grader.arena.session import ArenaSession
 from grader.arena.static_recorder import RunCost
 from grader.arena.workspace import read_member, run_in_place
-from grader.evidence.events import ActorEvent, ScenarioEvent
+from grader.evidence.events import CATKIN_MAKE, ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.files import READ_MAX, read_untrusted
 from grader.model.record import Record
@@ -81,7 +81,7 @@ async def build(
     async with ArenaSession(place, writer, master=False, last_run=last_run) as arena:
         beside = [_syntax_spec(place)] if to_compile else []
         ended = await _run_catkin_make(place, arena, beside, with_base=wants_base)
-        ok = arena.exit_codes.get("catkin_make") == 0
+        ok = arena.exit_codes.get(CATKIN_MAKE) == 0
         built = await _with_setup(place, arena) if ok else place.from_source()
         for package, scripts in ((None, answers), *answers_of.items()):
             own = built.of(package)
@@ -117,14 +117,14 @@ async def _run_catkin_make(
 ) -> bool:
     """Build the workspace, with other processes beside it; return whether the build ended by itself."""
     arena.course(ScenarioEvent(event="begin"))
-    arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True, collect=ARCHIVE))
+    arena.start(place.spec(CATKIN_MAKE, _catkin_make(place), role="build", build=True, collect=ARCHIVE))
     for spec in beside:
         arena.start(spec)
     if with_base:  # beside the build, on another core
         arena.start(base_spec(place))
-    ended = await arena.wait(lambda: "catkin_make" in arena.exit_codes, BUILD_S)
+    ended = await arena.wait(lambda: CATKIN_MAKE in arena.exit_codes, BUILD_S)
     if not ended:
-        await arena.interrupt("catkin_make", int_s=2.0, term_s=1.0)
+        await arena.interrupt(CATKIN_MAKE, int_s=2.0, term_s=1.0)
     await arena.wait(lambda: all(spec["name"] in arena.exit_codes for spec in beside), STEP_S)
     return ended
 
@@ -146,7 +146,7 @@ def _catkin_make(place: ProcessEnvironment) -> list[str]:
 def _note_excess(writer: EvidenceWriter, *found: str) -> None:
     """Note what the build left too much of, given in words, as far as there is any."""
     for detail in filter(None, found):
-        event = ActorEvent(action="limit", actor="catkin_make", detail=detail)
+        event = ActorEvent(action="limit", actor=CATKIN_MAKE, detail=detail)
         writer.event("/grader/actor", time.time_ns(), event)
 
 

@@ -12,7 +12,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from grader.arena.sandbox import RunLimits, Sandbox, Word, copy_of, scratch, system_call_filter
+from grader.arena.limits import RunLimits
+from grader.arena.sandbox import Sandbox, Word, copy_of, scratch, system_call_filter
 from grader.arena.sandbox_files import (
     BASE_WORKSPACE,
     BUILT,

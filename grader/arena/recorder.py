@@ -22,12 +22,12 @@ from grader.arena.admission import Admission, shared_folder
 from grader.arena.base_workspace import copy_course, provide_course
 from grader.arena.build import BUILD_EXPECTED_S, CMakeTrace, build
 from grader.arena.interruption import Stop, run_together, run_until_signal
+from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.sandbox import RunLimits, choose, temporary_base
+from grader.arena.sandbox import choose, temporary_base
 from grader.arena.sandbox_files import prepare
 from grader.arena.scenario import expected_s, run_scenario
 from grader.arena.static_recorder import (
-    PACKAGE,
     RETRIES,
     Recording,
     copy_recorded,
@@ -37,7 +37,7 @@ from grader.arena.static_recorder import (
 )
 from grader.arena.workspace import make_workspace
 from grader.errors import ArenaError, RosMissing
-from grader.evidence.events import ActorEvent, ScenarioEvent
+from grader.evidence.events import PACKAGE_RUN, ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.files import make_folder, read_untrusted, temporary_folder
 from grader.model import SandboxMode
@@ -161,9 +161,9 @@ class Recorder:
 
     async def _write_package(self, folder: Path, *, last: bool) -> None:
         recording = self.recording
-        path = recording.folder / f"{PACKAGE}.mcap"
+        path = recording.folder / f"{PACKAGE_RUN}.mcap"
         about = self._metadata()
-        with EvidenceWriter(path, scenario=PACKAGE, clock="real", warp=1.0, metadata=about) as writer:
+        with EvidenceWriter(path, scenario=PACKAGE_RUN, clock="real", warp=1.0, metadata=about) as writer:
             await self._build(self._make_place(folder), writer, last=last)
             write_files(writer, self._submission, recording.facts)
             for event in left_out_events(recording.facts):

@@ -1,4 +1,6 @@
-"""The wall around a student process tree: its limits, bubblewrap's arguments, and whether it can be had here.
+"""The wall around a student process tree: bubblewrap's arguments, and whether it can be had here.
+
+How much a process tree may use is in `limits.py`.
 
 Of a wall, only arguments are made; the arena starts the programs (`ros/launching.py`) in namespaces of its own
 (`ros/namespaces.py`). Going without (`choose`) is for machines that lack a program or whose kernel forbids it. A probe
@@ -21,66 +23,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from typing_extensions import Self
-
 from grader.arena.control_groups import Cgroups, find_cgroups
+from grader.arena.limits import RunLimits
 from grader.arena.sandbox_files import HOME, RECORD, RECORD_INSIDE, RECORD_SHIM, SHIMS, STANDINS
 from grader.errors import HostError, SandboxMissing
 from grader.host_programs import HOST_ENV, LOCALHOST, LOCALHOST_HINT, find_host_program, resolves
 from grader.model import SandboxMode
 from grader.model.record import Record
 from grader.ros_env import RosInstallation
-
-SUBMISSION_MESSAGE_BYTES = 160 << 20
-SUBMISSION_KEPT_BYTES = 20 << 20
-LEAST_RUN_BYTES = 8 << 20
-
-
-class RunLimits(Record):
-    """Memory, processes, tasks (threads count), CPU seconds, output, `home_bytes` (what its home may hold besides the
-    workspace's own files) and the number of files in each folder are of one process tree; messages and bytes of one
-    channel, or of one run (`run_bytes`, `channels`); so is what the buffers of its sockets hold (`socket_bytes`), and
-    so are the files that are kept of it."""
-
-    memory_bytes: int = 1 << 30
-    processes: int = 200
-    tasks: int = 512
-    cpu_s: float = 300.0
-    output_lines: int = 20_000
-    output_bytes: int = 8 << 20
-    home_bytes: int = 256 << 20
-    home_files: int = 40_000
-    tmp_bytes: int = 128 << 20
-    tmp_files: int = 10_000
-    shared_bytes: int = 64 << 20
-    shared_files: int = 1_000
-    locked_bytes: int = 1 << 20
-    queued_signals: int = 1024
-    file_bytes: int = 64 << 20
-    open_files: int = 1024
-    descriptors: int = 8192
-    socket_bytes: int = 128 << 20
-    address_space_bytes: int = 8 << 30
-    built_bytes: int = 96 << 20
-    channel_messages: int = 20_000
-    channel_bytes: int = 64 << 20
-    run_bytes: int = 64 << 20
-    channels: int = 300
-    kept_bytes: int = 16 << 20
-    kept_files: int = 10
-
-    def shared_by(self, runs: int, *, keeping: int = 0) -> Self:
-        """Return the limits of each of so many runs of one submission, of which some keep files: together they record
-        no more than one may."""
-        run_bytes = max(LEAST_RUN_BYTES, min(self.run_bytes, SUBMISSION_MESSAGE_BYTES // max(1, runs)))
-        return self.model_copy(
-            update={
-                "run_bytes": run_bytes,
-                "channel_bytes": min(self.channel_bytes, run_bytes),
-                "kept_bytes": min(self.kept_bytes, SUBMISSION_KEPT_BYTES // max(1, keeping)),
-            }
-        )
-
 
 Word: TypeAlias = "str | dict[str, Any]"
 """An argument, or what the arena puts into its place (`ros/launching.py`)."""

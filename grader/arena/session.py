@@ -23,7 +23,7 @@ from grader.arena.process_environment import LOOPBACK, ProcessEnvironment, searc
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.run_state import RunState, computes
 from grader.errors import ArenaError
-from grader.evidence.events import OTHER_TYPE, TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
+from grader.evidence.events import OTHER_TYPE, STOPPED, TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
 from grader.evidence.run import is_grader_node
 from grader.evidence.writer import EvidenceChannel, EvidenceWriter
 from grader.ros_env import RosInstallation
@@ -39,7 +39,6 @@ GROUPS_S, LOOK_S = 2.0, 0.02
 STUCK_S = 1.0
 """So long a call is waited for at least, though the programs only compute."""
 PORT = 11311
-STOPPED = "stopped by the grader"
 """Begins the details of limits for which a process is ended (`ros/processes.py`)."""
 SHORT = 0.1
 """Where less than this part of the memory is available, helpers of the system (earlyoom, systemd-oomd) kill too."""

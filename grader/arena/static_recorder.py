@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 from typing_extensions import Self
 
 from grader import __version__
-from grader.arena.sandbox import RunLimits
-from grader.evidence.events import ActorEvent
+from grader.arena.limits import RunLimits
+from grader.evidence.events import PACKAGE_RUN, ActorEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.files import read_untrusted
 from grader.model.package import PackageFacts, SourceFile
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from grader.arena.sandbox import Sandbox
 
 
-PACKAGE = "package"
 RETRIES = 2
 """So often a run is recorded again that could not be judged."""
 ATTACHED_BYTES_MAX = 256 << 10
@@ -181,9 +180,9 @@ class StaticRecorder:
 
     def _write_package(self) -> None:
         recording = self.recording
-        path = recording.folder / f"{PACKAGE}.mcap"
+        path = recording.folder / f"{PACKAGE_RUN}.mcap"
         limits = RunLimits().shared_by(len(self._rubric.scenarios))
         about = {**metadata(self._submission, recording, limits), "not_run": self._reason}
-        with EvidenceWriter(path, scenario=PACKAGE, clock="real", warp=1.0, metadata=about) as writer:
+        with EvidenceWriter(path, scenario=PACKAGE_RUN, clock="real", warp=1.0, metadata=about) as writer:
             write_files(writer, self._submission, recording.facts)
         recording.files.append(path)

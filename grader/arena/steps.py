@@ -1,5 +1,7 @@
 """What the grader does in a run once the processes are started: probes, calls, and the scenario's steps, one by one.
 
+What all belongs to a new kind of step is at the beginning of `rubric/scenario.py`.
+
 Messages are made here, from the text of their types, and go to the arena as bytes. Each deed is an event of
 `/grader/actor`.
 """

@@ -18,6 +18,7 @@ from grader.checks.support.processes import Life, lives
 from grader.checks.support.scripts import cmake_calls, is_elsewhere, paths_by_name, programs
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
+from grader.evidence.events import CATKIN_MAKE, STOPPED
 from grader.evidence.run import Run
 from grader.model.package import Executable, PackageFacts
 from grader.model.record import Record
@@ -25,7 +26,6 @@ from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclu
 from grader.untrusted_text import without_colours
 from grader.wording import join_words, seconds
 
-CATKIN_MAKE = "catkin_make"
 NO_PROGRAM = {"IMPORTED", "ALIAS", "EXCLUDE_FROM_ALL"}
 CANNOT_START = {126, 127}
 LOADER = (
@@ -125,7 +125,7 @@ def explain_by_build(package: PackageFacts | None, build: Run | None, verdict: V
 def _stopped_build(build: Run, took: str) -> Verdict:
     """By a limit that it broke, which is named, or because its time was up."""
     limits = (e.detail for _, e in build.actors if e.action == "limit" and e.actor == CATKIN_MAKE)
-    limit = next((detail for detail in limits if detail.startswith("stopped by the grader")), "")
+    limit = next((detail for detail in limits if detail.startswith(STOPPED)), "")
     return failed(
         f"catkin_make was {limit}" if limit else f"catkin_make had not finished after {took} and was stopped",
         expected=EXPECTED,

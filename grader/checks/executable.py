@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import PurePosixPath
 
-from grader.checks.build import CATKIN_MAKE, judge_build
+from grader.checks.build import judge_build
 from grader.checks.registry import check
 from grader.checks.support.exit_causes import SYNTAX, syntax_hint
 from grader.checks.support.scripts import (
@@ -22,6 +22,7 @@ from grader.checks.support.scripts import (
     shebang_obstacles,
 )
 from grader.checks.support.text import near_names, shown
+from grader.evidence.events import CATKIN_MAKE
 from grader.evidence.run import Run
 from grader.model.package import Fault, PackageFacts, SourceFile
 from grader.model.record import Record

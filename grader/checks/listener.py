@@ -39,7 +39,6 @@ CALLBACK_HINT = (
     "print the message's .data in the callback, without a condition and nothing slow beside it; "
     f"end with {SPIN}"
 )
-"""Of the points, for a message that is printed, but not in the handout's words."""
 
 
 class HearsParams(Record):

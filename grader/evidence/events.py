@@ -11,6 +11,12 @@ from grader.model.version import EVIDENCE
 
 EVIDENCE_VERSION = str(EVIDENCE.version)
 METADATA_NAME = "grader.evidence"
+PACKAGE_RUN = "package"
+"""The run that holds the package's facts and files, and its build: `package.mcap`."""
+CATKIN_MAKE = "catkin_make"
+"""The name of the build's process."""
+STOPPED = "stopped by the grader"
+"""Begins the detail of a limit at which a process was ended."""
 RECORDING_MISSING = "recording.missing"
 RECORDING_PROBLEM = "recording.problem"
 MISFIT = "the package's definition does not fit: "

@@ -207,7 +207,7 @@ def _channel(channel: Channel, budget: MemoryBudget) -> ChannelSummary:
 
 
 def _readable(channel: Channel, budget: MemoryBudget) -> bool:
-    """Return whether the definition fits every message, as far as a few seconds tell."""
+    """Return whether the definition fits every message, as far as the budget lets one look."""
     try:
         decoder = channel.decoder(budget)
         for message in channel.messages:

@@ -15,6 +15,7 @@ from grader.files import read_untrusted
 from grader.intake.find import BUILD_SPACES, MANIFEST, WORKSPACE_MARKS, Candidate, manifest_name, named_at
 from grader.intake.names import brief, encodable, is_archive_name, listing, printable
 from grader.intake.tree import NO_CONTENT, is_there, walk
+from grader.wording import is_one_edit
 
 COPIES_LOOKED_AT, FOLDERS_OF_A_COPY = 50, 300
 FIRST_LINE_BYTES = 200
@@ -95,17 +96,7 @@ def is_slip(name: str, wanted: str) -> bool:
     """
     one, other = (re.sub(r"[\s_-]", "", text.casefold()) for text in (name, wanted))
     digits = [re.sub(r"\D", "", text) for text in (one, other)]
-    return bool(one) and digits[0] == digits[1] and _one_edit(one, other)
-
-
-def _one_edit(one: str, other: str) -> bool:
-    """Return whether at most one letter has to be added, taken away, changed, or put before its neighbour."""
-    start = next(
-        (i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other))
-    )
-    rest, rest_other = one[start:], other[start:]
-    swapped = rest[:2] == rest_other[:2][::-1] and rest[2:] == rest_other[2:]
-    return swapped or rest[1:] == rest_other[1:] or rest[1:] == rest_other or rest == rest_other[1:]
+    return bool(one) and digits[0] == digits[1] and (one == other or is_one_edit(one, other))
 
 
 def _best(matches: list[Candidate], wanted: Wanted) -> Choice:

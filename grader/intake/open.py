@@ -249,7 +249,7 @@ def _locate(opened: Opened, wanted: Wanted) -> Located | None:
 
 
 def describe(located: Located, git: Git, limits: IntakeLimits) -> Submission:
-    """Return the record that the next station reads. Raises OSError for a file that cannot be read."""
+    """Return the record that the next room reads. Raises OSError for a file that cannot be read."""
     opened, choice = located.opened, located.choice
     chosen = choice.package
     repositories = Repositories(git, opened.leave_out, root=opened.root, known=opened.repository)

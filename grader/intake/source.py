@@ -1,4 +1,8 @@
-"""Reads SOURCE as it stands on the command line: which folder, archive or repository, which `@ref`, which id."""
+"""Reads SOURCE as it stands on the command line: which folder, archive or repository, which `@ref`, which id.
+
+A new kind of place that submissions come from is told apart here (`parse_source`) and brought to a folder on disk by
+`open.open_source`; for a class, `classes/fetching/obtain.py` chooses its commit.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """How a grading in a CI job ended: its outcome, the line that says so, and the folder of reports that is kept.
 
-`ci_systems` tells GitHub and GitLab; what a job grades is for `ci_settings`.
+`ci_systems` reads what a job is to grade, and tells GitHub and GitLab.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from grader.checks.support.exit_causes import SYNTAX, syntax_hint
 from grader.checks.support.launch import own_script, read_launch
 from grader.checks.support.processes import failed_program
 from grader.checks.support.scripts import find_script
-from grader.evidence.events import RECORDING_MISSING, RECORDING_PROBLEM
+from grader.evidence.events import PACKAGE_RUN, RECORDING_MISSING, RECORDING_PROBLEM
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.record import Record
@@ -28,7 +28,6 @@ NOT_RUN = "not_run"
 NO_PACKAGE = PackageFacts(
     name="", path=".", manifest=None, manifest_fault=None, cmake=None, files=(), launch_files=()
 )
-PACKAGE_RUN = "package"
 
 
 @dataclass(frozen=True, kw_only=True)

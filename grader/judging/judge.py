@@ -22,6 +22,7 @@ from grader.checks.support.processes import plain_type
 from grader.checks.support.text import near_names, texts_in
 from grader.checks.support.topics import SYSTEM_TOPICS, account_for_losses, explain_by_unheard_topic
 from grader.errors import EvidenceError
+from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.judging.annotate import (
     add_advice,
@@ -34,7 +35,7 @@ from grader.judging.annotate import (
     name_unchanged_files,
     show_lines,
 )
-from grader.judging.facts import NOT_RUN, PACKAGE_RUN, Facts, try_facts, views_of
+from grader.judging.facts import NOT_RUN, Facts, try_facts, views_of
 from grader.judging.repeats_and_repairs import (
     apply_repaired_copy,
     drop_unrepeated_losses,

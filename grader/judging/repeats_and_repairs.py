@@ -1,4 +1,4 @@
-"""What runs besides the first say of a criterion: scenarios that were run once more, and a repaired copy. Pure.
+"""What repeated runs, and runs of a repaired copy, say of a criterion that the first runs lost. Pure.
 
 All runs of the evidence come in, and `split_runs` sorts them into the first ones, repeats and those of the copy. With
 the verdicts on these, `drop_unrepeated_losses` takes back losses that did not come again, and `apply_repaired_copy`
@@ -16,8 +16,8 @@ from pathlib import PurePosixPath
 
 from pydantic import ValidationError
 
-from grader.checks.build import CATKIN_MAKE
 from grader.checks.support.text import texts_in
+from grader.evidence.events import CATKIN_MAKE, PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.repair import Repair, advice_of, place_of
@@ -27,7 +27,7 @@ from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Scenario
 from grader.wording import join_words
 
-PACKAGE_RUN, REPAIRS, BUILD = "package", "repairs", "build"
+REPAIRS, BUILD = "repairs", "build"
 NAMES = {"topic-name", "node-name", "parameter-name", "file-name", "package-name", "launch-type"}
 OF_BUILDS = {"build-line", "manifest-line"}
 """These explain nothing but the build and the files, unless something is run that the build makes."""
@@ -37,7 +37,8 @@ DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark",
 """The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 OF_PACKAGES = {"package.xml", "CMakeLists.txt"}
-SHARES = {1.0: "all", 0.5: "half"}
+SHARE_WORDS = {1.0: "all", 0.5: "half"}
+"""How a share is written; `model.repair.DEFAULT_SHARES` and a rubric's `repairs` say how large it is."""
 NUMBER = re.compile(r"\d+(\.\d+)?")
 
 Runs = dict[str, Run]
@@ -327,7 +328,7 @@ def _is_told(repair: Repair, hint: str) -> bool:
 
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:
     where = join_words(dict.fromkeys(place_of(repair) for repair in repairs))
-    earned = SHARES.get(share, f"{share:.0%}")
+    earned = SHARE_WORDS.get(share, f"{share:.0%}")
     score = copy.score * share
     status = Status.PARTIAL if share < 1 and copy.status is Status.PASS else copy.status
     points = f"{earned} of the points; " if copy.score else ""

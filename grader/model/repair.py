@@ -30,11 +30,26 @@ RepairKind = Literal[
 """In the order in which a student would meet them."""
 
 KINDS: tuple[RepairKind, ...] = get_args(RepairKind)
-HALF: frozenset[RepairKind] = frozenset(
-    {"python-syntax", "manifest-line", "build-line", "missing-import", "missing-call"}
-)
-DEFAULT_SHARES: dict[RepairKind, float] = {kind: 0.5 if kind in HALF else 1.0 for kind in KINDS}
-"""How much of its points a criterion is worth that was judged on a copy with a repair of this kind."""
+DEFAULT_SHARES: dict[RepairKind, float] = {
+    "executable-bit": 1.0,
+    "encoding": 1.0,
+    "byte-order-mark": 1.0,
+    "line-ends": 1.0,
+    "shebang": 1.0,
+    "file-name": 1.0,
+    "python-syntax": 0.5,
+    "manifest-line": 0.5,
+    "build-line": 0.5,
+    "package-name": 1.0,
+    "launch-type": 1.0,
+    "missing-import": 0.5,
+    "missing-call": 0.5,
+    "node-name": 1.0,
+    "topic-name": 1.0,
+    "parameter-name": 1.0,
+}
+"""Which share of its points a criterion keeps that passes on a copy with a repair of this kind. The criterion that asks
+for what was repaired loses its own points. A rubric's `repairs` can say otherwise."""
 BY_HAND: dict[RepairKind, str] = {
     "executable-bit": f"not executable: {chmod_hint(None, 'FILE')}",
     "encoding": "not saved as UTF-8: in the editor, save it with the encoding UTF-8",

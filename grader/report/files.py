@@ -30,7 +30,7 @@ def result_text(result: GradingResult, *, ascii_only: bool = False) -> str:
     """`notes`, `overrides`, `handed_in`, `late`, `standing` and `error` are there only where there are any.
 
     What a person wrote is bounded by its record and stays whole: a later grading compares it. Criteria are written as
-    `judge.summary.criteria_bytes` writes them.
+    `judging.summary.criteria_bytes` writes them.
     """
     data: dict[str, Any] = result.model_dump(mode="json", by_alias=True)
     for name in ("notes", "overrides", "handed_in", "late", "standing", "error"):

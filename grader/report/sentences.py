@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from datetime import datetime
 
 from grader.errors import GraderError
+from grader.evidence.events import PACKAGE_RUN
 from grader.judging.summary import passed
 from grader.model.repair import Repair, place_of
 from grader.model.result import (
@@ -232,7 +233,7 @@ COSTS_NOTHING = "None of this cost any points."
 
 def note_place(note: Note) -> str:
     """`build`, or the scenario's name; with the process or node, where it is known and has another name."""
-    run = "build" if note.scenario == "package" else note.scenario
+    run = "build" if note.scenario == PACKAGE_RUN else note.scenario
     return f"{run}, {note.actor}" if note.actor and note.actor.strip("/") != run else run
 
 

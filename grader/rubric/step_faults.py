@@ -1,4 +1,7 @@
-"""Faults of a scenario's steps that their records' types cannot say."""
+"""Faults of a scenario's steps, and of what the grader serves in it, that their records' types cannot say.
+
+What all belongs to a new kind of step is at the beginning of `scenario.py`.
+"""
 
 from __future__ import annotations
 

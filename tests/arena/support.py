@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.sandbox import RunLimits, choose, why_no_sandbox
+from grader.arena.sandbox import choose, why_no_sandbox
 from grader.arena.sandbox_files import prepare
 from grader.arena.scenario import run_scenario
 from grader.arena.workspace import make_workspace, run_in_place

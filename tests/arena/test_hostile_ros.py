@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.sandbox import RunLimits
+from grader.arena.limits import RunLimits
 from grader.evidence.run import Channel, Run
 from grader.rubric.scenario import Probe, Scenario, Start, Until
 from tests.arena.support import SCRIPT, exit_of, make_place, printed, run

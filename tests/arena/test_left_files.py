@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.sandbox import RunLimits
+from grader.arena.limits import RunLimits
 from grader.evidence.run import LeftFile, Run
 from grader.rubric.scenario import Scenario
 from tests.arena.support import SCRIPT, exit_of, make_place, needs_sandbox, run

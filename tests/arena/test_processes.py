@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.sandbox import RunLimits, why_no_sandbox
+from grader.arena.limits import RunLimits
+from grader.arena.sandbox import why_no_sandbox
 from tests.arena.support import exit_of, printed, run_script
 
 pytestmark = pytest.mark.ros

@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
+from grader.arena.limits import RunLimits
 from grader.arena.ros.wire import Frame, FrameReader
-from grader.arena.sandbox import RunLimits
 from grader.arena.session import ARENA
 from grader.checks import CHECKS
 from grader.checks.support.topics import account_for_losses, losses

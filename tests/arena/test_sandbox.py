@@ -11,7 +11,8 @@ import pytest
 from grader.arena import control_groups, sandbox
 from grader.arena.build import build
 from grader.arena.control_groups import Cgroup, Cgroups
-from grader.arena.sandbox import SUBMISSION_MESSAGE_BYTES, RunLimits, why_no_sandbox
+from grader.arena.limits import SUBMISSION_MESSAGE_BYTES, RunLimits
+from grader.arena.sandbox import why_no_sandbox
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter

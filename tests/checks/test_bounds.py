@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from grader.arena.sandbox import RunLimits
+from grader.arena.limits import RunLimits
 from grader.checks.support.build_errors import first_error
 from grader.checks.support.console_output import printed_lines, printed_times, split_log_line
 from grader.checks.support.exceptions import tracebacks

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.sandbox import RunLimits
+from grader.arena.limits import RunLimits
 from grader.classes.batch.job import Job, Outcome
 from grader.classes.cluster import executor
 from grader.classes.cluster.exchange import Exchange, Parcel, Report, pack

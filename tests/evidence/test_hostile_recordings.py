@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from mcap.writer import CompressionType, Writer
 
-from grader.arena.sandbox import SUBMISSION_MESSAGE_BYTES
+from grader.arena.limits import SUBMISSION_MESSAGE_BYTES
 from grader.cli.main import run as grader
 from grader.errors import EvidenceError
 from grader.evidence.decode import Decoder

@@ -1,4 +1,8 @@
-"""Operators: named functions, each making one kind of mistake wherever it fits a correct package."""
+"""Operators: named functions, each making one kind of mistake wherever it fits a correct package.
+
+A new operator is a function with `@operator` in the module of `operators/` for its kind of file; the page of operators
+is made of its docstring (`make reference`). Its test is a faulty package of a lab in `fixtures/`.
+"""
 
 from __future__ import annotations
 

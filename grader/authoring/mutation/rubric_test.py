@@ -57,7 +57,7 @@ def run_test(plan: Plan, progress: Progress) -> RubricTest:
     mutants: list[MutantResult] = []
     if not reference.lost:
         mutants = _grade_mutants(plan, _find_ignored(result), progress, time.monotonic() - begun_s)
-    known = None if plan.partial or reference.lost else _find_uncosted(plan, mutants)
+    uncosted = None if plan.partial or reference.lost else _find_uncosted(plan, mutants)
     killed = bool(mutants) and all(mutant.state == "killed" for mutant in mutants)
     rubric = plan.rubric
     return RubricTest(
@@ -65,10 +65,10 @@ def run_test(plan: Plan, progress: Progress) -> RubricTest:
         solution=plan.given,
         reference=reference,
         mutants=tuple(mutants),
-        uncosted=known,
+        uncosted=uncosted,
         unfit=tuple(plan.unfit),
         wall_s=round(time.monotonic() - begun_s, 3),
-        passed=killed and not reference.lost and not known,
+        passed=killed and not reference.lost and not uncosted,
     )
 
 
@@ -134,15 +134,15 @@ def _grade_mutants(
                     result.label, "done" if result.state == "killed" else "failed", _describe(result)
                 )
 
-    run(sorted(plan.mutants, key=_waits_least), plan.jobs)
+    run(sorted(plan.mutants, key=_ends_early), plan.jobs)
     for mutant in plan.mutants:
         if results[mutant.name].state == "inconclusive":
             run([mutant], 1)
     return [results[mutant.name] for mutant in plan.mutants]
 
 
-def _waits_least(mutant: Planned) -> bool:
-    """Sort key: faulty launch files first, because a run waits to its limit for what they do not bring up."""
+def _ends_early(mutant: Planned) -> bool:
+    """Return False for a faulty launch file, which then comes first: its run waits to its limit for the nodes."""
     return not any("launch" in name for name in (mutant.name, *mutant.mutant.operators))
 
 

@@ -15,6 +15,7 @@ from grader.checks.support.exceptions import Frame, Traceback, explain_exception
 from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import EMPTY, cmake_calls, path_in_package
 from grader.checks.support.text import LOOP, SPIN, near_names, shown
+from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
 from grader.installable import ROS_2, install_hint, known_packages, noetic_messages
 from grader.model.package import Fault, PackageFacts, PythonSlip
@@ -266,7 +267,7 @@ def explain_by_exception(
 def _limit(life: Life, run: Run) -> str:
     """Return what it had too much of, so that it was stopped."""
     met = (e.detail for _, e in run.actors if e.action in LIMITS and e.actor == life.name)
-    return next((detail for detail in met if detail.startswith("stopped by the grader")), "")
+    return next((detail for detail in met if detail.startswith(STOPPED)), "")
 
 
 def _refused_name(life: Life, run: Run) -> Ending | None:

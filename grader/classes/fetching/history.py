@@ -138,7 +138,8 @@ def not_chosen(rule: Rule, entry: Entry, at: datetime | None = None, note: str =
 def choose(
     commits: Iterable[Commit], *, rule: Rule, entry: Entry, branch: str, given: str
 ) -> tuple[Commit, HandedIn]:
-    """Return the commit of a branch that counts, and what to say of it. `commits` are the branch's, the newest first.
+    """Return the commit of a branch that counts, and what to say of it. `commits` are the branch's, the newest
+    first, at least one.
 
     Raises NothingInTime where none is old enough.
     """
@@ -157,11 +158,11 @@ def choose(
         return tip, as_it_is.model_copy(
             update={"at": as_it_is.at or tip.at, "by": "roster" if submitted else "commit", "note": note}
         )
-    found, first = _last(tip, walk, limit.at)
+    found, oldest = _last(tip, walk, limit.at)
     if found is None:
         raise NothingInTime(
             f"{given}: no commit on {printable(branch)} is from before {limit}",
-            hint=f"The first one is of {local_time(first.at)} ({BY_COMMIT}).",
+            hint=f"The first one is of {local_time(oldest.at)} ({BY_COMMIT}).",
         )
     handed_in = as_it_is.model_copy(
         update={
@@ -175,7 +176,7 @@ def choose(
 
 
 def _last(tip: Commit, rest: Iterator[Commit], time: datetime) -> tuple[Found | None, Commit]:
-    """The last commit that is not dated after `time`, and the last that was looked at."""
+    """Return the newest commit that is not dated after `time` (None if there is none), and the oldest one looked at."""
     commit, later_ones = tip, 0
     while commit.at > time:
         following = next(rest, None)

@@ -2,6 +2,9 @@
 
 A package's folder, its facts and what the rubric names come in, `model.repair.Repair`s go out; `apply_repair` makes
 one on a copy, or on the student's own files. Nothing of the student's is executed, and no link is followed.
+
+A new kind needs its name, its share and how it is done by hand (`RepairKind`, `DEFAULT_SHARES` and `BY_HAND` in
+`model/repair.py`), a function that finds it in one of the modules here, and a call of that in `find_repairs`.
 """
 
 from __future__ import annotations

@@ -12,8 +12,9 @@ from itertools import islice
 from typing import ParamSpec, TypeVar
 
 from grader.checks import CHECKS
+from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
-from grader.judging.facts import PACKAGE_RUN, Facts, try_facts
+from grader.judging.facts import Facts, try_facts
 from grader.judging.repeats_and_repairs import split_runs
 from grader.model.figure import Figure, Figures, RateFigure
 from grader.model.result import CriterionResult

@@ -13,6 +13,7 @@ from typing import TypeVar
 from jinja2 import Template
 from markupsafe import Markup
 
+from grader.evidence.events import PACKAGE_RUN
 from grader.model.figure import Figure, Figures
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
@@ -401,8 +402,8 @@ class Maker:
 
     def _ran(self) -> Iterator[Ran]:
         titles = {name: scenario.title for name, scenario in self._rubric.scenarios.items()}
-        names = dict.fromkeys(["package", *titles, *self._figures.graphs, *self._figures.consoles])
-        used = {c.scenario for c in self._result.criteria} | {"package"}
+        names = dict.fromkeys([PACKAGE_RUN, *titles, *self._figures.graphs, *self._figures.consoles])
+        used = {c.scenario for c in self._result.criteria} | {PACKAGE_RUN}
         for i, name in enumerate((n for n in names if n in used or n not in titles), start=1):
             graph, console = self._figures.graphs.get(name), self._figures.consoles.get(name)
             graph = graph if graph and graph.nodes else None
@@ -412,7 +413,7 @@ class Maker:
                 yield Ran(
                     anchor=f"run-{i}",
                     name=name,
-                    title="The build" if name == "package" else titles.get(name, name),
+                    title="The build" if name == PACKAGE_RUN else titles.get(name, name),
                     timeline=self._drawer.draw(when) if when else None,
                     graph=self._drawer.draw(graph) if graph else None,
                     console=self._drawer.draw(console) if console else None,
