@@ -31,6 +31,8 @@ NUMBER_SHARE = 0.1
 """So near is a rate that was measured to the number that its script asks for."""
 NEAR_SHARE = 0.25
 """A rate that is wrong by less than this share is measured once more before it costs anything."""
+SLEEPLESS = ("not-called", "sleep-outside", "undefined", "misspelt")
+"""Slips that keep a loop from sleeping."""
 LATE_P95_SHARE = 0.2
 LATE_MAX_SHARE = 0.5
 STALLS_SHARE = 0.1
@@ -165,7 +167,8 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
         return None
     own = (life_of(run, channel.callerid) for channel in run.student_channels(params.topic))
     scripts = {life.start.script for life in own if life is not None and life.start.script}
-    slips = [s for s in package.slips if "sleep" in s.message and (not scripts or s.file in scripts)]
+    told = [s for s in package.slips if s.kind in SLEEPLESS and "sleep" in s.message]
+    slips = [s for s in told if not scripts or s.file in scripts]
     if not slips and found.mean_hz < FLOOD_HZ and found.is_even:
         return None
     why = slips[0].message.partition(": write ")[0] if slips else ""

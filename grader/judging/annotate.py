@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 
 from grader.checks.cmake import NOT_CALLED
 from grader.checks.messages import code_of
-from grader.checks.support.exit_causes import NO_INPUT, RATE, SYNTAX, syntax_hint
+from grader.checks.support.console_output import probes_on
+from grader.checks.support.exit_causes import NO_INPUT, RATE, SYNTAX, name_slip, syntax_hint
 from grader.checks.support.launch import (
     find_launch,
     node_slip,
@@ -32,9 +33,20 @@ from grader.checks.support.scripts import (
     names_script,
     programs,
 )
-from grader.checks.support.text import Language, in_language, texts_in
+from grader.checks.support.text import (
+    SAID_DATA,
+    SECONDS,
+    VALUE,
+    Language,
+    could_say,
+    in_language,
+    in_source,
+    in_words,
+    texts_in,
+    texts_of_cpp,
+)
 from grader.evidence.run import Run
-from grader.judging.facts import Facts
+from grader.judging.facts import PACKAGE_RUN, Facts
 from grader.model.package import LaunchFile, PackageFacts, PythonSlip
 from grader.model.result import CriterionResult
 from grader.model.verdict import Citation, FileCitation, Status, Verdict
@@ -120,69 +132,131 @@ def _cites(criterion: CriterionResult, place: FileCitation) -> bool:
 
 
 def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Facts) -> dict[str, Verdict]:
-    """Return the verdicts; where there was nothing to judge of a node, the hint goes on with what its script shows of
+    """Return the verdicts; where there was nothing to judge of a node, the hint goes on with what its source shows of
     the criteria that were not reached."""
     later: dict[str, list[str]] = {}
     for criterion in rubric.criteria:
         verdict = verdicts[criterion.id]
-        unreached = verdict.status.is_lost and (verdict.unjudged or criterion.check in OF_TOPICS)
         package = facts.package_of(criterion)
-        if package is None or criterion.visibility != "visible":
+        if package is None or criterion.visibility != "visible" or not verdict.status.is_lost:
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
         if verdict.blocked_by and criterion.check == "launch-runs":
             told += _later_in_launch(criterion, package, facts)
-        elif unreached:
-            found = _later_faults(criterion, rubric, package, known=not verdict.cause)
-            told += [one for one in found if one not in told]
-    return {
-        name: verdict.model_copy(update={"hint": f"{verdict.hint}; then {join_words(later[name])}"})
-        if later.get(name) and verdict.status.is_lost and verdict.hint
-        else verdict
-        for name, verdict in verdicts.items()
-    }
+        elif verdict.unjudged or criterion.check in OF_TOPICS:
+            told += Later(criterion, verdict, package, facts).faults()
+    return {name: _with_later(verdict, later.get(name, ())) for name, verdict in verdicts.items()}
 
 
-def _later_faults(
-    criterion: Criterion, rubric: Rubric, package: PackageFacts, *, known: bool
-) -> Iterator[str]:
-    """Yield what the criterion would be lost by next, as far as its scripts say so in plain values.
+def _with_later(verdict: Verdict, later: Iterable[str]) -> Verdict:
+    told = [one for one in dict.fromkeys(later) if one not in verdict.hint]
+    if not told or not verdict.status.is_lost or not verdict.hint:
+        return verdict
+    return verdict.model_copy(update={"hint": f"{verdict.hint}; then {join_words(told)}"})
 
-    `known`: the node ran, so that names are told already, and only what is behind them is not.
-    """
-    wanted, scripts = criterion.parameters, _scripts(criterion, rubric, package)
-    found = [slip for slip in package.slips if slip.file in scripts]
-    topic, of_kind = (
-        str(wanted.get("topic", "")),
-        {s.kind: [one for one in found if one.kind == s.kind] for s in found},
-    )
-    published = of_kind.get("publisher", [])
-    lines = [one.line for one in published if f"/{one.message.lstrip('/')}" == topic]
-    if criterion.check == "rate":
-        hz, numbers = float(str(wanted["rate_hz"])), of_kind.get("rate-number", [])
+
+class Later:
+    """What a criterion that was not reached would be lost by next, as far as the sources say so in plain values."""
+
+    def __init__(self, criterion: Criterion, verdict: Verdict, package: PackageFacts, facts: Facts) -> None:
+        self._criterion, self._verdict = criterion, verdict
+        self._rubric, self._run = facts.rubric, facts.runs.get(criterion.scenario or "")
+        self._build = facts.runs.get(PACKAGE_RUN)
+        self._wanted = criterion.parameters
+        self._topic = str(self._wanted.get("topic", ""))
+        scripts = _scripts(criterion, facts.rubric, package)
+        self._slips = [slip for slip in package.slips if slip.file in scripts]
+        self._slips += self._texts_of_cpp(package)
+        self._ran = not verdict.cause
+        """Names are told already then, and only what is behind them is not."""
+
+    def faults(self) -> Iterator[str]:
+        """Yield how each is repaired."""
+        by_check = {
+            "rate": self._rate,
+            "node-name": self._node_name,
+            "hears": self._heard,
+            "topic-type": self._published,
+            "message": self._message,
+            "logs": self._logged,
+        }
+        if not self._ran:
+            yield from self._names()
+        yield from by_check[self._criterion.check]() if self._criterion.check in by_check else ()
+
+    def _of(self, *kinds: str) -> list[PythonSlip]:
+        return [slip for slip in self._slips if slip.kind in kinds]
+
+    def _texts_of_cpp(self, package: PackageFacts) -> Iterator[PythonSlip]:
+        for path in sorted(_sources(self._criterion, self._rubric, package)):
+            lines = self._build.file_lines(path)[:_LINES_READ] if self._build is not None else []
+            for kind, line, text in texts_of_cpp(text[:LINE_CHARS] for text in lines):
+                yield PythonSlip(file=path, line=line, kind=kind, message=text)
+
+    def _names(self) -> Iterator[str]:
+        """Names that are not there; an `except` of one is not reached."""
+        for slip in self._of("misspelt", "undefined"):
+            lines = self._build.file_lines(slip.file) if self._build is not None else []
+            caught = slip.line <= len(lines) and lines[slip.line - 1].lstrip().startswith("except")
+            if (one := name_slip(slip)) is not None and not caught:
+                yield one.fix
+
+    def _rate(self) -> Iterator[str]:
+        hz, numbers = float(str(self._wanted["rate_hz"])), self._of("rate-number")
         if len(numbers) == 1 and abs(float(numbers[0].message) - hz) > RATE_SHARE * hz:
             yield f"make it {significant(hz)} Hz in {_line(numbers[0])}, which asks for {numbers[0].message} Hz"
-    elif criterion.check == "node-name" and not known:
-        own, names = of_kind.get("node-name", []), [str(name) for name in _listed(wanted.get("names"))]
-        if len(own) == 1 and names and own[0].message.lstrip("/") not in names:
+        for slip in self._of("not-called"):
+            if "sleep" in slip.message:
+                yield f"in {_line(slip)}, {slip.message.partition(': ')[2]}"
+
+    def _node_name(self) -> Iterator[str]:
+        own, names = self._of("node-name"), [str(name) for name in _listed(self._wanted.get("names"))]
+        if not self._ran and len(own) == 1 and names and own[0].message.lstrip("/") not in names:
             yield f"name the node {names[0]} in {_line(own[0])}, not {own[0].message}"
-    elif criterion.check == "hears":
-        scenario = rubric.scenarios.get(criterion.scenario or "")
-        sent = (
-            [probe.type for probe in scenario.probes if probe.topic == topic] if scenario is not None else []
-        )
-        heard, types = of_kind.get("subscriber", []), of_kind.get("subscriber-type", [])
-        elsewhere = len(heard) == len(types) == 1 and f"/{heard[0].message.lstrip('/')}" != topic
-        if sent and elsewhere and types[0].message != sent[0].rpartition("/")[2]:
-            yield f"subscribe with {sent[0]} in {_line(types[0])}, not {types[0].message}"
-    elif criterion.check == "topic-type":
-        kind = str(wanted.get("type", ""))
-        if len(published) == 1 and not lines and not known:
-            yield f"publish on {topic} in {_line(published[0])}, not on {published[0].message}"
-        types = [one for one in of_kind.get("publisher-type", []) if one.line in lines or len(published) == 1]
-        types = types if not (known and lines) else []
+
+    def _published(self) -> Iterator[str]:
+        published, kind = self._of("publisher"), str(self._wanted.get("type", ""))
+        lines = [one.line for one in published if f"/{one.message.lstrip('/')}" == self._topic]
+        if len(published) == 1 and not lines and not self._ran:
+            yield f"publish on {self._topic} in {_line(published[0])}, not on {published[0].message}"
+        types = [one for one in self._of("publisher-type") if one.line in lines or len(published) == 1]
+        types = types if not (self._ran and lines) else []
         if len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
             yield f"publish {kind} in {_line(types[0])}, not {types[0].message}"
+
+    def _heard(self) -> Iterator[str]:
+        scenario = self._rubric.scenarios.get(self._criterion.scenario or "")
+        probes = scenario.probes if scenario is not None else ()
+        sent = [probe.type for probe in probes if probe.topic == self._topic]
+        heard, types = self._of("subscriber"), self._of("subscriber-type")
+        elsewhere = len(heard) == 1 and f"/{heard[0].message.lstrip('/')}" != self._topic
+        if elsewhere and not self._ran:
+            yield f"subscribe to {self._topic} in {_line(heard[0])}, not to {heard[0].message}"
+        if sent and len(types) == 1 and elsewhere and types[0].message != sent[0].rpartition("/")[2]:
+            yield f"subscribe with {sent[0]} in {_line(types[0])}, not {types[0].message}"
+        template = str(self._wanted.get("template", VALUE))
+        unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
+        words = template.partition(VALUE)[0].strip().casefold()
+        said = [one for one in self._of("prints") if SAID_DATA in one.message]
+        if unheard and words and len(said) == 1 and words not in " ".join(said[0].message.split()).casefold():
+            yield f"print '{in_words(template)}' in {_line(said[0])}, not '{in_source(said[0].message)}'"
+
+    def _message(self) -> Iterator[str]:
+        template, said = str(self._wanted.get("template", "")), self._of("publishes")
+        if len(said) != 1:
+            return
+        text, code = said[0].message, in_language(code_of(template), "python")
+        sample = template.replace(SECONDS, "1234567890.25")
+        if not could_say(text, sample):
+            words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code
+            yield f"publish `{words}` in {_line(said[0])}, not '{in_source(text)}'"
+        elif SECONDS in template and self._of("no-clock"):
+            yield f"publish the time in {_line(said[0])}, `{code}`: the script counts"
+
+    def _logged(self) -> Iterator[str]:
+        text, said = str(self._wanted.get("text", "")), self._of("prints")
+        if len(said) == 1 and "{" not in said[0].message and text not in said[0].message:
+            yield f"log {text!r} in {_line(said[0])}, not {said[0].message!r}"
 
 
 def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) -> Iterator[str]:
@@ -217,6 +291,20 @@ def _scripts(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set
 
 
 SOURCES = {".c", ".cc", ".cpp", ".cxx"}
+
+
+def _sources(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set[str]:
+    """Return the paths of the C++ sources of the programs that the criterion's scenario starts."""
+    scenario = rubric.scenarios.get(criterion.scenario or "")
+    started = scenario.start if scenario is not None else ()
+    names = {PurePosixPath(one.script).name for one in started if one.script}
+    every = any(one.built for one in started)
+    made = [
+        one for one in programs(package) if every or one.target in names or any(map(one.is_called, names))
+    ]
+    words = {word.rpartition("/")[2] for one in made for word in one.call.args}
+    paths = [PurePosixPath(file.path) for file in package.files]
+    return {str(path) for path in paths if path.suffix in SOURCES and path.name in words}
 
 
 def choose_hint_language(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
@@ -298,11 +386,11 @@ def fill_input_hint(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> V
 
 
 SAYS = {
-    "hears": r"\b(?:print|log\w+|write)\s*\(",
-    "logs": r"\blog\w+\s*\(",
+    "hears": r"\b(?:printf?|log\w+|write|ROS_\w+)\s*\(|\bc(?:out|err)\s*<<",
+    "logs": r"\b(?:log\w+|ROS_\w+)\s*\(",
     "message": r"\bpublish\s*\(",
 }
-"""The checks of a node's words, and what a line of Python calls that says them."""
+"""The checks of a node's words, and what a line of Python or C++ calls that says them."""
 _LITERAL = re.compile(r"""(["'])([^"'\\]+)\1""")
 _FILLED_IN = re.compile(r"%[-+ 0-9.]*[a-z]|\{[^{}]*\}")
 _WORD = re.compile(r"\w+")
@@ -320,9 +408,11 @@ def cite_words(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run)
     said = f"{verdict.measured} {verdict.message.partition(', not ')[0]} {verdict.message.partition(' it prints ')[2]}"
     lines = [
         (path, number, text)
-        for path in sorted(_scripts(criterion, facts.rubric, package))
+        for path in sorted(
+            _scripts(criterion, facts.rubric, package) | _sources(criterion, facts.rubric, package)
+        )
         for number, text in enumerate(build.file_lines(path)[:_LINES_READ], 1)
-        if len(text) <= LINE_CHARS and not text.lstrip().startswith("#")
+        if len(text) <= LINE_CHARS and not text.lstrip().startswith(("#", "//"))
     ]
     alike = [(_words_of(text, said), path, number) for path, number, text in lines]
     most = max((words for words, _, _ in alike), default=0)

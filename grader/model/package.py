@@ -261,6 +261,10 @@ SlipKind = Literal[
     "subscriber",
     "subscriber-type",
     "outside-method",
+    "undefined",
+    "no-effect",
+    "publishes",
+    "prints",
 ]
 
 
@@ -280,6 +284,9 @@ class PythonSlip(Record):
     takes another number of values than ROS has for it. `clock-value`: the values of the topic `message` are read from
     a clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C, and behind `: ` how to repair it.
     `outside-method`: a call in a class that stands in none of its methods and uses a name that is not there.
+    `undefined`: why a name has no value where it is read, and behind `: ` what to do; `no-effect`: a statement such as
+    `++i` or `i == 0`, likewise. `publishes` and `prints`: no slips, but a text that is published or printed, `{}` for a
+    value in it and `{data}` for that of a message.
     `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a topic; `message` is
     the name as written. `publisher-type` and `subscriber-type`: the message type in that line.
     """

@@ -119,6 +119,7 @@ def test_slips_are_found_and_named(tmp_path):
     (tmp_path / "a.py").write_text(text)
     (tmp_path / "own.py").write_text("def input():\n    pass\ninput()\n")
     slips = check_syntax(tmp_path, ["a.py", "own.py"]).slips
+    slips = [s for s in slips if s.kind != "undefined"]
     assert [(s.file, s.line, s.kind) for s in slips] == [
         ("a.py", 3, "rate-number"),
         ("a.py", 4, "not-called"),
@@ -192,6 +193,9 @@ def test_what_never_runs_is_known(tmp_path, text, found):
         "rate-number",
         "no-clock",
         "misspelt",
+        "undefined",
+        "publishes",
+        "prints",
         "not-called",
         "node-name",
         "publisher",
@@ -209,7 +213,7 @@ def test_where_names_of_the_graph_are_written_is_known(tmp_path):
         "rospy.init_node('talker')\nrospy.Publisher(\n    name='/chatter', data_class=String)\n"
         "from rospy import Subscriber\nSubscriber('~scan', LaserScan)\nrospy.Publisher(TOPIC, String)\n"
     )
-    slips = check_syntax(tmp_path, ["a.py"]).slips
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind != "undefined"]
     assert [(s.kind, s.line, s.message) for s in slips] == [
         ("node-name", 1, "talker"),
         ("publisher", 3, "/chatter"),
@@ -221,7 +225,7 @@ def test_where_names_of_the_graph_are_written_is_known(tmp_path):
 
 def test_letters_in_another_order_are_a_slip(tmp_path):
     (tmp_path / "a.py").write_text("def f(msg):\n    print(mgs.data)\n")
-    (slip,) = check_syntax(tmp_path, ["a.py"]).slips
+    slip, _ = check_syntax(tmp_path, ["a.py"]).slips
     assert (slip.kind, slip.line) == ("misspelt", 2)
     assert "did you mean `msg`?" in slip.message
 
@@ -309,7 +313,7 @@ def test_where_a_counter_goes_back_is_known(tmp_path, code, found):
 )
 def test_a_script_that_counts_and_reads_no_clock(tmp_path, value, imported, told):
     (tmp_path / "a.py").write_text(f"import rospy\n{imported}pub.publish('%s' % ({value}))\n")
-    slips = check_syntax(tmp_path, ["a.py"]).slips
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind not in ("undefined", "publishes")]
     assert [s.kind for s in slips] == ["no-clock"] * told
 
 
@@ -422,7 +426,8 @@ def test_why_a_node_goes_on_after_ctrl_c(tmp_path, code, told):
 )
 def test_a_name_that_is_not_there_and_one_that_is_spelt_alike(tmp_path, text, told):
     (tmp_path / "a.py").write_text(text)
-    assert [s.message for s in check_syntax(tmp_path, ["a.py"]).slips] == told
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in ("misspelt", "outside-method")]
+    assert [s.message for s in slips] == told
 
 
 def test_hostile_source_does_not_stop_the_others(tmp_path):

@@ -1,14 +1,17 @@
 """Finds what compiles in a student's Python and is not meant: `slips` of a syntax tree, for `syntax.py`.
 
-Names that are not called or not there, loops that never end or never wait, callbacks that do not fit; besides, where a
-script names its node, its topics and its rates. Nothing is executed. Python 3.8, standard library only.
+Statements without an effect, loops that never end or never wait, callbacks that do not fit; besides, the rates that a
+script asks for. Names and texts are for `script_names.py`. Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
-import builtins
-import difflib
+import os
+import sys
 
-TEXT_LIMIT = 300
+# `-I` leaves this folder out
+sys.path.append(os.path.dirname(os.path.abspath(__file__)))
+from script_names import TEXT_LIMIT, called_name, dotted, graph_names, is_call, misspelt, said_texts
+
 SLIPS_LIMIT = 100
 """Of a file."""
 CLOCKS = {
@@ -24,8 +27,6 @@ PLAIN_MODULES = {
     "__future__", "itertools", "math", "numpy", "os", "random", "roslib", "rospy", "signal", "string",
     "sys", "threading", "time",
 }  # fmt: skip
-NAMES_LIMIT = 500
-MODULE_NAMES = {"__file__", "__builtins__", "__annotations__", "WindowsError"}
 
 
 def slips(tree):
@@ -42,7 +43,7 @@ def slips(tree):
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             found.append({"line": node.lineno, "kind": "input", "message": message})
     finders = (misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops)
-    for find in (*finders, callbacks, graph_names, deaf_loops, clock_values):
+    for find in (*finders, callbacks, graph_names, said_texts, deaf_loops, clock_values, without_effect):
         found += find(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
     if published is not None and counts(tree):
@@ -83,26 +84,6 @@ def loop_rates(tree):
         elif number:
             hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
             yield {"line": value.lineno, "kind": "rate-number", "message": hz}
-
-
-NAMED = {"init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber"}
-"""Calls whose first argument is a name, and the kind of slip that tells where."""
-
-
-def graph_names(tree):
-    """Where a script names its node, and the topics that it publishes and subscribes to, as written; and the types that
-    it publishes."""
-    for node in ast.walk(tree):
-        kind = NAMED.get(called_name(node))
-        if not kind:
-            continue
-        names = node.args[:1] or [k.value for k in node.keywords if k.arg == "name"]
-        if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
-            yield {"line": names[0].lineno, "kind": kind, "message": names[0].value[:TEXT_LIMIT]}
-            types = node.args[1:2] or [k.value for k in node.keywords if k.arg == "data_class"]
-            name = dotted(types[0]).rpartition(".")[2] if types and kind != "node-name" else ""
-            if name.isidentifier():
-                yield {"line": names[0].lineno, "kind": kind + "-type", "message": name}
 
 
 def never_run(tree):
@@ -310,51 +291,6 @@ def read_parameter(node):
     return None
 
 
-def misspelt(tree):
-    """Names that are used and nowhere bound, where one that is bound is spelt alike, or `self` has one of that name."""
-    names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
-    own = {n.id for n in names if not isinstance(n.ctx, ast.Load)}
-    for node in ast.walk(tree):
-        if not isinstance(node, ast.keyword):
-            bound = [getattr(node, key, None) for key in ("name", "asname", "arg", "rest")]
-            own.update(part for text in bound if isinstance(text, str) for part in text.split("."))
-        if isinstance(node, (ast.Global, ast.Nonlocal)):
-            own.update(node.names)
-    if "*" in own or len(own) > NAMES_LIMIT:
-        return
-    attributes = {
-        dotted(n) for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)
-    }
-    known = own | set(dir(builtins)) | MODULE_NAMES
-    outside = {id(n) for n in outside_methods(tree)}
-    for node in names:
-        if id(node) in outside and (node.id == "self" or node.id not in known):
-            message = (
-                "line %d stands in the class and in none of its methods, so it runs before them" % node.lineno
-            )
-            yield {"line": node.lineno, "kind": "outside-method", "message": message}
-            continue
-        if node.id in known:
-            continue
-        near = ["self." + node.id] if "self." + node.id in attributes else []
-        near = near or difflib.get_close_matches(node.id[:TEXT_LIMIT], sorted(own), 1, 0.8)
-        near = near or [name for name in sorted(own) if sorted(name) == sorted(node.id)]
-        if near:
-            message = "`%s` is not defined anywhere: did you mean `%s`?" % (
-                node.id[:TEXT_LIMIT],
-                near[0][:TEXT_LIMIT],
-            )
-            yield {"line": node.lineno, "kind": "misspelt", "message": message}
-
-
-def outside_methods(tree):
-    """Yield the nodes of statements that stand in a class and call something, in none of its methods."""
-    for node in ast.walk(tree):
-        for statement in node.body if isinstance(node, ast.ClassDef) else ():
-            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call):
-                yield from ast.walk(statement)
-
-
 def counts(tree):
     return any(
         (isinstance(n, (ast.AugAssign, ast.BinOp)) and isinstance(n.op, ast.Add))
@@ -544,17 +480,6 @@ def is_plain(module):
     return module in PLAIN_MODULES or module.endswith((".msg", ".srv", "_msgs"))
 
 
-def is_call(node, name):
-    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == name
-
-
-def called_name(node):
-    """Return `b` of the calls `a.b()` and `b()`, "" of all else."""
-    if not isinstance(node, ast.Call):
-        return ""
-    return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-
-
 def uncalled(node, functions):
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Attribute):
         return dotted(node.value)
@@ -580,11 +505,24 @@ def asked(node, functions):
     return name if name in ("sys.stdin.read", "sys.stdin.readline", "sys.stdin.readlines") else None
 
 
-def dotted(node):
-    """Return `a.b.c` as it is written; what stands before the dots and is no name becomes an ellipsis."""
-    parts = []
-    while isinstance(node, ast.Attribute):
-        parts.append(node.attr)
-        node = node.value
-    parts.append(node.id if isinstance(node, ast.Name) else "...")
-    return ".".join(reversed(parts))[:TEXT_LIMIT]
+def without_effect(tree):
+    """Statements that compute something and keep nothing of it: `++i`, `i + 1`, `i == 0`."""
+    for node in ast.walk(tree):
+        value = node.value if isinstance(node, ast.Expr) else None
+        if isinstance(value, ast.UnaryOp) and isinstance(value.operand, ast.UnaryOp):
+            same = type(value.op) is type(value.operand.op) and isinstance(value.op, (ast.UAdd, ast.USub))
+            name, sign = dotted(value.operand.operand), "+" if isinstance(value.op, ast.UAdd) else "-"
+            if same and "..." not in name:
+                message = "`{1}{1}{0}` changes nothing in Python: write `{0} {1}= 1`".format(name, sign)
+                yield {"line": node.lineno, "kind": "no-effect", "message": message}
+        elif isinstance(value, ast.BinOp) and isinstance(value.op, (ast.Add, ast.Sub)):
+            name, sign = dotted(value.left), "+" if isinstance(value.op, ast.Add) else "-"
+            if "..." not in name and isinstance(value.right, ast.Constant):
+                message = "`{0} {1} {2!r}` alone changes nothing: write `{0} {1}= {2!r}`"
+                message = message.format(name, sign, value.right.value)
+                yield {"line": node.lineno, "kind": "no-effect", "message": message[:TEXT_LIMIT]}
+        elif isinstance(value, ast.Compare) and isinstance(value.ops[0], ast.Eq):
+            name = dotted(value.left)
+            if "..." not in name:
+                message = "`%s ==` compares and gives no value: write `%s =`" % (name, name)
+                yield {"line": node.lineno, "kind": "no-effect", "message": message}

@@ -19,7 +19,8 @@ import warnings
 
 # `-I` leaves this folder out, and a limited child does not begin in it.
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
-from slips import TEXT_LIMIT, slips
+from script_names import TEXT_LIMIT
+from slips import slips
 
 try:
     import resource

@@ -247,6 +247,21 @@ def judge_wraps(
     return verdict or _silent(count, run, package, params) or _too_few(count, good, run, params), last
 
 
+def cite_no_effect(
+    verdict: Verdict, count: Count, run: Run, package: PackageFacts, does: str = "changes nothing"
+) -> Verdict:
+    """Return the verdict; one that is lost with the line of the node's script that was to change the counter."""
+    slips = slips_of(package, run, count.callerid, "no-effect")
+    slip = next((one for one in slips if does in one.message), None)
+    if slip is None or not verdict.status.is_lost:
+        return verdict
+    why, _, fix = slip.message.rpartition(": ")
+    message = f"{verdict.message}; {slip.file}, line {slip.line}: {why}"
+    cited = (FileCitation(file=slip.file, line=slip.line), *verdict.citations)
+    update = {"message": message, "hint": f"{fix} in line {slip.line} of {slip.file}", "citations": cited}
+    return verdict.model_copy(update=update)
+
+
 class Turns(NamedTuple):
     """`every` step down, those of them that are `good`, and all `bad` steps: also those past the maximum."""
 

@@ -391,17 +391,41 @@ def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> t
             outside.message,
             f"indent line {place.line} like the lines of the method above it, or delete it",
         )
-    meant = [
-        (s.line, match[1], match[2])
-        for s in slips
-        if s.kind == "misspelt" and (match := _MEANT.match(s.message))
-    ]
-    here = next((one for one in meant if name and one[:2] == (place.line, name[1])), None)
+    meant = [one for one in map(name_slip, slips) if one is not None]
+    here = next((one for one in meant if name and (one.line, one.name) == (place.line, name[1])), None)
     if here is None:
         return None
-    others = [one for one in meant if one[0] != place.line][:OTHER_NAMES_SHOWN]
-    written = [f"in line {line}, write {new} instead of {old}" for line, old, new in (here, *others)]
-    return f"did you mean {here[2]}?", "; ".join(written)
+    others = {one.fix: one for one in reversed(meant) if one.line != place.line and one.fix != here.fix}
+    fixes = [one.fix for one in reversed(others.values())]
+    return here.why, "; ".join([here.fix, *fixes[:OTHER_NAMES_SHOWN]])
+
+
+class NameSlip(NamedTuple):
+    """A name that is not there: why, and what to do."""
+
+    name: str
+    line: int
+    why: str
+    fix: str
+
+
+def name_slip(slip: PythonSlip) -> NameSlip | None:
+    """Return what a slip says of a name that is not there; None of any other slip."""
+    if slip.kind == "misspelt" and (meant := _MEANT.match(slip.message)):
+        fix = f"in line {slip.line}, write {meant[2]} instead of {meant[1]}"
+        return NameSlip(meant[1], slip.line, f"did you mean {meant[2]}?", fix)
+    if slip.kind != "undefined" or (name := re.search(r"`(\w+)`", slip.message)) is None:
+        return None
+    if known := SLIPS.get(f"name '{name[1]}' is not defined"):
+        return NameSlip(name[1], slip.line, known[0], f"in line {slip.line}, {known[1]}")
+    why, _, fix = slip.message.partition(": ")
+    having = [package for package, types in noetic_messages().items() if name[1] in types]
+    if name[1][:1].isupper() and having and "<package>" in fix:
+        lines = join_words([f"`from {package}.msg import {name[1]}`" for package in having], "or")
+        why, fix = f"{name[1]} is not imported", f"write {lines} at the top"
+    return NameSlip(
+        name[1], slip.line, why, fix.replace("write `self.", f"in line {slip.line}, write `self.")
+    )
 
 
 def _callback(found: Traceback, place: FileCitation | None, package: PackageFacts) -> PythonSlip | None:

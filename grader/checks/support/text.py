@@ -205,3 +205,60 @@ def log_param(name: str) -> str:
     """Return the calls that read a parameter and log its value."""
     cpp = f'ros::param::get("{name}", value), then ROS_INFO_STREAM(value)'
     return both(f"rospy.loginfo(rospy.get_param('{name}'))", cpp)
+
+
+SAID_VALUE, SAID_DATA = "{}", "{data}"
+"""In the text of a source, a value, and what is in a message."""
+_GAP = re.compile(r"\{(?:data)?\}")
+_STRING = re.compile(r'"((?:[^"\\]|\\.)*)"')
+_PLACED = re.compile(r"%[-+ #0-9.]*(?:l|ll|h)?[a-zA-Z]")
+_CPP_PUBLISHES = re.compile(r"\s*(?!(?:std::)?c(?:out|err)\b)\w+\s*<<|.*\.data\s*=[^=]")
+_CPP_PRINTS = re.compile(
+    r"\s*(?:ROS_(?:INFO|WARN|ERROR|DEBUG)\w*\s*\(|printf\s*\(|(?:std::)?c(?:out|err)\s*<<)"
+)
+
+
+def could_say(said: str, wanted: str) -> bool:
+    """Return whether the text of a source can come out as `wanted`, without regard to capitals and blanks. Gaps may be
+    filled with anything."""
+    text = " ".join(wanted.split()).casefold()
+    first, *inner = [" ".join(part.split(" ")).casefold() for part in _GAP.split(" ".join(said.split()))]
+    if not inner:
+        return first == text
+    *inner, last = inner
+    if not text.startswith(first) or not text.endswith(last):
+        return False
+    at, end = len(first), len(text) - len(last)
+    for part in inner:
+        at = text.find(part, at, end)
+        if at < 0:
+            return False
+        at += len(part)
+    return at <= end
+
+
+def in_source(said: str) -> str:
+    """Return the text of a source as a student reads it: `hello <value>`."""
+    return said.replace(SAID_DATA, "<message>").replace(SAID_VALUE, "<value>")
+
+
+def texts_of_cpp(lines: Iterable[str]) -> Iterator[tuple[Literal["publishes", "prints"], int, str]]:
+    """Yield `publishes` or `prints`, the line and the text, of lines of C++ that build a text or print one."""
+    for number, line in enumerate(lines, 1):
+        code = line.partition("//")[0]
+        prints, strings = _CPP_PRINTS.match(code) is not None, _STRING.findall(code)
+        if not strings or not (prints or _CPP_PUBLISHES.match(code)):
+            continue
+        plain = _STRING.sub('"', code)
+        value = SAID_DATA if re.search(r"(->|\.)data\b(?!\s*=[^=])", plain) else SAID_VALUE
+        text = _PLACED.sub(value, strings[0])
+        if text == strings[0]:
+            streamed = "<<" in plain and '"' not in plain.partition("<<")[0]
+            parts = plain.split("<<")[1:] if streamed else re.split(r"<<|\+", plain[plain.index('"') :])
+            left = iter(strings)
+            text = "".join(next(left, "") if '"' in part else value for part in parts if _is_said(part))
+        yield "prints" if prints else "publishes", number, text.replace("\\n", "").replace('\\"', '"')
+
+
+def _is_said(part: str) -> bool:
+    return "endl" not in part and bool(part.strip(" ;)"))

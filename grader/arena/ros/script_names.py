@@ -1,0 +1,333 @@
+"""Finds the names and texts in a student's Python that its run depends on, for `slips.py`.
+
+Names that are not there when they are read; where a script names its node and its topics, and what it publishes and
+prints. Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+import builtins
+import difflib
+import re
+
+TEXT_LIMIT = 300
+NAMES_LIMIT = 500
+MODULE_NAMES = {"__file__", "__builtins__", "__annotations__", "WindowsError"}
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
+COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+
+
+def is_call(node, name):
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == name
+
+
+def called_name(node):
+    """Return `b` of the calls `a.b()` and `b()`, "" of all else."""
+    if not isinstance(node, ast.Call):
+        return ""
+    return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+
+
+def dotted(node):
+    """Return `a.b.c` as it is written; what stands before the dots and is no name becomes an ellipsis."""
+    parts = []
+    while isinstance(node, ast.Attribute):
+        parts.append(node.attr)
+        node = node.value
+    parts.append(node.id if isinstance(node, ast.Name) else "...")
+    return ".".join(reversed(parts))[:TEXT_LIMIT]
+
+
+# ---- where ROS is told a name
+
+NAMED = {"init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber"}
+"""Calls whose first argument is a name, and the kind of slip that tells where."""
+
+
+def graph_names(tree):
+    """Where a script names its node, and the topics that it publishes and subscribes to, as written; and the types that
+    it publishes."""
+    for node in ast.walk(tree):
+        kind = NAMED.get(called_name(node))
+        if not kind:
+            continue
+        names = node.args[:1] or [k.value for k in node.keywords if k.arg == "name"]
+        if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
+            yield {"line": names[0].lineno, "kind": kind, "message": names[0].value[:TEXT_LIMIT]}
+            name = published_type(node)
+            if name.isidentifier() and kind != "node-name":
+                yield {"line": names[0].lineno, "kind": kind + "-type", "message": name}
+
+
+def published_type(call):
+    """Return the name of the class that a `Publisher(…)` or `Subscriber(…)` is given, "" where it has none."""
+    types = call.args[1:2] or [k.value for k in call.keywords if k.arg == "data_class"]
+    return dotted(types[0]).rpartition(".")[2] if types else ""
+
+
+# ---- names that are not there
+
+
+def misspelt(tree):
+    """Names that are read where nothing has given them a value: `misspelt` where one that is bound is spelt alike, or
+    `self` has one of that name, else `undefined`."""
+    names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
+    own = {n.id for n in names if not isinstance(n.ctx, ast.Load)}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.keyword):
+            bound = [getattr(node, key, None) for key in ("name", "asname", "arg", "rest")]
+            own.update(part for text in bound if isinstance(text, str) for part in text.split("."))
+        if isinstance(node, (ast.Global, ast.Nonlocal)):
+            own.update(node.names)
+    if "*" in own or len(own) > NAMES_LIMIT:
+        return
+    attributes = {
+        dotted(n) for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)
+    }
+    known = own | set(dir(builtins)) | MODULE_NAMES
+    outside = {id(n) for n in outside_methods(tree)}
+    unbound = unbound_names(tree, known)
+    for node in names:
+        kind, message = "", ""
+        if id(node) in outside and (node.id == "self" or node.id not in known):
+            message = "line %d stands in the class and in none of its methods, so it runs before them"
+            kind, message = "outside-method", message % node.lineno
+        elif node.id not in known and (near := spelt_alike(node.id, own, attributes)):
+            message = "`%s` is not defined anywhere: did you mean `%s`?"
+            kind, message = "misspelt", message % (node.id[:TEXT_LIMIT], near[:TEXT_LIMIT])
+        elif id(node) in unbound:
+            told = undefined(node, tree) if node.id not in known else known_elsewhere(node.id, tree)
+            kind, message = "undefined", told
+        if message:
+            yield {"line": node.lineno, "kind": kind, "message": message}
+
+
+def spelt_alike(name, own, attributes):
+    """Return the name that is meant, "" where none is alike."""
+    if "self." + name in attributes:
+        return "self." + name
+    near = difflib.get_close_matches(name[:TEXT_LIMIT], sorted(own), 1, 0.8)
+    return next(iter(near or [one for one in sorted(own) if sorted(one) == sorted(name)]), "")
+
+
+def outside_methods(tree):
+    """Yield the nodes of statements that stand in a class and call something, in none of its methods."""
+    for node in ast.walk(tree):
+        for statement in node.body if isinstance(node, ast.ClassDef) else ():
+            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call):
+                yield from ast.walk(statement)
+
+
+def unbound_names(tree, known):
+    """Return the identities of the names that are read where no scope around them binds them.
+
+    A script that binds names as it runs has none, and neither has a `try:` that catches what such a name raises.
+    """
+    if any(called_name(n) in ("exec", "globals", "locals", "setattr") for n in ast.walk(tree)):
+        return set()
+    shared = {name for n in ast.walk(tree) if isinstance(n, ast.Global) for name in n.names}
+    builtin = (set(dir(builtins)) | MODULE_NAMES) & known
+    found, left = set(), [(tree, bound_names(tree) | shared | builtin)]
+    while left:
+        node, visible = left.pop()
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id not in visible:
+            found.add(id(node))
+        if isinstance(node, ast.Try) and any(catches_names(h) for h in node.handlers):
+            left += [(child, visible) for child in [*node.handlers, *node.orelse, *node.finalbody]]
+            continue
+        if isinstance(node, FUNCTIONS):
+            inner = visible | bound_names(node)
+            body = node.body if isinstance(node.body, list) else [node.body]
+            outer = [c for c in ast.iter_child_nodes(node) if c not in body]
+            left += [(c, visible) for c in outer] + [(c, inner) for c in body]
+        elif isinstance(node, ast.ClassDef):
+            own = visible | bound_names(node)
+            for child in ast.iter_child_nodes(node):
+                left.append((child, visible if isinstance(child, FUNCTIONS) else own))
+        elif isinstance(node, COMPREHENSIONS):
+            inner = visible | {
+                n.id for n in ast.walk(node) if isinstance(n, ast.Name) and not isinstance(n.ctx, ast.Load)
+            }
+            left += [(child, inner) for child in ast.iter_child_nodes(node)]
+        else:
+            left += [(child, visible) for child in ast.iter_child_nodes(node)]
+    return found
+
+
+def catches_names(handler):
+    kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
+    return any(kind is None or dotted(kind) in ("NameError", "Exception", "BaseException") for kind in kinds)
+
+
+def bound_names(scope):
+    """Return what a module, class or function binds itself, none of what functions and classes in it do."""
+    names, foreign = set(), set()
+    given = getattr(scope, "args", None)
+    left = [*ast.iter_child_nodes(given)] if isinstance(scope, FUNCTIONS) else []
+    left += scope.body if isinstance(getattr(scope, "body", None), list) else []
+    while left:
+        node = left.pop()
+        if isinstance(node, ast.arg):
+            names.add(node.arg)
+        elif isinstance(node, ast.alias):
+            names.add((node.asname or node.name).partition(".")[0])
+        elif isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+            names.add(node.id)
+        elif isinstance(node, ast.Global):
+            foreign.update(node.names)
+        elif isinstance(node, ast.Nonlocal):
+            names.update(node.names)
+        elif isinstance(getattr(node, "name", None), str):
+            names.add(node.name)
+        if isinstance(getattr(node, "rest", None), str):
+            names.add(node.rest)
+        if not isinstance(node, (*FUNCTIONS, ast.ClassDef)):
+            left += ast.iter_child_nodes(node)
+    return names - foreign
+
+
+ALIASES = {"np": "numpy as np", "plt": "matplotlib.pyplot as plt", "pd": "pandas as pd"}
+MODULES = {
+    "copy", "cv2", "datetime", "json", "math", "numpy", "os", "queue", "random", "re", "rosbag", "roslib", "rospy",
+    "signal", "socket", "string", "struct", "subprocess", "sys", "tf", "threading", "time", "traceback", "yaml",
+}  # fmt: skip
+
+
+def undefined(node, tree):
+    """Return why a name is not there that the file gives no value anywhere, and behind `: ` what to do."""
+    name, line = node.id[:TEXT_LIMIT], node.lineno
+    why = "nothing in the file gives `%s` a value: " % name
+    uses = [n for n in ast.walk(tree) if node in (getattr(n, "value", None), getattr(n, "func", None))]
+    used = uses[0] if uses else None
+    if name in ALIASES or (name in MODULES and isinstance(used, ast.Attribute)):
+        return "`%s` is not imported: write `import %s` at the top" % (name, ALIASES.get(name, name))
+    if name[:1].isupper():
+        how = "above line %d, define %s or import it (a message: `from <package>.msg import %s`)"
+        return why + how % (line, name, name)
+    if isinstance(used, ast.Call):
+        return why + "above line %d, define it with `def %s(…):`, or import it" % (line, name)
+    types = {published_type(n) for n in ast.walk(tree) if called_name(n) == "Publisher"} - {""}
+    sent = [n for n in ast.walk(tree) if is_call(n, "publish") and node in n.args]
+    if sent or (isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)):
+        kind = types.pop() if len(types) == 1 else "<Type>"
+        return why + "above line %d, create the message: `%s = %s()`" % (line, name, kind)
+    return why + "above line %d, write `%s = …`, with the value that it is to have" % (line, name)
+
+
+def known_elsewhere(name, tree):
+    """Return why a name is not there that only a function or a class has, and behind `: ` what to do; "" where none
+    has it."""
+    for one in ast.walk(tree):
+        if isinstance(one, ast.ClassDef) and name in bound_names(one):
+            return "`{0}` belongs to the class {1}: write `self.{0}` for `{0}`".format(name, one.name)
+    for one in ast.walk(tree):
+        if isinstance(one, ast.FunctionDef) and name in bound_names(one):
+            imports = [n for n in ast.walk(one) if isinstance(n, (ast.Import, ast.ImportFrom))]
+            where = "`%s` has a value only in `%s(…)`: " % (name, one.name[:TEXT_LIMIT])
+            if any(name in (a.asname, a.name) for n in imports for a in n.names):
+                return where + "move its import to the top of the file"
+            if name in {arg.arg for arg in ast.walk(one.args) if isinstance(arg, ast.arg)}:
+                return where + "keep it there in another variable, which is `global` or belongs to `self`"
+            return where + "below line %d, write `global %s`" % (one.lineno, name)
+    return ""
+
+
+# ---- texts that are published and printed
+
+PRINTED = ("loginfo", "logwarn", "logerr", "logdebug", "logfatal", "print", "write")
+VALUE, DATA = "{}", "{data}"
+PLACE = re.compile(r"%(?:\(\w*\))?[-+ #0-9.]*[a-zA-Z]|%%")
+FIELD = re.compile(r"\{[^{}]*\}")
+DEPTH = 6
+
+
+def said_texts(tree):
+    """The texts that a script publishes and prints, as far as its source has them: `{}` is a value, `{data}` that of a
+    message."""
+    given, kinds = {}, set()
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.Assign, ast.AugAssign)):
+            for target in getattr(node, "targets", None) or [node.target]:
+                plain = node.value if isinstance(node, ast.Assign) else None
+                given.setdefault(dotted(target), []).append(plain)
+        if isinstance(node, FUNCTIONS):
+            kinds.update(arg.arg for arg in ast.walk(node.args) if isinstance(arg, ast.arg))
+    read = Texts({name: values[0] for name, values in given.items() if len(values) == 1 and values[0]}, kinds)
+    for node in ast.walk(tree):
+        if is_call(node, "publish") and len(node.args) == 1:
+            place, text = read.message(node.args[0])
+            yield from said("publishes", place, text)
+        elif called_name(node) in PRINTED and node.args:
+            yield from said("prints", node, read.printed(node))
+
+
+def said(kind, node, text):
+    if text and text != VALUE and len(text) <= TEXT_LIMIT:
+        yield {"line": node.lineno, "kind": kind, "message": text}
+
+
+class Texts:
+    """Reads texts out of expressions. `given` are the names that one assignment gives a value, `arguments` those of
+    functions."""
+
+    def __init__(self, given, arguments):
+        self.given, self.arguments = given, arguments
+
+    def message(self, node):
+        """Return the place and the text of what is published: of a message, that of its `data`."""
+        name = dotted(node)
+        data = self.given.get(name + ".data")
+        if data is not None:
+            return data, self.of(data)
+        value = self.given.get(name, node)
+        if isinstance(value, ast.Call) and called_name(value) == "String" and not value.args:
+            data = [k.value for k in value.keywords if k.arg == "data"]
+            return (data or [node])[0], self.of(data[0]) if data else ""
+        return (node if isinstance(node, ast.Call) else value), self.of(node)
+
+    def printed(self, call):
+        texts = [self.of(arg) for arg in call.args]
+        if called_name(call) == "print":
+            return " ".join(texts)
+        return self.filled(texts[0], call.args[1:]) if len(texts) > 1 else texts[0]
+
+    def of(self, node, depth=DEPTH):
+        """Return the text of an expression; what only a run can tell is `{}`."""
+        if isinstance(node, ast.Constant):
+            return str(node.value).replace("{", "(").replace("}", ")")
+        if isinstance(node, ast.JoinedStr):
+            return "".join(self.of(part, depth) for part in node.values)
+        of_message = isinstance(node, ast.Attribute) and node.attr == "data"
+        if of_message or (isinstance(node, ast.Name) and node.id in self.arguments):
+            return DATA
+        inner = self.inside(node) if depth else None
+        if inner is not None:
+            return self.of(inner, depth - 1)
+        return self.joined(node, depth - 1) if depth else VALUE
+
+    def inside(self, node):
+        """Return the expression that another one gives its text: what is in `str(…)`, or what a name was given."""
+        if isinstance(node, ast.FormattedValue):
+            return node.value
+        if (
+            isinstance(node, ast.Call)
+            and node.args
+            and called_name(node) in ("str", "String", "unicode", "repr")
+        ):
+            return node.args[0]
+        return self.given.get(dotted(node)) if isinstance(node, (ast.Name, ast.Attribute)) else None
+
+    def joined(self, node, depth):
+        """Return the text of `a + b`, `a % b` or `a.format(b)`."""
+        operator = getattr(node, "op", None)
+        if isinstance(operator, ast.Add):
+            return self.of(node.left, depth) + self.of(node.right, depth)
+        if isinstance(operator, ast.Mod) and isinstance(node.left, ast.Constant):
+            values = node.right.elts if isinstance(node.right, ast.Tuple) else [node.right]
+            return self.filled(self.of(node.left), values)
+        text = getattr(node.func.value, "value", None) if is_call(node, "format") else None
+        return self.filled(text, node.args, FIELD) if isinstance(text, str) else VALUE
+
+    def filled(self, text, values, places=PLACE):
+        """Return the text with what stands in place of its `%s`, or of its `{}`."""
+        value = DATA if values and all(self.of(one, 0) == DATA for one in values) else VALUE
+        return places.sub(lambda found: "%" if found[0] == "%%" else value, text)

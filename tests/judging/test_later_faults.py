@@ -1,0 +1,233 @@
+"""What a node's source shows of the criteria that were not reached is named with the mistake that hides them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from grader.checks.support.text import could_say, texts_of_cpp
+from grader.judging import judge
+from grader.judging.annotate import cite_words
+from grader.judging.facts import try_facts
+from grader.model.verdict import FileCitation, partial
+from tests.judging.rubrics import CHATTER, NODE, PACKAGE, RATE, SCENARIO, SCRIPT, rubric
+from tests.support.timeline import build_runs
+
+FILE = SCRIPT["path"]
+DIES = {
+    "processes": [{"name": "talker", "script": FILE, "exit_s": 0.5, "exit_code": 1}],
+    "console": [
+        {
+            "process": "talker",
+            "stream": "stderr",
+            "at_s": 0.4,
+            "every_s": 0.001,
+            "lines": [
+                "Traceback (most recent call last):",
+                f'  File "/ws/src/lab1/{FILE}", line 3, in <module>',
+                "NameError: name 'countmsg' is not defined",
+            ],
+        }
+    ],
+    "outcome": "ended",
+}
+STARTED = {"name": "talker", "script": FILE, "nodes": ["/talker"], "stopped_by": "INT", "exit_s": 6.8}
+ELSEWHERE = {"processes": [STARTED], "topics": [{"topic": "/hello", "count": 61}]}
+DEAF = {"processes": [STARTED], "subscribers": {"/hello": ["/talker"]}}
+MESSAGE = {
+    "id": "message",
+    "check": "message",
+    "with": {"topic": "/chatter", "template": "hello world {seconds}"},
+    "scenario": "talker",
+    "requires": ["chatter", "node"],
+}
+HEARS = {
+    "id": "hears",
+    "check": "hears",
+    "with": {"topic": "/chatter", "template": "I heard {value}"},
+    "scenario": "talker",
+}
+LOGS = {
+    "id": "logs",
+    "check": "logs",
+    "with": {"text": "Hello World!"},
+    "scenario": "talker",
+    "requires": ["node"],
+}
+UNDEFINED = (
+    "nothing in the file gives `countmsg` a value: above line 3, create the message: `countmsg = Int32()`"
+)
+ROOT = {"requires": []}
+
+
+def slip(kind: str, message: str, line: int = 5) -> dict[str, Any]:
+    return {"file": FILE, "line": line, "kind": kind, "message": message}
+
+
+def hint_of(
+    name: str, run: dict[str, Any], criteria: list[dict[str, Any]], *slips: dict[str, Any], source: str = ""
+) -> str:
+    package = {**PACKAGE, "slips": list(slips)}
+    runs = {"talker": run, "package": {"attachments": {FILE: source}}}
+    scenarios = {
+        "talker": {**SCENARIO, "probes": [{"topic": "/chatter", "type": "std_msgs/String", "text": 2}]}
+    }
+    found = judge(rubric(*criteria, scenarios=scenarios), build_runs({"runs": runs, "package": package}))
+    return next(c.hint for c in found if c.id == name)
+
+
+TALKER = [NODE | ROOT, CHATTER, RATE, MESSAGE]
+CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str, Any]], str]] = {
+    "rate behind an undefined name": (
+        "node", DIES, TALKER, [slip("undefined", UNDEFINED, 3), slip("rate-number", "2", 4)],
+        f"above line 3, create the message: `countmsg = Int32()`; then make it 10 Hz in line 4 of {FILE}"),
+    "text behind an undefined name": (
+        "node", DIES, TALKER, [slip("publishes", "my words {}")],
+        f'; then publish `"hello world %s" % rospy.get_time()` in line 5 of {FILE}, not \'my words <value>\''),
+    "a second undefined name": (
+        "node", DIES, TALKER, [slip("undefined", "`math` is not imported: write `import math` at the top")],
+        "; then write `import math` at the top"),
+    "a name in Python 2 behind it": (
+        "node", DIES, TALKER, [slip("undefined", "nothing in the file gives `null` a value: above line 5, …")],
+        "; then in line 5, write `None` for `null`"),
+    "a message type that is not imported": (
+        "node", DIES, TALKER, [slip("undefined", "nothing in the file gives `Twist` a value: define <package>")],
+        "; then write `from geometry_msgs.msg import Twist` at the top"),
+    "rate.sleep without brackets behind it": (
+        "node", DIES, TALKER, [slip("not-called", "`rate.sleep` is named but not called: write `rate.sleep()`")],
+        f"; then in line 5 of {FILE}, write `rate.sleep()`"),
+    "a count where the time belongs": (
+        "node", DIES, TALKER, [slip("publishes", "hello world {}"), slip("no-clock", "the script counts")],
+        f'; then publish the time in line 5 of {FILE}, `"hello world %s" % rospy.get_time()`: the script counts'),
+    "text behind another topic": (
+        "message", ELSEWHERE, TALKER, [],
+        'publish "hello world %s" % rospy.get_time()'),
+    "listener's topic, type and words behind an error": (
+        "node", DIES, [NODE | ROOT, HEARS | {"requires": ["node"]}],
+        [slip("subscriber", "hello"), slip("subscriber-type", "Int32"), slip("prints", "got {data}", 7)],
+        (f"then subscribe to /chatter in line 5 of {FILE}, not to hello, subscribe with std_msgs/String in line 5 of "
+         f"{FILE}, not Int32 and print 'I heard <message>' in line 7 of {FILE}, not 'got <message>'")),
+    "listener's words behind another topic": (
+        "hears", DEAF, [NODE | ROOT, HEARS], [slip("subscriber", "hello"), slip("prints", "{}got {data}", 7)],
+        f"; then print 'I heard <message>' in line 7 of {FILE}, not '<value>got <message>'"),
+    "other words that are logged, behind an error": (
+        "node", DIES, [NODE | ROOT, LOGS], [slip("prints", "Hello ROS")],
+        f"; then log 'Hello World!' in line 5 of {FILE}, not 'Hello ROS'"),
+}  # fmt: skip
+NOTHING: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str, Any]]]] = {
+    "the right words": (
+        "node", DIES, TALKER, [slip("publishes", "Hello  world {}"), slip("rate-number", "10")]),
+    "words that only a run can tell": ("node", DIES, TALKER, [slip("publishes", "{}{}")]),
+    "two texts": ("node", DIES, TALKER, [slip("publishes", "a"), slip("publishes", "b", 6)]),
+    "a listener's right words": (
+        "node", DIES, [NODE | ROOT, HEARS | {"requires": ["node"]}],
+        [slip("subscriber", "/chatter"), slip("prints", "{}: i heard {data}", 7)]),
+    "what was printed is no message": (
+        "node", DIES, [NODE | ROOT, HEARS | {"requires": ["node"]}], [slip("prints", "listening")]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_is_wrong_behind_a_mistake_is_named_with_it(case: str) -> None:
+    name, run, criteria, slips, told = CASES[case]
+    assert told in hint_of(name, run, criteria, *slips)
+
+
+@pytest.mark.parametrize("case", NOTHING)
+def test_nothing_is_named_behind_a_mistake_that_is_not_plainly_wrong(case: str) -> None:
+    name, run, criteria, slips = NOTHING[case]
+    hint = hint_of(name, run, criteria, *slips)
+    assert hint != ""
+    assert "then" not in hint
+
+
+def test_a_name_in_an_except_is_not_reached() -> None:
+    wrong = slip("misspelt", "`rospi` is not defined anywhere: did you mean `rospy`?", 2)
+    sources = {"except": "try:\nexcept rospi.ROSInterruptException:\n", "plain": "x = 1\nrospi.spin()\n"}
+    hints = {name: hint_of("node", DIES, TALKER, wrong, source=text) for name, text in sources.items()}
+    assert "rospi" not in hints["except"]
+    assert hints["plain"].endswith("; then in line 2, write rospy instead of rospi")
+
+
+CPP = """\
+#include "ros/ros.h"
+int main(int argc, char **argv) {
+  ros::Publisher pub = nh.advertise<std_msgs::String>("hello", 10);  // not "chatter"
+  ss << "my words " << count;
+  ROS_INFO("got [%s]", msg->data.c_str());
+}
+"""
+
+
+def cpp_runs(run: dict[str, Any]) -> dict[str, Any]:
+    package = {
+        "files": [{"path": "src/talker.cpp"}],
+        "cmake": {
+            "calls": [["project", "lab1"], ["catkin_package"], ["add_executable", "talker", "src/talker.cpp"]]
+        },
+    }
+    runs = {"talker": run, "package": {"attachments": {"src/talker.cpp": CPP}}}
+    return build_runs({"runs": runs, "package": package})
+
+
+def cpp_rubric(*criteria: dict[str, Any]) -> Any:
+    probes = [{"topic": "/chatter", "type": "std_msgs/String", "text": 2}]
+    start = [{"name": "talker", "script": "talker"}]
+    return rubric(*criteria, scenarios={"talker": {**SCENARIO, "start": start, "probes": probes}})
+
+
+def test_words_of_a_source_in_cpp_are_named_too() -> None:
+    started = {**STARTED, "script": "talker"}
+    told = {}
+    for run in ({"processes": [started]}, {"processes": [started], "subscribers": {"/hello": ["/talker"]}}):
+        found = judge(cpp_rubric(NODE | ROOT, CHATTER, MESSAGE, HEARS), cpp_runs(run))
+        told |= {c.id: c.hint for c in found}
+    assert told["chatter"].endswith(
+        "; then publish `hello world <seconds>` in line 4 of src/talker.cpp, not 'my words <value>'"
+    )
+    assert told["hears"].endswith(
+        "; then print 'I heard <message>' in line 5 of src/talker.cpp, not 'got [<message>]'"
+    )
+
+
+def test_other_words_are_shown_where_the_program_in_cpp_makes_them() -> None:
+    runs = cpp_runs({"processes": [STARTED]})
+    lab = cpp_rubric(HEARS)
+    said = partial(0.5, "each message is printed, but not as 'I heard <message>': it prints 'got [abc]'")
+    found = cite_words(said, lab.criteria[0], try_facts(lab, runs), runs["package"])
+    assert found.citations == (FileCitation(file="src/talker.cpp", line=5),)
+
+
+@pytest.mark.parametrize(
+    ("line", "kind", "text"),
+    [
+        ('ss << "hello world " << count << std::endl;', "publishes", "hello world {}"),
+        ('msg.data = "hi " + std::to_string(x);', "publishes", "hi {}"),
+        ('msg.data = "fixed";', "publishes", "fixed"),
+        ('ROS_INFO("I heard: [%s]\\n", msg->data.c_str());', "prints", "I heard: [{data}]"),
+        ('ROS_INFO_STREAM("I got " << msg.data);', "prints", "I got {data}"),
+        ('std::cout << "abc " << n << std::endl;', "prints", "abc {}"),
+        ('// ROS_INFO("no")', "", ""),
+        ('ros::init(argc, argv, "talker");', "", ""),
+    ],
+)
+def test_a_line_of_cpp_says_a_text(line: str, kind: str, text: str) -> None:
+    assert list(texts_of_cpp([f"  {line}"])) == ([(kind, 1, text)] if kind else [])
+
+
+@pytest.mark.parametrize(
+    ("said", "wanted", "can"),
+    [
+        ("hello world {}", "hello world 12.5", True),
+        ("Hello  World {}", "hello world 12.5", True),
+        ("{}{}", "hello world", True),
+        ("hello {} {}", "hello world 12.5", True),
+        ("hello {} world", "hello world 12.5", False),
+        ("hello world", "hello world 12.5", False),
+        ("{data} hello", "hello world", False),
+        ("hello{}hello", "hello", False),
+    ],
+)
+def test_whether_a_text_of_a_source_can_come_out_as_another(said: str, wanted: str, can: bool) -> None:
+    assert could_say(said, wanted) is can

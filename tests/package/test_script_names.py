@@ -1,0 +1,90 @@
+"""Names that are not there, texts that are said, and statements without an effect, in Python that compiles."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.package.python import check_syntax
+
+UNDEFINED = {
+    "message": ("p = rospy.Publisher('a', Int32)\nfor i in range(3):\n    number.data = i\n    p.publish(number)\n",
+                "nothing in the file gives `number` a value: above line 4, create the message: `number = Int32()`"),
+    "module": ("x = math.sin(1)\n", "`math` is not imported: write `import math` at the top"),
+    "alias": ("x = np.zeros(3)\n", "`np` is not imported: write `import numpy as np` at the top"),
+    "class": ("x = Robot()\n", "nothing in the file gives `Robot` a value: above line 2, define Robot or import it"),
+    "function": ("steer(1)\n", "above line 2, define it with `def steer(…):`, or import it"),
+    "value": ("x = 3 * gain\n", "above line 2, write `gain = …`, with the value that it is to have"),
+    "method": ("class A:\n    def go(self):\n        turn()\n    def turn(self):\n        pass\n",
+               "`turn` belongs to the class A: write `self.turn` for `turn`"),
+    "other-function": ("def a():\n    total = 1\ndef b():\n    return total\n",
+                       "`total` has a value only in `a(…)`: below line 2, write `global total`"),
+    "argument": ("def a(msg):\n    pass\ndef b():\n    return msg\n",
+                 "`msg` has a value only in `a(…)`: keep it there"),
+    "import-in-function": ("def a():\n    import time\ndef b():\n    time.sleep(1)\n",
+                           "`time` has a value only in `a(…)`: move its import to the top of the file"),
+    "global": ("def a():\n    global total\n    total = 1\ndef b():\n    return total\n", ""),
+    "enclosing": ("def a(x):\n    def b():\n        return x\n    return [b, lambda y: x + y, [z for z in x]]\n", ""),
+    "class-level": ("class A:\n    n = 3\n    m = n + 1\n", ""),
+    "caught": ("try:\n    text = unicode\nexcept NameError:\n    text = str\n", ""),
+    "star": ("from math import *\nx = sin(3)\n", ""),
+    "made": ("exec('y = 3')\nx = y\n", ""),
+    "handled": ("try:\n    pass\nexcept OSError as error:\n    print(error)\n", ""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", UNDEFINED)
+def test_a_name_that_nothing_gives_a_value(tmp_path, case):
+    text, told = UNDEFINED[case]
+    (tmp_path / "a.py").write_text(f"import rospy; from std_msgs.msg import Int32\n{text}")
+    slips = [s.message for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "undefined"]
+    assert bool(slips) == bool(told)
+    assert told in "".join(slips[:1])
+
+
+SAID = {
+    "percent": ("p.publish('hello %s' % now)", ("publishes", "hello {}")),
+    "added": ("p.publish('hello ' + str(n))", ("publishes", "hello {}")),
+    "f-string": ("p.publish(f'{n} seconds')", ("publishes", "{} seconds")),
+    "format": ("p.publish('a {} b {:.2f}'.format(n, m))", ("publishes", "a {} b {}")),
+    "named": ("text = 'hello %d %%' % n; p.publish(text)", ("publishes", "hello {} %")),
+    "message": ("msg = String(); msg.data = 'fixed'; p.publish(msg)", ("publishes", "fixed")),
+    "class": ("p.publish(String(data='fixed'))", ("publishes", "fixed")),
+    "self": ("self.m = String('a' + x); self.p.publish(self.m)", ("publishes", "a{}")),
+    "given-twice": ("text = 'a'; text = 'b'; p.publish(text)", None),
+    "unknown": ("p.publish(make())", None),
+    "log": ("rospy.loginfo('got %s', msg.data)", ("prints", "got {data}")),
+    "log-of-caller": (
+        "rospy.loginfo(rospy.get_caller_id() + 'got %s', msg.data)",
+        ("prints", "{}got {data}"),
+    ),
+    "print": ("print('a', n, msg.data)", ("prints", "a {} {data}")),
+    "argument": ("heard = lambda m: print(m)", ("prints", "{data}")),
+}
+
+
+@pytest.mark.parametrize("case", SAID)
+def test_what_a_script_publishes_and_prints_is_read_from_its_source(tmp_path, case):
+    code, said = SAID[case]
+    (tmp_path / "a.py").write_text(code + "\n")
+    slips = [(s.kind, s.message) for s in check_syntax(tmp_path, ["a.py"]).slips]
+    assert [one for one in slips if one[0] in ("publishes", "prints")] == ([said] if said else [])
+
+
+@pytest.mark.parametrize(
+    ("code", "fix"),
+    [
+        ("++i", "write `i += 1`"),
+        ("--self.i", "write `self.i -= 1`"),
+        ("i + 1", "write `i += 1`"),
+        ("i == 0", "write `i =`"),
+        ("+i", ""),
+        ("-+i", ""),
+        ("f() == 3", ""),
+        ("i += 1", ""),
+        ("x = i == 0", ""),
+    ],
+)
+def test_a_statement_that_changes_nothing(tmp_path, code, fix):
+    (tmp_path / "a.py").write_text(f"i = 0\n{code}\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "no-effect"]
+    assert [(s.line, s.message.rpartition(": ")[2]) for s in slips] == ([(2, fix)] if fix else [])
