@@ -89,9 +89,10 @@ _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 def markdown(text: str, *, cell: bool = False) -> str:
     """One line of Markdown that reads as `text`, wherever it stands: at a line's start, in a list, in a table's `cell`.
 
-    No markup, link, mention, emoji, formula or HTML of it takes effect, but for `code` between two single backticks.
+    No markup, link, mention, emoji, formula or HTML of it takes effect, but for `code` between two single backticks
+    and for what shows by itself that it is code.
     """
-    words = _TOKEN.findall(" ".join(visible(text).split()))
+    words = _TOKEN.findall(_mark_code(" ".join(visible(text).split())))
     shown = " ".join(_with_code(word, cell=cell) for word in words)
     return shown if cell else _escape_line_start(shown)
 
@@ -161,20 +162,43 @@ def _escape_line_start(shown: str) -> str:
 
 
 _TEXT_ARGUMENTS = r"(?:[^()`]|\((?:[^()`]|\([^()`]*\))*\)){0,200}"
+_FILE = r"(?:[\w.~+-]{0,99}[./*][\w./*~+-]{0,99}[\w*]|FILE)"
+_COMMAND = rf"""
+    (?:(?:(?:sudo\ )?chmod\ \+x|dos2unix)(?:\ {_FILE})+
+    | git\ mv\ [\w./-]*\w\ [\w./-]*\w
+    | git\ (?:add|commit|push|rm|update-index)\b(?:\ -[\w=+-]+)*(?:\ {_FILE})*
+    | (?:mkdir|cd)\ [\w./~-]*\w
+    | catkin_create_pkg(?:\ \w+)+
+    | ros(?:run|launch)\ \w+\ {_FILE}
+    | ros(?:topic|node|param|service|msg)\ (?:list|info|echo|hz|pub|type|get|set|load|call|show)\b(?:\ {_FILE})*
+    | (?:sudo\ )?apt-get\ install(?:\ [\w.+-]*\w)+)
+"""
 _CODE = re.compile(
     rf"""
       `(?P<marked>[^`]+)`
     | (?P<found>
-        </?[A-Za-z][^<>`]*>(?!')                            # a tag
+        <(?P<tag>[A-Za-z]\w*)[^<>`]{{0,200}}>[\w@.-]+</(?P=tag)>  # an element
+      | </?[A-Za-z](?:"[^"`]{{0,200}}"|[^<>"`])*>(?!')         # a tag
+      | (?<![\w./-]){_COMMAND}(?![\w-])                       # a command
+      | (?<![\w-])--[a-z][\w-]*
+      | (?<![\w.:/-])\w+="[^"`]{{0,200}}"                      # an attribute
+      | (?<![\w.:/-])[a-z]\w*=(?:True|False|None|-?\d[\w.]*|…|(?![\w"'=<(\[{{$./-]))  # an argument, an attribute's name
+      | (?<!\w)_\w+:=[\w./-]+                               # a private parameter
+      | \$\([\w\ ./<>…-]+\)(?:/[\w./<>…-]*[\w>…])?         # a substitution of roslaunch
+      | "[^"`]{{1,100}}"\ %\ [\w.]+(?:\(\))?                 # a text with its value
       | \#!/[\w/.-]+(?:\ [\w.]+)?                         # the first line of a script
       | (?<![\w./])(?:[\w.]+\ [-+*/%]?=\ )?\w[\w.]*\((?!s\)|es\)){_TEXT_ARGUMENTS}\)(?:\.\w+(?:\({_TEXT_ARGUMENTS}\))?)*
+        (?:\['?\w+'?\])*
+      | (?<![\w./])[A-Za-z_][\w.]*\[[\w.*-]{{1,20}}\]        # an element
       | (?<![\w./~>])~?/?(?<=[~/])[A-Za-z]\w*(?:/\w+)*/?      # a topic, a path
       | \$\{{\w+\}}\)*
       | (?<![\w./-])[\w./-]*\w\.(?:py|launch|xml|ya?ml|txt|msg|srv|action|cpp|h|hpp|sh|bag|test|csv)(?![\w(/])
       | (?<![\w./])[a-z]\w*/[A-Z]\w*(?![\w/])              # a type: std_msgs/Int8
-      | (?<![\w./])[\w.]+\ [-+*/%]?=\ (?:'[^']*'|\"[^\"]*\"|-?\d[\w.]*)   # an assignment
+      | (?<![\w./])[\w.]+\ [-+*/%]?=\ (?:
+        '[^']*'|\"[^\"]*\"|-?\d[\w.]*|[a-z]\w+(?:\.\w+)*|\([\w\ +*/.-]+\)(?:\ %\ \d+)?)   # an assignment
       | (?<![\w./@-])(?:[A-Za-z]\w*\.)+[A-Za-z_]\w*(?<!e\.g)(?<!i\.e)(?![\w(/])
       | (?<![\w./])\w*[^\W\d]_\w+(?![\w/])
+      | (?<![\w./-])(?=[\w/]*_|src/|scripts/|launch/)\w+(?:/\w+)+/?  # a folder
       | \bfrom\ [\w.]+\ import\ \w+
       )
     """,
@@ -193,6 +217,21 @@ def code_parts(text: str) -> Iterator[tuple[str, bool]]:
         end = found.end()
     if end < len(text):
         yield text[end:], False
+
+
+def _mark_code(text: str) -> str:
+    """Return the text with backticks round what shows by itself that it is code."""
+    marked, end, last = "", 0, -1
+    for found in _CODE.finditer(text):
+        beside = text[max(0, found.start() - 1) : found.start()] + text[found.end() : found.end() + 1]
+        is_found = found["found"] is not None and "`" not in beside
+        marked += text[end : found.start()]
+        if is_found and found.start() == last:
+            marked = f"{marked[:-1]}{found[0]}`"
+        else:
+            marked += f"`{found[0]}`" if is_found else found[0]
+        end, last = found.end(), found.end() if is_found else -1
+    return marked + text[end:]
 
 
 CELL_CHARS = 2000

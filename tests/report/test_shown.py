@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import re
 import unicodedata
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fixtures.make import labs, rubric_of
 from grader.model.verdict import FileCitation
-from grader.report.text import code_parts, markdown_block
+from grader.report.text import code_parts, markdown, markdown_block
 from grader.report.view import caret, commands_in, headline, hint_beside, steps
 from grader.untrusted_text import (
     HIDDEN_CATEGORIES,
@@ -46,6 +50,20 @@ FLOOD = "`/chatter` runs at about 5,500 Hz instead of 10 Hz; the loop does not s
         ("/chatter carries std_msgs/String", ["/chatter", "std_msgs/String"]),
         ("a `:` of src/talker.py", [":", "src/talker.py"]),
         ("write #!/usr/bin/env python3 first", ["#!/usr/bin/env python3"]),
+        ('write type="talker.py" for type="talker"', ['type="talker.py"', 'type="talker"']),
+        ("write name= for nme=, or anonymous=True", ["name=", "nme=", "anonymous=True"]),
+        (
+            "chmod +x src/a.py src/b.py, then git add --chmod=+x src/a.py, commit and push",
+            [
+                "chmod +x src/a.py src/b.py",
+                "git add --chmod=+x src/a.py",
+            ],
+        ),
+        ("git mv Launch launch; then git add it", ["git mv Launch launch", "git add"]),
+        ("roslaunch lab1 lab1.launch shows it; roslaunch does not find it", ["roslaunch lab1 lab1.launch"]),
+        ("write $(find lab1)/launch/a.launch", ["$(find lab1)/launch/a.launch"]),
+        ('publish "hello world %s" % rospy.get_time()', ['"hello world %s" % rospy.get_time()']),
+        ("write <name>lab1</name> in package.xml", ["<name>lab1</name>", "package.xml"]),
         ("5 of 10, and/or 3/4, e.g. ada@york.ac.uk: it's 'hello world <seconds>'", []),
         ("the test(s) of the first node; 2.5 s, i.e. late", []),
     ],
@@ -54,6 +72,34 @@ def test_code_in_a_sentence_is_found(text, code) -> None:
     parts = list(code_parts(text))
     assert [part for part, is_code in parts if is_code] == code
     assert "".join(part for part, _ in parts) == text.replace("`", "")
+
+
+LOOKS_LIKE_CODE = re.compile(r"[=<>${}]|\w[(\[]|\bchmod\b|\bgit (add|mv|push|rm)\b|--\w|\w_\w|\+x")
+ORDER = re.compile(
+    r"(add|below|call|create|end|give|in|make|name|print|publish|put|remove|replace|run|set|take|use|write)\b"
+)
+
+
+def test_code_is_shown_as_code_in_what_checks_and_rubrics_advise() -> None:
+    checks = Path(__file__).parents[2] / "grader" / "checks"
+    advice = [text for path in checks.rglob("*.py") for text in _texts_of(path) if ORDER.match(text)]
+    advice += [hint for lab in labs() for one in rubric_of(lab).rubric.criteria if (hint := one.hint)]
+    assert len(advice) > 200
+    plain = {text: "".join(part for part, is_code in code_parts(text) if not is_code) for text in advice}
+    assert {text: rest for text, rest in plain.items() if LOOKS_LIKE_CODE.search(rest)} == {}
+    assert markdown('write type="a.py"; then rate.sleep()') == 'write `type="a.py"`; then `rate.sleep()`'
+
+
+def _texts_of(path: Path) -> Iterator[str]:
+    """Yield each text of a source file with a name in place of each of its values; docstrings are none."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    skipped = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            skipped |= {id(value) for value in node.values}
+            yield "".join(str(v.value) if isinstance(v, ast.Constant) else "x1" for v in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in skipped:
+            yield re.sub(r"\{\w*\}", "x1", node.value)
 
 
 @given(ANY_TEXT)

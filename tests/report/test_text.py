@@ -180,7 +180,7 @@ def test_what_a_forge_would_act_on_is_code(text):
             "write `rospy.Service('~count', Trigger, self.f)`.",
         ),
         ("f(g(h('x/y.py'), 2)).z(a, b) is read", "`f(g(h('x/y.py'), 2)).z(a, b)` is read"),
-        ("2 line(s) and (a b) c(d e) f", "2 line(s) and (a b) c(d e) f"),
+        ("2 line(s) and (a b) c(d e) f", "2 line(s) and (a b) `c(d e)` f"),
         ("call rate.sleep(), or (rospy.Rate(1)).", "call `rate.sleep()`, or (`rospy.Rate(1)`)."),
         ("1) no list", "1\\) no list"),
         ("> no quotation", "&gt; no quotation"),
