@@ -3,9 +3,22 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
+
+from markupsafe import Markup
+
+from grader.report.html.svg import Frame, drawing, element, path, text
+
+CHART = (640.0, 300.0)
+ROOM = 1.6
+"""The largest value of an axis is so many times the largest that is drawn: names stand at the ends of lines."""
+COLOURS = ("#0b57d0", "#b3261e", "#146c2e")
+DASHES = ("none", "7 3", "2 3")
+LOOK = """
+text { font: 12px sans-serif; fill: #444 } .grid { stroke: #ddd } .axis { stroke: #888 } .label { fill: #444 }
+"""
 
 
 class NotMeasured(Exception):
@@ -27,12 +40,14 @@ class Options:
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
-    """`runs` says how often what was run, `faults` what came out wrong: being slow is none."""
+    """`runs` says how often what was run, `faults` what came out wrong: being slow is none. `pictures` are SVG, by
+    their file names in this folder."""
 
     runs: str
     tables: tuple[str, ...]
     faults: tuple[str, ...] = ()
     remarks: tuple[str, ...] = field(default=())
+    pictures: Mapping[str, str] = field(default_factory=dict)
 
 
 class Row(NamedTuple):
@@ -67,6 +82,42 @@ def mid(values: Sequence[float], digits: int = 2) -> str:
     if len(values) == 1:
         return middle
     return f"{middle} ({min(values):.{digits}f} to {max(values):.{digits}f})"
+
+
+def chart(
+    name: str,
+    title: str,
+    labels: tuple[str, str],
+    lines: Mapping[str, Sequence[tuple[float, float]]],
+    *,
+    log: tuple[bool, bool] = (False, False),
+) -> str:
+    """Return a drawing of lines, each with its name at its end. `labels` and `log` are of the two axes."""
+    xs, ys = zip(*(point for points in lines.values() for point in points), strict=True)
+    frame = Frame(
+        width=CHART[0],
+        height=CHART[1],
+        x_low=min(xs),
+        x_high=max(xs) * (ROOM**3 if log[0] else 1.2),
+        y_low=min(ys) if log[1] else 0.0,
+        y_high=max(ys) * ROOM,
+        log_x=log[0],
+        log_y=log[1],
+    )
+    parts = [element("style", Markup(LOOK)), element("rect", width="100%", height="100%", fill="white")]  # noqa: S704 - ours
+    parts += frame.axes(*labels)
+    for (line, points), colour, dash in zip(lines.items(), COLOURS, DASHES, strict=False):
+        drawn = [(frame.x(x), frame.y(y)) for x, y in points]
+        parts.append(
+            element("path", d=path(drawn), fill="none", stroke=colour, stroke_width=2, stroke_dasharray=dash)
+        )
+        parts += [element("circle", cx=x, cy=y, r=3, fill=colour) for x, y in drawn]
+        parts.append(text(drawn[-1][0] + 6, drawn[-1][1] - 6, line))
+    words = "; ".join(
+        f"{line}: " + ", ".join(f"{y:.0f} at {x:g}" for x, y in points) for line, points in lines.items()
+    )
+    whole = drawing(name, CHART, title, words, *parts)
+    return str(whole).replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
 
 
 def share(part: int, whole: int) -> str:

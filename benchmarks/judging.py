@@ -30,7 +30,7 @@ def measure(options: Options) -> Found:
     count, times, jobs = options.count or COUNT, options.times or TIMES, options.jobs or cores()
     many, single = [], []
     with folder_for("judging", options) as folder:
-        recorded = _recorded(folder / "kinds")
+        recorded = record_kinds(folder / "kinds")
         everything, one = folder / "all", folder / "one"
         expected = _copied(everything, recorded, count)
         alone = _copied(one, recorded, 1)
@@ -65,7 +65,7 @@ def _table(many: list[Judged], single: list[Judged], count: int) -> str:
     )
 
 
-def _recorded(out: Path) -> dict[Path, Verdicts]:
+def record_kinds(out: Path) -> dict[Path, Verdicts]:
     """Each kind's folder of results, with what it got when it was recorded."""
     jobs = [FolderJob(name=kind, source=source, rubric=RUBRIC, out=out) for kind, source in KINDS.items()]
     return {out / one.name: verdicts_of(one.result.criteria) for one in graded(jobs, 1)}

@@ -5,11 +5,13 @@ from __future__ import annotations
 import ctypes
 import os
 import platform
+import re
 import resource
 import subprocess
+import threading
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -18,7 +20,7 @@ from benchmarks.figures import NotMeasured
 
 TIMEOUT_S = 600.0
 PR_SET_CHILD_SUBREAPER = 36
-LEAVE_S, LOOK_S = 10.0, 0.02
+LEAVE_S, LOOK_S, PEAKS_S = 10.0, 0.02, 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,6 +89,43 @@ def timed(
         last = (done.stderr + done.stdout).strip()[-400:]
         raise NotMeasured(f"{' '.join(argv[:5])} ended with {done.returncode}: {last}")
     return cost
+
+
+@contextmanager
+def peak_sizes(groups: Mapping[str, Callable[[], Iterable[int]]]) -> Iterator[dict[str, float]]:
+    """Yield the largest resident size (MB) of a process of each group, kept up to date while the block runs."""
+    found, ended = dict.fromkeys(groups, 0.0), threading.Event()
+
+    def look() -> None:
+        while not ended.wait(PEAKS_S):
+            for name, processes in groups.items():
+                found[name] = max(found[name], *map(_peak_mb, processes()), 0.0)
+
+    thread = threading.Thread(target=look)
+    thread.start()
+    try:
+        yield found
+    finally:
+        ended.set()
+        thread.join()
+
+
+def _peak_mb(pid: int) -> float:
+    """Return the largest resident size that the process had; 0 where it has ended."""
+    with suppress(OSError):
+        if kb := re.search(r"VmHWM:\s*(\d+) kB", Path(f"/proc/{pid}/status").read_text()):
+            return int(kb[1]) / 1e3
+    return 0.0
+
+
+def grader_workers(pid: int) -> Iterator[int]:
+    """Yield the worker processes of a grader, and the one that they are copies of."""
+    for listed in Path(f"/proc/{pid}/task").glob("*/children"):
+        with suppress(OSError):
+            for child in map(int, listed.read_text().split()):
+                if b"grader.workers" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    yield child
+                yield from grader_workers(child)
 
 
 def machine() -> str:

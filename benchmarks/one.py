@@ -74,11 +74,11 @@ def _grade(out: Path) -> Grading:
         own_cpu_s=cost.cpu_s - result.timing.student_cpu_s,
         student_cpu_s=result.timing.student_cpu_s - build_s,
         build_cpu_s=build_s,
-        arena_bytes=_largest_arena_bytes(evidence),
+        arena_bytes=largest_arena_bytes(evidence),
     )
 
 
-def _largest_arena_bytes(evidence: Path) -> int:
+def largest_arena_bytes(evidence: Path) -> int:
     events = [event for run in load_evidence([evidence]).values() for _, event in run.processes]
     return max(event.max_rss_bytes or 0 for event in events if event.name == "arena")
 

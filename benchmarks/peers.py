@@ -21,12 +21,18 @@ from benchmarks.ros import (
     hztest_workspace,
     master,
     program,
+    require_ros,
     running,
 )
 
 TIMES = 5
-SLEEP_S, END_S = 10.0, 20.0
+RECORD_S, SLEEP_S, END_S = 5.0, 10.0, 20.0
 TOPIC, RATE_HZ = "/chatter", 10.0
+READ_BAG = """
+import rosbag, sys
+times = [time.to_sec() for _, _, time in rosbag.Bag(sys.argv[1]).read_messages(sys.argv[2])]
+print((len(times) - 1) / (times[-1] - times[0]))
+"""
 TALKER, LISTENER, LAUNCH = "numeric_talker.py", "numeric_listener.py", "lab1.launch"
 GRADER = (sys.executable, "-m", "grader", "grade", str(SOLUTION), "--rubric", LAB, "--out")
 
@@ -38,6 +44,7 @@ def measure(options: Options) -> Found:
         workspace = hztest_workspace(folder, package, TALKER)
         peers: dict[str, Callable[[], Cost]] = {
             "`rostest` with `hztest`: one rate, built already": lambda: hztest(workspace),
+            "`rosbag record` and a script: one rate, built already": lambda: _bag(workspace),
             "`rostopic hz`, asked until it says a rate: one rate, built already": lambda: _poll(workspace),
             "a loop with sleeps of 10 s: build, talker, listener, launch file": lambda: _loop(folder),
         }
@@ -62,6 +69,15 @@ def _row(name: str, costs: list[Cost], ours: list[Cost]) -> list[str]:
         mid([own.wall_s / cost.wall_s for own, cost in pairs]),
         mid([own.cpu_s / cost.cpu_s for own, cost in pairs]),
     ]
+
+
+def _bag(workspace: Path) -> Cost:
+    """As in a script for one submission: record for some seconds, then read the file."""
+    meter, bag = Meter(), workspace / "run.bag"
+    with _node(workspace, "rosrun", "lab1", TALKER) as env:
+        timed([program("rosbag"), "record", f"--duration={RECORD_S:g}", "-O", str(bag), TOPIC], env=env)
+        rate = timed([require_ros().python, "-c", READ_BAG, str(bag), TOPIC], env=env).text
+    return _cost(meter, float(rate))
 
 
 def _poll(workspace: Path) -> Cost:

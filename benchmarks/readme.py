@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from benchmarks.figures import Found, NotMeasured
@@ -17,10 +18,13 @@ def section(found: Found, machine_line: str, loads: tuple[float, float]) -> str:
     return "\n".join(part for part in (f"{line}\n", *found.tables, remarks, faults) if part)
 
 
-def write(name: str, text: str) -> None:
+def write(name: str, text: str, pictures: Mapping[str, str]) -> None:
+    """Put the figures between the markers of that name, and the pictures beside the README."""
     start, end = f"<!-- {name} begin -->\n", f"<!-- {name} end -->\n"
     before, found, rest = README.read_text().partition(start)
     _, closed, after = rest.partition(end)
     if not found or not closed:
         raise NotMeasured(f"{README.name} has no markers for {name}")
+    for file, picture in pictures.items():
+        README.with_name(file).write_text(f"{picture}\n")
     README.write_text(f"{before}{start}\n{text}\n{end}{after}")

@@ -33,6 +33,7 @@ NAMES = (
     "load",
     "fair",
     "thousands",
+    "growth",
     "reviewing",
 )
 
@@ -70,7 +71,7 @@ def _right(name: str, options: Options, *, write: bool) -> bool:
         text = readme.section(found, machine(), (before, load()))
         print(text, flush=True)
         if write:
-            readme.write(name, text)
+            readme.write(name, text, found.pictures)
     except (NotMeasured, GraderError) as error:
         print(f"{name}: {error}", file=sys.stderr, flush=True)
         return False

@@ -8,13 +8,13 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.figures import Found, NotMeasured, Options, table
 from benchmarks.gradings import DATA, LAB, SOLUTION, cores, folder_for
+from benchmarks.machine import Meter, grader_workers, peak_sizes
 from fixtures.make import faulty_package
 
 COUNT = 10_000
@@ -25,14 +25,15 @@ FAULTY = ("cmake-project-name", "manifest-name", "ok-no-dependencies")
 KINDS = (SOLUTION, *(faulty_package(LAB, name) for name in FAULTY))
 LEFT = re.compile(r"\[(\d+) of (\d+) done.*about (\d+(?::\d+)?) (s|min|h) to go\]")
 UNITS_S = {"s": 1, "min": 60}
-GRADER = (sys.executable, "-m", "grader", "batch")
+GRADER = (sys.executable, "-m", "grader")
 
 
 class Batch(NamedTuple):
-    """Seconds of the wall, the largest resident sizes in MB of the process that hands out the work and of those that do
-    it, and what the progress said half-way that was left, with what then was."""
+    """Seconds of the wall and of CPU, the largest resident sizes in MB of the process that hands out the work
+    and of those that do it, and what the progress said half-way that was left, with what then was."""
 
     wall_s: float
+    cpu_s: float
     handing_mb: float
     grading_mb: float
     said_s: float | None
@@ -43,11 +44,11 @@ def measure(options: Options) -> Found:
     count, jobs = options.count or COUNT, options.jobs or cores()
     rows, faults = [], list[str]()
     with folder_for("thousands", options) as folder:
-        points = _points_alone(folder / "alone", jobs)
+        points = points_alone(folder / "alone", jobs)
         for number in (count // share for share in SHARES):
             handed_in, out = made(folder / f"in-{number}", number), folder / f"out-{number}"
             first, again = batch(handed_in, out, jobs), batch(handed_in, out, jobs)
-            faults += _wrong(out, number, points)
+            faults += wrong_points(out, number, points)
             rows += [_row(number, "graded", first), _row(number, "found complete", again)]
             shutil.rmtree(handed_in)
             shutil.rmtree(out)
@@ -82,7 +83,7 @@ def made(folder: Path, count: int) -> Path:
     return folder
 
 
-def _points_alone(folder: Path, jobs: int) -> list[float]:
+def points_alone(folder: Path, jobs: int) -> list[float]:
     """What each kind gets where it is alone."""
     batch(made(folder / "in", len(KINDS)), folder / "out", jobs)
     return list(_points(folder / "out"))
@@ -94,7 +95,7 @@ def _points(out: Path) -> Iterator[float]:
             yield json.loads(line)["points"]
 
 
-def _wrong(out: Path, count: int, alone: list[float]) -> Iterator[str]:
+def wrong_points(out: Path, count: int, alone: list[float]) -> Iterator[str]:
     found = list(_points(out))
     if len(found) != count:
         yield f"{len(found)} of {count} results"
@@ -104,21 +105,35 @@ def _wrong(out: Path, count: int, alone: list[float]) -> Iterator[str]:
 
 
 def batch(handed_in: Path, out: Path, jobs: int, rubric: Path = RUBRIC) -> Batch:
-    argv = [*GRADER, str(handed_in), "--rubric", str(rubric), "--out", str(out), "--jobs", str(jobs)]
-    begun_s, half_s, said_s = time.monotonic(), time.monotonic(), None
-    handing_kb = grading_kb = 0
-    with subprocess.Popen(argv, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+    return followed(
+        ["batch", str(handed_in), "--rubric", str(rubric), "--out", str(out), "--jobs", str(jobs)]
+    )
+
+
+def followed(argv: Sequence[str]) -> Batch:
+    """Run `grader` with these arguments for a class to its end."""
+    meter, half_s, said_s = Meter(), time.monotonic(), None
+    with subprocess.Popen(
+        [*GRADER, *argv], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as process:
         assert process.stderr is not None  # noqa: S101 - opened with PIPE
-        for line in process.stderr:
-            handing_kb = max(handing_kb, _peak_kb(process.pid))
-            grading_kb = max(grading_kb, *map(_peak_kb, _children(process.pid)), 0)
-            told = LEFT.search(line)
-            if told and said_s is None and int(told[1]) * 2 >= int(told[2]):
-                half_s, said_s = time.monotonic(), _seconds(told[3], told[4])
+        groups = {"hands out": lambda: [process.pid], "grades": lambda: grader_workers(process.pid)}
+        with peak_sizes(groups) as peaks:
+            for line in process.stderr:
+                told = LEFT.search(line)
+                if told and said_s is None and int(told[1]) * 2 >= int(told[2]):
+                    half_s, said_s = time.monotonic(), _seconds(told[3], told[4])
+            process.wait()
     if process.returncode not in {0, 1, 4}:  # 4: what a person has to decide is open
-        raise NotMeasured(f"grader batch ended with {process.returncode}")
-    ended_s = time.monotonic()
-    return Batch(ended_s - begun_s, handing_kb / 1e3, grading_kb / 1e3, said_s, ended_s - half_s)
+        raise NotMeasured(f"grader {argv[0]} ended with {process.returncode}")
+    return Batch(
+        wall_s=meter.wall_s(),
+        cpu_s=meter.children_cpu_s(),
+        handing_mb=peaks["hands out"],
+        grading_mb=peaks["grades"],
+        said_s=said_s,
+        took_s=time.monotonic() - half_s,
+    )
 
 
 def _seconds(number: str, unit: str) -> float:
@@ -126,20 +141,3 @@ def _seconds(number: str, unit: str) -> float:
         hours, minutes = number.split(":")
         return int(hours) * 3600 + int(minutes) * 60
     return int(number) * UNITS_S[unit]
-
-
-def _children(pid: int) -> Iterator[int]:
-    """Of all its threads."""
-    for listed in Path(f"/proc/{pid}/task").glob("*/children"):
-        with suppress(OSError):
-            yield from map(int, listed.read_text().split())
-
-
-def _peak_kb(pid: int) -> int:
-    """The largest resident size that the process had; 0 where it has ended."""
-    try:
-        status = Path(f"/proc/{pid}/status").read_text()
-    except OSError:
-        return 0
-    found = re.search(r"VmHWM:\s*(\d+) kB", status)
-    return int(found[1]) if found else 0
