@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from functools import cache
 from pathlib import Path
 
+from grader.wording import is_one_edit
+
+SLIP_CHARS_MIN = 4
+"""Shorter names differ by one letter because they are different names."""
 _TABLE = Path(__file__).with_name("installable.txt")
 PIP = "pip:"
 ROS_2 = {
@@ -47,13 +51,47 @@ def noetic_messages() -> dict[str, dict[str, tuple[str, ...]]]:
     return found
 
 
-def install_hint(name: str, lines: Iterable[str] = ()) -> str:
-    """Return what the grading machine needs, by the distribution of ROS that these lines of output name."""
+TUTORIALS = frozenset({"beginner_tutorials", "learning_joy", "my_package", "package_name", "your_package"})
+"""What handouts call a student's package: a name that is copied from them stands for one of the student's own."""
+PYTHON_2 = {
+    "ConfigParser": "configparser", "Queue": "queue", "SocketServer": "socketserver", "StringIO": "io",
+    "Tkinter": "tkinter", "cPickle": "pickle", "commands": "subprocess", "httplib": "http.client",
+    "thread": "threading", "tkMessageBox": "tkinter.messagebox", "urllib2": "urllib.request",
+    "urlparse": "urllib.parse",
+}  # fmt: skip
+"""Modules of Python 2 by their names, and what they are called in Python 3."""
+
+
+def exists_somewhere(name: str, own: Collection[str]) -> bool:
+    """Return whether a module or package that is not here is the machine's to have: its name is no slip of one of
+    Python's, of ROS's or of the student's `own`, and stands in no handout for the student's package."""
+    if name in known_packages() or name in sys.stdlib_module_names:
+        return True
+    return name not in {*ROS_2, *TUTORIALS, *PYTHON_2, *own} and not nearest_module(name, own)
+
+
+def nearest_module(name: str, own: Collection[str]) -> str:
+    """Return the module or package for which the name is a slip: capitals, underscores, one letter; "" for none."""
+    plain = name.casefold().replace("_", "")
+    first, last = (*own, "rospy", "roscpp", "catkin", *noetic_messages()), sys.stdlib_module_names
+    for one in (*first, *known_packages(), *sorted(last)) if name not in own else ():
+        other = one.casefold().replace("_", "")
+        same = other == plain and one not in known_packages()  # modules of PyPI may differ in capitals alone
+        if one != name and (
+            same or (len(other) >= SLIP_CHARS_MIN and other != plain and is_one_edit(other, plain))
+        ):
+            return one
+    return ""
+
+
+def install_hint(name: str, lines: Iterable[str] = (), *, module: bool = False) -> str:
+    """Return what the grading machine needs, by the distribution of ROS that these lines of output name. `module`: it
+    is imported in Python, and may be none of ROS's."""
     ros = next((found[1] for found in map(_PREFIX.search, lines) if found), "")
-    own = (
-        "" if name in known_packages() else "; a package of the student's own has to be pushed with this one"
-    )
-    return f"{ON_THE_MACHINE}{install_command(name, ros)}, then grade again{own}"
+    known, what = name in known_packages(), "module" if module else "package"
+    own = "" if known else f"; a {what} of the student's own has to be pushed with this package"
+    command = install_command(name, ros) if known or not module else f"install the Python module {name}"
+    return f"{ON_THE_MACHINE}{command}, then grade again{own}"
 
 
 def install_command(name: str, ros: str = "") -> str:

@@ -33,7 +33,7 @@ ALLOWED = {
     "errors": set[str](),
     "untrusted_text": set[str](),
     "wording": set[str](),
-    "installable": set[str](),
+    "installable": {"wording"},
     "syntax_fixes": set[str](),
     "portable": {"errors"},
     "ros_env": {"errors", "model", "portable"},

@@ -45,8 +45,9 @@ from grader.checks.support.text import (
     texts_in,
     texts_of_cpp,
 )
+from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
-from grader.judging.facts import PACKAGE_RUN, Facts
+from grader.judging.facts import Facts
 from grader.model.package import LaunchFile, PackageFacts, PythonSlip
 from grader.model.result import CriterionResult
 from grader.model.verdict import Citation, FileCitation, Status, Verdict

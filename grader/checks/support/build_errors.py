@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from grader.checks.support.scripts import cmake_calls, installed, path_in_package
 from grader.checks.support.text import near_names, shown
-from grader.installable import ON_THE_MACHINE, ROS_2, install_hint, known_packages
+from grader.installable import ON_THE_MACHINE, ROS_2, exists_somewhere, install_hint, known_packages
 from grader.model.package import PackageFacts, meant_command
 from grader.model.verdict import FileCitation
 from grader.wording import join_words
@@ -182,7 +182,6 @@ def _misspelt_components(package: PackageFacts) -> dict[str, str]:
 def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
     name = found[1]
     near = get_close_matches(name, (*ALWAYS_THERE, *known_packages()), 1, ONE_EDIT)
-    declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
     if name in SLIPS_OF_COMPONENTS:
         why = f"find_package(…) takes {name} for the name of a package: the word is COMPONENTS"
         return Explained(why, f"write COMPONENTS for {name}")
@@ -197,7 +196,8 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
     if name in ROS_2:
         return Explained(f"it needs {name}, which is from ROS 2", f"take {name} out: this lab is for ROS 1")
     placeholder = re.fullmatch(r"dep(end)?\d", name) is not None
-    if name in known_packages() or (name in declared and not near and not placeholder):
+    own = {package.name, *(one.name for one in package.also)}
+    if name in known_packages() or (not near and not placeholder and exists_somewhere(name, own)):
         return Explained(
             f"it needs the package {name}, which this grading machine lacks",
             install_hint(name, lines),

@@ -11,25 +11,32 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from grader.checks.registry import Check
-from grader.checks.support.exceptions import Frame, Traceback, explain_exception, tracebacks
+from grader.checks.support.exceptions import (
+    IMPORT_ERRORS,
+    NO_MODULE,
+    Frame,
+    Traceback,
+    explain_exception,
+    other_name,
+    own_modules,
+    tracebacks,
+)
 from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import EMPTY, cmake_calls, path_in_package
-from grader.checks.support.text import LOOP, SPIN, near_names, shown
+from grader.checks.support.text import LOOP, SPIN, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
-from grader.installable import ROS_2, install_hint, known_packages, noetic_messages
+from grader.installable import exists_somewhere, install_hint, known_packages, noetic_messages
 from grader.model.package import Fault, PackageFacts, PythonSlip
 from grader.model.verdict import Citations, FileCitation, Verdict, inconclusive
 from grader.syntax_fixes import corrected, without_brace
 from grader.wording import join_words, seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
-ATTRIBUTES_SHOWN = 8
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
 MAIN = "`if __name__ == '__main__':`"
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
-IMPORT_ERRORS = ("ImportError", "ModuleNotFoundError")
 RACE = "publish() to a closed topic"
 ARGUMENT_HINT = (
     "put the value in the code, or use a default where `len(sys.argv)` is 1: nothing passes arguments"
@@ -95,8 +102,6 @@ SLIPS = {
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
-_NO_MODULE = re.compile(r"No module named '(\w+)'$")
-_KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
 _ARITY = re.compile(r"([\w.]+)\(\) (?:takes|missing) ")
 _ADDED = re.compile(
     r"can only concatenate str \(not \"(\w+)\"\) to str|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'"
@@ -104,40 +109,6 @@ _ADDED = re.compile(
 _NAME = re.compile(r"name '(\w+)' is not defined")
 _BY_PYTHON = re.compile(r"\. Did you mean: '(\w+)'\?$")
 _MEANT = re.compile(r"`(\w+)` is not defined anywhere: did you mean `([\w.]+)`\?$")
-_IN_MODULE = re.compile(r"No module named '(\w+\.(?:msg|srv))\.(\w+)'")
-_FROM_PACKAGE = re.compile(r"cannot import name '(\w+)' from '(\w+)'")
-_NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
-_NO_ATTRIBUTE = re.compile(r"(?:module|type object)? ?'([\w.]+)'(?: object)? has no attribute '(\w+)'")
-KEYWORDS = (
-    *("anonymous", "log_level", "disable_signals", "argv", "queue_size", "latch", "tcp_nodelay", "headers"),
-    *(
-        "callback",
-        "callback_args",
-        "buff_size",
-        "subscriber_listener",
-        "data_class",
-        "oneshot",
-        "timeout",
-        "default",
-    ),
-)
-"""Arguments of rospy's functions that are given by their names."""
-ATTRIBUTES = {
-    "rospy": (
-        *("init_node", "Publisher", "Subscriber", "Service", "ServiceProxy", "Rate", "Timer", "Time", "Duration"),
-        *("sleep", "spin", "is_shutdown", "on_shutdown", "signal_shutdown", "loginfo", "logwarn", "logerr", "logdebug"),
-        *("logfatal", "get_param", "set_param", "has_param", "delete_param", "search_param", "get_time", "get_rostime"),
-        *("get_name", "wait_for_message", "wait_for_service", "get_namespace", "get_published_topics", "myargv"),
-        *("ROSException", "ROSInterruptException", "ROSInitException", "ServiceException"),
-    ),
-    "Publisher": ("publish", "unregister", "get_num_connections"),
-    "Subscriber": ("unregister", "get_num_connections"),
-    "Rate": ("sleep", "remaining"),
-    "Time": ("now", "to_sec", "to_nsec", "secs", "nsecs", "is_zero"),
-    "Duration": ("to_sec", "to_nsec", "secs", "nsecs"),
-    "ServiceProxy": ("wait_for_service", "close"),
-}  # fmt: skip
-"""What a lab's scripts use of rospy (http://docs.ros.org/en/noetic/api/rospy/html/)."""
 
 
 def syntax_hint(fault: Fault) -> str:
@@ -300,7 +271,8 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     if lacking := _lacking(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""
         cause = f"{shown(found.text)}{where}: this grading machine lacks {lacking}"
-        return Ending(cause, install_hint(lacking), (place,) if place else (), of_machine=True)
+        hint = install_hint(lacking, module=_is_module(lacking, package))
+        return Ending(cause, hint, (place,) if place else (), of_machine=True)
     if broken := _broken(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""
         cause = f"{shown(found.text)}{where}: raised by a file of this grading machine, {broken}"
@@ -351,34 +323,9 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     if name and re.search(rf"//.*\b{name[1]}\b", source):
         return "a comment begins with `#` in Python", f"write `{shown(source.replace('//', '#', 1))}`"
     known = next((known for said, known in SLIPS.items() if said in found.message), None)
-    meant = known or _other_name(found, package)
+    meant = known or other_name(found, package)
     frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
     return meant or explain_exception(found.kind, found.message, frame.source, frame.marked)
-
-
-def _other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
-    """A message type, a module, an attribute or an argument that there is none of, and what is meant."""
-    if wrong := _NO_TYPE.match(found.message):
-        return _other_types(wrong[1], wrong[2])
-    if wrong := _NO_ATTRIBUTE.search(found.message):
-        return _other_attributes(package, wrong[1], wrong[2])
-    if wrong := _KEYWORD.search(found.message):
-        near = near_names(wrong[1], KEYWORDS)
-        return (f"it is called {near[0]}", f"write {near[0]}= for {wrong[1]}=") if near else None
-    return _other_module(found.message) if found.kind in IMPORT_ERRORS else None
-
-
-def _other_module(message: str) -> tuple[str, str] | None:
-    """Return where messages come from that are imported from `std_msgs`, or from a package of nearly that name."""
-    if inner := _IN_MODULE.search(message):
-        return f"{inner[2]} is a class in {inner[1]}", f"write `from {inner[1]} import {inner[2]}`"
-    asked, wanted = _NO_MODULE.search(message), _FROM_PACKAGE.search(message)
-    if asked and asked[1] in ROS_2:
-        return f"{asked[1]} is of ROS 2", "this lab is for ROS 1: write the node with rospy"
-    near = near_names(asked[1], noetic_messages()) if asked and asked[1] not in known_packages() else ()
-    if wanted and wanted[1] in noetic_messages().get(wanted[2], ()):
-        near = (wanted[2],)
-    return (f"messages come from {near[0]}.msg", f"write `from {near[0]}.msg import …`") if near else None
 
 
 def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
@@ -465,57 +412,22 @@ def _operand(found: Traceback) -> tuple[str, str] | None:
     )
 
 
-def _other_types(name: str, package: str) -> tuple[str, str] | None:
-    """Return which packages of ROS have the message, or what the one that was asked has that is spelt alike."""
-    having = [other for other, names in noetic_messages().items() if name in names]
-    near = near_names(name, noetic_messages().get(package, ()))
-    if having:
-        lines = join_words([f"from {other}.msg import {name}" for other in having], "or")
-        return f"{package} has no {name}, {join_words(having)} has", lines
-    return (f"{package} has {near[0]}", f"from {package}.msg import {near[0]}") if near else None
-
-
-def _other_attributes(package: PackageFacts, owner: str, wrong: str) -> tuple[str, str] | None:
-    """Return what a message has, or an object of rospy's, in place of an attribute that it has not."""
-    known = ATTRIBUTES.get(owner) or _fields_of(package, owner)
-    if not known:
-        return None
-    if near := near_names(wrong, known):
-        return f"{owner} has {near[0]}", f"write {near[0]} for {wrong}"
-    if owner in ATTRIBUTES:
-        return None
-    listed = join_words(known[:ATTRIBUTES_SHOWN]) + (", …" if len(known) > ATTRIBUTES_SHOWN else "")
-    return f"{owner} has {listed}", f"write the field that you mean for {wrong}"
-
-
-def _fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
-    """Return the fields of a message type, of the student's own or of ROS's, by the name of its class."""
-    for own in (package, *package.also):
-        for one in own.interfaces:
-            stem = one.path.rpartition("/")[2].partition(".")[0]
-            part = name[len(stem) :].lower()
-            fields = tuple(field.name for field in one.fields if field.part == part)
-            if name.startswith(stem) and fields:
-                return fields
-    return next((fields for types in noetic_messages().values() if (fields := types.get(name, ()))), ())
-
-
 def _lacking(found: Traceback, package: PackageFacts) -> str:
     """Return the module that exists and that this machine lacks; "" for a name that is the student's own affair."""
-    match = _NO_MODULE.search(found.message) if found.kind == "ModuleNotFoundError" else None
+    match = NO_MODULE.search(found.message) if found.kind == "ModuleNotFoundError" else None
     # roslib.load_manifest, which rosbuild needed, asks for the ROS package itself
     name = found.message if found.kind == "ResourceNotFound" else match[1] if match else ""
-    own = {
-        package.name,
-        *(one.name for one in package.also),
-        *(f.path.rpartition("/")[2].removesuffix(".py") for f in package.files),
-    }
+    own = own_modules(package)
+    sure = found.kind == "ResourceNotFound" or (bool(found.frames) and found.frames[-1].in_library)
+    known = name in known_packages() or not _is_module(name, package)
+    lacks = exists_somewhere(name, own) and (known or not sure)
+    return name if name and name not in own and lacks else ""
+
+
+def _is_module(name: str, package: PackageFacts) -> bool:
+    """Return whether it is a module of Python, and no package of ROS that messages come from."""
     declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
-    messages = name.endswith(("_msgs", "_srvs")) and not near_names(
-        name, (*known_packages(), *noetic_messages(), *own)
-    )
-    exists = name in known_packages() or name in declared or messages
-    return name if exists and name not in own | ROS_2 else ""
+    return name not in declared and not name.endswith(("_msgs", "_srvs"))
 
 
 def _broken(found: Traceback, package: PackageFacts) -> str:
