@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import os
 import stat
 import struct
@@ -105,7 +106,7 @@ def latest_ms(path: Path) -> float:
     now_ns = time.monotonic_ns()
     whole = len(data) - len(data) % ENTRY.size
     found = [late for at, late in ENTRY.iter_unpack(data[:whole]) if 0 <= now_ns - at < FRESH_S * 1e9]
-    return max((late for late in found if late == late and late >= 0), default=0.0)  # noqa: PLR0124 - not a number
+    return max((late for late in found if not math.isnan(late) and late >= 0), default=0.0)
 
 
 # Who may start now, and who may run alone.
@@ -199,7 +200,10 @@ def _has_room(runs: FileLock) -> bool:
     """Return whether a run that shares this lock finds memory, or no other run shares it. It is held if so."""
     if not runs.take(shared=True):
         return False
-    return available_bytes() > RUN_BYTES or (runs.take() and runs.take(shared=True))
+    if available_bytes() > RUN_BYTES:
+        return True
+    is_alone = runs.take()  # this lock alone is granted only where no other run shares it
+    return is_alone and runs.take(shared=True)
 
 
 async def _until(look: Callable[[], T], patience_s: float) -> T:

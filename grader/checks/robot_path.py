@@ -152,7 +152,7 @@ def _strays_late(course: Course, way: Way) -> bool:
 def _why_late(late: Lateness) -> str:
     if not (late.full or late.max_ms >= LATE_MS or late.p95_ms >= LATE_P95_MS):
         return ""
-    return "busy" if late.full else f"late itself, by up to {late.max_ms:.0f} ms"
+    return late.reason
 
 
 def _in_degrees(run: Run) -> Words | None:

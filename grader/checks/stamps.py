@@ -236,7 +236,7 @@ def _far(run: Run, found: Sequence[Stamp], params: StampsParams) -> Verdict | No
     def why(late: Lateness) -> str:
         if not (late.full or late.max_ms / 1e3 * run.warp >= params.within_s / 2):
             return ""
-        return "busy" if late.full else f"late itself, by up to {late.max_ms:.0f} ms"
+        return late.reason
 
     return excused(verdict.once(), run, found[0].time_ns, found[-1].time_ns, why)
 

@@ -10,15 +10,12 @@ from rich.console import RenderableType
 
 from grader.cli.output import report, say, say_document
 from grader.errors import ExitCode, GraderError
-from grader.judging.summary import overall_status, reached_pass_mark
+from grader.judging.summary import overall_status, reached_pass_mark, scaled_pass_mark
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.files import result_text
 from grader.report.terminal import open_console, print_report
 from grader.rubric.model import Rubric
-
-EXACT_DIGITS = 6
-"""More digits than points have, and fewer than rounding errors show in."""
 
 
 def exit_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
@@ -55,10 +52,8 @@ def judged_criteria(criteria: Iterable[CriterionResult]) -> tuple[CriterionResul
 
 def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric:
     """Return the rubric with its pass mark scaled from all points to those that are shown."""
-    if rubric.pass_mark is None:
-        return rubric
-    share = sum(c.max_points for c in shown) / (rubric.max_points or 1.0)
-    return rubric.model_copy(update={"pass_mark": round(rubric.pass_mark * share, EXACT_DIGITS)})
+    points = sum(c.max_points for c in shown)
+    return rubric.model_copy(update={"pass_mark": scaled_pass_mark(rubric, points)})
 
 
 REPORT = "report.html"

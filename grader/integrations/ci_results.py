@@ -13,6 +13,7 @@ from pathlib import Path
 
 from grader.errors import ExitCode, GraderError, OutputError, PackageNotFound, SubmissionError
 from grader.files import atomic_write, make_folder
+from grader.judging.summary import scaled_pass_mark
 from grader.model.result import GradingResult
 from grader.report.forms import FORMS, ReportInput
 from grader.report.markdown import render_markdown
@@ -115,9 +116,9 @@ def describe_outcome(
 
 def points_to_pass(rubric: Rubric, points: float) -> str:
     """Return what it takes to pass, out of the `points` that are counted."""
-    if rubric.pass_mark is None:
+    needed = scaled_pass_mark(rubric, points)
+    if needed is None:
         return "to pass, every visible criterion has to be met"
-    needed = rubric.pass_mark * points / (rubric.max_points or 1)
     return f"to pass, it takes {number(needed)}"
 
 
@@ -126,10 +127,8 @@ def summarize(graded: Graded) -> str:
     if graded.counted is graded.result:
         report = graded.folder / "report.md"
         return report.read_text(encoding="utf-8") if report.is_file() else ""
-    mark, rubric = graded.rubric.pass_mark, graded.rubric
-    if mark is not None:
-        share = graded.counted.max_points / (rubric.max_points or 1)
-        rubric = rubric.model_copy(update={"pass_mark": mark * share})
+    mark = scaled_pass_mark(graded.rubric, graded.counted.max_points)
+    rubric = graded.rubric.model_copy(update={"pass_mark": mark})
     return render_markdown(graded.counted, rubric, hidden=len(hidden_ids(rubric)))
 
 

@@ -34,6 +34,8 @@ KINDS = ("refused", "limit")
 NOTES_MAX = 20
 TEXT_CHARS = 300
 ACTOR_CHARS = 100
+EXACT_DIGITS = 6
+"""More digits than points have, and fewer than rounding errors show in."""
 NOTHING_RUN = "nothing was run"
 """In place of a sandbox's name."""
 
@@ -138,6 +140,13 @@ def overall_status(results: Sequence[CriterionResult]) -> Literal["graded", "inc
     if not counting or any(r.status is Status.ERROR for r in counting):
         return "error"
     return "inconclusive" if any(r.status.is_open for r in counting) else "graded"
+
+
+def scaled_pass_mark(rubric: Rubric, points: float) -> float | None:
+    """Return the rubric's pass mark in proportion to the `points` that are counted; None where it has none."""
+    if rubric.pass_mark is None:
+        return None
+    return round(rubric.pass_mark * points / (rubric.max_points or 1.0), EXACT_DIGITS)
 
 
 def reached_pass_mark(rubric: Rubric, results: Sequence[CriterionResult]) -> bool:

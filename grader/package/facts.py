@@ -148,7 +148,7 @@ def _text_facts(
         "shebang": shebang,
         "shebang_problem": problem if script and (not binary or suffix in _SCRIPTS) else "",
         "crlf": b"\r\n" in data and not binary,
-        "bom": data.startswith(b"\xef\xbb\xbf") or utf16,
+        "bom": data.startswith(_BOM) or utf16,
         "encoding": _encoding(data, python=python),
         "binary": binary,
         "python": python,
@@ -159,7 +159,7 @@ def _encoding(data: bytes, *, python: bool) -> str:
     """Return the encoding that a reader would use: of Python by PEP 263, `unknown-8bit` for what is not UTF-8."""
     if data.startswith(_UTF16):
         return "utf-16"
-    name = "utf-8-sig" if data.startswith(b"\xef\xbb\xbf") else "utf-8"
+    name = "utf-8-sig" if data.startswith(_BOM) else "utf-8"
     try:
         if python:
             name, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
@@ -180,9 +180,7 @@ def on_system(program: str) -> bool:
     return shutil.which(program, path=SYSTEM_PATH) is not None
 
 
-def read_shebang(
-    data: bytes, interpreters: Callable[[str], bool] | None = None
-) -> tuple[Shebang | None, str]:
+def read_shebang(data: bytes, interpreters: Interpreters | None = None) -> tuple[Shebang | None, str]:
     """Return the shebang of a file that begins with `data`, and why the system cannot use it ("" where it can).
 
     `interpreters` is asked for absolute paths and names behind `env`; `python` and `python3` are always

@@ -215,9 +215,5 @@ def explain(message: str, root: etree._Element) -> tuple[int | None, str]:
 def _line_of(root: etree._Element, tags: str) -> int | None:
     """Return the line of the last element with one of the tags: where a tag stands twice, the second is too much."""
     wanted = tags.split(", ")
-    lines = [
-        line_of(element)
-        for element in root
-        if isinstance(element.tag, str) and etree.QName(element).localname in wanted
-    ]
+    lines = [line_of(element) for tag, element in _elements(root) if tag in wanted]
     return lines[-1] if lines else None

@@ -191,6 +191,11 @@ class Lateness(NamedTuple):
         return (self.busy or 0.0) >= FULL
 
     @property
+    def reason(self) -> str:
+        """What was the matter with the machine: `busy`, or `late itself, by up to 80 ms`."""
+        return "busy" if self.full else f"late itself, by up to {self.max_ms:.0f} ms"
+
+    @property
     def described(self) -> str:
         """`machine 97 % busy (by this run alone: 95 %) and late by 3 ms, calibration 9.97 Hz`."""
         share = self.own or 0.0
@@ -244,7 +249,7 @@ def why_late(late: Lateness) -> str:
     """Return what the machine was where it was late enough to delay an answer; "" where it was not."""
     if not (late.full or late.max_ms >= LATE_MS):
         return ""
-    return "busy" if late.full else f"late itself, by up to {late.max_ms:.0f} ms"
+    return late.reason
 
 
 class _Window(NamedTuple):

@@ -183,12 +183,9 @@ def explain_by_unread_parameter(
     unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
     if not unexplained or not isinstance(run, Run) or early_end(run):
         return verdict
-    asked = [
-        (e.actor, absolute_name(e.topic or ""))
-        for _, e in run.actors
-        if e.action == "read" and run.is_student_node(e.actor)
-    ]
-    names = {name for _, name in asked}
+    reads = [(e.actor, absolute_name(e.topic or "")) for _, e in run.actors if e.action == "read"]
+    names = {name for _, name in reads}  # a program of the grader's reads some of them itself
+    asked = [(node, name) for node, name in reads if run.is_student_node(node)]
     unread = [
         one
         for name, one in params_given(run).items()

@@ -147,8 +147,11 @@ def _not_advertised(package: PackageFacts, run: Run, topic: str, of_node: Callab
         verdict = of_node(f"{what}: {slip.message}", measured=measured, hint=_reach_hint(slip))
         return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
     hint = f"add {publisher(topic)} and publish in the loop"
-    other = f", or rename {join_words(published, 'or')} if that is meant to be it" if published else ""
-    return of_node(f"{what}: no node publishes on it", measured=measured, hint=f"{hint}{other}")
+    if not published:
+        return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
+    hint += f", or rename {join_words(published, 'or')} if that is meant to be it"
+    verdict = of_node(f"{what}; the node publishes on {join_words(published)}", measured=measured, hint=hint)
+    return verdict.about(citations=named_at(package, run, "publisher", next(iter(published))))
 
 
 def _with_others(absent: Verdict, published: Collection[str]) -> Verdict:
