@@ -25,6 +25,7 @@ NAMES = (
     "one",
     "peers",
     "faulty",
+    "scenarios",
     "against",
     "hundred",
     "judging",

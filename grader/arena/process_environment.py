@@ -212,18 +212,26 @@ class ProcessEnvironment:
         found = (f"{path.parent.parent.name}/{path.stem}" for path in islice(files, SERVICE_TYPES_MAX))
         return tuple(dict.fromkeys(found))
 
-    def has_line(self, pattern: re.Pattern[bytes], script: str | None = None) -> bool:
-        """Return whether a script or a source file of the lab's packages has it, or this script of theirs."""
+    def has_line(
+        self,
+        pattern: re.Pattern[bytes],
+        script: str | None = None,
+        *,
+        programs: re.Pattern[bytes] | None = None,
+    ) -> bool:
+        """Return whether a script or a source file of the lab's packages has it, or this script of theirs; with
+        `programs`, this one or a file that has nothing like that and may be imported."""
         packages = (self.workspace, *self.workspace.others.values())
         folders = [one.repaired / one.folder for one in packages]
-        if script is None:
-            found = (
-                path for folder in folders for path in folder.rglob("*") if path.suffix in SOURCE_ENDINGS
-            )
-        else:
-            found = (folder / script for folder in folders)
-        files = [path for path in islice(found, SOURCES_MAX) if path.is_file()]
-        return any(pattern.search(read_untrusted(path, SOURCE_BYTES_MAX) or b"") for path in files)
+        own = [folder / script for folder in folders] if script is not None else []
+        found = (path for folder in folders for path in folder.rglob("*") if path.suffix in SOURCE_ENDINGS)
+        files = own if script is not None and programs is None else [*own, *islice(found, SOURCES_MAX)]
+        texts = ((path, read_untrusted(path, SOURCE_BYTES_MAX) or b"") for path in files if path.is_file())
+        return any(
+            pattern.search(text)
+            for path, text in texts
+            if programs is None or path in own or not programs.search(text)
+        )
 
     def package_file(self, file: str) -> Path | None:
         """Return where a file of the package is on disk, found as `script_path` finds it."""

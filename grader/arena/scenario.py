@@ -12,8 +12,8 @@ from itertools import count
 from pathlib import Path
 
 from grader.arena.admission import Admission, Leave
+from grader.arena.outcome import describe_wait, find_outcome, next_look_s, waits
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.run_state import describe_wait, find_outcome, next_look_s, waits
 from grader.arena.sandbox_files import FUNCTIONS, ROSTESTS
 from grader.arena.scenario_inputs import OVER, make_shots, settings
 from grader.arena.session import ArenaSession
@@ -28,6 +28,12 @@ from grader.rubric.scenario import Param, Scenario, Start
 
 NAPS = re.compile(rb"\bsleep\(\s*[^)\s]|Timer\(")
 """A sleep of so many seconds, `rospy.sleep(0.5)` and not `rate.sleep()`, or a timer."""
+PUBLISHES = re.compile(
+    rb"^[^#\n]*?(?:publish(?!er)|sendTransform|send_goal|set_succeeded|set_aborted)", re.MULTILINE
+)
+"""A line that sends a message, or may."""
+PUBLISHER = re.compile(rb"(?:Publisher|Broadcaster)\(|\.advertise\s*<")
+PROGRAM = re.compile(rb"\binit_node\s*\(|\bros::init\s*\(")
 GIVES_UP = re.compile(rb"[wW]ait_?[fF]or_?[sS]erv(?:er|ice)\([^)\n]*(?:,|timeout|Duration|\b\d)")
 """A wait for a service or an action's server that ends without it."""
 ENDLESS = rb"(?:True|1|not\s+(?:rospy\.)?is_shutdown\(\))"
@@ -128,7 +134,13 @@ def _tell_what_is_known(
     if not place.has_line(GIVES_UP):
         session.live.serves = frozenset(one.service or one.action or "" for one in scenario.serves)
     session.live.naps = place.has_line(NAPS)
+    scripts = {spec["name"]: spec["script"] for _, spec in starts if spec["script"] is not None}
     session.live.endless = frozenset(s["name"] for _, s in starts if place.has_line(IDLE, s["script"]))
+    session.live.mute = frozenset(
+        name
+        for name, path in scripts.items()
+        if place.has_line(PUBLISHER, path) and not place.has_line(PUBLISHES, path, programs=PROGRAM)
+    )
     session.live.least_s = max(watched_s + WATCHED_MORE_S, expected_s(scenario) - STARTING_S)
 
 

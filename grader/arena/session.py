@@ -9,7 +9,7 @@ import signal
 import struct
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +21,7 @@ from grader.arena.control_groups import remove_groups
 from grader.arena.left_files import LeftFiles
 from grader.arena.process_environment import LOOPBACK, ProcessEnvironment, search_path
 from grader.arena.ros.wire import Frame, FrameReader
-from grader.arena.run_state import RunState, computes
+from grader.arena.run_state import ROSOUT, RunState, all_compute
 from grader.errors import ArenaError
 from grader.evidence.events import OTHER_TYPE, STOPPED, TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
 from grader.evidence.run import is_grader_node
@@ -29,14 +29,14 @@ from grader.evidence.writer import EvidenceChannel, EvidenceWriter
 from grader.ros_env import RosInstallation
 
 ARENA = Path(__file__).parent / "ros"
-CLOCK, ROSOUT_TOPIC = "/clock", "/rosout"
+CLOCK = "/clock"
 TIME = struct.Struct("<II")
 WATCHED_MAX = 20
 NS = 1_000_000_000
 READY_S = 15.0
 END_S = 5.0
 GROUPS_S, LOOK_S = 2.0, 0.02
-STUCK_S = 1.0
+STUCK_S = 0.5
 """So long a call is waited for at least, though the programs only compute."""
 PORT = 11311
 """Begins the details of limits for which a process is ended (`ros/processes.py`)."""
@@ -169,9 +169,10 @@ class ArenaSession:
         number = self._calls
         self.send(do="call", id=number, timeout_s=timeout_s, **command)
         begun_s = time.monotonic()
+        patient_s = begun_s - self.live.lost_s + STUCK_S
 
         def is_over() -> bool:
-            stuck = time.monotonic() > begun_s + STUCK_S and computes(self.live)
+            stuck = time.monotonic() - self.live.lost_s > patient_s and all_compute(self.live)
             return number in self._answers or stuck
 
         if not await self.wait(is_over, timeout_s + END_S) or number not in self._answers:
@@ -260,7 +261,7 @@ class ArenaSession:
             self._clock_ns = secs * NS + nsecs
         if frame.datas and not is_grader_node(channel.callerid):
             own = channel.callerid not in self.live.helper_nodes
-            if channel.topic != ROSOUT_TOPIC:
+            if channel.topic != ROSOUT:
                 self.live.talking.setdefault(channel.callerid, time.monotonic())
             if channel.topic in self._watched:
                 self._watched[channel.topic].extend(frame.datas)
@@ -276,8 +277,8 @@ class ArenaSession:
             picture = {key: value for key, value in record.items() if key != "connections"}
             self.live.note_graph(nodes, record["processes"], time.monotonic(), picture=picture)
             self.live.services = set(record["services"])
-            self.live.published = {t for t, by in record["publishers"].items() if set(by) & set(nodes)}
-            self.live.listened = {t for t, by in record["subscribers"].items() if set(by) & set(nodes)}
+            self.live.published = _of(nodes, record["publishers"])
+            self.live.listened = _of(nodes, record["subscribers"])
         elif topic == "/grader/console":
             self._print(**record)
         elif topic == "/grader/process" and record["event"] == "exit":
@@ -308,7 +309,7 @@ class ArenaSession:
         if stream == "stdout" and process in self._printed:
             self._printed[process].append(line)
         if process in self.live.running | self.live.ended:
-            self.live.note_line(line, time.monotonic())
+            self.live.note_line(line, time.monotonic(), process)
 
     def _note_exit(self, record: dict[str, Any]) -> None:
         name = record["name"]
@@ -438,3 +439,9 @@ def _available() -> float:
     """Return the part of this machine's memory that is available."""
     memory = read_numbers(MEMINFO)
     return memory.get("MemAvailable", 0) / memory.get("MemTotal", 1)
+
+
+def _of(nodes: list[str], topics: Mapping[str, list[str]]) -> dict[str, set[str]]:
+    """Return which of these nodes each topic has; topics that have none of them are left out."""
+    found = {topic: {*callers} & {*nodes} for topic, callers in topics.items()}
+    return {topic: own for topic, own in found.items() if own}

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 Tell = Callable[[str], None]
 ANSWER_S = 10.0
 SUBSCRIBE_S = 6.0
-REFUSED_S = 1.0
+REFUSED_S, UNANSWERED_S = 1.0, 0.5
 """So long a node that asks for a topic of the grader's by another type may yet do something else."""
 CTRL_C_S = 5.0
 LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
@@ -376,9 +376,7 @@ class StepRunner:
         self._tell(f"waiting for {name}")
         limit_s = wait.limit_s or (min(SUBSCRIBE_S, patience_s) if name in self._in_vain else patience_s)
         if self._deaf and self._deaf <= live.refused and not live.topics[name].count:
-            limit_s = min(
-                limit_s, REFUSED_S
-            )  # the node's type is another, so it hears nothing that it could answer
+            limit_s = min(limit_s, UNANSWERED_S)  # the node's type is another: it hears nothing to answer
         wanted = wait.messages + (live.topics[name].count if wait.new else 0)
 
         def is_there() -> bool:

@@ -381,14 +381,16 @@ class Until(Record):
 
     What cannot come is given up sooner: once all processes are nodes that only wait, loop or compute, and nothing in
     the graph has changed for 1.5 to 4 s. A topic on which a node only waits for callbacks stays silent then, and after
-    `silent_s` one of a node that loops, unless `first_message_s` is more than 20. `alive_s`, silence and `quiet_s` do
-    not count while a process may still become a node: until it is one, or `silent_s` after its start. Where others
-    fill the machine, this, `first_message_s` and `limit_s` are longer by what they take.
+    `silent_s` one of a node that loops and whose script publishes, unless `first_message_s` is more than 20.
+    `alive_s`, silence and `quiet_s` do not count while a process may still become a node: until it is one, or
+    `silent_s` after its start. Where others fill the machine, this, `first_message_s` and `limit_s` are longer by what
+    they take.
     """
 
     window_s: Seconds | None = None
     """That long after the first message on every topic of `topics`, or until the rates that are judged there are
-    clear. A topic that stays silent is waited for until `silent_s` after the first message on another."""
+    clear. A topic that stays silent is waited for until `silent_s` after the first message on another, and twice as
+    long while messages come to a node of the student's: it may collect many before it publishes."""
     topics: tuple[str, ...] = ()
     """The topics of `window_s`, with their slash."""
     messages: Annotated[dict[str, int], Field(default_factory=dict)]

@@ -7,15 +7,8 @@ from itertools import accumulate
 
 import pytest
 
-from grader.arena.run_state import (
-    RunState,
-    computes,
-    describe_wait,
-    find_outcome,
-    is_settled,
-    is_silent,
-    next_look_s,
-)
+from grader.arena.outcome import describe_wait, find_outcome, next_look_s
+from grader.arena.run_state import RunState, all_compute, is_settled, is_silent
 from grader.model.message_rate import RateBounds
 from grader.rubric.scenario import Until
 
@@ -338,7 +331,7 @@ def test_what_never_comes_ends_the_wait_once_the_graph_has_settled(
     until: Until, published: set[str], outcome: str | None
 ) -> None:
     live = _resting(node=("spins", 1))
-    live.published = published
+    live.published = {topic: {"/node"} for topic in published}
     assert find_outcome(live, until, 3.0) is None
     assert find_outcome(live, until, 5.0) == (outcome and ("silent", outcome))
 
@@ -424,7 +417,7 @@ def test_a_topic_stays_silent_when_its_programs_do_nothing_for_it(
     rest: str, messages: int, until: Until, silent_s: float | None
 ) -> None:
     live = _resting(node=(rest, 1))
-    live.published = {"/a"}
+    live.published = {"/a": {"/node"}}
     if messages:
         seen = live.topics["/a"]
         seen.count, seen.first_s, seen.last_s = messages, 1.6, 1.6 + 0.1 * (messages - 1)
@@ -436,20 +429,48 @@ def test_a_topic_stays_silent_when_its_programs_do_nothing_for_it(
 
 def test_who_hears_messages_may_yet_answer() -> None:
     live, until = _resting(node=("spins", 1)), Until(messages={"/a": 10})
-    live.published, live.listened = {"/a"}, {"/pose"}
+    live.published, live.listened = {"/a": {"/node"}}, {"/pose": {"/node"}}
     live.note_messages("/pose", 1, 20.0, active=False)
     assert not is_silent(live, ("/a",), until, 21.4)
     ends = Until(ended=("node",), silent_s=60)
     assert find_outcome(live, ends, 21.4) is None
     assert find_outcome(live, ends, 21.6) == ("silent", "the graph has settled")
     live.sent_s = 21.0  # the grader's own
-    assert not is_silent(live, ("/a",), until, 22.4)
-    assert is_silent(live, ("/a",), until, 22.6)
+    assert not is_silent(live, ("/a",), until, 21.9)
+    assert is_silent(live, ("/a",), until, 22.1)
+
+
+def test_who_is_sent_messages_may_collect_many_before_it_publishes() -> None:
+    live, until = _live(raw=(80, 1.0, 9.0)), Until(messages={"/a": 1})
+    assert find_outcome(live, until, 7.1) == ("silent", "no message on /a for 6 s")
+    live.listened, live.owners = {"/raw": {"/node"}}, {"/node": "node"}
+    assert find_outcome(live, until, 9.1) is None
+    live.note_line("[ERROR] [17.5]: bad callback: <function callback at 0x7f>", 9.0, "node")
+    assert find_outcome(live, until, 9.1) == ("silent", "no message on /a for 6 s")
+    live.raised_s.clear()
+    live.note_messages("/raw", 40, 13.0, active=True)
+    assert find_outcome(live, until, 13.1) == ("silent", "no message on /a for 12 s")
+    live.note_messages("/a", 1, 13.1, active=True)
+    assert find_outcome(live, until, 13.1) == ("complete", "")
+
+
+def test_a_loop_in_which_nothing_publishes_is_not_waited_for() -> None:
+    live, until = _resting(node=("loops", 1)), Until(messages={"/a": 10})
+    live.published = {"/rosout": {"/node"}}
+    live.mute = frozenset({"node"})
+    assert not is_settled(live, 5.9)  # it may yet register something
+    live.published["/a"] = {"/node"}
+    assert find_outcome(live, until, 4.4) is None
+    assert find_outcome(live, until, 4.6) == ("silent", "the graph has settled, without /a")
+    live.note_line("publishing 1", 4.5)  # it only says so
+    assert find_outcome(live, until, 4.6) == ("silent", "the graph has settled, without /a")
+    live.mute = frozenset()
+    assert find_outcome(live, until, 7.9) is None
 
 
 def test_a_simulator_that_has_not_begun_is_waited_for() -> None:
     live, until = _resting(node=("spins", 1)), Until(messages={"/a": 10})
-    live.published = {"/a"}
+    live.published = {"/a": {"/node"}}
     live.note_start("world", 0.0, helper=True)
     live.note_graph(["/node", "/world"], {"/node": "node", "/world": "world"}, 2.0)
     assert not is_silent(live, ("/a",), until, 19.0)
@@ -474,9 +495,10 @@ def test_who_looks_for_what_nobody_offers_is_not_waited_for(
     live, until = _resting(node=("loops", 1)), Until(ended=("node",))
     live.serves = frozenset({"/add", "/count"})
     live.sought["/node"] = sought
-    live.published = {f"{goal}/goal", f"{goal}/cancel"} if goal else {"/goal"}
-    assert find_outcome(live, until, 2.9) is None
-    assert find_outcome(live, until, 3.1) == (("silent", "the graph has settled") if in_vain else None)
+    topics = (f"{goal}/goal", f"{goal}/cancel") if goal else ("/goal",)
+    live.published = {topic: {"/node"} for topic in topics}
+    assert find_outcome(live, until, 2.2) is None
+    assert find_outcome(live, until, 2.3) == (("silent", "the graph has settled") if in_vain else None)
 
 
 def test_nothing_is_settled_while_the_grader_works_on_an_answer() -> None:
@@ -484,14 +506,14 @@ def test_nothing_is_settled_while_the_grader_works_on_an_answer() -> None:
     live.answers_s = math.inf
     assert not is_settled(live, 60.0)
     live.answers_s = 60.0
-    assert not is_settled(live, 61.4)
-    assert is_settled(live, 61.6)
+    assert not is_settled(live, 60.9)
+    assert is_settled(live, 61.1)
 
 
 def test_a_call_is_given_up_where_all_programs_compute() -> None:
-    assert computes(_resting(node=("stuck", 1)))
-    assert not computes(_resting(node=("stuck", 1), other=("spins", 1)))
-    assert not computes(RunState())
+    assert all_compute(_resting(node=("stuck", 1)))
+    assert not all_compute(_resting(node=("stuck", 1), other=("spins", 1)))
+    assert not all_compute(RunState())
 
 
 def test_a_rate_on_another_topic_has_its_window_too() -> None:

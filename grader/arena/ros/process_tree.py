@@ -131,14 +131,14 @@ def resident_bytes(pid):
         return 0
 
 
-LOOK_S, LOOK_RARELY_S = 0.25, 2.0
+LOOK_S, LOOK_OFTEN_S, LOOK_RARELY_S = 0.25, 0.1, 2.0
 PROGRAMS_MAX, THREADS_MAX = 30, 200
 """Past these, a tree is not looked at closely and counts as busy."""
 ASLEEP_S = 0.8
 """`rospy.spin()` wakes every 0.5 s."""
 WORKING = 0.4
 SPIN_HZ = 3.2
-COMPUTES_S, STUCK_S = 1.0, 5.0
+COMPUTES_S, STUCK_S = 0.6, 5.0
 """CPU seconds in one stretch, without new memory: so many, and a program computes; so many, and it does only that."""
 GROWS = 25
 """A program that touches more pages of new memory than these from look to look imports or loads something."""
@@ -218,9 +218,11 @@ KINDS = (None, "computes", "stuck", "loops", "spins")
 
 
 class TreeRest:
-    """The same of a tree: of all its programs. Shells that wait for the program that they started do not count."""
+    """The same of a tree: of all its programs. Shells that wait for the program that they started do not count.
+    `computed_s` is that of the program that has computed longest."""
 
     def __init__(self):
+        self.computed_s = 0.0
         self._programs = {}
 
     def look(self, pids, now_s):
@@ -232,6 +234,7 @@ class TreeRest:
         self._programs = {pid: self._programs.get(pid) or Rest(pid, now_s) for pid in pids}
         for pid, program in self._programs.items():
             program.look(now_s, *seen[pid][1:])
+        self.computed_s = max((program.computed_s for program in self._programs.values()), default=0.0)
         parents = {parent for parent, _, _ in seen.values()}
         last = [pid for pid in pids if pid not in parents]
         above = [p for pid, p in self._programs.items() if pid in parents]

@@ -9,6 +9,7 @@ import time
 from launching import launch
 from left_files import left_files
 from process_tree import (
+    LOOK_OFTEN_S,
     LOOK_RARELY_S,
     LOOK_S,
     MAPS_MAX,
@@ -22,6 +23,9 @@ from process_tree import (
 )
 
 WATCH_S = 0.5
+ENDS_COMPUTING_S, STILL_COMPUTES_S = 1.0, 0.2
+"""A program that computes for so many CPU seconds behind a signal will not end by it: the second, where it did so
+before."""
 WORDS_BYTES = 200
 INFO_BYTES_MAX = 4096
 LINE_BYTES_MAX = 4096
@@ -64,7 +68,7 @@ class Process:
         self._spawn(spec)
         self._event("start", argv=spec["argv"], script=spec["script"], repairs=spec["repairs"])
         loop.call_later(WATCH_S, self._watch)
-        self._rest, self._rest_told = TreeRest(), None
+        self._rest, self._rest_told, self._ends_within_s = TreeRest(), (None, 0), 0.0
         if self.role == "student":
             loop.call_later(LOOK_S, self._look)
 
@@ -74,7 +78,8 @@ class Process:
         if not self.alive:
             return
         self._stopped_by = "INT"
-        self._rest = TreeRest()
+        computed = self._rest_told[0] in ("computes", "stuck")
+        self._rest, self._ends_within_s = TreeRest(), STILL_COMPUTES_S if computed else ENDS_COMPUTING_S
         self._signal_group(signal.SIGINT)
         self.loop.call_later(int_s, lambda: self._escalate("TERM", signal.SIGTERM))
         self.loop.call_later(int_s + term_s, self.kill)
@@ -186,7 +191,7 @@ class Process:
     def _escalate(self, name, number):
         if self.alive and self._stopped_by != "KILL":
             self._stopped_by = name
-            self._rest = TreeRest()
+            self._rest, self._ends_within_s = TreeRest(), STILL_COMPUTES_S
             for pid in self._tree():
                 _kill(pid, number)
 
@@ -235,7 +240,7 @@ class Process:
             return
         tree = self._tree() if self._entered else []
         found = self._rest.look(tree, time.monotonic())
-        if self._stopped_by is not None and found[0] in ("computes", "stuck"):
+        if self._stopped_by is not None and self._rest.computed_s > self._ends_within_s:
             if self._stopped_by == "INT":
                 self._escalate("TERM", signal.SIGTERM)
             else:
@@ -244,7 +249,8 @@ class Process:
             self._rest_told = found
             rest, programs = found
             self._wire.status("rest", name=self.name, rest=rest, programs=programs)
-        self.loop.call_later(LOOK_S if len(tree) <= PROGRAMS_MAX else LOOK_RARELY_S, self._look)
+        look_s = LOOK_S if self._stopped_by is None else LOOK_OFTEN_S
+        self.loop.call_later(look_s if len(tree) <= PROGRAMS_MAX else LOOK_RARELY_S, self._look)
 
     def _excess(self, tree):
         """Return what the tree has too much of, in words, or None."""

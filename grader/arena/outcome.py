@@ -1,0 +1,276 @@
+"""Whether a run has seen enough: pure, worked out from what has been seen of it so far."""
+
+from __future__ import annotations
+
+import math
+
+from grader.arena.run_state import (
+    ROSOUT,
+    RunState,
+    TopicSeen,
+    computes,
+    goes_on,
+    is_fed,
+    is_settled,
+    is_silent,
+)
+from grader.rubric.scenario import Until
+
+Outcome = tuple[str, str]
+HEARD_S, HEARD_LOST_S_MAX = 2.0, 6.0
+CONNECTED_S = 1.0
+"""So long after the last probe and the last line, a value that is not printed will not be."""
+FED = 2.0
+"""A topic whose nodes are sent messages has so many times as long for its first."""
+HEARD_AT_MOST_S = 8.0
+"""So long after the last probe and the last value that was heard, whatever else is printed."""
+
+
+def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
+    """Return (outcome, detail) once the run has seen enough or has to give up, else None.
+
+    `silent`: what was waited for stopped coming, or never came though the nodes were up.
+    """
+    given, until = until, _patient(live, until)
+    starting = _is_starting(live, until, now_s)
+    enough = (not starting, *_enough(live, until, now_s))
+    if live.ended and not live.running:
+        return "complete" if until.ended and all(enough) else "ended", ""
+    if waits(until):
+        if all(enough):
+            return "complete", ""
+    elif now_s - live.started_s > until.limit_s:
+        return "complete", f"watched for {until.limit_s:g} s"
+    silent = "" if starting else _silent(live, until, now_s) or _never(live, until, given, now_s)
+    silent = silent or _in_namespaces(live, until, now_s)
+    if silent:
+        return "silent", silent
+    if now_s - live.started_s > until.limit_s:
+        return "timeout", f"not complete after {until.limit_s:g} s"
+    return None
+
+
+def _enough(live: RunState, until: Until, now_s: float) -> tuple[bool, ...]:
+    return (
+        _window(live, until, now_s),
+        _messages(live, until),
+        _are_connected(live, until, now_s),
+        _has_heard(live, until, now_s),
+        _nodes(live, until, now_s),
+        _quiet(live, until, now_s),
+    )
+
+
+def _patient(live: RunState, until: Until) -> Until:
+    """Return `until` with more patience for processes to which others left little of the machine."""
+    more_s = round(live.lost_s - live.lost_before_s)
+    if not more_s:
+        return until
+    limit_s = until.limit_s + more_s if waits(until) else until.limit_s
+    return until.model_copy(update={"first_message_s": until.first_message_s + more_s, "limit_s": limit_s})
+
+
+def waits(until: Until) -> bool:
+    """Return whether anything ends the run before its limit."""
+    lasting = (until.window_s, until.alive_s, until.quiet_s)
+    seen = (until.messages, until.connected, until.heard, until.nodes, until.opened, until.ended)
+    return any(seconds is not None for seconds in lasting) or any(seen)
+
+
+def describe_wait(live: RunState, until: Until) -> str:
+    """Return in a few words what the run still waits for."""
+    missing = [t for t in (*until.topics, *until.messages) if not live.topics[t].count]
+    if missing:
+        return f"waiting for the first message on {missing[0]}"
+    for topic, wanted in until.messages.items():
+        if live.topics[topic].count < wanted:
+            return f"{live.topics[topic].count} of {wanted} messages on {topic}"
+    if not set(until.connected) <= set(live.connected_s):
+        return f"waiting for a connection over {', '.join(until.connected)}"
+    if len(live.nodes) < until.nodes:
+        return f"{len(live.nodes)} of {until.nodes} nodes are up"
+    return "observing"
+
+
+def next_look_s(live: RunState, until: Until, now_s: float) -> float:
+    """Return how long nothing can change by time alone."""
+    until = _patient(live, until)
+    looks = [live.started_s + until.limit_s, live.started_s + until.first_message_s]
+    looks += [_starts_until_s(live, until)]
+    for seen in live.topics.values():
+        looks += [
+            seen.first_s + (until.window_s or 0),
+            seen.last_s + until.silent_s,
+            seen.first_s + until.silent_s,
+        ]
+    looks += [live.graph_changed_s + max(until.silent_s, until.first_message_s)]
+    looks += [max(live.last_line_s, live.last_sent_s) + HEARD_S]
+    looks += [max(live.last_sent_s, live.last_heard_s) + HEARD_AT_MOST_S]
+    looks += [live.activity_s + (until.quiet_s or 0), live.news_s + until.silent_s]
+    looks += [_lived_s(live, until.alive_s or 0)]
+    ahead = [look - now_s for look in looks if look > now_s]
+    return min([*ahead, 1.0]) + 0.001
+
+
+def _talking(live: RunState) -> list[TopicSeen]:
+    """Return the topics with messages; log messages do not count, as they say nothing of what else may come."""
+    return [seen for topic, seen in live.topics.items() if seen.count and topic != ROSOUT]
+
+
+def _window(live: RunState, until: Until, now_s: float) -> bool:
+    if until.window_s is None:
+        return True
+    topics = until.topics or tuple(live.topics)
+    if until.topics:  # others whose rates are judged have their window too, once they are there
+        topics = (
+            *topics,
+            *(t for t in live.rates if t not in topics and t in live.topics and live.topics[t].count),
+        )
+    seen = [live.topics[t] for t in topics if live.topics[t].count]
+    if not seen:
+        return _talks_elsewhere(live, until, now_s)
+    if until.topics and _rates_are_clear(live, topics):
+        return True
+    if len(seen) == len(topics):
+        return now_s >= max(s.first_s for s in seen) + until.window_s
+    return now_s >= max(s.first_s for s in seen) + max(until.window_s, _late_s(live, until, now_s))
+
+
+def _talks_elsewhere(live: RunState, until: Until, now_s: float) -> bool:
+    """Whether the nodes have talked for so long on topics that are not waited for that no more will come of them."""
+    first_s = min((seen.first_s for seen in _talking(live)), default=now_s)
+    return now_s > first_s + max(until.window_s or 0, _late_s(live, until, now_s))
+
+
+def _late_s(live: RunState, until: Until, now_s: float) -> float:
+    """Return how long after the first message on another topic a topic may yet have its first: a node that is sent
+    messages may collect many before it publishes."""
+    return FED * until.silent_s if is_fed(live, now_s) else until.silent_s
+
+
+def _rates_are_clear(live: RunState, topics: tuple[str, ...]) -> bool:
+    """Return whether each topic is there to show a rate, and its rate is known well enough."""
+    return bool(topics) and all(
+        topic in live.rates
+        and all(bounds.decided_by(live.arrivals_ns[topic]) for bounds in live.rates[topic])
+        for topic in topics
+    )
+
+
+def _messages(live: RunState, until: Until) -> bool:
+    return all(live.topics[topic].count >= count for topic, count in until.messages.items())
+
+
+def _are_connected(live: RunState, until: Until, now_s: float) -> bool:
+    """Return whether the nodes have been connected for so long that one which dies as soon as it is up would
+    have died."""
+    since = [live.connected_s.get(topic, now_s) for topic in until.connected]
+    return all(now_s >= one_s + CONNECTED_S for one_s in since)
+
+
+def _nodes(live: RunState, until: Until, now_s: float) -> bool:
+    """Return whether what is waited for is there or gone: nodes, opened programs, processes that ended."""
+    alive = until.alive_s is None or now_s >= _lived_s(live, until.alive_s)
+    up = len(live.nodes) >= until.nodes and set(until.opened) <= live.opened
+    return alive and up and set(until.ended) <= live.ended
+
+
+def _lived_s(live: RunState, alive_s: float) -> float:
+    """Return when the nodes have been up for so long, the last process's for half of it."""
+    return max(live.first_node_s + alive_s, live.registered_s + alive_s / 2) if live.nodes else math.inf
+
+
+def _quiet(live: RunState, until: Until, now_s: float) -> bool:
+    return until.quiet_s is None or (live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s)
+
+
+def _has_heard(live: RunState, until: Until, now_s: float) -> bool:
+    if not until.heard or not live.unheard or is_settled(live, now_s):
+        return True
+    lost_s = min(live.lost_s, HEARD_LOST_S_MAX)
+    news_s = max(live.last_sent_s, live.last_heard_s)
+    return now_s > min(max(live.last_line_s, news_s) + HEARD_S, news_s + HEARD_AT_MOST_S) + lost_s
+
+
+def _is_starting(live: RunState, until: Until, now_s: float) -> bool:
+    """Return whether a process may yet become a node: on a busy machine, its imports alone can take many seconds."""
+    waited_for = {p for p in live.running - live.registered if not computes(live, p)}
+    return bool(waited_for) and now_s <= _starts_until_s(live, until)
+
+
+def _starts_until_s(live: RunState, until: Until) -> float:
+    return live.last_start_s + until.silent_s + live.lost_s - live.lost_before_last_s
+
+
+def _silent(live: RunState, until: Until, now_s: float) -> str:
+    waited = (*until.topics, *until.messages)
+    seen = _talking(live)
+    if waited and not seen:
+        return (
+            f"no message within {until.first_message_s:g} s"
+            if now_s > live.started_s + until.first_message_s - live.waited_s
+            else ""
+        )
+    for topic, count in until.messages.items():
+        topic_s = live.topics[topic].last_s
+        last_s = max(topic_s or min(s.first_s for s in seen), live.started_s)
+        silent_s = until.silent_s if topic_s else _late_s(live, until, now_s)
+        if live.topics[topic].count < count and now_s > last_s + silent_s:
+            return f"no message on {topic} for {silent_s:g} s"
+    patience_s = max(until.silent_s, until.first_message_s)
+    changed_s = live.graph_changed_s and max(live.graph_changed_s, live.started_s)
+    if until.connected and changed_s and now_s > changed_s + patience_s:
+        return f"the graph has not changed for {patience_s:g} s"
+    return _standstill(live, until, now_s)
+
+
+def _never(live: RunState, until: Until, given: Until, now_s: float) -> str:
+    """Return what is waited for and cannot come, and all the rest has been seen; else "". `given` is `until` as the
+    rubric has it."""
+    if not is_settled(live, now_s):
+        return ""
+    waited = [t for t in until.topics if not live.topics[t].count]
+    waited += [t for t, wanted in until.messages.items() if live.topics[t].count < wanted]
+    absent = {topic for topic in waited if is_silent(live, (topic,), given, now_s)}
+    absent |= {topic for topic in until.connected if topic not in live.connected_s}
+    topics = tuple(topic for topic in until.topics if topic not in absent)
+    possible = {
+        "window_s": until.window_s if topics else None,
+        "topics": topics,
+        "messages": {topic: count for topic, count in until.messages.items() if topic not in absent},
+        "connected": tuple(topic for topic in until.connected if topic not in absent),
+        "nodes": min(until.nodes, len(live.nodes)),
+        "ended": tuple(process for process in until.ended if not goes_on(live, process, now_s)),
+    }
+    if all(_enough(live, until.model_copy(update=possible), now_s)):
+        missing = min(absent, default="")
+        return f"the graph has settled, without {missing}" if missing else "the graph has settled"
+    return ""
+
+
+def _in_namespaces(live: RunState, until: Until, now_s: float) -> str:
+    """Return that all nodes are up and connected over topics of these names in namespaces, as long as it would take
+    outside of them; else ""."""
+    rests = [(process, live.at_rest.get(process)) for process in live.running]
+    owners = [live.owners.get(node) for node in live.here]
+    if not rests or any(rest is None or owners.count(process) < rest.programs for process, rest in rests):
+        return ""
+    for topic in until.connected:
+        since = [at_s for name, at_s in live.connected_s.items() if name != topic and name.endswith(topic)]
+        if topic in live.connected_s or not since or now_s < max(since) + CONNECTED_S:
+            return ""
+    others = until.model_copy(update={"connected": ()})
+    if until.connected and all(_enough(live, others, now_s)):
+        return f"the nodes are connected over {until.connected[0]} of a namespace"
+    return ""
+
+
+def _standstill(live: RunState, until: Until, now_s: float) -> str:
+    """Nothing happens any more, though more nodes, programs or ends were waited for."""
+    growing_up = live.nodes and now_s < _lived_s(live, until.alive_s or 0)
+    if growing_up or _nodes(live, until, now_s):
+        return ""
+    patience_s = until.silent_s if live.nodes else max(until.silent_s, until.first_message_s)
+    if now_s > max(live.news_s, live.started_s) + patience_s:
+        return f"nothing happened for {patience_s:g} s"
+    return ""
