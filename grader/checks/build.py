@@ -15,7 +15,13 @@ from grader.checks.support.build_errors import (
 )
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.processes import Life, lives
-from grader.checks.support.scripts import cmake_calls, is_elsewhere, paths_by_name, programs
+from grader.checks.support.scripts import (
+    cmake_calls,
+    handed_in_with_git,
+    is_elsewhere,
+    paths_by_name,
+    programs,
+)
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.events import CATKIN_MAKE, STOPPED
@@ -78,7 +84,7 @@ def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
     How it is measured
         By the exit code of `catkin_make`; the first error that it printed is quoted. Nodes are run all the
         same, from their sources. A script is there where `catkin_install_python` puts it into `devel/lib`,
-        or where `rosrun` finds it in the package; whether it has its executable bit counts elsewhere.
+        or where `rosrun` finds it in the package; whether it is executable is judged elsewhere.
 
     How to fix
         Clone your repository into a new workspace, run `catkin_make`, and fix the first error: the later
@@ -171,11 +177,12 @@ def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | No
         return None
     near = [there[n] for s in lost for n in near_names(PurePosixPath(s).name, there)]
     seen = f"; there is {join_words(dict.fromkeys(near))}" if near else ""
+    push = ", then git add, commit and push" if handed_in_with_git(package) else ""
     return unjudged(
         f"catkin_make succeeded, but there is no {join_words(lost, 'or')} to run{seen}",
         expected=EXPECTED,
         measured=f"rosrun finds no {join_words((PurePosixPath(s).name for s in lost), 'or')}",
-        hint=f"add {join_words(lost)} to the package, then git add, commit and push",
+        hint=f"add {join_words(lost)} to the package{push}",
     )
 
 

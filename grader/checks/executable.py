@@ -50,19 +50,19 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
     """The script can be run as a node.
 
     What it checks
-        That the script is there, has its executable bit, and begins with a `#!` line which names an
-        interpreter that exists. An executable wrapper that the build makes of it (`catkin_install_python`)
-        does as well. A Python script must also parse: no line of it may be a syntax error.
+        That the script is there, is executable (the system may run it as a program), and begins with a `#!`
+        line which names an interpreter that exists. A script of which `catkin_install_python` makes a program
+        need not be executable itself. A Python script must also be free of syntax errors.
 
     Why it matters on a robot
         `rosrun` and `roslaunch` only find files that may be executed, and the `#!` line is all that tells
         the robot that a file is Python. It works in your editor and fails on the robot.
 
     How it is measured
-        The bit comes from git's tree for a repository, from the archive's entries or from the disk. The
+        Whether it is executable is what git has of it in a repository, or the archive, or the disk. The
         first line is read as the kernel reads it: a line that ends in CR LF, a byte order mark or a blank
-        line in front of it break it. A script in another folder counts, with a hint. ROS's own Python parses the
-        file without running it, and says which line it does not understand.
+        line in front of it break it. A script in another folder counts, with a hint. ROS's own Python reads
+        the file without running it, and says which line it does not understand.
 
     How to fix
         `chmod +x <file>`, then with git `git add --chmod=+x <file>`, commit and push; an archive is packed
@@ -96,11 +96,17 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
     elif found.executable and not obstacles:
         verdict = passed(f"{found.path} is executable and names {_interpreter(found)}", hint=hint)
     elif has_wrapper(package, build, found.path):
-        advice = f" (without it: {obstacles[0].why})" if obstacles else ""
-        verdict = passed(f"the build makes an executable wrapper of {found.path}{advice}", hint=hint)
+        advice = f", though the file itself {obstacles[0].why}" if obstacles else ""
+        verdict = passed(
+            f"catkin_install_python makes {found.path} a program that rosrun starts{advice}",
+            measured=f"{found.path}: made a program by catkin_install_python",
+            hint=hint,
+        )
     elif obstacles and (undecided := _undecided_wrapper(package, build, found.path)):
         why = "; it also ".join(o.why for o in obstacles)
-        message = f"{found.path} {why}; the build makes a wrapper of it, but {undecided.message}"
+        message = (
+            f"{found.path} {why}; catkin_install_python would make a program of it, but {undecided.message}"
+        )
         verdict = inconclusive(message, hint=undecided.hint, citations=undecided.citations)
     elif obstacles:
         why = "; it also ".join(o.why for o in obstacles)
@@ -109,7 +115,7 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
     else:
         message = f"whether {found.path} is executable cannot be seen: the submission carries no file modes"
         verdict = inconclusive(
-            message, hint="hand in a git repository or a .tar.gz, which keep the executable bit"
+            message, hint="hand in a git repository or a .tar.gz: both keep which files are executable"
         )
     measured = verdict.measured or f"{found.path}: {_mode(found)}, {_first_line(found)}"
     only_mode = bool(obstacles) and not of_first_line
@@ -175,7 +181,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     movable = [p for p in near if can_be_moved(p, path)]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
     seen = f"; there is {join_words(near)}" if near else ""
-    hint = f"git mv {movable[0]} {path}" if movable else add_hint(path)
+    hint = f"git mv {movable[0]} {path}" if movable else add_hint(package, path)
     if not movable and (elsewhere := package.hints_on(wanted.name)):
         where, _, hint = elsewhere[0].partition(": ")
         seen = f"; {where}"
@@ -189,7 +195,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
 
 def _mode_obstacles(file: SourceFile, remarks: tuple[str, ...]) -> Iterator[Obstacle]:
     if file.executable is False:
-        yield Obstacle("has no executable bit", "; ".join(remarks) or chmod_hint(file.mode_source, file.path))
+        yield Obstacle("is not executable", "; ".join(remarks) or chmod_hint(file.mode_source, file.path))
 
 
 def _rosrun_answer(build: Run, path: str) -> str:

@@ -64,7 +64,7 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
     How it is measured
         The file is found by its name anywhere in the package and read without being run, with the files of
         the package that it includes, its `<arg>`s and groups. What `if` or `unless` switches off does not
-        count, nor does `<test>`. The executable bit is not this check's business.
+        count, nor does `<test>`. Whether the scripts are executable is judged elsewhere.
 
     How to fix
         One `<node pkg="<package>" type="<file>.py" name="<name>" output="screen"/>` for each script, all of
@@ -136,7 +136,7 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
         return None
     if not _exists(package, name) and not any(name in {one.target, one.name} for one in programs(package)):
         message = f"there is no {name} in the package that a <node> could start"
-        return unjudged(message, hint=add_hint(script))
+        return unjudged(message, hint=add_hint(package, script))
     meant = (_slip_for(package, node, name) for node in file.brings if _is_meant(node, name))
     slip = next(filter(None, meant), None)
     return slip.verdict() if slip else _no_node(file, package.name, name)
@@ -255,7 +255,7 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
 
     Why it matters on a robot
         Launch files start more than nodes: drivers, cameras and tools have their own start scripts, and they
-        need the executable bit and a first line as every node does.
+        have to be executable and need a first line, as every node does.
 
     How it is measured
         The program's place is taken by one that notes what it is asked to open. The script's mode and first

@@ -70,7 +70,7 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
         nodes of the package do, under any names.
 
     How to fix
-        One `<node pkg="…" type="….py" name="…"/>` for each script, with the `.py` and the executable bit.
+        One `<node pkg="…" type="….py" name="…"/>` for each script, with the `.py`; the scripts have to be executable.
         `roslaunch <package> <file>`, then `rosnode list` and `rostopic info <topic>` show what came up.
     """
     expected = f"{params.launch} brings up a publisher and a subscriber connected over {params.topic}"

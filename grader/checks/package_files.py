@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import DependencyName, NoParams, check
-from grader.checks.support.scripts import find_script
+from grader.checks.support.scripts import add_hint, find_script
 from grader.checks.support.text import near_names, shown
 from grader.model.package import Fault, Manifest, PackageFacts
 from grader.model.record import Record
@@ -118,7 +118,7 @@ def _lost_folder(package: PackageFacts, folder: str, params: LayoutParams) -> Sl
         return Slip(what, f"git mv {instead} {folder}", f"{instead}/")
     own = [s for s in params.scripts if PurePosixPath(s).parts[0] == folder]
     nowhere = bool(own) and all(find_script(package, s) is None for s in own)
-    fix = f"mkdir {folder} in the package folder, put the files that belong there into it, and git add them"
+    fix = f"mkdir {folder} in the package folder, and put the files that belong there into it"
     return Slip(f"there is no folder {folder}/", fix, explained=nowhere)
 
 
@@ -141,7 +141,7 @@ def _lost_file(package: PackageFacts, name: str) -> Slip:
         if path.parent == wanted.parent and near_names(wanted.name, [path.name])
     ]
     other = next(iter([*near, *same]), "")
-    seen, fix = (f", but {other}", f"git mv {other} {name}") if other else ("", f"add {name}, and push it")
+    seen, fix = (f", but {other}", f"git mv {other} {name}") if other else ("", add_hint(package, name))
     return Slip(f"there is no {name}{seen}", fix, other, explained=True)
 
 

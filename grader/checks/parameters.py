@@ -116,7 +116,7 @@ def _no_file(package: PackageFacts, build: Run, path: str, wanted: list[str]) ->
     there = near or yaml
     seen = f"; there is {join_words(there)}" if there else ""
     movable = [p for p in near if can_be_moved(p, path)]
-    hint = f"git mv {movable[0]} {path}" if movable else add_hint(path)
+    hint = f"git mv {movable[0]} {path}" if movable else add_hint(package, path)
     return failed(f"{path} is not in the package{seen}", hint=hint)
 
 

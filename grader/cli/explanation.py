@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -15,6 +16,7 @@ from grader.model.record import Record
 from grader.model.repair import BY_HAND, RepairKind
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
+from grader.report.view import see_words
 from grader.rubric.find import known_labs
 from grader.rubric.load import LoadedRubric, all_rubrics, load_rubric
 from grader.rubric.model import Criterion, Rubric
@@ -41,9 +43,10 @@ SLIPS: tuple[tuple[tuple[str, ...], tuple[RepairKind, ...]], ...] = (
 
 
 def print_explanation(name: str, rubric: str | None) -> None:
-    """Print how to fix it, what, why and how it is measured. Raises UsageError for an unknown name.
+    """Print how to fix it and what is checked; of a check, also why, how it is measured and what a rubric can set.
+    Raises UsageError for an unknown name.
 
-    What a rubric can set is told of a check alone: who asks for a criterion has a package, not a rubric. The name is
+    Of a criterion, the rest stays behind a line that says where it is: most terminals show 24 lines. The name is
     looked up in `rubric` beside the grader's own checks; `LAB/criterion` says the same.
     """
     lab, slash, criterion = ("", "", name) if rubric is not None else name.rpartition("/")
@@ -61,7 +64,12 @@ def print_explanation(name: str, rubric: str | None) -> None:
         _print(_criterion_lines(each.rubric, item))
         if item.check in each.checks and item.check not in told:
             told.add(item.check)
-            _print(_check_lines(each.checks[item.check], parameters_too=False))
+            asked = [] if rubric is None or item.check in known_checks(Path(), {}) else ["--rubric", rubric]
+            _print(
+                _check_lines(
+                    each.checks[item.check], more=shlex.join(["grader", "explain", item.check, *asked])
+                )
+            )
 
 
 def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]) -> UsageError:
@@ -81,7 +89,7 @@ def _criterion_lines(rubric: Rubric, criterion: Criterion) -> Iterator[Line]:
     if criterion.hint:
         yield f"hint: {criterion.hint}", 2
     if criterion.reproduce:
-        yield f"see it yourself: {criterion.reproduce}", 2
+        yield f"see it yourself: {see_words(criterion.reproduce)}", 2
     yield "", 0
 
 
@@ -103,9 +111,10 @@ def worth_of(criterion: Criterion, rubric: Rubric) -> str:
     return ", ".join(said)
 
 
-def _check_lines(check: Check, *, parameters_too: bool = True) -> Iterator[Line]:
+def _check_lines(check: Check, *, more: str = "") -> Iterator[Line]:
+    """Yield all about a check; with `more`, the command that prints all, only what helps to fix it."""
     yield f"{check.name}: {check.title}", 0
-    *measured, fix = HEADINGS
+    what, *measured, fix = HEADINGS
     yield from _section(check, fix)
     slips = next((kinds for names, kinds in SLIPS if check.name.startswith(names)), ())
     if slips:
@@ -113,11 +122,14 @@ def _check_lines(check: Check, *, parameters_too: bool = True) -> Iterator[Line]
         yield "Common mistakes, and how to repair them by hand", 0
         for kind in slips:
             yield BY_HAND[kind], 2
-    for heading in measured:
-        yield from _section(check, heading)
-    if not parameters_too:
+    yield from _section(check, what)
+    if more:
+        yield "", 0
+        yield f"Why it matters, and how it is measured: {more}", 0
         yield "", 0
         return
+    for heading in measured:
+        yield from _section(check, heading)
     yield from _parameter_lines(check.params, "What a rubric can set")
     for record, words in inner_records(check.params).items():
         yield from _parameter_lines(record, f"Keys of a {words}")

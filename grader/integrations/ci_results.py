@@ -43,7 +43,7 @@ OF_CODE = {
 TITLES = {
     Outcome.PASSED: "Passed",
     Outcome.BELOW: "Below the pass mark",
-    Outcome.INCONCLUSIVE: "Still open",
+    Outcome.INCONCLUSIVE: "Not decided yet",
     Outcome.NOT_GRADED: "Not graded",
     Outcome.WRONG_INPUT: "Wrong input",
 }
@@ -111,7 +111,10 @@ def describe_outcome(
         return f"{reached}; something could not be judged, and this costs no marks", ""
     points = number(sum(loss.points for loss in waiting))
     first = waiting[0].criterion
-    return f"{reached}; {points} more are still open, and this costs no marks: {first.message}", first.hint
+    return (
+        f"{reached}; {points} more are not decided yet, and this costs no marks: {first.message}",
+        first.hint,
+    )
 
 
 def points_to_pass(rubric: Rubric, points: float) -> str:

@@ -22,7 +22,7 @@ from grader.integrations.bundle import (
 )
 from grader.model.result import CriterionResult, GradingResult
 from grader.report.gradescope import LIMIT, LOOK, render_gradescope
-from grader.report.sentences import score_words, without_sandbox
+from grader.report.sentences import STATES, score_words, without_sandbox
 from grader.report.text import html, line, text_limit
 from grader.report.view import hidden_ids
 from grader.rubric.load import LoadedRubric
@@ -177,7 +177,7 @@ def _invalid(message: str, hint: str) -> dict[str, Any]:
 def _message(result: GradingResult, shown: list[CriterionResult]) -> Iterator[str]:
     waiting = sum(c.missing for c in shown if c.status.is_open)
     if waiting:
-        yield f"{LOOK}: {number(waiting)} points are still open; no points are lost for good."
+        yield f"{LOOK}: {number(waiting)} points are not decided yet; no points are lost for good."
     yield f"{number(result.points)} of {number(result.max_points)} points"
     yield from (line(words, LIMIT) for words in score_words(result))
 
@@ -194,7 +194,7 @@ def _test(criterion: CriterionResult, limit: int) -> dict[str, Any]:
         "name": line(f"{LOOK}: {name}" if criterion.status.is_open else name, limit),
         "points": criterion.points,
         "max_points": criterion.max_points,
-        "message": line(f"{criterion.status.value}: {criterion.message}", limit),
+        "message": line(f"{STATES[criterion.status]}: {criterion.message}", limit),
         "output": "\n".join(f"{label}{line(text, limit)}" for label, text in rows.items() if text),
     }
 

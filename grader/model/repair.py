@@ -57,7 +57,7 @@ BY_HAND: dict[RepairKind, str] = {
     "line-ends": "Windows' line ends: dos2unix FILE, or switch CRLF to LF in the editor",
     "shebang": "no usable first line: write #!/usr/bin/env python3 as the very first line",
     "file-name": "a misspelt file name: git mv OLD NEW, and write the new name wherever the old one stands",
-    "python-syntax": "it does not parse: python3 -m py_compile FILE names the line",
+    "python-syntax": "a syntax error: python3 -m py_compile FILE names the line",
     "manifest-line": "a line is missing in package.xml: compare it with one that catkin_create_pkg makes",
     "build-line": "a line is missing in CMakeLists.txt: compare it with one that catkin_create_pkg makes",
     "package-name": "a misspelt package name: it is the same in package.xml, in project(…) and in each pkg=",

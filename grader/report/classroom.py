@@ -103,7 +103,7 @@ def _message(criterion: CriterionResult, limit: int) -> str:
     words = line(criterion.message, limit) if limit else ""
     if not criterion.status.is_open:
         return words
-    points = f"{number(criterion.missing)} points are still open"
+    points = f"{number(criterion.missing)} points are not decided yet"
     return f"A PERSON MUST LOOK: {line(criterion.id, NAME_CHARS)}: {points}{': ' if words else ''}{words}"
 
 

@@ -169,7 +169,7 @@ def _not_graded(result: GradingResult) -> Iterator[str]:
 def _last_row(result: GradingResult) -> str:
     if result.status == "error":
         return "not graded"
-    open_ = ", still open: something could not be judged" if result.status == "inconclusive" else ""
+    open_ = ", not decided yet: something could not be judged" if result.status == "inconclusive" else ""
     return f"{number(result.points)} of {number(result.max_points)} points{open_}"
 
 

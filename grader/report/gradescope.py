@@ -14,6 +14,7 @@ from grader.errors import GraderError
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.sentences import (
+    STATES,
     decided_criteria,
     decision,
     look_again,
@@ -77,7 +78,7 @@ class _Writer:
         waiting = [c for c in shown if c.status.is_open and c.counts]
         if any(c.status.is_open and c.counts for c in result.criteria):
             points = number(sum(c.missing for c in waiting))
-            what = f": {points} points are still open" if waiting else ""
+            what = f": {points} points are not decided yet" if waiting else ""
             yield f"{LOOK}{what}; no points are lost for good."
         hidden = len(result.criteria) - len(shown) + missing_hidden(result, self._rubric)
         if hidden:
@@ -102,7 +103,7 @@ class _Writer:
         }
 
     def _details(self, criterion: CriterionResult) -> Iterator[str]:
-        yield f"{criterion.status.value}, {points_of(criterion)} points"
+        yield f"{STATES[criterion.status]}, {points_of(criterion)} points"
         override = self._decided.get(criterion.id)
         rows = {
             "": criterion.message,

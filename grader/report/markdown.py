@@ -13,6 +13,7 @@ from grader.model.verdict import Status
 from grader.report import sentences
 from grader.report.sentences import (
     NOT_SETTLED,
+    STATES,
     automatic_words,
     decided_criteria,
     decided_title,
@@ -24,7 +25,17 @@ from grader.report.sentences import (
     without_sandbox,
 )
 from grader.report.text import line, markdown, markdown_block, markdown_code
-from grader.report.view import Loss, arrange, commands_in, not_graded, places, pointed_at, points_of
+from grader.report.view import (
+    Loss,
+    arrange,
+    commands_in,
+    missing_file,
+    not_graded,
+    places,
+    pointed_at,
+    points_of,
+    where_to_type,
+)
 from grader.rubric.model import Rubric
 from grader.wording import number
 
@@ -109,8 +120,8 @@ class _Writer:
         view = arrange(result, rubric)
         lost, still = ((), ()) if not_graded(result) else (view.lost, view.open)
         lines = [*self._head(result, rubric, hidden), *self._changes(changes), *self._decisions(result)]
-        lines += self._list_losses("What was lost", lost)
-        lines += self._list_losses("What is still open", still)
+        lines += self._list_losses("To fix", lost)
+        lines += self._list_losses("Not decided yet", still)
         if self._detail.folded:
             told = [row for loss in (*lost, *still) for row in self._loss_section(loss)]
             lines += self._fold("Details, and how to fix it", told)
@@ -142,7 +153,7 @@ class _Writer:
             yield from ([] if not_graded(result) else ["It could not be graded automatically:", ""])
             yield from (self._text(result.error.message), "", self._text(result.error.hint), "")
         if result.status == "inconclusive":
-            yield from (f"**Still open:** {NOT_SETTLED}", "")
+            yield from (f"**Not decided yet:** {NOT_SETTLED}", "")
         for words in (verdict_words(result, rubric, hidden), visible_words(result, hidden)):
             yield from (words, "") if words else ()
         version = self._text(result.rubric.version)
@@ -185,13 +196,13 @@ class _Writer:
             others = sum(other.missing for other in (*loss.blocked, *loss.alike))
             more = f", and {number(others)} more points with it" if others else ""
             words = markdown(line(c.message or c.title, min(SHORT_CHARS, self._detail.text)))
-            yield f"- {self._code(c.id)}: {points_of(c)}{more}, {c.status.value}: {words}"
+            yield f"- {self._code(c.id)}: {points_of(c)}{more}, {STATES[c.status]}: {words}"
         yield from self._more(losses)
         yield ""
 
     def _loss_section(self, loss: Loss) -> Iterator[str]:
         criterion = loss.criterion
-        yield from (f"### {self._code(criterion.id)}: {points_of(criterion)}, {criterion.status.value}", "")
+        yield from (f"### {self._code(criterion.id)}: {points_of(criterion)}, {STATES[criterion.status]}", "")
         details = [*self._details(criterion), *self._blocked_lines(loss)]
         yield from (*(details or [self._text(criterion.title)]), "")
         for pair in pointed_at(criterion):
@@ -200,12 +211,13 @@ class _Writer:
     def _details(self, criterion: CriterionResult) -> Iterator[str]:
         rows = {"Measured": criterion.measured, "Expected": criterion.expected, "Hint": criterion.hint}
         yield from (f"- {name}: {self._text(value)}" for name, value in rows.items() if value)
-        if criterion.reproduce:
+        if criterion.reproduce and not missing_file(criterion):
+            where = where_to_type(criterion.reproduce)
             shown = (
                 self._code(text) if is_command else self._text(text)
                 for text, is_command in commands_in(criterion.reproduce)
             )
-            yield f"- See it yourself: {' '.join(shown)}"
+            yield f"- See it yourself: {' '.join([*([where] if where else []), *shown])}"
         if criterion.citations:
             yield f"- Where: {', '.join(self._code(cited) for cited in places(criterion))}"
 
@@ -213,7 +225,7 @@ class _Writer:
         if loss.alike:
             yield f"- The same holds for: {self._names(loss.alike)}"
         if loss.blocked:
-            yield f"- Could not be judged because of this: {self._names(loss.blocked)}"
+            yield f"- Not tested because of it: {self._names(loss.blocked)}"
 
     def _names(self, criteria: tuple[CriterionResult, ...]) -> str:
         return ", ".join(f"{self._code(c.id)} ({points_of(c)})" for c in criteria)
@@ -250,7 +262,7 @@ class _Writer:
         for c in self._first(criteria):
             cells = [
                 points_of(c),
-                c.status.value,
+                STATES[c.status],
                 self._code(c.id, cell=True),
                 self._text(c.title, cell=True),
                 self._text(c.measured, cell=True),

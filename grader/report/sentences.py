@@ -20,7 +20,7 @@ from grader.model.result import (
     Note,
 )
 from grader.model.verdict import Status
-from grader.report.view import ReportView, hidden_ids, not_graded, points_of
+from grader.report.view import Loss, ReportView, hidden_ids, missing_file, not_graded, points_of
 from grader.rubric.made_up import as_text
 from grader.rubric.model import Rubric
 from grader.wording import join_words, number, plural
@@ -294,6 +294,16 @@ SIGNS = {
     Status.ERROR: "!",
     Status.MANUAL: "•",
 }
+STATES = {
+    Status.PASS: "passed",
+    Status.PARTIAL: "to fix",
+    Status.FAIL: "to fix",
+    Status.BLOCKED: "not tested",
+    Status.INCONCLUSIVE: "not decided yet",
+    Status.ERROR: "not decided yet",
+    Status.MANUAL: "not decided yet",
+}
+"""The word for each status in whatever people read: the glossary has the same."""
 MEANINGS = {
     Status.PASS: "reached",
     Status.PARTIAL: "partly reached",
@@ -337,7 +347,7 @@ def verdict(result: GradingResult, rubric: Rubric, hidden: int, to_fix: int) -> 
     if not hidden and passed(rubric, result):
         return "pass", "Passed"
     if result.status != "graded":
-        return "inconclusive", "Still open"
+        return "inconclusive", "Not decided yet"
     if hidden:
         reached = all(c.status is Status.PASS for c in result.criteria if c.is_required)
         return ("pass", "So far, so good") if reached else ("partial", "There is something to fix")
@@ -374,11 +384,10 @@ def in_short(result: GradingResult, view: ReportView) -> str:
     said = [] if late > 0 or result.gate else ["You lost nothing."]
     if lost > 0:
         one = len(view.lost) == 1
+        first = "" if one else f", the first one alone {number(view.lost[0].points)}"
         said = [
-            f"{'One mistake costs' if one else f'{len(view.lost)} mistakes cost'} you {count_points(lost)}."
+            f"{'One mistake costs' if one else f'{len(view.lost)} mistakes cost'} {count_points(lost)}{first}."
         ]
-    if len(view.lost) > 1:
-        said.append(f"The first one alone costs {count_points(view.lost[0].points)}.")
     if result.gate:
         cost = result.gate.points_before - result.gate.at_most
         said.append(f"Without {result.gate.criterion}, {count_points(cost)} do not count.")
@@ -386,27 +395,38 @@ def in_short(result: GradingResult, view: ReportView) -> str:
         said.append(f"Being late costs you {count_points(late)}.")
     if view.open:
         still = sum(loss.points for loss in view.open)
-        said.append(f"{count_points(still)} {'is' if still == 1 else 'are'} still open.")
+        said.append(f"{count_points(still)} {'is' if still == 1 else 'are'} not decided yet.")
     return " ".join(said)
 
 
 def points_line(result: GradingResult, view: ReportView) -> str:
-    """`95 of 100 points`; `20 of 100 points so far, 80 still open` where not all is settled."""
+    """`95 of 100 points`; `20 of 100 points so far, 80 not decided yet` where not all is settled."""
     still = sum(loss.points for loss in view.open)
     return f"{number(result.points)} of {number(result.max_points)} points" + (
-        f" so far, {number(still)} still open" if still else ""
+        f" so far, {number(still)} not decided yet" if still else ""
     )
 
 
-def lost_words(criterion: CriterionResult, blocked: float, alike: float = 0.0) -> str:
-    """`10 points lost, and 25 more in what it blocks`; points that are open are not lost. `alike` are those of
-    other criteria that the same mistake costs."""
-    own = criterion.missing
-    state = "still open" if criterion.status.is_open else "lost"
-    said = f"{count_points(own)} {state}" if own else "costs nothing by itself"
-    more = [f"{number(alike)} more where the same mistake shows"] if alike else []
-    more += [f"{number(blocked)} more in what it blocks"] if blocked else []
-    return ", and ".join([said, *more])
+def lost_words(loss: Loss) -> str:
+    """Return what one mistake costs: `-5 here, -25 in all: also chatter-rate -15 and message -5`. Empty where nothing
+    else is lost, for what it costs itself stands beside it."""
+    together = (loss.criterion, *loss.alike) if missing_file(loss.criterion) else (loss.criterion,)
+    others = [c for c in (*loss.alike, *loss.blocked) if c.missing and c not in together]
+    if not others:
+        return ""
+    if loss.criterion.status.is_open:
+        return f"{count_points(loss.points)} in all, with {join_words(c.id for c in others)}"
+    own = sum(c.missing for c in together)
+    also = join_words(f"{c.id} {minus(c.missing)}" for c in others)
+    return f"{f'{minus(own)} here, ' if own else ''}{minus(loss.points)} in all: also {also}"
+
+
+def minus(points: float) -> str:
+    """Return the points with a minus sign in front: what is lost."""
+    return f"{MINUS}{number(points)}"
+
+
+MINUS = "\N{MINUS SIGN}"
 
 
 def is_own_fault(criterion: CriterionResult) -> bool:

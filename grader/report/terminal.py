@@ -16,8 +16,11 @@ from grader.model.verdict import Status
 from grader.report import sentences
 from grader.report.sentences import (
     COSTS_NOTHING,
+    MINUS,
     NOTICED_TITLE,
     SIGNS,
+    STATES,
+    minus,
     note_place,
     note_text,
     visible_words,
@@ -26,23 +29,26 @@ from grader.report.sentences import (
 from grader.report.text import line, without_ci_commands
 from grader.report.view import (
     Loss,
+    MissingFile,
     ReportView,
     arrange,
     file_places,
     hint_beside,
+    missing_files,
     not_graded,
     pointed_at,
     points_of,
+    see_words,
     without_place,
+    write_files_hint,
 )
 from grader.rubric.model import Rubric
 from grader.wording import number, plural
 
 LIMIT = 500
-MEASURED_LIMIT = 120
+TO_FIX, NOT_DECIDED = "To fix", "Not decided yet: no points are lost for good"
 INDENT = 2
 SOURCE_CHARS_MIN = 20
-MINUS = "\N{MINUS SIGN}"
 STYLES = {
     Status.PASS: "green",
     Status.PARTIAL: "yellow",
@@ -163,8 +169,8 @@ class Terminal:
         if unrun:
             parts += self._unrun(view.open, unrun)
         else:
-            parts += self.losses("Still open: no points are lost for good", view.open)
-        parts += self.losses("Lost", view.lost, sentences.judged_repaired(result))
+            parts += self.losses(NOT_DECIDED, view.open)
+        parts += self.losses(TO_FIX, view.lost, sentences.judged_repaired(result))
         parts.append(self._score(result, view))
         emit(self.console, parts)
 
@@ -209,7 +215,7 @@ class Terminal:
 
     def _unrun(self, losses: tuple[Loss, ...], why: str) -> list[RenderableType]:
         points = number(sum(loss.points for loss in losses))
-        still = f"criteria worth {points} points are still open" if losses else "nothing is open"
+        still = f"criteria worth {points} points are not decided yet" if losses else "all is decided"
         return [Text(f"\nNothing was run ({why}): {still}.")]
 
     def _loss(self, loss: Loss, repaired: Sequence[str]) -> RenderableType:
@@ -218,24 +224,40 @@ class Terminal:
         place, *others = file_places(c) or [""]
         code = [row for pair in pointed_at(c, self._source_chars) for row in self._code(*pair)]
         alike = {a.id for a in loss.alike}
+        files = missing_files(loss)
+        several = len(files) > 1
         rows = [
-            ("expected", "" if code else c.expected),
-            ("fix", hint_beside(c, place)),
+            ("expected", "" if code or several else c.expected),
+            ("fix", write_files_hint(files) if several else hint_beside(c, place)),
             ("also at", ", ".join(others)),
-            ("see", c.reproduce),
-            ("also costs", ", ".join(f"{a.id} {self._cost(a)}" for a in loss.alike)),
+            ("see", "" if files else see_words(c.reproduce)),
+            ("also costs", "" if several else ", ".join(f"{a.id} {self._cost(a)}" for a in loss.alike)),
             ("judged with this repaired", ", ".join(name for name in repaired if name not in alike)),
-            ("blocks", ", ".join(f"{b.id} {self._cost(b)}" for b in loss.blocked)),
+            ("not tested because of it", ", ".join(f"{b.id} {self._cost(b)}" for b in loss.blocked)),
         ]
-        words = self._words(without_place(c.message, place) or c.title)
-        status = "" if c.status is Status.FAIL else c.status.value
-        return Group(self._line(c, status, self._cost(c), place), words, *code, *self._rows(rows))
+        said = f"{len(files)} files are not in the package:" if several else without_place(c.message, place)
+        lacking = [self._missing_file(file) for file in files] if several else []
+        head = self._line(c, self._total(loss), "" if several else place)
+        return Group(head, self._words(said or c.title), *lacking, *code, *self._rows(rows))
+
+    def _missing_file(self, file: MissingFile) -> RenderableType:
+        """`launch/a.launch (launch-xml 0/10): <launch> at its root, …`."""
+        cost = f"{file.criterion.id} {self._cost(file.criterion)}"
+        words = "; ".join(filter(None, [file.holds, file.says]))
+        return self._words(f"{file.path} ({cost}): {words}", indent=2 * INDENT)
 
     def _cost(self, criterion: CriterionResult) -> str:
         """`-5`; `0/5` where the points are not lost for good."""
         if criterion.status.is_open:
             return points_of(criterion)
-        return self._fit_encoding(f"{MINUS}{number(criterion.missing)}")
+        return self._fit_encoding(minus(criterion.missing))
+
+    def _total(self, loss: Loss) -> str:
+        """`-5`; `-25 in all` where the mistake costs more than its own criterion's points."""
+        cost = self._cost(loss.criterion)
+        if loss.criterion.status.is_open or loss.points == loss.criterion.missing:
+            return cost
+        return f"{self._fit_encoding(minus(loss.points))} in all"
 
     def _advice(self, criterion: CriterionResult) -> RenderableType:
         words = self._words(criterion.message or criterion.title)
@@ -260,11 +282,12 @@ class Terminal:
         return [Text(f"\n{sign} {said}", STYLES[Status.PASS])]
 
     def _measured_line(self, criterion: CriterionResult) -> RenderableType:
-        measured = criterion.measured or (
-            criterion.title if criterion.status is Status.PASS else criterion.message
-        )
-        line = self._line(criterion, criterion.status.value, points_of(criterion))
-        return Group(line, self._words(measured, MEASURED_LIMIT))
+        line = self._line(criterion, STATES[criterion.status], points_of(criterion))
+        passed, measured = criterion.status is Status.PASS, criterion.measured
+        if criterion.status is Status.BLOCKED:
+            measured = ""  # what was there instead of what could be measured
+        said = criterion.title if passed else criterion.message or criterion.title
+        return Group(line, self._words(said), *self._rows([("measured", measured)]))
 
     def _line(self, criterion: CriterionResult, *more: str) -> RenderableType:
         """`✗ chatter-rate  -10  src/talker.py:17`; the last stands below where there is no room for it."""

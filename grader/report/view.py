@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from unicodedata import east_asian_width
@@ -97,6 +97,8 @@ def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
 def _mistake(loss: Loss, charged: Mapping[Repair, tuple[Repair, ...]]) -> Hashable:
     """`charged` says of a repair with which others it is charged."""
     criterion = loss.criterion
+    if missing_file(criterion):
+        return missing_file
     used = criterion.repaired
     if used is not None and (used.charged or criterion.points >= used.share * criterion.full - POINTS_EQUAL):
         costly = min(used.repairs, key=lambda one: one not in charged)
@@ -108,6 +110,44 @@ def _mistake(loss: Loss, charged: Mapping[Repair, tuple[Repair, ...]]) -> Hashab
     if said.startswith("/"):  # how a topic behaves: of two topics, one loop is the reason
         said = NAMES.sub("", said)
     return criterion.hint, lines or (criterion.check, said)
+
+
+WRITE_FILE = re.compile(r"write (?P<path>[\w./-]+\.\w+)(?P<then>, then git add, commit and push it)?")
+"""The hint of a criterion for which a file is missing (`checks.support.scripts.add_hint`)."""
+
+
+def missing_file(criterion: CriterionResult) -> str:
+    """Return the path of the file that has to be written for the criterion; empty where that is not its fault."""
+    found = WRITE_FILE.fullmatch(criterion.hint)
+    return found["path"] if found and criterion.status.is_lost else ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MissingFile:
+    """`says` is what else is known of it, `holds` what the criterion expects of it."""
+
+    path: str
+    criterion: CriterionResult
+    says: str
+    holds: str
+
+
+def missing_files(loss: Loss) -> list[MissingFile]:
+    """Return the files that one entry of losses asks to write."""
+    found = []
+    for criterion in (loss.criterion, *loss.alike):
+        if path := missing_file(criterion):
+            _, _, says = criterion.message.partition("; ")
+            name = re.escape(path.rpartition("/")[2])
+            holds = re.sub(rf"^(\S*/)?{name}[,:]? ", "", criterion.expected)
+            found.append(MissingFile(path=path, criterion=criterion, says=says, holds=holds))
+    return found
+
+
+def write_files_hint(files: Sequence[MissingFile]) -> str:
+    """Return what to do about several missing files."""
+    found = WRITE_FILE.fullmatch(files[0].criterion.hint)
+    return "write these files" + (found["then"].replace(" it", " them") if found and found["then"] else "")
 
 
 def _open_alike(loss: Loss) -> Hashable:
@@ -288,14 +328,38 @@ def commands_in(reproduce: str) -> Iterator[tuple[str, bool]]:
 
 
 COMMAND = re.compile(r"(?<!`)`([^`]+)`(?!`)")
+IN_PACKAGE = re.compile(r"(cat|grep|head|ls|sed|python3?|rosparam load)\b")
+WITH_MASTER = re.compile(r"(rosrun|rosparam)\b")
+WITH_NODES = re.compile(r"(rosnode|rosservice|rostopic)\b|rosparam get\b")
+
+
+def see_words(reproduce: str) -> str:
+    """Return how to see it, in one line: `rosrun lab1 talker.py (while roscore runs in another terminal)`."""
+    where = where_to_type(reproduce).removesuffix(":")
+    return f"{reproduce} ({where[:1].lower()}{where[1:]})" if where else reproduce
+
+
+def where_to_type(reproduce: str) -> str:
+    """Return where the commands of `reproduce` work: `In the folder of your package:`. Empty where they say it
+    themselves, or work anywhere."""
+    commands = [text for text, is_command in commands_in(reproduce) if is_command]
+    if len(commands) != 1 or commands[0].startswith("cd "):
+        return ""
+    said = ["in the folder of your package"] if IN_PACKAGE.match(commands[0]) else []
+    if WITH_NODES.match(commands[0]):
+        said.append("while roscore and your nodes run in other terminals")
+    elif WITH_MASTER.match(commands[0]):
+        said.append("while roscore runs in another terminal")
+    words = ", ".join(said)
+    return f"{words[:1].upper()}{words[1:]}:" if words else ""
 
 
 STARTS = re.compile(
     r"""(a|add|after|all|an|another|at|both|bring|build|call|check|close|correct|create|declare|delete|do
-    |does|drive|each|every|fill|find|first|fix|from(?!\ \S+\ import)|give|hand|have|in|indent|install|it
+    |does|drive|each|every|executable|fill|find|first|fix|from(?!\ \S+\ import)|give|hand|have|in|indent|install|it
     |its|keep|leave|let|line|look|loop|make|more|move|negative|neither|no|nothing|on|once|one|only|open
     |order|pass|perhaps|print|publish|put|read|record|remove|rename|replace|reset|run|save|send|set
-    |something|start|steer|stop|subscribe|take|tell|the|there|this|too|try|turn|twice|two|use|what|whether
+    |something|starts?|steer|brings?|loads?|stop|subscribe|take|tell|the|there|this|too|try|turn|twice|two|use|what|whether
     |which|while|with|wrap|write|wrong|your)[,:;]?(?=\ )""",
     re.VERBOSE,
 )

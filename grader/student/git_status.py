@@ -175,7 +175,7 @@ class _Advice:
             text = f"A .gitignore file keeps out of git what the package uses: {listing(list(files.ignored))}"
             yield Point(kind="ignored", text=text, fix=commands.add_and_commit(files.ignored, force=True))
         if files.modes:
-            text = f"git does not have the executable bit of {listing(list(files.modes))}"
+            text = f"git does not know that this is executable: {listing(list(files.modes))}"
             yield Point(kind="mode", text=text, fix=commands.make_executable(files.modes))
 
     def _push_advice(self, server: Server) -> Iterator[Point]:

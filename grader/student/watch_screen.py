@@ -14,7 +14,7 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.files import result_text
 from grader.report.sentences import points_line
-from grader.report.terminal import Terminal, emit, open_console, print_report
+from grader.report.terminal import NOT_DECIDED, TO_FIX, Terminal, emit, open_console, print_report
 from grader.report.text import line
 from grader.report.view import arrange, points_of
 from grader.rubric.model import Rubric
@@ -103,11 +103,11 @@ class TerminalScreen(Screen):
         if not changed:
             yield Text("as before", "dim")
         if not self._static:
-            yield from Terminal(self._console).losses("Still open: no points are lost for good", view.open)
+            yield from Terminal(self._console).losses(NOT_DECIDED, view.open)
         elif view.open:
             points = number(sum(loss.points for loss in view.open))
-            yield Text(f"\nNothing was run (--static): criteria worth {points} points are still open.")
-        yield from Terminal(self._console).losses("Lost", view.lost)
+            yield Text(f"\nNothing was run (--static): criteria worth {points} points are not decided yet.")
+        yield from Terminal(self._console).losses(TO_FIX, view.lost)
 
     def _details(self, rows: Iterable[tuple[str, str]]) -> Iterable[RenderableType]:
         for name, words in rows:

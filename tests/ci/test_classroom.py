@@ -50,13 +50,13 @@ def test_a_loss_is_told_below_its_name_with_its_line_in_the_repository():
 def test_what_could_not_be_judged_tells_no_points_at_all():
     seen = _made(criterion("a", "pass", 40, 40), criterion("b", "inconclusive", 0, 60), status="inconclusive")
     assert (seen.points, seen.of, seen.failed) == (None, None, "Some tests errored.")
-    assert "b: 60 points are still open" in seen.console
+    assert "b: 60 points are not decided yet" in seen.console
 
 
 def test_what_a_person_judges_has_no_part_in_the_sum():
     seen = _made(criterion("a", "pass", 40, 40), criterion("b", "manual", 0, 60), status="inconclusive")
     assert (seen.points, seen.of, seen.failed) == (40, 40, "Some tests errored.")
-    assert "A PERSON MUST LOOK: b: 60 points are still open" in seen.console
+    assert "A PERSON MUST LOOK: b: 60 points are not decided yet" in seen.console
 
 
 def test_a_machine_that_cannot_grade_leaves_earlier_points_as_they_are():

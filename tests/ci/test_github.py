@@ -108,7 +108,9 @@ def test_a_machine_without_ros_takes_no_marks(runner, fail_on, code):
     ran = runner.use(lab="leeds-comp3631-lab1", container="never", fail_on=fail_on)
     assert (ran.code, ran.outputs["status"]) == (code, "inconclusive"), ran.log
     said = ran.annotations("error" if code else "warning")
-    assert said[0].startswith("Still open: 20 of 100 points; 80 more are still open, and this costs no marks")
+    assert said[0].startswith(
+        "Not decided yet: 20 of 100 points; 80 more are not decided yet, and this costs no marks"
+    )
     assert "no ROS 1" in said[0]
     assert reporter(ran.outputs["result"]).points is None
 

@@ -25,13 +25,13 @@ from tests.support.a_class import criterion
 
 PASSED = EarlyVerdict(criterion=criterion("manifest", "pass", 5, 5, message="names lab1"), final=True)
 FAILED = EarlyVerdict(
-    criterion=criterion("talker", "fail", 0, 5, message="has no executable bit", hint="chmod +x talker.py"),
+    criterion=criterion("talker", "fail", 0, 5, message="is not executable", hint="chmod +x talker.py"),
     final=False,
 )
 SHOWN = """\
 Your files, before anything is built or run:
   ✓ 1 pass: manifest
-  ✗ fail  talker  has no executable bit
+  ✗ fail  talker  is not executable
     hint: chmod +x talker.py
   Provisional: the build can still change these results.
 

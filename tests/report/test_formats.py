@@ -221,7 +221,7 @@ def test_gradescope_shows_hidden_criteria_after_grades_are_published_and_tells_n
 
 def test_gradescope_says_that_a_person_must_look_where_something_is_open():
     data = scope()
-    assert data["output"].startswith("A PERSON MUST LOOK: 40 points are still open")
+    assert data["output"].startswith("A PERSON MUST LOOK: 40 points are not decided yet")
     waiting = [test for test in data["tests"] if "score" not in test]
     assert [test["tags"] for test in waiting] == [["inconclusive"], ["error"], ["manual"]]
     assert all(test["name"].startswith("A PERSON MUST LOOK: ") for test in waiting)

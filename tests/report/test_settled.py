@@ -96,7 +96,7 @@ def test_markdown_says_it_below_the_points():
     text = render_markdown(settled(), rubric())
     assert text.startswith("# 70 of 100 points\n\n87.5 of 100 points before, 70 after: 2 days late")
     assert "\n\nThe last commit on main counts\n\n" in text
-    section = text[text.index("## Decided by a person") : text.index("## What was lost")]
+    section = text[text.index("## Decided by a person") : text.index("## To fix")]
     assert section == (
         "## Decided by a person\n\n"
         "- `style`: 7/10 by A. Miller, 2026-11-02: clear names\n"
@@ -110,7 +110,7 @@ def test_the_terminal_says_it_below_the_points():
     text = terminal(settled())
     assert text.startswith("ada\nhostile-lab: A lab | with *markup*\n87.5 of 100 points before, 70")
     assert "\n70 of 100 points, " in text
-    section = text[text.index("Decided by a person") : text.index("\nLost\n")]
+    section = text[text.index("Decided by a person") : text.index("\nTo fix\n")]
     assert "style  7/10\n  by A. Miller, 2026-11-02: clear names\n" in section
     assert AGAIN in " ".join(section.split())
     assert section.count("look again") == 1
@@ -132,7 +132,7 @@ def test_junit_has_it_as_properties_and_in_the_output():
 
 def test_nothing_of_it_where_nobody_decided():
     for text in (render_markdown(result(), rubric()), terminal(result()), render_junit(result()).decode()):
-        assert "ecided" not in text
+        assert "ecided by" not in text
         assert "late" not in text
 
 
@@ -156,7 +156,7 @@ def test_what_a_person_graded_in_the_graders_place_is_graded():
     text = render_markdown(settled(error=error), rubric())
     assert text.startswith("# 70 of 100 points\n")
     assert "It could not be graded automatically:\n\nno package in it\n\nhand in a package\n" in text
-    assert "## What was lost" in text
+    assert "## To fix" in text
     assert render_markdown(settled(error=error, status="error"), rubric()).startswith("# Not graded\n")
 
 

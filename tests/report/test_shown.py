@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from fixtures.make import labs, rubric_of
 from grader.model.verdict import FileCitation
 from grader.report.text import code_parts, markdown, markdown_block
-from grader.report.view import caret, commands_in, headline, hint_beside, steps
+from grader.report.view import caret, commands_in, headline, hint_beside, steps, where_to_type
 from grader.untrusted_text import (
     HIDDEN_CATEGORIES,
     clip,
@@ -162,6 +162,25 @@ def test_a_fix_says_in_which_line(hint, shown) -> None:
 )
 def test_commands_are_told_from_the_sentence_around_them(text, parts) -> None:
     assert list(commands_in(text)) == parts
+
+
+@pytest.mark.parametrize(
+    ("reproduce", "where"),
+    [
+        ("cat package.xml", "In the folder of your package:"),
+        (
+            "rosparam load config/a.yaml",
+            "In the folder of your package, while roscore runs in another terminal:",
+        ),
+        ("rosrun lab1 talker.py", "While roscore runs in another terminal:"),
+        ("rostopic hz /chatter", "While roscore and your nodes run in other terminals:"),
+        ("roslaunch lab1 lab1.launch", ""),
+        ("cd ~/catkin_ws && catkin_make", ""),
+        ("In two terminals: `rosrun a b` Then: `rosnode list`", ""),
+    ],
+)
+def test_a_command_says_where_it_works(reproduce, where) -> None:
+    assert where_to_type(reproduce) == where
 
 
 TO_A_CI = re.compile(r"^\s*::|##[A-Za-z]*\[", re.MULTILINE)

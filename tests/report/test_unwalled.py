@@ -74,7 +74,7 @@ def test_reports_say_it_before_anything_that_was_lost(shown) -> None:
         more = () if shown is render_markdown else (Figures(),)
         return shown(of, rubric(), *more).replace("&#39;", "'").replace("\\", "")
 
-    lost = re.compile('What was lost|<h2 id="lost"|Lost ')
+    lost = re.compile(r'## To fix|<h2 id="lost"|To fix\s+[◐✗]')
     without = text(graded(label("bwrap is not installed")))
     assert "has no sandbox (bwrap is not installed)" in without
     assert without.index("has no sandbox") < lost.search(without).start()

@@ -141,7 +141,7 @@ def test_hostile_text_is_shown_and_obeyed_by_nobody(lab: Clone) -> None:
 
 
 def test_a_point_is_a_record() -> None:
-    point = Point(kind="mode", text="git does not have the executable bit of a.py", fix="git add a.py")
+    point = Point(kind="mode", text="git does not know that this is executable: a.py", fix="git add a.py")
     assert GitStatus.model_validate_json(GitStatus(points=(point,)).model_dump_json()) == GitStatus(
         points=(point,)
     )

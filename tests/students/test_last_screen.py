@@ -52,7 +52,7 @@ MISTAKES = [
     (
         "mcr2-basic-comms/listener-not-executable",
         f"✗ listener-executable {MINUS}5 scripts/listener.py",
-        "has no executable bit",
+        "is not executable",
         f"✗ cmake-install {MINUS}10 CMakeLists.txt:48",
         "chmod +x scripts/listener.py",
     ),

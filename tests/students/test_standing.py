@@ -93,7 +93,7 @@ def test_an_executable_bit_that_git_does_not_have(clone: Clone, tmp_path: Path, 
     clone.git("config", "core.fileMode", heeded)
     (point,) = clone.standing(tmp_path).points
     assert point.kind == "mode"
-    assert point.text == "git does not have the executable bit of scripts/talker.py"
+    assert point.text == "git does not know that this is executable: scripts/talker.py"
     assert point.fix == "git update-index --chmod=+x scripts/talker.py && git commit -m Lab"
 
 

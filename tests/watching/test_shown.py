@@ -70,7 +70,7 @@ def test_the_first_result_is_whole_and_later_ones_say_what_changed() -> None:
         "0 of 25 points, 25 lost",
         "now lost: rate 0/10",
         "",
-        "Lost",
+        "To fix",
         f"✗ rate  {MINUS}10",
         "  5 Hz, not 10 Hz",
         "  fix: Rate(10)",
@@ -125,7 +125,7 @@ def test_files_alone_leave_the_rest_open() -> None:
     open_ = criterion("rate", Status.INCONCLUSIVE, 0.0, 10.0, scenario="talker", message="not run")
     text = shown(StringIO(), graded(open_, HALF), graded(open_, TWO), static=True)
     assert "worse: wrap 0/15\n" in text
-    assert text.count("Nothing was run (--static): criteria worth 10 points are still open.") == 2
+    assert text.count("Nothing was run (--static): criteria worth 10 points are not decided yet.") == 2
 
 
 def test_hostile_text_steers_nothing() -> None:

@@ -131,7 +131,7 @@ def _unreadable(
         message = f"{launch} is not in the package{seen}"
         movable = [p for p in near if can_be_moved(p, launch) and (not wanted or started.get(p, wanted))]
         movable += full[:1] if len(full) == 1 else []
-        hint = f"git mv {movable[0]} launch/{launch}" if movable else add_hint(f"launch/{launch}")
+        hint = f"git mv {movable[0]} launch/{launch}" if movable else add_hint(package, f"launch/{launch}")
         place = movable[0] if movable else f"launch/{launch}"
         return failed(message, hint=hint, citations=(FileCitation(file=place),))
     if file.fault is None:
@@ -423,10 +423,10 @@ def _owner(package: PackageFacts, node: LaunchNode) -> PackageFacts | None:
 
 
 def not_executable(*scripts: SourceFile) -> Absence:
-    """Return the absence of nodes whose scripts lack the executable bit."""
+    """Return the absence of nodes whose scripts are not executable."""
     paths = tuple(dict.fromkeys(script.path for script in scripts))
-    has, them = ("has", "it") if len(paths) == 1 else ("have", "them")
-    why = f"{join_words(paths)} {has} no executable bit, so that roslaunch does not find {them}"
+    are, them = ("is", "it") if len(paths) == 1 else ("are", "them")
+    why = f"{join_words(paths)} {are} not executable, so that roslaunch does not find {them}"
     hint = chmod_hint(scripts[0].mode_source, *paths)
     return Absence(why, hint, True, tuple(FileCitation(file=path) for path in paths))
 

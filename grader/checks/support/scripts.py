@@ -90,8 +90,15 @@ def can_be_moved(path: str, wanted: str) -> bool:
     return one == other or not one or not other or (other == ".launch" and one.startswith(other))
 
 
-def add_hint(path: str) -> str:
-    return f"write {path}, then git add, commit and push it"
+def add_hint(package: PackageFacts, path: str) -> str:
+    """Return the hint that a file has to be written; of what was handed in with git, that it has to be pushed too."""
+    then = ", then git add, commit and push it" if handed_in_with_git(package) else ""
+    return f"write {path}{then}"
+
+
+def handed_in_with_git(package: PackageFacts) -> bool:
+    """Return whether git says what is in the package."""
+    return any(file.mode_source == "git" for file in package.files)
 
 
 def cmake_calls(package: PackageFacts, *names: str) -> tuple[CMakeCall, ...]:

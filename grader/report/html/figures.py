@@ -43,16 +43,21 @@ CONSOLE_FIRST, CONSOLE_LAST = 35, 25
 LINE_CHARS = 500
 TITLE_CHARS = 200
 SHOWN_TAB = "⇥   "
-HEARD_MAX = 60
+HEARD_MAX, HEARD_ALIKE_MAX = 60, 3
+PHONE_PX = 330
+LATE_S = 0.1
+"""A listener prints within milliseconds: only a later line is worth a column."""
+NEAR_LINES = 1
+"""How far from a cited line those are that a narrow screen shows too."""
 GRAPH_ROWS_MAX = 100
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drawn:
     """`name` is its id on the page, `points` how many points, rows or lines it has. The first of at most two `plots` is
-    the more telling one; `second` says what the other shows. `same_as` is the id of an earlier
-    figure that shows the same; then nothing else is drawn. `left_out` says what is not shown, of a console after
-    `gap_at` lines."""
+    the more telling one; `second` says what the other shows. `same_as` is the id of an earlier figure that shows the
+    same; then nothing else is drawn. `late` says whether some row was heard late. `left_out` says what is not shown,
+    of a console after `gap_at` lines."""
 
     name: str
     kind: str
@@ -67,6 +72,13 @@ class Drawn:
     left_out: str = ""
     same_as: str = ""
     timeline: Timeline | None = None
+    late: bool = False
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether the first plot has no room on a phone, even as small as it may become."""
+        width = re.search(r"min-width:([\d.]+)px", self.plots[0]) if self.plots else None
+        return width is not None and float(width[1]) > PHONE_PX
 
 
 @dataclass(kw_only=True)
@@ -159,6 +171,8 @@ def _thinned_text(shown: int, there: int) -> str:
 def _draw_heard(figure: HeardFigure, name: str) -> Drawn:
     missed = [row for row in figure.rows if row.heard is None]
     rows = _first(figure.rows, missed)
+    if len(missed) == len(rows) or all(row.other_words for row in rows):
+        rows = rows[:HEARD_ALIKE_MAX]  # all the same is seen from a few
     many = len(figure.rows)
     said = f"{many - len(missed)} of {plural(many, 'message')} {'was' if many == 1 else 'were'} printed."
     if other := sum(row.other_words for row in figure.rows):
@@ -172,6 +186,7 @@ def _draw_heard(figure: HeardFigure, name: str) -> Drawn:
         words=said,
         points=len(rows),
         rows=rows,
+        late=any(row.after_s is not None and row.after_s >= LATE_S for row in rows),
         left_out=_thinned_text(len(rows), many + figure.left_out),
     )
 
@@ -216,6 +231,7 @@ def _code(figure: CodeFigure, name: str) -> Drawn:
             (
                 number,
                 number in figure.marked,
+                all(abs(number - at) > NEAR_LINES for at in figure.marked),
                 text[: len(text) - len(text.lstrip())].replace("\t", SHOWN_TAB),
                 _parts(text, figure.columns.get(number), figure.ends.get(number)),
             )

@@ -24,6 +24,7 @@ from grader.report.sentences import (
     ADVICE,
     MEANINGS,
     SIGNS,
+    STATES,
     is_own_fault,
     lost_words,
     visible_words,
@@ -32,6 +33,7 @@ from grader.report.sentences import (
 from grader.report.text import line
 from grader.report.view import (
     Loss,
+    MissingFile,
     ReportView,
     arrange,
     commands_in,
@@ -39,12 +41,17 @@ from grader.report.view import (
     headline,
     hidden_ids,
     hint_beside,
+    missing_file,
+    missing_files,
     not_graded,
+    of_points,
     places,
     points_of,
     sentence,
     steps,
+    where_to_type,
     without_place,
+    write_files_hint,
 )
 from grader.rubric.model import Rubric
 from grader.wording import number
@@ -185,7 +192,7 @@ def _sections(result: GradingResult, page: Page) -> Iterator[tuple[str, str]]:
     if page.lost:
         yield "lost", f"To fix ({len(page.lost)})"
     if page.open:
-        yield "open", f"Open ({len(page.open)})"
+        yield "open", f"Not decided yet ({len(page.open)})"
     if page.advice:
         yield "advice", "Advice"
     if result.notes:
@@ -235,7 +242,7 @@ class Card:
     what it cost, with what it holds back; `advice` is the title of its hint, which has steps. `seen` is how to see it:
     texts, and which of them are commands. `code` are the lines that it cites, `figures` what was measured, the most
     telling first.
-    `repaired` were judged with its fault repaired."""
+    `repaired` were judged with its fault repaired. `files` are those that have to be written."""
 
     anchor: str
     criterion: CriterionResult
@@ -244,8 +251,10 @@ class Card:
     hidden: bool
     advice: str
     sign: str
+    state: str
     meaning: str
     points: str
+    of: str
     lost: str = ""
     why: Markup = NOTHING
     how: Markup = NOTHING
@@ -258,6 +267,7 @@ class Card:
     blocked: Sequence[Card] = ()
     alike: Sequence[Card] = ()
     repaired: Sequence[Card] = ()
+    files: Sequence[MissingFile] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -332,15 +342,26 @@ class Maker:
         return kept
 
     def _loss(self, loss: Loss) -> Card:
-        blocked = sum(c.missing for c in loss.blocked)
         told = {c.id for c in loss.alike}
         repaired = [self._by_id[i] for i in self._repaired.get(loss.criterion.id, ()) if i not in told]
-        return replace(
+        files = missing_files(loss)
+        card = replace(
             self._card(loss.criterion, self._with_graph(loss.criterion)),
-            lost=lost_words(loss.criterion, blocked, sum(c.missing for c in loss.alike)),
+            lost=lost_words(loss),
             blocked=[self._short(c) for c in loss.blocked],
-            alike=[self._short(c) for c in loss.alike],
+            alike=[] if files else [self._short(c) for c in loss.alike],
             repaired=[self._short(c) for c in repaired],
+            files=files,
+        )
+        if len(files) < 2:
+            return card
+        together = [file.criterion for file in files]
+        return replace(
+            card,
+            message=f"{len({file.path for file in files})} files are not in the package",
+            rest="",
+            hint=[self._prose(sentence(write_files_hint(files)))],
+            of=f"{number(sum(c.points for c in together))} of {number(sum(c.max_points for c in together))}",
         )
 
     def _with_graph(self, criterion: CriterionResult) -> list[Figure]:
@@ -368,7 +389,7 @@ class Maker:
             hint=[
                 self._prose(sentence(step)) for step in steps(hint_beside(criterion, place)) if criterion.hint
             ],
-            seen=tuple(commands_in(criterion.reproduce)),
+            seen=self._seen(criterion),
             where=self._where(criterion),
             code=code,
             figures=[figure for figure in drawn if figure.kind != "code"],
@@ -383,9 +404,18 @@ class Maker:
             hidden=criterion.id in self._hidden,
             advice=ADVICE.get(criterion.status, "What to do"),
             sign=SIGNS[criterion.status],
+            state=STATES[criterion.status],
             meaning=MEANINGS[criterion.status],
             points=points_of(criterion),
+            of=of_points(criterion),
         )
+
+    def _seen(self, criterion: CriterionResult) -> tuple[tuple[str, bool], ...]:
+        """Return how to see it, and where; nothing of a missing file, of which a command only says the same."""
+        if missing_file(criterion):
+            return ()
+        where = where_to_type(criterion.reproduce)
+        return (*([(where, False)] if where else []), *commands_in(criterion.reproduce))
 
     def _where(self, criterion: CriterionResult) -> list[str]:
         """Places that no code beside them shows."""

@@ -13,6 +13,7 @@
 
   function copy(button) {
     var code = button.parentNode.querySelector("code");
+    var text = button.getAttribute("data-copy") || code.textContent;
     function said(done) {
       button.textContent = done ? "Copied" : "Select it";
       status.textContent = done ? "Copied" : "It could not be copied";
@@ -25,7 +26,7 @@
       said(selected(code));
       return;
     }
-    navigator.clipboard.writeText(code.textContent).then(
+    navigator.clipboard.writeText(text).then(
       function () { said(true); },
       function () { said(selected(code)); }
     );

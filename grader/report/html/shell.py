@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 import sys
 from contextlib import suppress
 from functools import cache
@@ -17,7 +18,7 @@ from jinja2.runtime import Context
 from markupsafe import Markup, escape
 
 from grader.report.text import code_parts, line
-from grader.report.view import of_points
+from grader.report.view import of_points, sentence
 from grader.wording import number
 
 LIMIT = 1000
@@ -53,6 +54,9 @@ def environment() -> Environment:
     made.filters["number"] = number
     made.filters["of_points"] = of_points
     made.filters["code"] = _code
+    made.filters["sentence"] = sentence
+    made.filters["joined"] = _join_signs
+    made.filters["to_write"] = _to_write
     return made
 
 
@@ -102,6 +106,30 @@ def prose(text: str) -> Markup:
     return Markup("").join(
         Markup("<code>{}</code>").format(part) if is_code else escape(part)
         for part, is_code in code_parts(text)
+    )
+
+
+TO_WRITE = re.compile(
+    r"(?:in line \d+, |in place of lines? [\d to]+ )?(?:write|add|publish|use) <code>(.*?)</code>",
+    re.IGNORECASE,
+)
+IS_CODE = re.compile(r"[(<=\"']")
+
+
+def _to_write(step: Markup) -> str:
+    """Return the code that a step of a hint says to write, for copying; empty where it says none."""
+    found = TO_WRITE.match(step)
+    code = Markup(found[1]).unescape() if found else ""  # noqa: S704 - read, not shown
+    return code if IS_CODE.search(code) else ""
+
+
+@pass_context
+def _join_signs(context: Context, text: str) -> Markup:
+    """Return a line of code in which no arrow and no end of a comment is broken where the line is."""
+    parts = re.split("(<!--|-+>)", line(text, context.get("limit", LIMIT)))
+    return Markup("").join(
+        Markup('<span class="join">{}</span>').format(part) if i % 2 else escape(part)
+        for i, part in enumerate(parts)
     )
 
 

@@ -21,7 +21,7 @@ from grader.model.result import ErrorInfo, GradingResult, Lateness, Note
 from grader.model.verdict import FileCitation, Status
 from grader.report.html.page import BYTES_MAX, render_html
 from grader.report.html.shell import policy, script
-from grader.report.sentences import FAULTS, blame
+from grader.report.sentences import FAULTS, MINUS, blame
 from grader.report.text import line, visible
 from tests.report.hostile import CRITERIA, result, rubric
 from tests.report.html.made import SCRIPT, code, console, figures, graph, hostile_figures
@@ -72,8 +72,8 @@ def test_points_come_first_then_what_was_lost_the_most_expensive_first():
     order = [c.get("data-criterion") for c in document.xpath("//section[h2/@id='lost']/article")]
     assert order == ["talker-node", "chatter-rate", "listener-chatter"]
     text = words(document.find(".//main"))
-    assert text.index("What you lost") < text.index("Still open") < text.index("All criteria")
-    assert "3 mistakes cost you 47.5 points. The first one alone costs 30 points." in words(document)
+    assert text.index("To fix") < text.index("Not decided yet") < text.index("All criteria")
+    assert "3 mistakes cost 47.5 points, the first one alone 30." in words(document)
 
 
 def test_a_card_says_what_why_how_to_mend_it_and_where():
@@ -87,7 +87,6 @@ def test_a_card_says_what_why_how_to_mend_it_and_where():
         lost.measured,
         lost.hint,
         "0 of 10",
-        "10 points lost",
     ):
         assert said in text
     assert DOCS["some-check"]["Why it matters on a robot"] in text
@@ -114,7 +113,7 @@ def test_what_a_loss_holds_back_is_named_and_linked():
         "counter-step",
         "counter-wrap",
     ]
-    assert "5 points lost, and 25 more in what it blocks" in words(found)
+    assert f"{MINUS}5 here, {MINUS}30 in all: also counter-start {MINUS}5" in words(found)
 
 
 def test_every_criterion_has_its_details_once_and_its_row():
@@ -133,7 +132,45 @@ def test_every_criterion_has_its_details_once_and_its_row():
 
 def test_each_status_has_a_word_beside_its_colour():
     badges = {words(badge) for badge in parsed(page()).xpath("//*[starts-with(@class, 'badge status-')]")}
-    assert badges == {"✓ pass", "✗ fail", "◐ partial", "⊘ blocked", "? inconclusive", "! error", "• manual"}
+    still = {f"{sign} not decided yet" for sign in "?!•"}
+    assert badges == {"✓ passed", "✗ to fix", "◐ to fix", "⊘ not tested"} | still
+
+
+def test_files_that_have_to_be_written_are_one_card_which_says_what_they_hold():
+    asked = {"launch/a.launch": "a.launch starts /talker", "config/b.yaml": "it sets /rate"}
+    lost = tuple(
+        criterion(
+            f"file-{i}",
+            Status.FAIL,
+            0,
+            10,
+            message=f"{path} is not in the package",
+            expected=holds,
+            hint=f"write {path}",
+        )
+        for i, (path, holds) in enumerate(asked.items())
+    )
+    document = parsed(page(result(criteria=lost)))
+    (only,) = document.xpath("//section[h2/@id='lost']/article")
+    assert "2 files are not in the package 0 of 20" in words(only)
+    assert [words(item) for item in only.xpath(".//div[@class='files']//li")] == [
+        f"launch/a.launch {MINUS}10Starts /talker",
+        f"config/b.yaml {MINUS}10It sets /rate",
+    ]
+    assert not only.xpath(".//div[@class='see']"), "a command would only say that there is none"
+
+
+def test_code_that_a_fix_says_to_write_can_be_copied():
+    def copied(hint: str) -> list[str]:
+        found = card(parsed(page(result(criteria=(criterion("a", Status.FAIL, 0, 5, hint=hint),)))), "a")
+        return found.xpath(".//*[contains(@class, 'hint')]//button/@data-copy")
+
+    assert copied("write `rate.sleep()` as the last line") == ["rate.sleep()"]
+    assert copied("add <depend>rospy</depend> below line 4; then in line 7, write f(a)") == [
+        "<depend>rospy</depend>",
+        "f(a)",
+    ]
+    assert copied("write talker.py") == copied("remove `rate.sleep()`") == []
 
 
 def test_the_same_picture_is_drawn_once():
