@@ -7,14 +7,18 @@ turns with each other, and their locks lie where no test looks for what is left.
 
 from __future__ import annotations
 
+import json
 import os
+import sys
 import tempfile
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+from grader.limited_child import Answer, ChildLimits
 from grader.workers import Worker
 
 settings.register_profile("all", deadline=None)
@@ -48,8 +52,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def without_processes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Workers do their jobs in this process: for tests of what is made of the answers. To start one takes a second."""
+    """Workers and limited children do their jobs here, for tests of what is made of the answers: to start one
+    takes longer than most jobs."""
     monkeypatch.setattr(Worker, "run", lambda _worker, function, job: function(job))
+    monkeypatch.setattr(sys, "path", [*sys.path])  # a child adds to its own
+    for module in ("intake.archive", "package.python", "package.repairs.python"):
+        monkeypatch.setattr(f"grader.{module}.run_limited", run_in_this_process)
+
+
+def run_in_this_process(function: str, *arguments: object, limits: ChildLimits) -> Answer:
+    """Do what `run_limited` does, without a child and its limits."""
+    module, _, name = function.partition(":")
+    values = getattr(import_module(module), name)(*json.loads(json.dumps(arguments)))
+    return Answer(lines=b"".join(json.dumps(value).encode() + b"\n" for value in values), done=True)
 
 
 @pytest.fixture

@@ -57,7 +57,7 @@ def test_a_text_that_is_cut_is_noticed() -> None:
 @pytest.mark.parametrize("like", ["12 Station Road, Mumbai", "Asha", "+91 98-76", "a\nb: c\n", "Al", "", "7"])
 def test_what_is_made_up_has_the_shape_of_the_original(like: str) -> None:
     found = {made_up(like) for _ in range(20)}
-    assert len(found) == 20
+    assert len(found) >= 18, "two of 20 may be alike by chance"
     for text in found:
         rest = "".join("x" if c.isalnum() else c for c in text)
         assert rest.startswith("".join("x" if c.isalnum() else c for c in like).rstrip())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gzip
 import hashlib
 import io
-import json
 import os
 import struct
 import tarfile
@@ -14,9 +13,7 @@ import zipfile
 import pytest
 
 from grader.errors import SubmissionError
-from grader.intake import archive
 from grader.intake.limits import IntakeLimits
-from grader.limited_child import Answer, ChildLimits
 from tests.intake.samples import (
     NODE,
     lab_tar,
@@ -29,19 +26,8 @@ from tests.intake.samples import (
     zip_entry,
 )
 
-
-@pytest.fixture(autouse=True)
-def _in_this_process(monkeypatch) -> None:
-    """No child for each archive: what it may take is looked at in test_hostile_archive.py."""
-
-    def call(function: str, *arguments: object, limits: ChildLimits) -> Answer:
-        assert function == "grader.intake.archive:unpack_here"
-        assert limits.memory_bytes == archive.MEMORY_BYTES
-        (record,) = archive.unpack_here(*json.loads(json.dumps(arguments)))
-        return Answer(lines=json.dumps(record).encode(), done=True)
-
-    monkeypatch.setattr(archive, "run_limited", call)
-
+pytestmark = pytest.mark.usefixtures("without_processes")
+"""No child for each archive: what it may take is looked at in test_hostile_archive.py."""
 
 MANIFEST = ("lab1/package.xml", manifest("lab1"))
 

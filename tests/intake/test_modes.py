@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
-from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 from grader.errors import OutputError, UsageError
-from grader.intake import archive
-from grader.limited_child import Answer
 from grader.model.submission import chmod_hint
 from grader.package import read_package
 from grader.package.repairs import Wanted, find_repairs
@@ -226,20 +222,12 @@ def test_a_work_folder_that_cannot_be_made(tmp_path):
         opened(root, root / "file")
 
 
-def run_here(function, *arguments, limits):
-    """`run_limited`, in this process: a test can change what the child does."""
-    del limits
-    module, _, name = function.partition(":")
-    values = getattr(import_module(module), name)(*arguments)
-    return Answer(lines=b"".join(json.dumps(value).encode() + b"\n" for value in values), done=True)
-
-
+@pytest.mark.usefixtures("without_processes")
 def test_a_disk_that_is_full(tmp_path, monkeypatch):
     def full(*_args, **_kwargs):
         raise OSError(28, "No space left on device")
 
     path = lab_zip(tmp_path / "a.zip")
-    monkeypatch.setattr(archive, "run_limited", run_here)
     monkeypatch.setattr(shutil, "copyfileobj", full)
     with pytest.raises(OutputError, match="disk is full"):
         opened(path, tmp_path)

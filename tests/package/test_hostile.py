@@ -286,6 +286,29 @@ def test_files_that_python_has_no_time_for_are_named(tmp_path):
     assert len(report.faults) == 5000
 
 
+def test_hostile_source_does_not_stop_the_others(tmp_path):
+    (tmp_path / "bomb.py").write_text("x = " + "-" * 900_000 + "1\n")
+    (tmp_path / "chain.py").write_text("x = a" + ".a" * 400_000 + "\n")
+    (tmp_path / "good.py").write_text("x = 1\n")
+    (tmp_path / "large.py").write_bytes(b"(" * 2_000_001)
+    report = check_syntax(tmp_path, ["bomb.py", "chain.py", "good.py", "large.py", "gone.py"])
+    assert set(report.checked) == {"bomb.py", "chain.py", "good.py", "large.py", "gone.py"}
+    assert report.faults["bomb.py"].kind in {"MemoryError", "RecursionError", "PythonCrash", "SyntaxError"}
+    assert "good.py" not in report.faults
+    assert report.faults["gone.py"].kind == "FileNotFoundError"
+
+
+@pytest.mark.full
+def test_a_crash_is_laid_to_its_file(tmp_path, monkeypatch):
+    monkeypatch.setattr("grader.package.python.CHECK", "tests.package.crashing:check_all")
+    report = check_syntax(tmp_path, ["a", "crash", "b", "slow", "c"], timeout_s=10.0)
+    assert {path: fault.kind for path, fault in report.faults.items()} == {
+        "crash": "PythonCrash",
+        "slow": "NotChecked",
+        "c": "NotChecked",
+    }
+
+
 def test_python_files_that_crash_or_never_end(tmp_path):
     files = {
         "src/brackets.py": "(" * 10_000 + ")" * 10_000,

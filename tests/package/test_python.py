@@ -11,6 +11,9 @@ from grader.checks.support.exit_causes import syntax_hint
 from grader.package.python import cause_of, check_syntax, read_syntax_report
 from grader.syntax_fixes import corrected
 
+pytestmark = pytest.mark.usefixtures("without_processes")
+"""What the child may take, and what ends it, is looked at in test_hostile.py."""
+
 # Each text, the line of its fault, and words of its cause; all hold under Python 3.8 as under the newest.
 CASES = {
     "print": ('print "x"\n', 1, "Python 2: `print`"),
@@ -428,29 +431,6 @@ def test_a_name_that_is_not_there_and_one_that_is_spelt_alike(tmp_path, text, to
     (tmp_path / "a.py").write_text(text)
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in ("misspelt", "outside-method")]
     assert [s.message for s in slips] == told
-
-
-def test_hostile_source_does_not_stop_the_others(tmp_path):
-    (tmp_path / "bomb.py").write_text("x = " + "-" * 900_000 + "1\n")
-    (tmp_path / "chain.py").write_text("x = a" + ".a" * 400_000 + "\n")
-    (tmp_path / "good.py").write_text("x = 1\n")
-    (tmp_path / "large.py").write_bytes(b"(" * 2_000_001)
-    report = check_syntax(tmp_path, ["bomb.py", "chain.py", "good.py", "large.py", "gone.py"])
-    assert set(report.checked) == {"bomb.py", "chain.py", "good.py", "large.py", "gone.py"}
-    assert report.faults["bomb.py"].kind in {"MemoryError", "RecursionError", "PythonCrash", "SyntaxError"}
-    assert "good.py" not in report.faults
-    assert report.faults["gone.py"].kind == "FileNotFoundError"
-
-
-@pytest.mark.full
-def test_a_crash_is_laid_to_its_file(tmp_path, monkeypatch):
-    monkeypatch.setattr("grader.package.python.CHECK", "tests.package.crashing:check_all")
-    report = check_syntax(tmp_path, ["a", "crash", "b", "slow", "c"], timeout_s=10.0)
-    assert {path: fault.kind for path, fault in report.faults.items()} == {
-        "crash": "PythonCrash",
-        "slow": "NotChecked",
-        "c": "NotChecked",
-    }
 
 
 def test_names_of_any_bytes(tmp_path):

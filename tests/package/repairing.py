@@ -1,0 +1,84 @@
+"""A small correct package whose files a test replaces, and what a lab asks of it: for tests of repairs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from grader.package.repairs import Repair, Wanted, apply_repair, find_repairs
+from tests.package.trees import facts_of
+
+WANTED = Wanted(
+    package="lab",
+    scripts=("src/talker.py",),
+    topics=("/numeric_chatter",),
+    nodes=("talker",),
+    params=("/details/name", "/talker/rate"),
+    types=("std_msgs/Int8",),
+    dependencies=("rospy",),
+)
+SCRIPT = """\
+#!/usr/bin/env python3
+import rospy
+from std_msgs.msg import Int8
+
+def main():
+    rospy.init_node('talker')
+    publisher = rospy.Publisher('numeric_chatter', Int8, queue_size=10)
+    rate = rospy.Rate(rospy.get_param('~rate', 10))
+    while not rospy.is_shutdown():
+        publisher.publish(1)
+        rate.sleep()
+
+main()
+"""
+MANIFEST = """\
+<package format="2">
+  <name>lab</name>
+  <version>0.0.0</version>
+  <description>x</description>
+  <maintainer email="a@b.org">a</maintainer>
+  <license>MIT</license>
+  <buildtool_depend>catkin</buildtool_depend>
+  <depend>rospy</depend>
+</package>
+"""
+CMAKE = """\
+cmake_minimum_required(VERSION 3.0.2)
+project(lab)
+find_package(catkin REQUIRED COMPONENTS rospy)
+catkin_package()
+"""
+LAUNCH = '<launch>\n  <node pkg="lab" type="talker.py" name="talker"/>\n</launch>\n'
+FILES = {
+    "src/talker.py": SCRIPT,
+    "package.xml": MANIFEST,
+    "CMakeLists.txt": CMAKE,
+    "launch/lab.launch": LAUNCH,
+}
+TALKER, XML, CMAKELISTS, LAUNCHED = FILES
+
+
+def package(folder: Path, changes: dict[str, str | bytes | None] | None = None) -> Path:
+    """The correct package, with some files replaced or, for None, left out."""
+    for name, content in {**FILES, **(changes or {})}.items():
+        if content is not None:
+            path = folder / "lab" / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content if isinstance(content, bytes) else content.encode())
+            path.chmod(0o755 if name.endswith(".py") else 0o644)
+    return folder / "lab"
+
+
+def repair_all(folder: Path, wanted: Wanted = WANTED, name: str = "lab") -> tuple[Repair, ...]:
+    found = find_repairs(folder, facts_of(folder, name), wanted)
+    for repair in found:
+        apply_repair(folder, repair)
+    return found
+
+
+def swapped(name: str, *pairs: tuple[str, str]) -> dict[str, str | bytes | None]:
+    text = FILES[name]
+    for old, new in pairs:
+        assert old in text
+        text = text.replace(old, new)
+    return {name: text}

@@ -1,0 +1,125 @@
+"""Repairs of hostile packages: links, pipes, huge files and sources that no parser likes."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from grader.package.repairs import NotRepairable, Repair, apply_repair, find_repairs
+from tests.package.repairing import SCRIPT, TALKER, WANTED, package, repair_all, swapped
+from tests.package.trees import facts_of
+
+
+@pytest.fixture
+def outside(tmp_path: Path) -> Path:
+    folder = tmp_path / "outside"
+    folder.mkdir()
+    (folder / "secret.py").write_text(SCRIPT.replace("numeric_chatter", "numeric_chater"))
+    (folder / "secret.py").chmod(0o644)
+    return folder
+
+
+def snapshot(folder: Path) -> dict[str, tuple[int, bytes]]:
+    return {p.name: (p.stat().st_mode, p.read_bytes()) for p in folder.rglob("*") if p.is_file()}
+
+
+def misspelt(file: str = "src/talker.py") -> Repair:
+    line = "    publisher = rospy.Publisher('numeric_chater', Int8, queue_size=10)"
+    after = line.replace("chater", "chatter")
+    return Repair(kind="topic-name", file=file, line=7, before=line, after=after, message="x", fix="x")
+
+
+def test_a_link_in_place_of_the_script_is_not_followed(tmp_path: Path, outside: Path) -> None:
+    before = snapshot(outside)
+    folder = package(tmp_path, {TALKER: None})
+    (folder / "src").mkdir()
+    (folder / "src" / "talker.py").symlink_to(outside / "secret.py")
+    assert [r for r in find_repairs(folder, facts_of(folder), WANTED) if r.file == TALKER] == []
+    bit = Repair(kind="executable-bit", file=TALKER, message="x", fix="x")
+    for repair in (bit, misspelt()):
+        with pytest.raises((OSError, NotRepairable)):
+            apply_repair(folder, repair)
+    assert snapshot(outside) == before
+    assert (folder / "src" / "talker.py").is_symlink()
+
+
+def test_a_linked_folder_is_not_entered(tmp_path: Path, outside: Path) -> None:
+    before = snapshot(outside)
+    folder = package(tmp_path, {TALKER: None})
+    (folder / "src").symlink_to(outside)
+    for file in ("src/secret.py", "../outside/secret.py", str(outside / "secret.py")):
+        with pytest.raises((OSError, NotRepairable)):
+            apply_repair(folder, misspelt(file))
+    assert snapshot(outside) == before
+
+
+def test_windows_opens_nothing_relative_to_a_folder(tmp_path: Path, outside: Path, monkeypatch) -> None:
+    monkeypatch.setattr("grader.package.repairs.editing.HAS_DIR_FD", False)
+    before = snapshot(outside)
+    changed = SCRIPT.replace("numeric_chatter", "numeric_chater")
+    folder = package(tmp_path, {TALKER: None, "src/talkr.py": changed})
+    assert [repair.kind for repair in repair_all(folder)] == ["file-name", "topic-name"]
+    assert (folder / "src" / "talker.py").read_text() == SCRIPT
+    (folder / "scripts").symlink_to(outside)
+    with pytest.raises((OSError, NotRepairable)):
+        apply_repair(folder, misspelt("scripts/secret.py"))
+    assert snapshot(outside) == before
+
+
+def test_a_script_with_a_name_elsewhere_changes_here_alone(tmp_path: Path, outside: Path) -> None:
+    before = snapshot(outside)
+    folder = package(tmp_path, {TALKER: None})
+    (folder / "src").mkdir()
+    os.link(outside / "secret.py", folder / "src" / "talker.py")
+    assert [repair.kind for repair in repair_all(folder)] == ["executable-bit", "topic-name"]
+    assert snapshot(outside) == before
+    assert (folder / "src" / "talker.py").read_text() == SCRIPT
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    folder = package(tmp_path, {TALKER: None})
+    (folder / "src").mkdir()
+    os.mkfifo(folder / "src" / "talker.py")
+    assert [r for r in find_repairs(folder, facts_of(folder), WANTED) if r.file == TALKER] == []
+    for repair in (misspelt(), Repair(kind="executable-bit", file=TALKER, message="x", fix="x")):
+        with pytest.raises((OSError, NotRepairable)):
+            apply_repair(folder, repair)
+
+
+def test_a_huge_file_is_left_as_it_is_but_for_its_bit(tmp_path: Path) -> None:
+    folder = package(tmp_path)
+    script = folder / "src" / "talker.py"
+    with script.open("r+b") as file:
+        file.truncate(100_000_000)
+    script.chmod(0o644)
+    assert [repair.kind for repair in repair_all(folder)] == ["executable-bit"]
+    assert script.stat().st_size == 100_000_000
+    with pytest.raises(NotRepairable):
+        apply_repair(folder, misspelt())
+
+
+def test_a_name_with_a_newline_is_a_name(tmp_path: Path) -> None:
+    file = "src/a\nb/talker.py"
+    folder = package(tmp_path, {TALKER: None, file: SCRIPT.replace("numeric_chatter", "numeric_chater")})
+    (found,) = repair_all(folder)
+    assert found.file == file
+    assert (folder / file).read_text() == SCRIPT
+
+
+@pytest.mark.parametrize(
+    "source",
+    ["(" * 50_000, "x = " + "-" * 60_000 + "1", "def f():\n" + "".join(" " * i + "if 1:\n" for i in range(1, 200)),
+     "print 'a'\n" * 3_000, "'" * 60_001, "\x0c\x0b\x1c x = 1\n", "x = '\\ud800'\nprint x\n", "\u2028print 'a'\n"],
+    ids=["brackets", "signs", "indents", "prints", "quotes", "feeds", "surrogate", "separator"],
+)  # fmt: skip
+def test_a_hostile_source_costs_its_own_repairs(source: str, tmp_path: Path) -> None:
+    launch = '<launch>\n  <node pkg="lab" type="evil.py" name="evil"/>\n</launch>\n'
+    wrong = swapped(TALKER, ("numeric_chatter", "numeric_chater"))
+    folder = package(
+        tmp_path, {**wrong, "src/evil.py": f"#!/usr/bin/env python3\n{source}", "launch/e.launch": launch}
+    )
+    found = [repair for repair in repair_all(folder) if repair.file == TALKER]
+    assert [repair.kind for repair in found] == ["topic-name"]
+    assert (folder / "src" / "talker.py").read_text() == SCRIPT
