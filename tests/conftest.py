@@ -2,11 +2,13 @@
 
 Examples of properties have no deadline: on a machine that is shared, how long one takes says nothing. All gradings take
 turns with each other, and their locks lie where no test looks for what is left. Where only tests with ROS are asked for
-(`-m "ros …"`), files without any are not imported: they are most of all.
+(`-m "ros …"`), files without any are not imported: they are most of all. What is collected stays to the end, and
+Python looks for garbage neither while it is collected nor in it.
 """
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import sys
@@ -18,6 +20,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from grader import workers
 from grader.limited_child import Answer, ChildLimits
 from grader.workers import Worker
 
@@ -38,6 +41,7 @@ os.environ["XDG_RUNTIME_DIR"] = str(LOCKS)
 def pytest_configure(config: pytest.Config) -> None:
     """Properties get fewer examples where the marker `full` is left out, as in `make test`."""
     settings.load_profile("quick" if "not full" in config.option.markexpr else "all")
+    gc.disable()
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
@@ -50,11 +54,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST else len(LONGEST))
 
 
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.enable()
+
+
 @pytest.fixture
 def without_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Workers and limited children do their jobs here, for tests of what is made of the answers: to start one
     takes longer than most jobs."""
     monkeypatch.setattr(Worker, "run", lambda _worker, function, job: function(job))
+    monkeypatch.setattr(workers, "_template", lambda *_: None)
     monkeypatch.setattr(sys, "path", [*sys.path])  # a child adds to its own
     for module in ("intake.archive", "package.python", "package.repairs.python"):
         monkeypatch.setattr(f"grader.{module}.run_limited", run_in_this_process)

@@ -20,6 +20,7 @@ from grader.rubric.model import Rubric
 from tests.package.trees import facts_of, plain
 from tests.support.shapes import LOGIC, REPAIRED_AS, REWORDED, shapes
 
+pytestmark = pytest.mark.usefixtures("without_processes")
 SHORTER = "mcr2-basic-comms/"
 QUICK = (
     "eyantra-ros-basics/yaml-key-misspelt+bit-removed",

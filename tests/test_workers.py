@@ -30,6 +30,7 @@ from tests.test_workers import sleep
 from grader.workers import Worker
 Worker().run(sleep, sys.argv[1])
 """
+LIMITS = WorkerLimits(memory_bytes=1 << 30, cpu_s=2.0, wall_s=120.0)
 
 
 @pytest.fixture(autouse=True)
@@ -37,9 +38,18 @@ def _importable(monkeypatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
 
 
+@pytest.fixture(scope="module")
+def template() -> Iterator[workers.Template | None]:
+    """One process has imported what this module needs, for all of its tests: each would take half a second for it."""
+    made = workers._template(2, "tests.test_workers", {"PYTHONPATH": str(ROOT)})
+    yield made
+    if made is not None:
+        made.close()
+
+
 @pytest.fixture
-def worker() -> Iterator[Worker]:
-    made = Worker(WorkerLimits(memory_bytes=1 << 30, cpu_s=2.0, wall_s=120.0))
+def worker(template: workers.Template | None) -> Iterator[Worker]:
+    made = Worker(LIMITS, template=template)
     yield made
     made.close()
 
@@ -80,8 +90,10 @@ def harm(number: int) -> int:
     return number * number
 
 
-def test_one_process_does_many_jobs(worker: Worker) -> None:
+def test_one_process_does_many_jobs() -> None:
+    worker = Worker(LIMITS)
     assert worker.run(pid, 1) == worker.run(pid, 2) != os.getpid()
+    worker.close()
 
 
 @pytest.mark.parametrize(

@@ -108,12 +108,22 @@ def test_a_name_with_a_newline_is_a_name(tmp_path: Path) -> None:
     assert (folder / file).read_text() == SCRIPT
 
 
+INDENTS = "def f():\n" + "".join(" " * depth + "if 1:\n" for depth in range(1, 200))
+
+
 @pytest.mark.parametrize(
     "source",
-    ["(" * 50_000, "x = " + "-" * 60_000 + "1", "def f():\n" + "".join(" " * i + "if 1:\n" for i in range(1, 200)),
-     "print 'a'\n" * 3_000, "'" * 60_001, "\x0c\x0b\x1c x = 1\n", "x = '\\ud800'\nprint x\n", "\u2028print 'a'\n"],
-    ids=["brackets", "signs", "indents", "prints", "quotes", "feeds", "surrogate", "separator"],
-)  # fmt: skip
+    [
+        pytest.param("(" * 50_000, id="brackets", marks=pytest.mark.full),
+        pytest.param("x = " + "-" * 60_000 + "1", id="signs"),
+        pytest.param(INDENTS, id="indents", marks=pytest.mark.full),
+        pytest.param("print 'a'\n" * 3_000, id="prints", marks=pytest.mark.full),
+        pytest.param("'" * 60_001, id="quotes", marks=pytest.mark.full),
+        pytest.param("\x0c\x0b\x1c x = 1\n", id="feeds", marks=pytest.mark.full),
+        pytest.param("x = '\\ud800'\nprint x\n", id="surrogate"),
+        pytest.param("\u2028print 'a'\n", id="separator", marks=pytest.mark.full),
+    ],
+)
 def test_a_hostile_source_costs_its_own_repairs(source: str, tmp_path: Path) -> None:
     launch = '<launch>\n  <node pkg="lab" type="evil.py" name="evil"/>\n</launch>\n'
     wrong = swapped(TALKER, ("numeric_chatter", "numeric_chater"))

@@ -384,7 +384,16 @@ def test_any_text_of_a_criterion_stands_in_its_card(shown):
             assert " ".join(line(getattr(shown.criteria[0], field), 1000).split()) in content
 
 
-@pytest.mark.parametrize("text", HUGE, ids=["letters", "hidden", "entities", "stars", "names"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param(HUGE[0], id="letters", marks=pytest.mark.full),
+        pytest.param(HUGE[1], id="hidden", marks=pytest.mark.full),
+        pytest.param(HUGE[2], id="entities"),
+        pytest.param(HUGE[3], id="stars", marks=pytest.mark.full),
+        pytest.param(HUGE[4], id="names", marks=pytest.mark.full),
+    ],
+)
 def test_a_page_stays_below_400_kilobytes_whatever_is_in_it(text):
     graded = spoiled(of(text)).model_copy(update={"error": None, "status": "graded"})
     drawn = Figures(
