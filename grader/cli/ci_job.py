@@ -34,12 +34,11 @@ from grader.model.result import GradingResult
 from grader.report.sentences import rubric_words, without_sandbox
 from grader.report.terminal import open_console, print_report
 from grader.report.view import hidden_ids, without_hidden
-from grader.results import read_result
+from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 
 WHICH = "give the package's folder as path (GRADER_PATH), and the lab as lab (GRADER_LAB)"
-RESULT = "result.json"
 
 
 def run_job(system: str) -> ExitCode:

@@ -15,6 +15,7 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.files import result_text
 from grader.report.terminal import open_console, print_report
+from grader.results import RESULT
 from grader.rubric.model import Rubric
 
 
@@ -57,7 +58,7 @@ def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric
 
 
 REPORT = "report.html"
-REPORTS = (REPORT, "result.json", "report.md", "junit.xml", "console.log")
+REPORTS = (REPORT, RESULT, "report.md", "junit.xml", "console.log")
 
 
 def show(

@@ -19,6 +19,7 @@ from grader.report.forms import FORMS, ReportInput
 from grader.report.markdown import render_markdown
 from grader.report.sentences import RUBRIC_FROM
 from grader.report.view import arrange, hidden_ids
+from grader.results import EVIDENCE, RESULT
 from grader.rubric.model import Rubric
 from grader.wording import number
 
@@ -54,7 +55,7 @@ WITH_LINES = ("junit", "code-quality", "sarif")
 """Forms that are rendered once more, or only here, with files as the repository has them."""
 REPORT_NAMES = frozenset(
     {
-        "console.log", "evidence", "grader.env", "result.json", *(FORMS[name].file for name in WITH_LINES),
+        "console.log", EVIDENCE, "grader.env", RESULT, *(FORMS[name].file for name in WITH_LINES),
         *(form.file for form in FORMS.values() if form.in_results),
     }
 )  # fmt: skip

@@ -8,15 +8,20 @@ from pathlib import Path
 
 import pytest
 
+from grader.classes.review.guard import REPORTS as SHOWN_IN_REVIEW
+from grader.cli.outcome import REPORTS as SHOWN_AT_THE_END
 from grader.errors import HostError, OutputError
 from grader.files import atomic_write, check_writable
+from grader.integrations.ci_results import REPORT_NAMES
 from grader.model.repair import Repair
 from grader.model.result import ErrorInfo, Repaired
 from grader.model.verdict import Status
 from grader.report.files import result_bytes, write_reports
+from grader.report.forms import FORMS
 from grader.report.sentences import repair_words
 from grader.report.terminal import Terminal, open_console
 from grader.report.view import arrange, without_hidden
+from grader.results import PARTS, RESULT
 from tests.report.hostile import result, rubric
 from tests.support.a_class import criterion
 
@@ -234,3 +239,9 @@ def test_carets_stand_below_what_is_meant_whatever_the_encoding(encoding, number
     text, carets = Terminal(console)._code(f"{number} | …r, mgs.data)", f"{' ' * len(number)} |     ^^^")
     assert text.plain.index("mgs") == carets.plain.index("^")
     assert "\\u" not in text.plain
+
+
+def test_files_beside_a_result_are_known_wherever_they_are_handled():
+    written = {form.file for form in FORMS.values() if form.in_results}
+    for names in (PARTS, SHOWN_AT_THE_END, SHOWN_IN_REVIEW, REPORT_NAMES):
+        assert written | {RESULT} <= set(names)

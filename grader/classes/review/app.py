@@ -63,6 +63,7 @@ from grader.report.html.page import render_html
 from grader.report.html.shell import environment, style
 from grader.report.sentences import SIGNS
 from grader.report.view import of_points
+from grader.results import RESULT
 from grader.rubric.model import Criterion
 from grader.wording import number, plural
 
@@ -319,7 +320,7 @@ class _Views:
             waits=self._session.waits(item),
             troubles=troubles,
             report=next((name for name in ("report.html", "report.md") if name in there), ""),
-            files=[name for name in there if name not in {"report.html", "result.json"} and not item.alias],
+            files=[name for name in there if name not in {"report.html", RESULT} and not item.alias],
             evidence=evidence_of(folder) if not item.alias else [],
         )
 

@@ -14,7 +14,7 @@ from flask import Flask, Response, redirect, request, session
 from werkzeug.exceptions import Forbidden
 from werkzeug.wrappers import Response as AnyResponse
 
-from grader.results import EVIDENCE
+from grader.results import EVIDENCE, RESULT
 
 TOKEN_BYTES = 24
 BODY_BYTES = 64 << 10
@@ -100,7 +100,7 @@ REPORTS = {
     "report.md": "text/plain",
     "console.log": "text/plain",
     "junit.xml": "text/plain",
-    "result.json": "text/plain",
+    RESULT: "text/plain",
 }
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,150}")
 FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
