@@ -13,7 +13,12 @@ import pytest
 
 from fixtures.make import faulty_package, labs
 from grader.authoring.mutation.package_tree import read_tree
+from grader.intake import open_submission
+from grader.judging.judge import judge_files
 from grader.model.result import GradingResult
+from grader.model.verdict import FileCitation
+from grader.package import read_packages
+from grader.pipeline import wanted_package
 from tests.fixture_runs import (
     GIT,
     REFERENCE,
@@ -25,13 +30,17 @@ from tests.fixture_runs import (
     in_turn,
     is_example,
     lacking_packages,
+    loaded,
     missed,
     read_fixture,
     rubric_of,
     shorter_round,
+    source_of,
     surprises,
     workers,
 )
+from tests.gradebook.made import criterion
+from tests.support.advice import faulty_advice
 
 LABS = labs()
 FAULTY_AT_LEAST = {"leeds-comp3631-lab1": 20}
@@ -140,6 +149,46 @@ def test_git_keeps_the_executable_bits() -> None:
     assert wrong == []
 
 
+@pytest.mark.parametrize(
+    ("lab", "name"),
+    [pytest.param(*pair, marks=[] if pair in SHORTER else pytest.mark.full) for pair in NAMED],
+)
+def test_what_is_advised_by_the_files_is_true(lab, name, tmp_path) -> None:
+    """Two criteria do not contradict each other, lines and files are there, and what to write is not there yet."""
+    rubric, source = loaded(lab), source_of(lab, name)
+    submission = open_submission(
+        str(source), package=wanted_package(rubric.rubric, ""), workdir=tmp_path, submission_id=name
+    )
+    found = judge_files(rubric.rubric, read_packages(submission), rubric.checks)
+    assert faulty_advice([verdict.criterion for verdict in found], source) == []
+
+
+@pytest.mark.parametrize(
+    ("hint", "fault"),
+    [
+        ("write `rate.sleep()`", "rate: rate.sleep() is there already"),
+        (
+            "write #!/usr/bin/env python3 as the very first line",
+            "rate: the first line is #!/usr/bin/env python3",
+        ),
+        ("src/talker.py line 7: write `rospy.spin()`", "rate: there is no line 7 of src/talker.py"),
+        ("write `pass`", "src/talker.py, line 2: write break or pass?"),
+        ("remove `break`", "rate: remove break, which other advice says to write"),
+    ],
+)
+def test_wrong_advice_is_found(hint, fault, tmp_path) -> None:
+    (tmp_path / "src").mkdir()
+    (tmp_path / "src" / "talker.py").write_text("#!/usr/bin/env python3\nrate.sleep()\n")
+    place = (FileCitation(file="src/talker.py", line=2),)
+    first, other = (
+        criterion(name, 0).model_copy(update={"hint": said, "citations": place})
+        for name, said in (("rate", hint), ("name", "write `break`"))
+    )
+    found = faulty_advice([first, other], tmp_path)
+    assert any(line.startswith(fault) for line in found)
+    assert faulty_advice([other], tmp_path) == []
+
+
 @pytest.mark.ros
 @pytest.mark.slow
 @pytest.mark.parametrize(
@@ -153,3 +202,4 @@ def test_graded_for_real(lab, graded_name, graded) -> None:
     found = surprises(result, read_fixture(lab, graded_name), rubric)
     assert not found, "\n  ".join([f"{lab}/{graded_name} is not graded as declared:", *found])
     assert {c.id for c in result.criteria} == {c.id for c in rubric.criteria}
+    assert faulty_advice(result.criteria, source_of(lab, graded_name)) == []

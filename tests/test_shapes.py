@@ -18,6 +18,7 @@ from grader.package.repairs import apply_repair, find_repairs, wanted_of
 from grader.pipeline import GradeOptions, grade
 from grader.rubric.model import Rubric
 from tests.package.trees import facts_of, plain
+from tests.support.advice import faulty_advice
 from tests.support.shapes import LOGIC, REPAIRED_AS, REWORDED, shapes
 
 pytestmark = pytest.mark.usefixtures("without_processes")
@@ -82,6 +83,7 @@ def test_the_hints_lead_to_full_marks(shape: str, tmp_path: Path) -> None:
     write_tree(tree, tmp_path / "copy")
     first = last = graded(tmp_path, lab, 0)
     assert_consistent(first, rubric_of(lab).rubric)
+    assert faulty_advice(first.criteria, tmp_path / "copy") == []
     for number in range(1, ROUNDS_MAX + 1):
         repairs = tuple(one for one in found_in(tmp_path / "copy", lab) if is_told(last, one))
         if not repairs:

@@ -127,11 +127,23 @@ def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str
         slip = next((c for c in packages if c.args and c.args[0].casefold() == "catkin"), None)
         other = f" (line {slip.line} says {slip.args[0]})" if slip else ""
         line = slip.line if slip else None
-        yield f"find_package(catkin …) is missing{other}", "add find_package(catkin REQUIRED)", line
+        fix = (
+            f"write catkin in place of {slip.args[0]}"
+            if slip
+            else f"add find_package(catkin REQUIRED){_below(project)}"
+        )
+        yield f"find_package(catkin …) is missing{other}", fix, line or (project.line if project else None)
     if slip := _misspelt(facts, "catkin_package"):
         yield _respell(slip, "catkin_package")
     elif _first(facts, "catkin_package") is None:
-        yield "catkin_package(…) is missing", "add catkin_package() after find_package(catkin …)", None
+        above = next((c for c in packages if c.args[:1] == ("catkin",)), project)
+        fix = f"add catkin_package(){_below(above)}"
+        yield "catkin_package(…) is missing", fix, above.line if above else None
+
+
+def _below(call: CMakeCall | None) -> str:
+    """Return where a new call goes: below this one, which may go on over several lines."""
+    return f" below the {call.name}(…) of line {call.line}" if call else ""
 
 
 def _first(facts: CMakeFacts, name: str) -> CMakeCall | None:
@@ -254,7 +266,11 @@ def _why_misplaced(package: PackageFacts, one: Installed) -> Lack:
         why = f"{where}: nothing follows DESTINATION, or only a variable that has no value (is its name misspelt?)"
     else:
         why = f"{where}: the destination of {{}} is {shown(one.destination)}, not {BIN} (lib/{package.name})"
-    return Lack(why, f"write DESTINATION {BIN}, below find_package(catkin …)", _line(one))
+    fix = f"write DESTINATION {BIN}"
+    if one.destination:
+        return Lack(why, f"{fix} in place of DESTINATION {shown(one.destination)}", _line(one))
+    where = ", below find_package(catkin …)" if one.destination == "" else " as the last words of this call"
+    return Lack(why, f"{fix}{where}", _line(one))
 
 
 def _why_unnamed(
@@ -272,7 +288,7 @@ def _why_unnamed(
         why, fix, line = _respell(slip, PYTHON)
         return Lack(f"{why}, so nothing installs {{}}", fix, FileCitation(file=slip.file, line=line))
     if not of_python:
-        return _without_call(all_named, path)
+        return _without_call(package, all_named, path)
     names = {PurePosixPath(one.path).name: one for one in of_python if not _is_there(package, one)}
     wanted = PurePosixPath(path).name
     near = [wanted] if wanted in names else list(near_names(wanted, names))
@@ -283,7 +299,8 @@ def _why_unnamed(
     why = "catkin_install_python(…) does not name {}"
     if any(one.kind == "PROGRAMS" and is_bin(one.destination or "", package) for one in of_python):
         return Lack(why, "write {} into it, after PROGRAMS", None, path)
-    return Lack(why, f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN})", None, path)
+    fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN}){_below(of_python[-1].call)}"
+    return Lack(why, fix, None, path)
 
 
 def _is_there(package: PackageFacts, one: Installed) -> bool:
@@ -291,13 +308,16 @@ def _is_there(package: PackageFacts, one: Installed) -> bool:
     return any(names_script(one, file.path) for file in package.files)
 
 
-def _without_call(all_named: Sequence[Installed], path: str) -> Lack:
+def _without_call(package: PackageFacts, all_named: Sequence[Installed], path: str) -> Lack:
     fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN})"
     if folder := _folder_above(all_named, path):
         other = "install(DIRECTORY …)"
         why = f"line {folder.call.line}: {other} names {{}}, where catkin_install_python(PROGRAMS …) should"
         return Lack(why, f"{fix} below it", _line(folder), path)
-    return Lack(f"{NOT_CALLED}, so nothing installs {{}}", f"{fix} below catkin_package()", None, path)
+    above = _first(package.cmake, "catkin_package") if package.cmake else None
+    place = FileCitation(file=above.file, line=above.line) if above else None
+    below = _below(above) or " below catkin_package()"
+    return Lack(f"{NOT_CALLED}, so nothing installs {{}}", f"{fix}{below}", place, path)
 
 
 def _folder_above(all_named: Sequence[Installed], path: str) -> Installed | None:

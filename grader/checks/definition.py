@@ -97,7 +97,10 @@ def definition(package: PackageFacts, params: DefinitionParams) -> Verdict:
     if faults:
         more = f"; and {len(faults) - FAULTS_SHOWN} more" if len(faults) > FAULTS_SHOWN else ""
         said = "; ".join(fault.message for fault in faults[:FAULTS_SHOWN])
-        verdict = failed(f"{f'{params.file}: ' if found else ''}{said}{more}", hint=faults[0].hint)
+        verdict = failed(
+            f"{f'{params.file}: ' if found else ''}{said}{more}",
+            hint="; ".join(_fixes(faults[:FAULTS_SHOWN])),
+        )
     else:
         verdict = passed(f"{params.file} defines {_words(wanted)}")
     lines = dict.fromkeys(fault.line for fault in faults) or {None: None}
@@ -107,6 +110,12 @@ def definition(package: PackageFacts, params: DefinitionParams) -> Verdict:
         measured=_words(found.fields) if found and found.fields else "no field" if found else "no such file",
         citations=tuple(FileCitation(file=there, line=line) for line in lines) if found else (),
     )
+
+
+def _fixes(faults: list[_Fault]) -> Iterator[str]:
+    """Yield each fix once, with its line where there are several."""
+    for fault in dict.fromkeys(faults):
+        yield f"in line {fault.line}, {fault.hint}" if fault.line and len(faults) > 1 else fault.hint
 
 
 def _words(fields: Iterator[InterfaceField] | list[InterfaceField] | tuple[InterfaceField, ...]) -> str:
@@ -171,7 +180,8 @@ def _differs(
             yield _Fault(message, apart.line, "--- separates the parts: put the field into the other part")
         else:
             kind = "constant" if wanted.value is not None else "field"
-            yield _Fault(f"there is no {kind} {name}", None, f"add the line `{line}`")
+            type_ = "" if wanted.type else f"{_type_for(wanted.value or '')} "
+            yield _Fault(f"there is no {kind} {name}", None, f"add the line `{type_}{line}`")
     elif (wanted.value is None) != (found.value is None):
         kinds = ("constant", "field") if wanted.value is None else ("field", "constant")
         message = f"{name} is a {kinds[0]} (line {found.line}), but the handout asks for a {kinds[1]}"
@@ -184,6 +194,16 @@ def _differs(
         yield _Fault(
             message, found.line, f"write `{found.type} {line}`" if not wanted.type else f"write `{line}`"
         )
+
+
+def _type_for(value: str) -> str:
+    """Return a type that fits a constant where the handout leaves it open."""
+    if value in {"True", "False"}:
+        return "bool"
+    try:
+        return "int32" if float(value).is_integer() else "float64"
+    except ValueError:
+        return "string"
 
 
 def _plain(type_: str, package: str) -> str:

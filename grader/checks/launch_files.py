@@ -184,21 +184,24 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     if test := next((t for t in file.tests if t.type == name), None):
         cited = (FileCitation(file=test.file, line=test.line),)
         message = f"{message}: a <test> is started by rostest only"
-        return failed(message, hint="write <node …>", citations=cited)
+        return failed(message, hint=f"write {_node_tag(pkg, name)} in place of the <test>", citations=cited)
     commented = (line for kind, line in file.commented if kind in {name, PurePosixPath(name).stem})
     if line := next(commented, None):
         cited = (FileCitation(file=file.path, line=line),)
         message = f"{message}: the one in line {line} stands in a comment, which roslaunch skips"
-        written = f'<node pkg="{pkg}" type="{name}" name="…" output="screen"/>'
-        return failed(
-            message, hint=f"take it out of the comment (`<!--` and `-->`): {written}", citations=cited
-        )
+        kind = "" if (name, line) in file.commented else f', and write type="{name}" in it'
+        hint = f"take the <node> of line {line} out of the comment: remove `<!--` before it and `-->` after it{kind}"
+        return failed(message, hint=hint, citations=cited)
     unknown = (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node")
     for tag, line in unknown:
         cited = (FileCitation(file=file.path, line=line),)
         message = f"{message}: roslaunch skips the tag <{tag}> of line {line}"
         return failed(message, hint="the tag is <node …>, in lower case", citations=cited)
-    return failed(message, hint=f'add <node pkg="{pkg}" type="{name}" name="…" output="screen"/>')
+    return failed(message, hint=f"below <launch>, add {_node_tag(pkg, name)}")
+
+
+def _node_tag(pkg: str, name: str) -> str:
+    return f'<node pkg="{pkg}" type="{name}" name="{PurePosixPath(name).stem}" output="screen"/>'
 
 
 def _exists(package: PackageFacts, name: str) -> bool:
@@ -332,7 +335,7 @@ def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> V
     lying = [f.path for f in package.files if f.path.endswith(".sh")]
     seen = f"; there is {join_words(lying)} in the package" if lying else ""
     name = PurePosixPath(lying[0]).name if lying else "<script>.sh"
-    hint = f'add <node pkg="{package.name}" type="{name}" name="…" output="screen"/>'
+    hint = f"below <launch>, add {_node_tag(package.name, name)}"
     return failed(f"{file.path} has no <node> that is a shell script{seen}", hint=hint)
 
 

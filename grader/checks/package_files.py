@@ -243,8 +243,8 @@ def _unbuilt(found: Manifest) -> Verdict | None:
     return failed(
         f"{found.file} does not name catkin as its build tool",
         measured=f"build tool {found.build_type or 'none'}, no dependency on catkin",
-        hint="add <buildtool_depend>catkin</buildtool_depend>",
-        citations=(FileCitation(file=found.file, line=found.name_line),),
+        hint=f"add <buildtool_depend>catkin</buildtool_depend> below line {_last_line(found)}",
+        citations=(FileCitation(file=found.file, line=_last_line(found)),),
     )
 
 
@@ -346,16 +346,19 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     only = f"; {join_words(dict.fromkeys(d.name for d in at_build))} only for building" if at_build else ""
     near = [n for name in missing for n in near_names(name, declared) if n not in names]
     slip = f"; it declares {join_words(near)}" if near else ""
-    # a new line goes below the last of its kind
-    last = max((d.line for d in found.dependencies), default=found.name_line)
+    last = max((d.line for d in at_build), default=_last_line(found))
     lines = tuple(FileCitation(file=found.file, line=d.line) for d in at_build)
-    below = f" below line {last}" if not lines and found.dependencies else ""
     return failed(
         f"{found.file} does not declare {join_words(missing)} for run time{only or slip}",
         measured=_declared_text(found),
-        hint=f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in missing)}{below}",
+        hint=f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in missing)} below line {last}",
         citations=lines or (FileCitation(file=found.file, line=last),),
     )
+
+
+def _last_line(found: Manifest) -> int:
+    """Return the line below which a new dependency goes: that of the last one, or else of the name."""
+    return max((d.line for d in found.dependencies), default=found.name_line)
 
 
 def _unreadable(fault: Fault | None) -> Verdict:

@@ -72,11 +72,19 @@ def add_advice(
     visible = {c.id for c in rubric.criteria if c.visibility == "visible"}
     good = [c for c in results if c.status is Status.PASS and c.id in visible]
     host = next((c for check in OF_FILES for c in good if c.check == check), None)
-    points = [text for place, text in _points(package) if not _is_told(place, results)][:POINTS_MAX]
+    absent = {match[1] for c in results if c.status.is_lost and (match := _ABSENT.search(c.message))}
+    points = [
+        text
+        for place, text in _points(package)
+        if not _is_told(place, results) and not any(f"there is no {name} " in text for name in absent)
+    ][:POINTS_MAX]
     if host is None or not points:
         return tuple(results)
     told = host.model_copy(update={"hint": "; ".join(filter(None, (host.hint, *points)))})
     return tuple(told if c is host else c for c in results)
+
+
+_ABSENT = re.compile(r"([\w.-]+) is not in the package")
 
 
 def _points(package: PackageFacts) -> Iterator[tuple[FileCitation, str]]:
@@ -111,14 +119,17 @@ def _nodes(package: PackageFacts, launch: LaunchFile) -> Iterator[tuple[FileCita
         if slip is not None:
             text = f"roslaunch leaves a <node> out: {slip.file}, line {slip.line}: {slip.why}; {slip.fix}"
             yield FileCitation(file=slip.file, line=slip.line), text
-        elif script and script.executable is False and not _is_installed(package, script.path):
+        elif script and script.executable is False and not _needs_no_bit(package, script.path):
             why = not_executable(script)
             text = f"{why.why} ({node.file}, line {node.line}); {why.hint}"
             yield FileCitation(file=script.path), text
 
 
-def _is_installed(package: PackageFacts, path: str) -> bool:
-    return any(one.call.name == PYTHON and names_script(one, path) for one in installed(package))
+def _needs_no_bit(package: PackageFacts, path: str) -> bool:
+    """Return whether the build makes a program of it: of a script that it installs, and of a source of C++."""
+    return PurePosixPath(path).suffix in SOURCES or any(
+        one.call.name == PYTHON and names_script(one, path) for one in installed(package)
+    )
 
 
 def _is_told(place: FileCitation, results: Sequence[CriterionResult]) -> bool:
@@ -452,12 +463,13 @@ def cite_commented_call(verdict: Verdict, build: Run) -> Verdict:
     called = f"{NOT_CALLED}: it is commented out in {place}"
     update = {
         "message": verdict.message.replace(NOT_CALLED, called, 1),
-        "hint": f"in place of {place} {verdict.hint.removesuffix(' below catkin_package()')}, without # before it",
+        "hint": f"in place of {place} {_BELOW.sub('', verdict.hint)}, without # before it",
         "citations": (FileCitation(file=file, line=first + 1),),
     }
     return verdict.model_copy(update=update)
 
 
+_BELOW = re.compile(r" below (the )?catkin_package\(…?\)( of line \d+)?$")
 _UNDECLARED = re.compile(r" does not declare (\w+) for run time")
 _LACKED = re.compile(r": it needs the package (\w+), which this grading machine lacks")
 

@@ -304,7 +304,9 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
     lines = [
         FileCitation(file=one.file, line=one.line)
         for one in repairs
-        if one.line is not None and not any(one.file == file and line is not None for file, line in cited)
+        if (one.file, one.line) not in cited
+        and one.line is not None
+        and (one not in told or not any(one.file == file and line is not None for file, line in cited))
     ]
     update = {
         "message": "; ".join(words),

@@ -203,9 +203,11 @@ class _Loader:
     def _include(self, element: etree._Element, scope: Scope, depth: int) -> None:
         path = scope.own_path(scope.get(element, "file") or "")
         if path is None:
-            if slip := self._misnamed_package(scope, scope.get(element, "file") or ""):
+            written = scope.get(element, "file") or ""
+            if slip := self._misnamed_package(scope, written):
                 message = f"it includes a file of the package {slip}, which is called {scope.own[0]}"
-                self.loaded.faults.append(_fault(element, scope, message))
+                fix = f'write file="{written.replace(slip, scope.own[0], 1)}"'
+                self.loaded.faults.append(_fault(element, scope, message, fix))
             return
         self.loaded.included += 1
         if depth >= DEPTH_MAX or self.loaded.included > INCLUDES_MAX:
@@ -219,7 +221,8 @@ class _Loader:
                 if fault
                 else "it is not in the package"
             )
-            self.loaded.faults.append(_fault(element, scope, f"it includes {path}, and {reason}"))
+            fix = f"first fix {path}" if fault else f"write {path}, or push it"
+            self.loaded.faults.append(_fault(element, scope, f"it includes {path}, and {reason}", fix))
         elif wanted(root, scope):
             self.walk(root, _included(element, scope, path), depth + 1)
 
@@ -277,8 +280,11 @@ def _private(param: LaunchParam, inside: Scope) -> LaunchParam:
     return param.model_copy(update={"name": inside.resolved(param.name.lstrip("~/"))})
 
 
-def _fault(element: etree._Element, scope: Scope, message: str) -> Fault:
-    return Fault(file=scope.file, line=line_of(element), kind="Include", message=message)
+def _fault(
+    element: etree._Element, scope: Scope, message: str, fix: str = "take this <include> out"
+) -> Fault:
+    cause = f"this <include> brings nothing: {fix}"
+    return Fault(file=scope.file, line=line_of(element), kind="Include", message=message, cause=cause)
 
 
 class Scope(Record):

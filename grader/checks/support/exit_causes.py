@@ -122,7 +122,7 @@ def syntax_hint(fault: Fault) -> str:
     if below := re.match(r"(`global \w+`) stands below", fault.cause):
         inside = fault.source[:1].isspace()
         return (
-            f"{where}write {below[1]} as the first line of the function"
+            f"{where}move {below[1]} up, as the first line of the function"
             if inside
             else f"{where}delete this line"
         )

@@ -175,9 +175,10 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
         slips = {name: meant[0] for name in node.unknown if (meant := near_names(name, missing))} | known
         told = "".join(f"; it has no attribute {name}" for name in slips)
         fix = "; ".join(f"write {right}= for {name}=" for name, right in slips.items())
-        return _slip(
-            node, f"<node> has no {join_words(missing)}{told}", fix or "a <node> needs pkg, type and name"
-        )
+        stem = PurePosixPath(node.type or "<file>.py").stem
+        own = {"pkg": package.name, "type": f"{node.name or '<file>'}.py", "name": stem}
+        add = " ".join(f'{name}="{own[name]}"' for name in missing)
+        return _slip(node, f"<node> has no {join_words(missing)}{told}", fix or f"add {add} to the <node>")
     pkg, name = str(node.pkg), str(node.type)
     if path := next((a for a in ("pkg", "type") if "$(find" in str(getattr(node, a))), None):
         return _slip(
@@ -206,12 +207,7 @@ def illegal_name(node: LaunchNode) -> Slip | None:
 def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
     """Yield what makes roslaunch start nothing at all."""
     for fault in file.include_faults:
-        yield Slip(
-            fault.file or file.path,
-            fault.line or 1,
-            fault.message,
-            f"write $(find {package.name})/launch/<file>",
-        )
+        yield Slip(fault.file or file.path, fault.line or 1, fault.message, fault.fix)
     seen: dict[str, LaunchNode] = {}
     for node in file.brings:
         slip = node_slip(package, node)
@@ -257,13 +253,21 @@ def _no_program(package: PackageFacts, node: LaunchNode, of_lab: Sequence[Packag
         return _slip(node, f'{why}: type="{name}" lacks the .py of {found.path}', f'write type="{plain}.py"')
     if made := next((one for one in programs(package) if name in {one.target, one.name}), None):
         return _named_otherwise(package, node, made, why)
+    return _nothing_like_it(package, node, why)
+
+
+def _nothing_like_it(package: PackageFacts, node: LaunchNode, why: str) -> Slip:
+    """The package has a program of nearly that name, or ROS has one, or the script was never written."""
+    plain = PurePosixPath(str(node.type)).name
     suffix = PurePosixPath(plain).suffix
-    names = [n for n in _program_names(package) if n != name]
+    names = [n for n in _program_names(package) if n != node.type]
     near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
     if near:
         return _slip(node, f"{why}; there is {join_words(near)}", f'write type="{near[0]}"')
+    if known := next((pkg for pkg, named in PROGRAMS_OF.items() if node.type in named), None):
+        return _slip(node, f"{why}; ROS has one in {known}", f'write pkg="{known}"')
     fix = "type is the script's whole file name, with its ending"
-    return _slip(node, why, f"write {plain}, or the name of a script that is there" if suffix else fix)
+    return _slip(node, why, f"write the script {plain}, or the name of one that is there" if suffix else fix)
 
 
 def _named_otherwise(package: PackageFacts, node: LaunchNode, made: Executable, why: str) -> Slip:

@@ -87,7 +87,13 @@ def paths_by_name(package: PackageFacts) -> dict[str, str]:
 def can_be_moved(path: str, wanted: str) -> bool:
     """Return whether one file can be what another was meant to be: of the same kind, or without a suffix."""
     one, other = PurePosixPath(path).suffix, PurePosixPath(wanted).suffix
-    return one == other or not one or not other or (other == ".launch" and one.startswith(other))
+    return (
+        {one, other} <= {".yaml", ".yml"}
+        or one == other
+        or not one
+        or not other
+        or (other == ".launch" and one.startswith(other))
+    )
 
 
 def add_hint(package: PackageFacts, path: str) -> str:
@@ -187,10 +193,14 @@ def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
         yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}, then commit and push")
     elif file.shebang_problem == EMPTY:
         yield Obstacle("is empty", f"write the node in {file.path}, with {RIGHT_SHEBANG} as its first line")
+    elif file.bom:
+        why = file.shebang_problem or "it begins with an invisible byte order mark (BOM)"
+        fix = f"in the editor, save {file.path} as UTF-8 without BOM"
+        yield Obstacle(
+            f"cannot be run: {why}", fix if file.shebang else f"{fix}, with {RIGHT_SHEBANG} as its first line"
+        )
     elif file.shebang_problem:
         yield Obstacle(f"cannot be run: {file.shebang_problem}", fix)
-    elif file.bom:
-        yield Obstacle("begins with an invisible byte order mark (BOM)", "save it as UTF-8 without BOM")
     elif file.shebang is None:
         yield Obstacle("does not begin with a #! line", fix)
     elif file.shebang.found is False:

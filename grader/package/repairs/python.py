@@ -220,7 +220,7 @@ def _words_by_cause(file: str, steps: list[_Step], before: str) -> dict[Cause, t
         ),
         "global": (
             below,
-            f"write `global {names}` as the first line of the function, and nowhere else in it",
+            f"move `global {names}` up, as the first line of the function, and have it nowhere else in it",
         ),
         "outside": (below, f"take line {first.line} out: outside of a function `global` does nothing"),
         "old-name": (

@@ -1,0 +1,99 @@
+"""What is wrong with the advice of a report, as far as the package's files show it: for the tests of all fixtures."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from grader.model.result import CriterionResult
+from grader.model.verdict import FileCitation
+from grader.report.view import ON_COPY
+
+FILE = r"(?P<file>(?:\.\./)?[\w./-]*\w\.(?:py|launch|xml|txt|yaml|yml|msg|srv|action|cpp|sh))"
+PLACE = re.compile(rf"{FILE},? line (?P<line>\d+)|line (?P<line2>\d+) of {FILE.replace('file', 'file2')}")
+WRITE = re.compile(
+    r"\bwrite (?:`(?P<marked>[^`]+)`|(?P<plain>#!\S+(?: \w+)?|<[^<>]+>(?:[\w@.]+</\w+>)?|\w+=\"[^\"]*\"))"
+)
+REMOVE = re.compile(r"\b(?:remove|delete|take out) (?:`(?P<marked>[^`]+)`|(?P<plain>\w+=\"[^\"]*\"))")
+FIRST_LINE = "as the very first line"
+
+
+def faulty_advice(criteria: Sequence[CriterionResult], source: Path) -> list[str]:
+    """Return what is wrong, a line each; empty where all is well. `source` is what was submitted, with the package."""
+    files = {path.relative_to(source).as_posix(): path for path in source.rglob("*") if path.is_file()}
+    told = [c for c in criteria if c.status.is_lost and c.hint and not re.fullmatch(r"fix \S+ first", c.hint)]
+    lines = _Lines(files)
+    found = [f"{c.id}: {fault}: {c.hint} [{c.message}]" for c in told for fault in _faults(c, lines)]
+    return found + list(_contradictions(told))
+
+
+class _Lines:
+    """The lines of a submission's files, by the paths that a report gives them."""
+
+    def __init__(self, files: dict[str, Path]) -> None:
+        self._files = files
+
+    def of(self, name: str) -> list[str] | None:
+        """Return the lines of the file of that path below some folder; None where there is none."""
+        wanted = name.removeprefix("../")
+        path = next((p for at, p in self._files.items() if f"/{at}".endswith(f"/{wanted}")), None)
+        return path.read_text(encoding="utf-8-sig", errors="replace").splitlines() if path else None
+
+
+def _faults(criterion: CriterionResult, lines: _Lines) -> Iterator[str]:
+    cited = [c for c in criterion.citations if isinstance(c, FileCitation) and c.line]
+    named = _places(criterion.hint)
+    for file, line in [*named, *((c.file, c.line or 0) for c in cited)]:
+        there = lines.of(file)
+        if there is None or not 0 < line <= len(there):
+            yield f"there is no line {line} of {file}"
+    texts = {(lines.of(file) or [])[line - 1 : line][0].strip() for file, line in _there(named, cited, lines)}
+    for code in _codes(WRITE, criterion.hint):
+        if code in texts:
+            yield f"{code} is there already"
+    if FIRST_LINE in criterion.hint and (code := next(_codes(WRITE, criterion.hint), "")):
+        first = next((there[0] for c in cited if (there := lines.of(c.file))), "")
+        if first.strip() == code:
+            yield f"the first line is {code}"
+    seen = [(m["file"] or m["file2"]) for m in PLACE.finditer(ON_COPY.sub("", criterion.message))]
+    if seen and not named and not any(isinstance(c, FileCitation) for c in criterion.citations):
+        yield f"{seen[0]} is known, and is not cited"
+
+
+def _places(text: str) -> list[tuple[str, int]]:
+    return [(m["file"] or m["file2"], int(m["line"] or m["line2"])) for m in PLACE.finditer(text)]
+
+
+def _there(
+    named: list[tuple[str, int]], cited: list[FileCitation], lines: _Lines
+) -> Iterator[tuple[str, int]]:
+    for file, line in dict.fromkeys([*named, *((c.file, c.line or 0) for c in cited)]):
+        if 0 < line <= len(lines.of(file) or []):
+            yield file, line
+
+
+def _codes(pattern: re.Pattern[str], hint: str) -> Iterator[str]:
+    for found in pattern.finditer(hint):
+        yield found["marked"] or found["plain"]
+
+
+def _contradictions(told: Sequence[CriterionResult]) -> Iterator[str]:
+    """Yield two pieces of advice for one line that differ, and what one tells to remove and another to write."""
+    for_line: dict[tuple[str, int], set[str]] = defaultdict(set)
+    for criterion in told:
+        cited = [(c.file, c.line or 0) for c in criterion.citations if isinstance(c, FileCitation) and c.line]
+        places = set(_places(criterion.hint) or cited)
+        codes = list(_codes(WRITE, criterion.hint))
+        if len(places) == len(codes) == 1:
+            (file, line), code = next(iter(places)), codes[0]
+            for_line[file, line].add(code)
+    for (file, line), codes_of_line in for_line.items():
+        if len(codes_of_line) > 1:
+            yield f"{file}, line {line}: write {' or '.join(sorted(codes_of_line))}?"
+    written = {code for c in told for code in _codes(WRITE, c.hint)}
+    for criterion in told:
+        for code in _codes(REMOVE, criterion.hint):
+            if code in written:
+                yield f"{criterion.id}: remove {code}, which other advice says to write"
