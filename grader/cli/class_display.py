@@ -41,7 +41,7 @@ OPEN = {
 CRITERIA_SHOWN = 4
 NEXT_STEPS = {
     "error": "{count} could not be graded; once that is fixed: --only failed",
-    "inconclusive": "{count} inconclusive; to grade them again: --only inconclusive",
+    "inconclusive": "{count} not decided yet; to grade them again: --only inconclusive",
     "manual": "{count} with criteria that a person decides: grader review {folder}, or points in {overrides}",
     "missing": "{count} not graded yet: the same command goes on with them",
 }
@@ -122,7 +122,7 @@ def list_attention(folder: BatchFolder) -> Iterator[str]:
             error = row.result.error
             yield f"{_name(row)}: error: {error.message if error else _open(row)}"
         elif state == "inconclusive":
-            yield f"{_name(row)}: inconclusive: {_open(row)}"
+            yield f"{_name(row)}: not decided yet: {_open(row)}"
         for override in row.result.overrides:
             if override.changed:
                 yield f"{row.entry.id}: {override.criterion}: a person decided, and the check says something else now"
@@ -225,7 +225,7 @@ def summary(progress: BatchProgress) -> str:
     parts = [f"{progress.done} of {progress.total} done"]
     parts += [f"{len(progress.running)} running"] if progress.running else []
     parts += [f"{progress.waiting} waiting"] if progress.waiting else []
-    parts += [f"{progress.inconclusive} inconclusive"] if progress.inconclusive else []
+    parts += [f"{progress.inconclusive} not decided yet"] if progress.inconclusive else []
     parts += [f"{progress.failed} failed"] if progress.failed else []
     words = ", ".join(parts)
     if progress.mean_points is not None:
@@ -265,7 +265,7 @@ def print_batch(folder: BatchFolder, *, as_json: bool) -> None:
         say(text)
     counts = folder.run.counts
     parts = [plural(counts.submissions, "submission"), f"{counts.graded} graded ({counts.passed} passed)"]
-    parts += [f"{counts.inconclusive} inconclusive"] if counts.inconclusive else []
+    parts += [f"{counts.inconclusive} not decided yet"] if counts.inconclusive else []
     parts += [f"{counts.error} could not be graded"] if counts.error else []
     parts += [f"{counts.missing} not graded yet"] if counts.missing else []
     parts += [f"{counts.kept} complete already"] if counts.kept else []

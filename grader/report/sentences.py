@@ -166,7 +166,7 @@ def decision(override: AppliedOverride) -> str:
 
 
 def automatic_words(override: AppliedOverride, criterion: CriterionResult) -> str:
-    """`fail 0/10: 5 Hz, not 10 Hz`; empty where that counts, or the points are a person's to award anyway."""
+    """`0/10 (to fix): 5 Hz, not 10 Hz`; empty where that counts, or the points are a person's to award anyway."""
     if override.automatic.status is Status.MANUAL or not override.awards:
         return ""
     message = override.automatic.message
@@ -183,7 +183,7 @@ def look_again(override: AppliedOverride, criterion: CriterionResult) -> str:
 
 def _automatic_text(automatic: Automatic, criterion: CriterionResult) -> str:
     points = points_of(criterion.model_copy(update={"points": automatic.points, "left_out": None}))
-    return f"{automatic.status.value} {points}"
+    return f"{points} ({STATES[automatic.status]})"
 
 
 def decided_criteria(result: GradingResult) -> list[tuple[AppliedOverride, CriterionResult]]:

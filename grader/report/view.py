@@ -334,7 +334,7 @@ WITH_NODES = re.compile(r"(rosnode|rosservice|rostopic)\b|rosparam get\b")
 
 
 def see_words(reproduce: str) -> str:
-    """Return how to see it, in one line: `rosrun lab1 talker.py (while roscore runs in another terminal)`."""
+    """Return how to see it, in one line: `rosrun lab1 talker.py (with roscore running)`."""
     where = where_to_type(reproduce).removesuffix(":")
     return f"{reproduce} ({where[:1].lower()}{where[1:]})" if where else reproduce
 
@@ -347,9 +347,9 @@ def where_to_type(reproduce: str) -> str:
         return ""
     said = ["in the folder of your package"] if IN_PACKAGE.match(commands[0]) else []
     if WITH_NODES.match(commands[0]):
-        said.append("while roscore and your nodes run in other terminals")
+        said.append("with roscore and your nodes running")
     elif WITH_MASTER.match(commands[0]):
-        said.append("while roscore runs in another terminal")
+        said.append("with roscore running")
     words = ", ".join(said)
     return f"{words[:1].upper()}{words[1:]}:" if words else ""
 

@@ -36,7 +36,7 @@ def test_counts_and_points_so_far() -> None:
     assert progress.mean_points == 60
     words = summary(progress)
     assert words.startswith(
-        "3 of 5 done, 1 running, 1 waiting, 1 inconclusive, 1 failed; 60 points on average"
+        "3 of 5 done, 1 running, 1 waiting, 1 not decided yet, 1 failed; 60 points on average"
     )
 
 

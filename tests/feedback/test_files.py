@@ -202,7 +202,7 @@ def test_a_mail_for_each_student(published: Path, capsys) -> None:
     text = ada.get_body(("plain",))
     assert text is not None
     assert text.get_content().startswith("85 of 100 points\r\n")
-    assert "What was lost" in text.get_content()
+    assert "To fix" in text.get_content()
     assert "bob" not in text.get_content()
     assert "<details>" not in text.get_content()
     (page,) = ada.iter_attachments()

@@ -99,7 +99,7 @@ def test_of_hidden_criteria_it_is_said_that_there_are_some() -> None:
 def test_what_is_settled_is_published_and_the_rest_stays_a_draft(out: Path, capsys) -> None:
     assert publish(out) == 3  # of one there is no result
     said = capsys.readouterr().out
-    assert "eve: stays a draft: still open: style and answers\n" in said
+    assert "eve: stays a draft: not decided yet: style and answers\n" in said
     assert "gus: stays a draft: not graded yet\n" in said
     assert "4 published, 2 left as drafts\n" in said
     published = read_published(out)
@@ -198,7 +198,7 @@ def test_json_says_what_is_done(out: Path, capsys) -> None:
     publish(out, "--json")
     found = {one["id"]: one for one in json.loads(capsys.readouterr().out)}
     assert (found["ada"]["state"], found["ada"]["points"]) == ("new", 85)
-    assert (found["eve"]["state"], found["eve"]["why"]) == ("draft", "still open: style and answers")
+    assert (found["eve"]["state"], found["eve"]["why"]) == ("draft", "not decided yet: style and answers")
 
 
 def test_published_results_are_for_their_owner_alone(out: Path) -> None:

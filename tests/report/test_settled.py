@@ -51,7 +51,7 @@ CRITERIA = (
     ),
     criterion("build", Status.PASS, 80, 80),
 )
-AGAIN = "the check now says pass 10/10, it said fail 0/10 when this was decided: look again"
+AGAIN = "the check now says 10/10 (passed), it said 0/10 (to fix) when this was decided: look again"
 
 
 def settled(**changes: object) -> GradingResult:
@@ -101,7 +101,7 @@ def test_markdown_says_it_below_the_points():
         "## Decided by a person\n\n"
         "- `style`: 7/10 by A. Miller, 2026-11-02: clear names\n"
         "- `rate`: 8/10 by a person\n"
-        "  - The check says: pass 10/10: 10 Hz\n"
+        "  - The check says: 10/10 (passed): 10 Hz\n"
         f"  - **{AGAIN}**\n\n"
     )
 
@@ -125,7 +125,7 @@ def test_junit_has_it_as_properties_and_in_the_output():
         for case in suite.iterfind("testcase")
     ]
     assert style["decided_by_a_person"] == "by A. Miller, 2026-11-02: clear names"
-    assert (rate["check"], rate["look_again"]) == ("pass 10/10: 10 Hz", AGAIN)
+    assert (rate["check"], rate["look_again"]) == ("10/10 (passed): 10 Hz", AGAIN)
     assert "look_again" not in style
     assert "check" not in build
 

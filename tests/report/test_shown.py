@@ -170,10 +170,10 @@ def test_commands_are_told_from_the_sentence_around_them(text, parts) -> None:
         ("cat package.xml", "In the folder of your package:"),
         (
             "rosparam load config/a.yaml",
-            "In the folder of your package, while roscore runs in another terminal:",
+            "In the folder of your package, with roscore running:",
         ),
-        ("rosrun lab1 talker.py", "While roscore runs in another terminal:"),
-        ("rostopic hz /chatter", "While roscore and your nodes run in other terminals:"),
+        ("rosrun lab1 talker.py", "With roscore running:"),
+        ("rostopic hz /chatter", "With roscore and your nodes running:"),
         ("roslaunch lab1 lab1.launch", ""),
         ("cd ~/catkin_ws && catkin_make", ""),
         ("In two terminals: `rosrun a b` Then: `rosnode list`", ""),

@@ -154,7 +154,7 @@ def _draft(result: GradingResult | None, *, named: bool) -> str:
     if result.error is not None:
         return f"could not be graded: {result.error.message}"
     waiting = [c.id for c in result.criteria if c.status.is_open and c.counts]
-    return f"still open: {join_words(waiting)}"
+    return f"not decided yet: {join_words(waiting)}"
 
 
 def digest_of(result: GradingResult) -> str:
@@ -344,7 +344,7 @@ def changes_between(
 def _total(result: GradingResult) -> str:
     if not_graded(result):
         return "not graded"
-    return number(result.points) + (" (still open)" if result.status == "inconclusive" else "")
+    return number(result.points) + (" (not decided yet)" if result.status == "inconclusive" else "")
 
 
 def _criteria(before: GradingResult, after: GradingResult, hidden: Collection[str]) -> Iterator[str]:

@@ -61,7 +61,7 @@ from grader.errors import GraderError, RubricError
 from grader.model.result import AppliedOverride, WrittenOverride
 from grader.report.html.page import render_html
 from grader.report.html.shell import environment, style
-from grader.report.sentences import SIGNS
+from grader.report.sentences import SIGNS, STATES
 from grader.report.view import of_points
 from grader.results import RESULT
 from grader.rubric.model import Criterion
@@ -88,7 +88,7 @@ def create_app(review: ReviewSession, *, port: int, token: str, author: str) -> 
     app.extensions["review"] = review
     guard(app, port=port, token=token)
     app.jinja_env.filters.update(number=number, of_points=of_points, verbatim=escape)
-    app.jinja_env.globals.update(SIGNS=SIGNS, points_words=points_words)
+    app.jinja_env.globals.update(SIGNS=SIGNS, STATES=STATES, points_words=points_words)
     version = secrets.token_hex(8)  # of this review: what browsers keep is asked for by no other address
     app.context_processor(
         lambda: {"csrf": session.get("csrf", ""), "author": _author(author), "version": version}

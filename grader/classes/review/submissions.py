@@ -25,7 +25,7 @@ from grader.untrusted_text import line
 
 FILTERS = {
     "manual": "Waiting for points",
-    "inconclusive": "Inconclusive",
+    "inconclusive": "Not decided yet",
     "error": "Errors",
     "changed": "Look again",
     "asked": "Requests",
@@ -108,7 +108,7 @@ class Item:
             return (
                 ("manual", "waiting for points")
                 if self.kinds == {"manual", ALL}
-                else ("inconclusive", "inconclusive")
+                else ("inconclusive", "not decided yet")
             )
         return {"missing": ("blocked", "not graded yet"), "error": ("error", "not graded")}.get(
             self.status, ("pass", "graded")

@@ -4,11 +4,12 @@
   const REPORT = "/report.html";
   const SIGNS = { p: "✓", a: "◐", f: "✗", b: "⊘", i: "?", e: "!", m: "•", n: "" };
   const WORDS = {
-    p: "pass", a: "partial", f: "fail", b: "blocked", i: "inconclusive", e: "error", m: "manual", n: "not judged",
+    p: "passed", a: "partly to fix", f: "to fix", b: "not tested", i: "not decided yet",
+    e: "not decided yet, the check broke", m: "waits for a person", n: "not judged",
   };
   const STATES = {
     graded: ["graded", "pass", "✓"],
-    inconclusive: ["inconclusive", "inconclusive", "?"],
+    inconclusive: ["not decided yet", "inconclusive", "?"],
     manual: ["waits for a person", "manual", "•"],
     error: ["could not be graded", "error", "!"],
     missing: ["not graded yet", "blocked", "–"],

@@ -19,6 +19,7 @@ from markupsafe import Markup
 from grader.files import atomic_write
 from grader.model.batch import BatchRun, CriterionInfo, Entry
 from grader.model.result import GradingResult
+from grader.model.verdict import Status
 from grader.report.class_page.statistics import (
     Cost,
     HeatMap,
@@ -44,7 +45,7 @@ from grader.report.class_page.submissions import (
     link_to,
 )
 from grader.report.html.shell import environment, policy, script, style
-from grader.report.sentences import SIGNS
+from grader.report.sentences import SIGNS, STATES
 from grader.report.text import html
 from grader.untrusted_text import line
 from grader.wording import plural
@@ -158,6 +159,15 @@ def _columns(lines: Sequence[Line]) -> Iterator[tuple[str, str]]:
     yield "time", "Time"
 
 
+WORDS = {
+    **STATES,
+    Status.PARTIAL: "partly to fix",
+    Status.ERROR: "not decided yet, the check broke",
+    Status.MANUAL: "waits for a person",
+}
+"""As in `class.js`: those who look after a class have to know which of them is which."""
+
+
 @cache
 def _template() -> Template:
     copying, own = script(COPYING), Markup(_file("class.js"))  # noqa: S704 - ours
@@ -165,7 +175,7 @@ def _template() -> Template:
         "style": style() + Markup(_file("class.css")),  # noqa: S704 - ours
         "scripts": (copying, own),
         "policy": Markup(policy(copying, own)),  # noqa: S704 - ours
-        "signs": {LETTERS[status]: (sign, status.value) for status, sign in SIGNS.items()},
+        "signs": {LETTERS[status]: (sign, WORDS[status]) for status, sign in SIGNS.items()},
         "count": plural,
         "span": span,
         "link_to": link_to,
@@ -309,8 +319,8 @@ KINDS = (
     ),
     _Kind(
         anchor="inconclusive",
-        title="Inconclusive",
-        advice="These could not be decided this time, so they cost no points. Grade only these again:",
+        title="Not decided yet",
+        advice="These could not be judged this time, which costs no points. Grade only these again:",
         holds=lambda found: found.state == "inconclusive",
         text=lambda found: found.why,
         command=lambda run, out: again(run, out, "inconclusive", static=False),
