@@ -69,9 +69,11 @@ from grader.wording import number, plural
 
 
 class _Pages(Flask):
-    """Flask with our templates' rules: no one's text becomes markup, and what hides or steers is written out."""
+    """Flask with our templates' rules: no one's text becomes markup, what hides or steers is written out, and they are
+    compiled once."""
 
     jinja_options = {  # noqa: RUF012 - as Flask has it
+        "bytecode_cache": environment().bytecode_cache,
         "finalize": environment().finalize,
         "lstrip_blocks": True,
         "trim_blocks": True,
