@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
-from grader.checks.registry import check
+from grader.checks.registry import PackageName, check
 from grader.checks.support.build_errors import misspelt_cmake_lists
 from grader.checks.support.scripts import PYTHON, Installed, copies_of, installed, is_bin, names_script
 from grader.checks.support.text import near_names, shown
@@ -25,7 +25,7 @@ BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 class CMakeParams(Record):
     """The package's name in CMake."""
 
-    name: str
+    name: PackageName
     """The handout's name for the package; it is right also where the manifest has another."""
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.registry import DependencyName, NoParams, check
+from grader.checks.registry import DependencyName, NoParams, PackageName, check
 from grader.checks.support.scripts import add_hint, find_script
 from grader.checks.support.text import near_names, shown
 from grader.model.package import Fault, Manifest, PackageFacts
@@ -154,7 +154,7 @@ LEFT_AS_MADE = "@todo.todo"
 class ManifestParams(Record):
     """What package.xml has to say."""
 
-    name: str
+    name: PackageName
     """The name that the handout gives the package."""
     dependencies: tuple[DependencyName, ...] = ()
     """Packages that it has to declare for run time."""

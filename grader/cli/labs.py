@@ -11,6 +11,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import IO
 
@@ -202,17 +203,24 @@ def _summary(test: RubricTest) -> Iterator[Text]:
 
 
 def print_labs(rubrics: Sequence[tuple[Rubric, str]], stream: IO[str]) -> None:
-    """Print a table of labs with the package that each is for, and where each comes from."""
+    """Print a table of labs with the package that each is for, below the folder of the user's that it comes from."""
+    shown: list[RenderableType] = []
+    for source, group in groupby(rubrics, key=lambda known: known[1]):
+        if source not in {BUILT_IN, EXAMPLE}:
+            shown.append(Text(f"\n{visible(source)}", "bold"))
+        shown.append(_labs_table([rubric for rubric, _ in group]))
+    emit(open_console(stream), shown)
+
+
+def _labs_table(rubrics: Sequence[Rubric]) -> Table:
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="dim")
-    own = any(source not in {BUILT_IN, EXAMPLE} for _, source in rubrics)
-    for heading in ("lab", "package", "criteria", "points", "title", *(["from"] if own else [])):
-        table.add_column(heading, no_wrap=heading not in {"title", "from"}, overflow="fold")
-    for rubric, source in rubrics:
-        points = number(rubric.max_points)
-        cells = [rubric.id, ", ".join(rubric.package_names), str(len(rubric.criteria)), points, rubric.title]
-        cells += [source] if own else []
+    for heading in ("lab", "package", "criteria", "points", "title"):
+        table.add_column(heading, no_wrap=heading != "title", overflow="fold")
+    for rubric in rubrics:
+        packages, points = ", ".join(rubric.package_names), number(rubric.max_points)
+        cells = (rubric.id, packages, str(len(rubric.criteria)), points, rubric.title)
         table.add_row(*(Text(visible(cell)) for cell in cells))
-    emit(open_console(stream), [table])
+    return table
 
 
 def write_example(lab: str, folder: Path, mistake: str | None) -> None:

@@ -41,6 +41,8 @@ def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = 
     scenarios = as_map(rubric.get("scenarios"))
     criteria = as_maps(rubric.get("criteria"))
     faults = [f for name, s in scenarios.items() for f in scenario_faults(("scenarios", name), as_map(s))]
+    if not isinstance(rubric.get("criteria"), list):
+        return faults  # that is what is wrong; what else would not fit, follows from it
     for index, criterion in criteria:
         path = ("criteria", index)
         faults += _check(path, criterion, checks, complete=complete)

@@ -69,9 +69,14 @@ def add_folder(folder: Path) -> Path:
     """Write a folder down, and return its absolute path. Raises UsageError where there is no rubric in it."""
     absolute = folder.expanduser().resolve()
     if not any(_rubrics_in(absolute)):
-        raise UsageError(
-            f"{folder} has no rubric in it", hint="give the folder in which your rubrics' files are"
+        what = (
+            "has no rubric in it"
+            if absolute.is_dir()
+            else "is a file"
+            if absolute.exists()
+            else "is not there"
         )
+        raise UsageError(f"{folder} {what}", hint="give the folder in which your rubrics' files are")
     _write_down([*(path for path in _written_down() if path != absolute), absolute])
     return absolute
 

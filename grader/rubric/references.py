@@ -93,6 +93,8 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
         fault = ros_packages().program_fault(value)
     elif to == "dependency":
         fault = "" if value in own else ros_packages().misspelt(value)
+    elif to == "package" and value not in packages_in(rubric):
+        fault = f'the lab has no package "{value}"{_instead(value, packages_in(rubric))}'
     elif to in TYPES and re.fullmatch(TYPE_PATTERN, value := value.partition("[")[0]):
         fault = ros_packages().type_fault(value, TYPES[to], own)
     if fault:

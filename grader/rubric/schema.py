@@ -44,6 +44,7 @@ REFERRED = {
     "rostest": "`.test` file of the scenario",
     "watched_s": "number",
     "dependency": "text",
+    "package": "package of the lab",
     "cause": "condition",
 }
 REQUIRED = "required"

@@ -153,6 +153,13 @@ def test_labs(capsys):
     assert all(name in shown for name in rubric_ids())
 
 
+def test_labs_says_which_folder_is_not_there(capsys, monkeypatch, tmp_path):
+    monkeypatch.setenv("GRADER_RUBRICS", str(tmp_path / "course"))
+    assert run(["labs"]) == 0
+    found = capsys.readouterr()
+    assert f"{tmp_path / 'course'} is not there" in (found.out + found.err).replace("\n", "")
+
+
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=pytest.mark.full if n % 8 else ()) for n, name in enumerate(sorted(CHECKS))],

@@ -70,6 +70,10 @@ def test_a_path_that_depends_on_where_the_grader_starts_is_refused(monkeypatch: 
 def test_a_folder_without_a_rubric_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="has no rubric in it"):
         add_folder(tmp_path)
+    with pytest.raises(UsageError, match="is a file"):
+        add_folder(lab(tmp_path / "labs"))
+    with pytest.raises(UsageError, match="is not there"):
+        add_folder(tmp_path / "lab")
     with pytest.raises(UsageError, match="is not among your folders"):
         remove_folder(tmp_path)
 

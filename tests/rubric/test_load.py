@@ -164,6 +164,13 @@ def test_each_fault_in_plain_words(old, new, fault, tmp_path):
     assert f"lab.yaml:{fault}" in faults(spoiled(tmp_path, (old, new)))
 
 
+def test_a_misspelt_key_of_the_criteria_is_named_without_what_follows_from_it(tmp_path):
+    named = faults(spoiled(tmp_path, ("criteria:", "criterias:")))
+    assert len(named) == 2
+    assert named[0].endswith("criteria: is missing")
+    assert named[1].endswith('criterias: is not known here (did you mean "criteria"?)')
+
+
 def test_a_circle_is_named_once(tmp_path):
     path = spoiled(tmp_path, ("    scenario: real\n", "    scenario: real\n    requires: [chatter-rate]\n"))
     assert faults(path) == [

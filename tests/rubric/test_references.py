@@ -94,6 +94,12 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
             id="process",
         ),
         pytest.param(
+            "check: logs, with: {text: a}, scenario: launch",
+            "check: manifest, with: {name: lab2}",
+            '39: criteria[9].with.name: the lab has no package "lab2" (did you mean "lab1"?)',
+            id="package",
+        ),
+        pytest.param(
             "{text: a}",
             "{text: a, process: turtlesim}",
             '39: criteria[9].with.process: launch starts no process "turtlesim" of the student\'s: there is roslaunch',

@@ -46,7 +46,7 @@ def labs(
     with loading():
         from grader.cli.labs import print_labs
         from grader.cli.output import say, say_json
-        from grader.rubric.find import add_folder, example_labs, known_labs, remove_folder
+        from grader.rubric.find import add_folder, example_labs, known_labs, own_folders, remove_folder
         from grader.rubric.load import load_rubric
     if add is not None:
         say(f"{add_folder(add)}: its labs are known from now on")
@@ -54,7 +54,7 @@ def labs(
         say(f"{remove_folder(remove)}: its labs are no longer known")
     if add is not None or remove is not None:
         return ExitCode.PASSED
-    rows, faulty = [], []
+    rows, faulty = [], [f"{folder} is not there" for folder in own_folders() if not folder.is_dir()]
     for lab in example_labs() if examples else known_labs():
         try:
             rows.append((load_rubric(str(lab.path)).rubric, lab.source))

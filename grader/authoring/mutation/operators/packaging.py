@@ -84,13 +84,13 @@ def no_catkin_package(text: str, command: Command) -> list[Edit]:
 
 @operator("unknown-component", each=find_catkin)
 def unknown_component(_text: str, command: Command) -> list[Edit]:
-    """Asks catkin for a package that is not installed.
+    """Asks catkin for dep1, as the help of catkin_create_pkg does.
 
     Fits every CMakeLists.txt with find_package(catkin …).
     """
     has = any(argument.value == "COMPONENTS" for argument in command.args)
     end = command.span.stop - 1
-    return [Edit(end, end, " our_course_msgs" if has else " COMPONENTS our_course_msgs")]
+    return [Edit(end, end, " dep1" if has else " COMPONENTS dep1")]
 
 
 @operator("cmake-malformed", each=_last_command)
