@@ -16,7 +16,7 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.rubric.model import Rubric
 from grader.untrusted_text import CITATIONS_MAX, clip, visible
-from grader.wording import number, plural
+from grader.wording import join_words, number, plural
 
 ON_COPY = re.compile(r"judged on a copy with .*? repaired: ")
 NAMES, NUMBERS = re.compile(r"/[\w/~]+"), re.compile(r"-?\d+(\.\d+)?")
@@ -91,7 +91,47 @@ def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
         for one in used.repairs
     }
     folded = _fold(asked_first, partial(_mistake, charged=charged))
-    return tuple(sorted(folded, key=lambda loss: -loss.points))
+    return tuple(sorted(_fold_one_edit(folded), key=lambda loss: -loss.points))
+
+
+INSTALL = "cmake-install"
+NOT_STARTED = re.compile(r"(?P<path>\S+) (?P<bit>has no executable bit|cannot be run: )")
+"""What is said of a script that the build would make executable if CMakeLists.txt installed it."""
+
+
+def _fold_one_edit(losses: Sequence[Loss]) -> Iterator[Loss]:
+    """Yield one entry for scripts that one `chmod` makes executable, or that the build does once they are installed."""
+    scripts = {
+        loss.criterion.id: found
+        for loss in losses
+        if loss.criterion.check == "executable" and (found := NOT_STARTED.match(loss.criterion.message))
+    }
+    install = next((loss for loss in losses if loss.criterion.check == INSTALL), None)
+    installed = [i for i, found in scripts.items() if install and found["path"] in install.criterion.message]
+    bits = [i for i, found in scripts.items() if i not in installed and found["bit"].startswith("has")]
+    for first, names in ((install.criterion.id if install else "", installed), ("".join(bits[:1]), bits[1:])):
+        folded = next((loss for loss in losses if loss.criterion.id == first), None)
+        others = [loss for loss in losses if loss.criterion.id in names]
+        if folded is not None and others:
+            paths = [scripts[name]["path"] for name in names]
+            criterion = _joined(folded.criterion, paths)
+            alike = tuple(c for loss in others for c in (loss.criterion, *loss.alike))
+            blocked = tuple(c for loss in (folded, *others) for c in loss.blocked)
+            joined = Loss(criterion=criterion, blocked=blocked, alike=(*folded.alike, *alike))
+            losses = [joined if loss is folded else loss for loss in losses if loss not in others]
+    yield from losses
+
+
+def _joined(criterion: CriterionResult, paths: Sequence[str]) -> CriterionResult:
+    """Return the criterion of an edit that also makes these scripts executable, with what it does for them."""
+    if criterion.check == INSTALL:
+        told = f"{criterion.hint}; the build then makes {join_words(paths)} executable"
+        return criterion.model_copy(update={"hint": told})
+    own = criterion.message.partition(" ")[0]
+    message = f"{join_words([own, *paths])} have no executable bit"
+    return criterion.model_copy(
+        update={"message": message, "hint": criterion.hint.replace(own, " ".join([own, *paths]))}
+    )
 
 
 def _mistake(loss: Loss, charged: Mapping[Repair, tuple[Repair, ...]]) -> Hashable:

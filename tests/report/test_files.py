@@ -139,6 +139,37 @@ def test_one_mistake_is_told_once(messages, mistakes):
     assert len(arrange(result(criteria=tuple(same)), rubric()).lost) == mistakes
 
 
+def not_executable(name, path):
+    message, hint = f"{path} has no executable bit; rosrun answers: no", f"chmod +x {path}, then git add it"
+    return criterion(name, Status.FAIL, 0, 5, check="executable", message=message, hint=hint)
+
+
+BITS = (not_executable("talker-executable", "src/a.py"), not_executable("listener-executable", "src/b.py"))
+
+
+def test_one_chmod_is_told_once_and_names_both_scripts():
+    (loss,) = arrange(result(criteria=BITS), rubric()).lost
+    assert loss.criterion.message == "src/a.py and src/b.py have no executable bit"
+    assert loss.criterion.hint == "chmod +x src/a.py src/b.py, then git add it"
+    assert (loss.points, [c.id for c in loss.alike]) == (10, ["listener-executable"])
+
+
+def test_scripts_that_the_build_would_make_executable_are_told_with_their_installation():
+    message = "CMakeLists.txt: catkin_install_python(…) does not name src/a.py and src/b.py"
+    install = criterion(
+        "install", Status.FAIL, 0, 10, check="cmake-install", message=message, hint="write src/a.py src/b.py"
+    )
+    (loss,) = arrange(result(criteria=(*BITS, install)), rubric()).lost
+    assert (loss.criterion.id, loss.points) == ("install", 20)
+    assert (
+        loss.criterion.hint
+        == "write src/a.py src/b.py; the build then makes src/a.py and src/b.py executable"
+    )
+    other = install.model_copy(update={"message": "catkin_install_python(…) does not name src/a.py"})
+    told = arrange(result(criteria=(*BITS, other)), rubric()).lost
+    assert [(one.criterion.id, one.points) for one in told] == [("install", 15), ("listener-executable", 5)]
+
+
 def copied(name, status, points, *, charged=False, **fields):
     """A criterion of 5 points that was judged on a copy without a mistake in its indentation."""
     repair = Repair(kind="python-syntax", file="a.py", line=1, message="line 1 of a.py: tabs", fix="spaces")
