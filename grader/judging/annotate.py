@@ -154,10 +154,21 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
         if verdict.blocked_by and criterion.check == "launch-runs":
-            told += _later_in_launch(criterion, package, facts)
+            found = _later_in_launch(criterion, package, facts)
+            if own := _of_its_file(criterion, verdicts, rubric):
+                later.setdefault(own, []).extend(found)
+            else:
+                told += [f"for {criterion.id}, {one}" for one in found]
         elif verdict.unjudged or criterion.check in OF_TOPICS:
             told += Later(criterion, verdict, package, facts).faults()
     return {name: _with_later(verdict, later.get(name, ())) for name, verdict in verdicts.items()}
+
+
+def _of_its_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: Rubric) -> str | None:
+    """Return the criterion that is lost by the launch file itself: what comes next in the file is told there."""
+    file = launched.parameters.get("launch")
+    of_file = (c.id for c in rubric.criteria if c.scenario is None and c.parameters.get("launch") == file)
+    return next((i for i in of_file if verdicts[i].status.is_lost and not verdicts[i].blocked_by), None)
 
 
 def _with_later(verdict: Verdict, later: Iterable[str]) -> Verdict:
@@ -450,7 +461,7 @@ _COMMENTED_CALL = re.compile(rf"\s*#[#\s]*{PYTHON}\s*\(")
 def cite_commented_call(verdict: Verdict, build: Run) -> Verdict:
     """Return the verdict; one on a missing catkin_install_python(…) says in which lines it is commented out."""
     file = "CMakeLists.txt"
-    if NOT_CALLED not in verdict.message or verdict.citations != (FileCitation(file=file),):
+    if NOT_CALLED not in verdict.message or len(verdict.citations) != 1 or not _BELOW.search(verdict.hint):
         return verdict
     lines = build.file_lines(file)[:_LINES_READ]
     first = next((i for i, text in enumerate(lines) if _COMMENTED_CALL.match(text[:LINE_CHARS])), None)

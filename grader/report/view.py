@@ -95,7 +95,7 @@ def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
 
 
 INSTALL = "cmake-install"
-NOT_STARTED = re.compile(r"(?P<path>\S+) (?P<bit>has no executable bit|cannot be run: )")
+NOT_STARTED = re.compile(r"(?P<path>\S+) (?P<bit>is not executable|cannot be run: )")
 """What is said of a script that the build would make executable if CMakeLists.txt installed it."""
 
 
@@ -108,7 +108,7 @@ def _fold_one_edit(losses: Sequence[Loss]) -> Iterator[Loss]:
     }
     install = next((loss for loss in losses if loss.criterion.check == INSTALL), None)
     installed = [i for i, found in scripts.items() if install and found["path"] in install.criterion.message]
-    bits = [i for i, found in scripts.items() if i not in installed and found["bit"].startswith("has")]
+    bits = [i for i, found in scripts.items() if i not in installed and found["bit"] == "is not executable"]
     for first, names in ((install.criterion.id if install else "", installed), ("".join(bits[:1]), bits[1:])):
         folded = next((loss for loss in losses if loss.criterion.id == first), None)
         others = [loss for loss in losses if loss.criterion.id in names]
@@ -128,7 +128,7 @@ def _joined(criterion: CriterionResult, paths: Sequence[str]) -> CriterionResult
         told = f"{criterion.hint}; the build then makes {join_words(paths)} executable"
         return criterion.model_copy(update={"hint": told})
     own = criterion.message.partition(" ")[0]
-    message = f"{join_words([own, *paths])} have no executable bit"
+    message = f"{join_words([own, *paths])} are not executable"
     return criterion.model_copy(
         update={"message": message, "hint": criterion.hint.replace(own, " ".join([own, *paths]))}
     )

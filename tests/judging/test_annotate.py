@@ -144,11 +144,11 @@ def test_a_call_that_is_commented_out_is_named_by_its_lines(text: str, place: st
     build = build_runs({"runs": {"package": {"attachments": {"CMakeLists.txt": text}}}})["package"]
     lost = failed(
         "CMakeLists.txt: no catkin_install_python(…) is called, so nothing installs a.py",
-        hint="write catkin_install_python(PROGRAMS a.py DESTINATION b) below catkin_package()",
-        citations=(FileCitation(file="CMakeLists.txt"),),
+        hint="write catkin_install_python(PROGRAMS a.py DESTINATION b) below the catkin_package(…) of line 1",
+        citations=(FileCitation(file="CMakeLists.txt", line=1),),
     )
     found = cite_commented_call(lost, build)
-    assert found.citations == (FileCitation(file="CMakeLists.txt", line=line),)
+    assert found.citations == (FileCitation(file="CMakeLists.txt", line=line or 1),)
     if not place:
         assert found == lost
         return

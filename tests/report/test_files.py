@@ -140,7 +140,7 @@ def test_one_mistake_is_told_once(messages, mistakes):
 
 
 def not_executable(name, path):
-    message, hint = f"{path} has no executable bit; rosrun answers: no", f"chmod +x {path}, then git add it"
+    message, hint = f"{path} is not executable; rosrun answers: no", f"chmod +x {path}, then git add it"
     return criterion(name, Status.FAIL, 0, 5, check="executable", message=message, hint=hint)
 
 
@@ -149,7 +149,7 @@ BITS = (not_executable("talker-executable", "src/a.py"), not_executable("listene
 
 def test_one_chmod_is_told_once_and_names_both_scripts():
     (loss,) = arrange(result(criteria=BITS), rubric()).lost
-    assert loss.criterion.message == "src/a.py and src/b.py have no executable bit"
+    assert loss.criterion.message == "src/a.py and src/b.py are not executable"
     assert loss.criterion.hint == "chmod +x src/a.py src/b.py, then git add it"
     assert (loss.points, [c.id for c in loss.alike]) == (10, ["listener-executable"])
 
