@@ -9,8 +9,8 @@ import contextlib
 import ctypes
 import fcntl
 import os
-import shutil
 import socket
+import stat
 import struct
 import sys
 
@@ -26,6 +26,7 @@ IFREQ = struct.Struct("16sh14x")
 SIZE_BYTES = 512 << 20
 """More than any package, with what its build left, can have."""
 INODES = 100_000
+COPIED_BYTES = 1 << 20
 KEYCTL_JOIN_SESSION_KEYRING = 1
 KEYCTL = {
     "x86_64": 250,
@@ -159,15 +160,18 @@ class Stage:
 
 def copy_tree(source, target):
     """Links as links, files with their modes, nothing else. What was written by a student is followed nowhere."""
-    if os.path.islink(source):
+    mode = os.lstat(source).st_mode
+    if stat.S_ISLNK(mode):
         os.symlink(os.readlink(source), target)
-    elif os.path.isdir(source):
+    elif stat.S_ISDIR(mode):
         os.mkdir(target, 0o755)
-        for entry in os.scandir(source):
-            copy_tree(entry.path, os.path.join(target, entry.name))
-    elif os.path.isfile(source):
-        shutil.copyfile(source, target)
-        os.chmod(target, os.stat(source).st_mode & 0o777)
+        for name in os.listdir(source):
+            copy_tree(source + "/" + name, target + "/" + name)
+    elif stat.S_ISREG(mode):
+        with open(source, "rb", buffering=0) as ours, open(target, "xb", buffering=0) as theirs:
+            while theirs.write(ours.read(COPIED_BYTES)):
+                pass
+            os.fchmod(theirs.fileno(), mode & 0o777)
 
 
 if __name__ == "__main__":
