@@ -35,6 +35,7 @@ from grader.judging.summary import assemble_result, environment_info
 from grader.model.figure import Figures
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
+from grader.model.record import build_records
 from grader.model.result import EarlyVerdict, GradingResult, SubmissionInfo, TimingInfo
 from grader.model.submission import RecordedSubmission, Submission
 from grader.package import read_packages
@@ -174,10 +175,13 @@ def warm_up() -> None:
     from grader.arena.arena_process import template_of  # noqa: PLC0415
     from grader.arena.sandbox import choose  # noqa: PLC0415
     from grader.arena.session import arena_command  # noqa: PLC0415
+    from grader.evidence import message_values  # noqa: F401, PLC0415
+    from grader.package import launch, launch_loader  # noqa: F401, PLC0415
     from grader.report import figures, junit, markdown  # noqa: F401, PLC0415
     from grader.report.html.page import load_template  # noqa: PLC0415
 
     import_later()
+    build_records()
     load_template()
     ros = find_ros()
     if ros is not None:

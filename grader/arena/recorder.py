@@ -100,6 +100,7 @@ class Recorder:
         self._stack = ExitStack()
         self._admission: Admission
         self._runs: Counter[str] = Counter()
+        self._expected_s = {name: expected_s(scenario) for name, scenario in rubric.scenarios.items()}
 
     def __enter__(self) -> Self:
         base = temporary_base(self._sandbox)
@@ -137,7 +138,7 @@ class Recorder:
         copy_recorded(self._recorded, self.recording.folder, self._progress)
         self._progress.step("build", "waiting", "", BUILD_EXPECTED_S)
         for name in names:
-            self._progress.step(name, "waiting", "for the build", expected_s(self._rubric.scenarios[name]))
+            self._progress.step(name, "waiting", "for the build", self._expected_s[name])
         await run_together(self._record_package(), asyncio.to_thread(beside_build))
         if self._place is None:
             for name in names:
@@ -250,9 +251,9 @@ class Recorder:
             nonlocal shown
             if detail != shown:
                 shown = detail
-                self._progress.step(name, "running", detail, expected_s(scenario))
+                self._progress.step(name, "running", detail, self._expected_s[name])
 
-        self._progress.step(name, "waiting", WAITING_ALONE if alone else WAITING, expected_s(scenario))
+        self._progress.step(name, "waiting", WAITING_ALONE if alone else WAITING, self._expected_s[name])
         path = (folder or self.recording.folder) / f"{name}.mcap"
         async with self._admission.run(alone=alone):
             self.recording.add(

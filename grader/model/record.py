@@ -43,6 +43,15 @@ def _list_of(kind: type[T]) -> TypeAdapter[list[T]]:
     return TypeAdapter(list[kind])  # type: ignore[valid-type]
 
 
+def build_records() -> None:
+    """Build now what reads and writes each record that is imported: else its first use does."""
+    waiting = [Record]
+    while waiting:
+        kind = waiting.pop()
+        waiting += kind.__subclasses__()
+        kind.model_rebuild(raise_errors=False)
+
+
 def field_docstrings(record: type) -> dict[str, str]:
     """Return the docstrings of a class's fields by their keys; none where there is no source to read.
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from grader.checks.support.text import GET_TIME
 from grader.evidence.events import HostEvent
-from grader.evidence.run import Channel, Run
+from grader.evidence.run import Channel, Run, once_for_each_run
 from grader.model.verdict import Verdict, failed, inconclusive
 from grader.wording import plural, seconds
 
@@ -82,6 +82,7 @@ def _interpolate(ticks: list[tuple[int, float]], zero_s: float) -> ToSeconds:
     return seconds
 
 
+@once_for_each_run
 def _ticks(run: Run) -> list[tuple[int, float]]:
     """Return when each tick of the grader's `/clock` was sent (ns), and the time that it told (s)."""
     return [

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Literal, Protocol
 
@@ -287,10 +287,14 @@ def _grading_ended(job: FolderJob, error: WorkerEnded) -> Graded:
 def _grade_folder(job: FolderJob) -> Graded:
     options, steps = GradeOptions(sandbox=job.sandbox, submission_id=job.name), _Steps()
     try:
-        result = grade(str(job.source), load_rubric(str(job.rubric)), job.out, options, steps)
+        result = grade(str(job.source), _load_once(str(job.rubric)), job.out, options, steps)
     except GraderError as error:
         return Graded(name=job.name, result=None, error=error.message)
     return Graded(name=job.name, result=result, again=steps.again)
+
+
+_load_once = lru_cache(maxsize=8)(load_rubric)
+"""In a worker, which lives for the jobs of one `grade_all`."""
 
 
 class _Steps(Silence):
