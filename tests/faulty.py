@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from grader.model.result import GradingResult
+from tests.support.processes import children_of
 
 ROOT = Path(__file__).resolve().parent.parent
 VICTIM = ROOT / "tests" / "hostile" / "victim"
@@ -22,7 +23,6 @@ RUBRIC = ROOT / "tests" / "faulty.yaml"
 ROOM = ("unshare", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc", "--propagation", "private")
 WAIT_S = 60.0
 LOOK_S = 0.01
-ENDED_S = 10.0
 GRADER = r"(?!unshare |sh ).*python\S* -m grader grade "
 TAKEN = {"fail", "partial", "blocked"}
 
@@ -140,20 +140,7 @@ def marked_down(result: GradingResult) -> list[str]:
 
 def below(pid: int) -> list[int]:
     """All that it started, and what those started."""
-    found: list[int] = []
-    for thread in Path("/proc", str(pid), "task").glob("*/children"):
-        with suppress(OSError):
-            for child in map(int, thread.read_text().split()):
-                found += [child, *below(child)]
-    return found
-
-
-def ended(pid: int) -> bool:
-    """Whether it ends in good time: one that has been killed is there for a moment yet."""
-    deadline = time.monotonic() + ENDED_S
-    while command(pid) and time.monotonic() < deadline:
-        time.sleep(LOOK_S)
-    return not command(pid)
+    return [found for child in children_of(pid) for found in (child, *below(child))]
 
 
 def command(pid: int) -> str:

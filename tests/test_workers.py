@@ -21,7 +21,7 @@ import pytest
 from grader import workers
 from grader.errors import HostError
 from grader.workers import HEAD_BYTES, Worker, WorkerEnded, WorkerLimits, run_each
-from tests.cluster.clusters import children_of, lives, until
+from tests.support.processes import children_of, lives, until
 
 ROOT = Path(__file__).resolve().parent.parent
 PARENT = """
@@ -194,17 +194,18 @@ def test_every_job_has_a_result() -> None:
 @pytest.mark.full
 def test_a_caller_that_stops_leaves_nothing_running(tmp_path: Path) -> None:
     before, mark = children_of(os.getpid()), tmp_path / "mark"
-    found = run_each(_mark_or_sleep, [str(mark), ""], 2, ended=lambda *_: "ended")
+    found = run_each(_sleep_or_wait, [("sleep", str(mark)), ("wait", str(mark))], 2, ended=lambda *_: "ended")
     assert next(found) == "asleep"
     found.close()
     assert children_of(os.getpid()) == before
     assert not mark.exists()
 
 
-def _mark_or_sleep(path: str) -> str:
-    if path:
+def _sleep_or_wait(job: tuple[str, str]) -> str:
+    what, path = job
+    if what == "sleep":
         sleep(path)
-    time.sleep(2)
+    until(Path(path).exists)
     return "asleep"
 
 

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
@@ -28,6 +27,7 @@ from tests.batch.a_class import (
     roster_of,
     run_of,
 )
+from tests.support.processes import children_of, lives, until
 
 NAMES = [f"s{number:02}" for number in range(60)]
 
@@ -261,17 +261,8 @@ def started(roster: Path, out: Path, *more: str) -> subprocess.Popen[bytes]:
 
 
 def wait_for_results(out: Path, count: int, process: subprocess.Popen[bytes]) -> None:
-    until = time.monotonic() + 600
-    while len(stamps(out)) < count:
-        assert process.poll() is None, "the batch ended too early"
-        assert time.monotonic() < until
-        time.sleep(0.005)
-
-
-def children_of(pid: int) -> list[int]:
-    """Of all its threads."""
-    lists = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/children")]
-    return [int(word) for text in lists for word in text.split()]
+    until(lambda: len(stamps(out)) >= count or process.poll() is not None)
+    assert process.poll() is None, "the batch ended too early"
 
 
 @pytest.mark.full
@@ -285,7 +276,7 @@ def test_a_batch_that_is_stopped_goes_on_where_it_stopped(tmp_path, signal_numbe
     process.send_signal(signal_number)
     assert process.wait() == (130 if signal_number == signal.SIGINT else -signal.SIGKILL)
     for pid in workers:
-        wait_until_gone(pid)
+        until(lambda pid=pid: not lives(pid))
     if signal_number == signal.SIGINT:
         assert run_of(out)["state"] == "interrupted"
         assert len(book(out)) == 60
@@ -303,13 +294,6 @@ def test_a_batch_that_is_stopped_goes_on_where_it_stopped(tmp_path, signal_numbe
     assert [row["id"] for row in book(out)] == NAMES
     assert {row["points"] for row in book(out)} == {"100"}
     assert not list(out.rglob(".grader-*"))
-
-
-def wait_until_gone(pid: int) -> None:
-    until = time.monotonic() + 600
-    while Path(f"/proc/{pid}").exists():
-        assert time.monotonic() < until, f"process {pid} outlived its batch"
-        time.sleep(0.01)
 
 
 @pytest.mark.full

@@ -7,16 +7,16 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from distributed.security import Security
 
+from tests.support.processes import until
+
 DASK = (sys.executable, "-m", "dask")
 ROOT = Path(__file__).resolve().parents[2]
-PATIENCE_S = 600.0
 
 
 class Cluster:
@@ -88,28 +88,6 @@ def _certificates(folder: Path) -> dict[str, Path]:
     for name, text in files.items():
         (folder / name).write_text(str(text))
     return {name: folder / name for name in files}
-
-
-def until(holds: Callable[[], object], patience_s: float = PATIENCE_S) -> None:
-    """Wait until it holds."""
-    end = time.monotonic() + patience_s
-    while not holds():
-        assert time.monotonic() < end, "it never came"
-        time.sleep(0.05)
-
-
-def children_of(pid: int) -> list[int]:
-    """The processes that it has started, as far as they live; none where it does not."""
-    tasks = Path(f"/proc/{pid}/task").glob("*/children")
-    return [int(child) for task in tasks for child in task.read_text().split()]
-
-
-def lives(pid: int) -> bool:
-    """Whether there is such a process, and not only what is left of it."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 def kill(pid: int) -> None:

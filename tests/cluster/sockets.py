@@ -6,7 +6,7 @@ import re
 from contextlib import suppress
 from pathlib import Path
 
-from tests.cluster.clusters import children_of
+from tests.support.processes import children_of
 
 LISTENING = "0A"
 

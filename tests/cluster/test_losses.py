@@ -14,8 +14,9 @@ import pytest
 from grader.classes.cluster import ClusterExecutor
 from grader.classes.cluster.executor import EXCHANGE
 from grader.errors import HostError
-from tests.cluster.clusters import ROOT, Cluster, children_of, cluster, kill, lives, until
+from tests.cluster.clusters import ROOT, Cluster, cluster, kill
 from tests.cluster.jobs import ids, jobs_for, named_job, verdicts
+from tests.support.processes import children_of, lives, until
 
 pytestmark = pytest.mark.slow
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from grader.classes.cluster.connect import Answer, Needs, Recruits, why_not
-from tests.cluster.clusters import until
+from tests.support.processes import until
 
 VERSIONS = {"grader": "1.0", "code": "1f2e", "python": "3.11", "pydantic": "2.7.0"}
 GOOD = {**VERSIONS, "host": "node1", "ros": "noetic", "kept_out": ""}

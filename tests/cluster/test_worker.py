@@ -14,8 +14,8 @@ import pytest
 from grader.classes.cluster import worker
 from grader.classes.cluster.exchange import Exchange, GradeRequest
 from grader.errors import HostError
-from tests.cluster.clusters import children_of, lives, until
 from tests.cluster.jobs import named_job
+from tests.support.processes import children_of, lives, until
 
 WORD = "0123abcd"
 

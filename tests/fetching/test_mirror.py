@@ -19,6 +19,7 @@ from grader.classes.fetching import Rule, prefetch
 from grader.classes.fetching.cache import cache_folder, locked, tidy
 from tests.fetching.samples import AT_ONCE, DEADLINE, HOST, commit_at, entry
 from tests.intake.samples import git, write
+from tests.support.processes import until
 
 
 def fetches(server, monkeypatch) -> Path:
@@ -313,8 +314,7 @@ def test_an_end_waits_for_no_server(server, monkeypatch):
 
     def interrupted() -> None:
         with prefetch([entry(), entry()], threads=1, patience=AT_ONCE):
-            while not started.exists():
-                time.sleep(0.01)
+            until(started.exists)
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

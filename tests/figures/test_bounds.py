@@ -43,7 +43,7 @@ ALL = (
 )
 
 
-def sound(figures: Figures) -> None:
+def assert_sound(figures: Figures) -> None:
     """Points, indices and texts are as the records say, and JSON brings the same back."""
     text = figures.model_dump_json()
     assert len(text) < 200_000
@@ -94,7 +94,7 @@ def test_any_messages(sent: tuple[str, list[Any]], count: int, rate_hz: float) -
         {"topics": [{"topic": TOPIC, "type": kind, "values": values, "count": count, "rate_hz": rate_hz}]},
         *ALL,
     )
-    sound(figures)
+    assert_sound(figures)
     for name, result in results.items():
         marks = [f.wrong for f in figures.by_criterion.get(name, ()) if isinstance(f, CounterFigure)]
         assert result.status.value != "pass" or not any(marks)
@@ -122,7 +122,7 @@ def test_any_events(values: list[object], lines: list[str], name: str, times: li
         processes=((START_NS, ProcessEvent(event="start", name=name, role="student")),),
     )
     figures, _ = drawn(run, *ALL)
-    sound(figures)
+    assert_sound(figures)
 
 
 class Broken(Run):
@@ -159,7 +159,7 @@ def test_a_flood_of_a_hundred_thousand_messages_from_a_name_of_ten_thousand_lett
         "callerid": "/" + "y" * 10_000,
     }
     figures, _ = drawn({"topics": [{**topic, "values": {"count_from": 0, "wrap_after": 127}}]}, *ALL)
-    sound(figures)
+    assert_sound(figures)
     wrap = only(figures, "counter-wrap", CounterFigure)
     assert len(wrap.publisher) == 200
     assert wrap.messages == 100_000

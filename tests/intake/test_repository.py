@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import threading
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from grader.intake import open_recorded, open_recording, open_submission
 from grader.intake.limits import IntakeLimits
 from grader.intake.source import identify, parse_source
 from tests.intake.samples import commit, git, lab, opened, repository, write
+from tests.support.processes import lives, until
 
 
 @pytest.fixture(scope="module")
@@ -326,20 +326,19 @@ def test_git_asks_nothing(tmp_path, monkeypatch):
 
 
 def test_a_server_that_does_not_answer(tmp_path, monkeypatch):
-    stand_in_for_git(tmp_path, monkeypatch, f"sleep 60 & echo $! > {tmp_path}/pid; wait")
+    stand_in_for_git(tmp_path, monkeypatch, f"sleep 3600 & echo $! > {tmp_path}/pid; wait")
     error = refused("https://h.invalid/lab", tmp_path, git_timeout_s=0.5)
     assert "no answer within 0.5 s" in error.message
     assert error.blame == "machine"
-    assert ended(int((tmp_path / "pid").read_text()))
+    until(lambda: not lives(int((tmp_path / "pid").read_text())))
 
 
 def test_ctrl_c_ends_git_and_leaves_nothing(tmp_path, monkeypatch):
-    stand_in_for_git(tmp_path, monkeypatch, f"sleep 60 & echo $! > {tmp_path}/pid; wait")
+    stand_in_for_git(tmp_path, monkeypatch, f"sleep 3600 & echo $! > {tmp_path}/pid; wait")
     pid_file = tmp_path / "pid"
 
     def interrupt():
-        while not (pid_file.exists() and pid_file.read_text()):
-            time.sleep(0.01)
+        until(lambda: pid_file.exists() and pid_file.read_text())
         os.kill(os.getpid(), 2)
 
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
@@ -349,22 +348,8 @@ def test_ctrl_c_ends_git_and_leaves_nothing(tmp_path, monkeypatch):
         opened("https://h.invalid/lab", tmp_path)
     thread.join()
     signal.signal(signal.SIGINT, before)
-    assert ended(int(pid_file.read_text()))
+    until(lambda: not lives(int(pid_file.read_text())))
     assert list((tmp_path / "work").iterdir()) == []
-
-
-def ended(pid: int) -> bool:
-    """Whether the process is gone, or dead and not yet fetched by its parent."""
-    deadline = time.monotonic() + 300
-    while time.monotonic() < deadline:
-        try:
-            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-        except FileNotFoundError:
-            return True
-        if state == "Z":
-            return True
-        time.sleep(0.01)
-    return False
 
 
 def test_without_git(repo, tmp_path, monkeypatch):

@@ -13,6 +13,7 @@ import pytest
 
 from grader.arena.interruption import Stop
 from grader.student.watching import Saves, changed_files, is_ignored, take_snapshot
+from tests.support.processes import until
 from tests.watching.labs import append, copy_of, write
 
 LEEDS = "leeds-comp3631-lab1"
@@ -90,10 +91,7 @@ def test_a_save_asks_what_runs_to_stop(when, saves, package) -> None:
         if when == "during":
             assert not stop.asked
             write(package / "src/talker.py", "x")
-        until_s = time.monotonic() + LONG_S
-        while not stop.asked and time.monotonic() < until_s:
-            time.sleep(0.01)
-    assert stop.asked
+        until(lambda: stop.asked)
     assert saves.wait(0) == {str(package / "src/talker.py")}
 
 

@@ -157,7 +157,8 @@ def test_more_wrong_steps_than_can_be_named_are_counted():
 def test_any_numbers_can_be_drawn(values):
     figure = counter(values=values, numbers=(0, 1), times_s=(1.0, 1.0), wraps=(), wrong=(1,), texts=("x",))
     (plot,) = counter_plots(figure, "f")
-    svg(plot)
+    heights = [float(one.get(end)) for one in svg(plot).iter(f"{SVG}line") for end in ("y1", "y2")]
+    assert 0 <= min(heights) < max(heights) <= 240
 
 
 def places(plot: Markup, name: str) -> dict[str, float]:
