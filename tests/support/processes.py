@@ -22,9 +22,10 @@ def until(holds: Callable[[], object]) -> None:
 def children_of(pid: int) -> list[int]:
     """The processes that it has started, as far as they live; none where it does not."""
     found: list[int] = []
-    for thread in Path(f"/proc/{pid}/task").glob("*/children"):
-        with suppress(OSError):  # it may end meanwhile
-            found += map(int, thread.read_text().split())
+    with suppress(OSError):  # it may end meanwhile, and its threads
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            with suppress(OSError):
+                found += map(int, (thread / "children").read_text().split())
     return found
 
 
