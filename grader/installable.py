@@ -25,7 +25,8 @@ ROS_2 = {
     "rosidl_runtime_py",
 }
 """No machine for ROS 1 has these."""
-ON_THE_MACHINE = "nothing for you to do: tell your instructor. On the grading machine: "
+NOTHING_TO_DO = "nothing for you to do: "
+ON_THE_MACHINE = f"{NOTHING_TO_DO}tell your instructor. On the grading machine: "
 """How every hint begins that only the instructor can follow: grading again changes nothing before."""
 _PREFIX = re.compile(r"/opt/ros/([a-z]+)\b")
 

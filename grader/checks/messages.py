@@ -42,6 +42,8 @@ from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, pa
 from grader.wording import join_words, plural, significant
 
 ENOUGH = 3
+_CLOCK_FACE = re.compile(r"\d:[0-5]\d:[0-5]\d")
+"""Hours, minutes and seconds: a time, and not one in seconds."""
 _LAST_NUMBER = re.compile(rf".*?({NUMBER})\D*", re.DOTALL)
 SECONDS_CHARS_MAX = 60
 TIMED = both(" % rospy.get_time()", " with ros::Time::now().toSec() for %s")
@@ -149,6 +151,8 @@ def _tells_time(package: PackageFacts, run: Run, heard: Sequence[Channel]) -> bo
     without a clock counts grows so at one a second."""
     for channel in heard:
         if slips_of(package, run, channel.callerid, "no-clock"):
+            return False
+        if all(map(_CLOCK_FACE.search, channel.data)):
             return False
         found = [_LAST_NUMBER.fullmatch(text[-SECONDS_CHARS_MAX:]) for text in channel.data]
         told = [float(one[1]) for one in found if one]

@@ -31,7 +31,7 @@ SLIPS: tuple[tuple[tuple[str, ...], tuple[RepairKind, ...]], ...] = (
     (("executable",), ("executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding", "file-name")),
     (("build", "cmake"), ("build-line", "package-name", "manifest-line")),
     (("manifest", "dependencies"), ("manifest-line", "package-name")),
-    (("launch", "opens"), ("launch-type", "package-name", "file-name", "executable-bit")),
+    (("launch", "opens"), ("launch-syntax", "launch-type", "package-name", "file-name", "executable-bit")),
     (("param",), ("parameter-name", "python-syntax")),
     (("node",), ("node-name", "python-syntax", "missing-import", "missing-call")),
     (

@@ -1,14 +1,13 @@
 """What is added to verdicts once they are judged; no status and no points change by it.
 
-Hints speak the language of the node that they are for, cited lines have their text, and a loss says where a file is
-still as the course handed it out. What no criterion asks for, but stops a student later, is added as advice.
+Hints speak the language of the node that they are for, and cited lines have their text. What is wrong behind a mistake,
+and what no criterion asks for, but stops a student later, is added as advice.
 """
 
 from __future__ import annotations
 
-import posixpath
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 
 from grader.checks.cmake import NOT_CALLED
@@ -42,21 +41,23 @@ from grader.checks.support.text import (
     in_language,
     in_source,
     in_words,
+    says,
     texts_in,
     texts_of_cpp,
 )
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
+from grader.installable import NOTHING_TO_DO, ON_THE_MACHINE
 from grader.judging.facts import Facts
 from grader.model.package import LaunchFile, PackageFacts, PythonSlip
 from grader.model.result import CriterionResult
 from grader.model.verdict import Citation, FileCitation, Status, Verdict
-from grader.rubric.load import names_in
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Scenario
 from grader.wording import join_words, significant
 
 POINTS_MAX = 3
+NAMES_SHOWN = 3
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
 RATE_SHARE = 0.05
@@ -150,7 +151,8 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
     for criterion in rubric.criteria:
         verdict = verdicts[criterion.id]
         package = facts.package_of(criterion)
-        if package is None or criterion.visibility != "visible" or not verdict.status.is_lost:
+        lacking = verdict.status is Status.INCONCLUSIVE and verdict.hint.startswith(ON_THE_MACHINE)
+        if package is None or criterion.visibility != "visible" or not (verdict.status.is_lost or lacking):
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
         if verdict.blocked_by and criterion.check == "launch-runs":
@@ -159,7 +161,7 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
                 later.setdefault(own, []).extend(found)
             else:
                 told += [f"for {criterion.id}, {one}" for one in found]
-        elif verdict.unjudged or criterion.check in OF_TOPICS:
+        elif verdict.unjudged or lacking or criterion.check in OF_TOPICS:
             told += Later(criterion, verdict, package, facts).faults()
     return {name: _with_later(verdict, later.get(name, ())) for name, verdict in verdicts.items()}
 
@@ -173,8 +175,11 @@ def _of_its_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: R
 
 def _with_later(verdict: Verdict, later: Iterable[str]) -> Verdict:
     told = [one for one in dict.fromkeys(later) if one not in verdict.hint]
-    if not told or not verdict.status.is_lost or not verdict.hint:
+    if not told or not verdict.hint:
         return verdict
+    if verdict.hint.startswith(ON_THE_MACHINE):
+        hint = f"{join_words(told)}. {verdict.hint.replace(NOTHING_TO_DO, 'For the rest, ', 1)}"
+        return verdict.model_copy(update={"hint": hint})
     return verdict.model_copy(update={"hint": f"{verdict.hint}; then {join_words(told)}"})
 
 
@@ -189,7 +194,8 @@ class Later:
         self._topic = str(self._wanted.get("topic", ""))
         scripts = _scripts(criterion, facts.rubric, package)
         self._slips = [slip for slip in package.slips if slip.file in scripts]
-        self._slips += self._texts_of_cpp(package)
+        self._paths = scripts | _sources(criterion, facts.rubric, package)
+        self._slips += self._texts_of_cpp()
         self._ran = not verdict.cause
         """Names are told already then, and only what is behind them is not."""
 
@@ -210,8 +216,8 @@ class Later:
     def _of(self, *kinds: str) -> list[PythonSlip]:
         return [slip for slip in self._slips if slip.kind in kinds]
 
-    def _texts_of_cpp(self, package: PackageFacts) -> Iterator[PythonSlip]:
-        for path in sorted(_sources(self._criterion, self._rubric, package)):
+    def _texts_of_cpp(self) -> Iterator[PythonSlip]:
+        for path in sorted(path for path in self._paths if PurePosixPath(path).suffix in SOURCES):
             lines = self._build.file_lines(path)[:_LINES_READ] if self._build is not None else []
             for kind, line, text in texts_of_cpp(text[:LINE_CHARS] for text in lines):
                 yield PythonSlip(file=path, line=line, kind=kind, message=text)
@@ -242,6 +248,9 @@ class Later:
         lines = [one.line for one in published if f"/{one.message.lstrip('/')}" == self._topic]
         if len(published) == 1 and not lines and not self._ran:
             yield f"publish on {self._topic} in {_line(published[0])}, not on {published[0].message}"
+        if len(published) > 1 and not lines:
+            names = join_words(f"{one.message} (line {one.line})" for one in published[:NAMES_SHOWN])
+            yield f"publish {kind} on {self._topic}: {published[0].file} publishes on {names}"
         types = [one for one in self._of("publisher-type") if one.line in lines or len(published) == 1]
         types = types if not (self._ran and lines) else []
         if len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
@@ -257,18 +266,35 @@ class Later:
             yield f"subscribe to {self._topic} in {_line(heard[0])}, not to {heard[0].message}"
         if sent and len(types) == 1 and elsewhere and types[0].message != sent[0].rpartition("/")[2]:
             yield f"subscribe with {sent[0]} in {_line(types[0])}, not {types[0].message}"
-        template = str(self._wanted.get("template", VALUE))
+        template, said = str(self._wanted.get("template", VALUE)), self._of("prints")
+        said = [one for one in said if SAID_DATA in one.message]
         unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
-        words = template.partition(VALUE)[0].strip().casefold()
-        said = [one for one in self._of("prints") if SAID_DATA in one.message]
-        if unheard and words and len(said) == 1 and words not in " ".join(said[0].message.split()).casefold():
+        if not unheard or template == VALUE or any(says(one.message, template) for one in said):
+            return
+        if len(said) == 1:
             yield f"print '{in_words(template)}' in {_line(said[0])}, not '{in_source(said[0].message)}'"
+        elif self._lacks_words(template.partition(VALUE)[0]):
+            yield f"print '{in_words(template)}'"
+
+    def _lacks_words(self, words: str) -> bool:
+        """Return whether the words stand in no line of the sources, which are known."""
+        lines = [
+            line.partition("#" if path.endswith(".py") else "//")[0]
+            for path in self._paths
+            for line in (self._build.file_lines(path) if self._build is not None else ())
+        ]
+        return bool(lines) and not any(
+            words.strip().casefold() in " ".join(line.split()).casefold() for line in lines
+        )
 
     def _message(self) -> Iterator[str]:
         template, said = str(self._wanted.get("template", "")), self._of("publishes")
+        code = in_language(code_of(template), "python")
         if len(said) != 1:
+            if not said and self._lacks_words(template.partition(SECONDS)[0]):
+                yield f"publish `{code}`"
             return
-        text, code = said[0].message, in_language(code_of(template), "python")
+        text = said[0].message
         sample = template.replace(SECONDS, "1234567890.25")
         if not could_say(text, sample):
             words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code
@@ -540,59 +566,3 @@ def _with_text(citation: Citation, build: Run) -> Citation:
     indent = len(text) - len(text.lstrip())
     begin, end = (citation.column or 1) + indent, citation.end_column + indent
     return citation.model_copy(update={"source": text, "column": begin, "end_column": end})
-
-
-CPP = frozenset({".cpp", ".cc", ".cxx"})
-
-
-def name_unchanged_files(
-    result: CriterionResult, rubric: Rubric, package: PackageFacts, handed_out: Collection[str]
-) -> CriterionResult:
-    """Return the criterion; where it is lost, with those of its files whose sha256 is among `handed_out`.
-
-    Its files are those that it cites or its parameters name, and the programs of its run.
-    """
-    if result.status not in {Status.FAIL, Status.PARTIAL} or not handed_out:
-        return result
-    criterion = next(c for c in rubric.criteria if c.id == result.id)
-    cited = {one.file for one in result.citations if isinstance(one, FileCitation)}
-    names = names_in(criterion).union(_programs(criterion, rubric, package))
-    own = rubric.package_of(criterion) if rubric.package_of(criterion) != rubric.package else ""
-    unchanged = [
-        path
-        for one in (package, *package.also)
-        for file in one.files
-        if file.sha256 in handed_out
-        and (
-            (path := posixpath.normpath(f"{package.way_to(one)}/{file.path}")) in cited
-            or (_is_named(path, names) and one.asked == own)
-        )
-    ]
-    if not unchanged:
-        return result
-    verb, them = ("is", "it") if len(unchanged) == 1 else ("are", "them")
-    told = f"{join_words(unchanged)} {verb} still as the course handed {them} out"
-    return result.model_copy(update={"message": f"{result.message}; {told}"})
-
-
-def _is_named(path: str, names: Collection[str]) -> bool:
-    """Return whether the file is among the names; a program in C++ is named without its suffix."""
-    file = PurePosixPath(path)
-    return file.name in names or (file.suffix in CPP and file.stem in names)
-
-
-def _programs(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> Iterator[str]:
-    """Yield the names of the student's programs in the criterion's run: of its process, where it judges one."""
-    scenario = rubric.scenarios.get(criterion.scenario or "")
-    starts = scenario.start if scenario is not None else ()
-    process = criterion.parameters.get("process")
-    for start in [one for one in starts if one.name == process] or starts:
-        if start.script is not None:
-            yield PurePosixPath(start.script).name
-        for launch in (file for one in (package, *package.also) for file in one.launch_files):
-            if (
-                start.launch is not None
-                and PurePosixPath(launch.path).name == PurePosixPath(start.launch).name
-            ):
-                names = {one.name for one in (package, *package.also)}
-                yield from (node.type for node in launch.brings if node.pkg in names and node.type)

@@ -32,7 +32,6 @@ from grader.judging.annotate import (
     cite_name,
     cite_words,
     fill_input_hint,
-    name_unchanged_files,
     show_lines,
 )
 from grader.judging.facts import NOT_RUN, Facts, try_facts, views_of
@@ -45,7 +44,7 @@ from grader.judging.repeats_and_repairs import (
     split_runs,
     was_built,
 )
-from grader.judging.summary import leave_out, round_half_up
+from grader.judging.summary import leave_out, name_unchanged_files, round_half_up
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult, EarlyVerdict, Repaired
 from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive
@@ -102,7 +101,7 @@ def judge_all_runs(
         verdicts, uses = apply_repaired_copy(
             rubric, verdicts, on_copy, repairs, built=built, launched=launched_in(of_copy.package)
         )
-    verdicts = add_later_faults(verdicts, rubric, facts)
+    verdicts = add_later_faults(verdicts, rubric, of_copy if repaired else facts)
     build = first.get(PACKAGE_RUN)
     shown = dict(verdicts)
     if build is not None:

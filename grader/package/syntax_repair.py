@@ -148,10 +148,14 @@ def _with_body_indented(lines: list[str], at: int) -> Iterator[str]:
 
 
 def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:
-    """Yield the text with the line, and what stands below it as far in, at the level of the line before it; or, where
-    it is further out than that, at the one level above that is nearest."""
+    """Yield the text with the line before at the level of those around it; with the line, and what stands below it as
+    far in, at the level of the line before it; or, where it is further out than that, at the one level above that is
+    nearest."""
     own = _width(lines[at])
-    above = [_width(line) for line in lines[:at] if _code(line).strip()] or [0]
+    numbers = [number for number, line in enumerate(lines[:at]) if _code(line).strip()]
+    above = [_width(lines[number]) for number in numbers] or [0]
+    if own > above[-1] and above[-2:-1] == [own]:  # the line between two of one level is the odd one
+        yield with_line(lines, numbers[-1], " " * own + lines[numbers[-1]].lstrip())
     if OUTERMOST.match(lines[at].strip()):
         level = 0
     elif own > above[-1]:

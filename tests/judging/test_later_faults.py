@@ -108,6 +108,12 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
         [slip("subscriber", "hello"), slip("subscriber-type", "Int32"), slip("prints", "got {data}", 7)],
         (f"then subscribe to /chatter in line 5 of {FILE}, not to hello, subscribe with std_msgs/String in line 5 of "
          f"{FILE}, not Int32 and print 'I heard <message>' in line 7 of {FILE}, not 'got <message>'")),
+    "two topics, and none is the right one": (
+        "node", DIES, TALKER, [slip("publisher", "left"), slip("publisher", "right", 6)],
+        f"publish std_msgs/String on /chatter: {FILE} publishes on left (line 5) and right (line 6)"),
+    "words that are glued to others": (
+        "node", DIES, [NODE | ROOT, HEARS | {"requires": ["node"]}], [slip("prints", "I heard: {data}", 7)],
+        f"then print 'I heard <message>' in line 7 of {FILE}, not 'I heard: <message>'"),
     "listener's words behind another topic": (
         "hears", DEAF, [NODE | ROOT, HEARS], [slip("subscriber", "hello"), slip("prints", "{}got {data}", 7)],
         f"; then print 'I heard <message>' in line 7 of {FILE}, not '<value>got <message>'"),
@@ -142,12 +148,41 @@ def test_nothing_is_named_behind_a_mistake_that_is_not_plainly_wrong(case: str) 
     assert "then" not in hint
 
 
+LACKS = "#!/usr/bin/env python3\n# I heard, hello world\nx = 1\n"
+
+
+def test_words_that_stand_nowhere_in_the_source_are_named() -> None:
+    heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
+    assert hint_of("node", DIES, heard, source=LACKS).endswith("; then print 'I heard <message>'")
+    assert hint_of("node", DIES, TALKER, source=LACKS).endswith(
+        '; then publish `"hello world %s" % rospy.get_time()`'
+    )
+    for criteria, words in ((heard, "I heard"), (TALKER, "Hello  World")):
+        assert "then" not in hint_of("node", DIES, criteria, source=f"{LACKS}say('{words}')\n")
+
+
+def test_what_a_machine_lacks_does_not_hide_what_is_the_students() -> None:
+    console = {
+        **DIES["console"][0],
+        "lines": [*DIES["console"][0]["lines"][:-1], "ModuleNotFoundError: No module named 'smoothly'"],
+    }
+    run = {**DIES, "console": [console]}
+    hints = [
+        hint_of("rate", run, TALKER, *found)
+        for found in ([slip("rate-number", "2")], [slip("rate-number", "10")])
+    ]
+    assert hints[0].startswith(
+        f"make it 10 Hz in line 5 of {FILE}, which asks for 2 Hz. For the rest, tell your instructor"
+    )
+    assert hints[1].startswith("nothing for you to do: tell your instructor")
+
+
 def test_a_name_in_an_except_is_not_reached() -> None:
     wrong = slip("misspelt", "`rospi` is not defined anywhere: did you mean `rospy`?", 2)
     sources = {"except": "try:\nexcept rospi.ROSInterruptException:\n", "plain": "x = 1\nrospi.spin()\n"}
     hints = {name: hint_of("node", DIES, TALKER, wrong, source=text) for name, text in sources.items()}
     assert "rospi" not in hints["except"]
-    assert hints["plain"].endswith("; then in line 2, write rospy instead of rospi")
+    assert "; then in line 2, write rospy instead of rospi" in hints["plain"]
 
 
 CPP = """\

@@ -32,7 +32,8 @@ def test_a_whole_package(tmp_path):
     assert facts.cmake.source == "parser"
     assert facts.file("src/a.py").executable is True
     assert facts.file("src/bad.py").python_fault.line == 3
-    assert [(s.file, s.line) for s in facts.slips] == [("src/a.py", 3)]
+    kinds = {(s.file, s.line, s.kind) for s in facts.slips}
+    assert kinds == {("src/a.py", 3, "not-called"), ("src/a.py", 3, "undefined")}
     assert [(f.path, f.nodes[0].line) for f in facts.launch_files] == [("launch/lab1.launch", 2)]
     assert facts.hints == ("found by folder name",)
     assert python_paths(facts) == ("src/a.py", "src/bad.py", "src/tool")

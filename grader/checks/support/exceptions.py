@@ -314,6 +314,8 @@ ATTRIBUTES = {
 
 def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """A message type, a module, an attribute or an argument that there is none of, and what is meant."""
+    if meant := own_message(found, package):
+        return meant
     if wrong := _NO_TYPE.match(found.message):
         return _other_types(wrong[1], wrong[2])
     if wrong := _NO_ATTRIBUTE.search(found.message):
@@ -322,6 +324,21 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
         near = near_names(wrong[1], KEYWORDS)
         return (f"it is called {near[0]}", f"write {near[0]}= for {wrong[1]}=") if near else None
     return _other_module(found.message, package) if found.kind in IMPORT_ERRORS else None
+
+
+def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """Return what is meant where a message that the package has itself is imported from one that is not there."""
+    source = found.own_frames[-1].source if found.own_frames else ""
+    asked = re.match(r"from\s+(\w+)\.(?:msg|srv)\s+import\s+(.+)", source)
+    if asked is None or not NO_MODULE.search(found.message) or asked[1] == package.name:
+        return None
+    names = set(re.findall(r"\w+", asked[2]))
+    own = next(
+        (one for one in package.interfaces if one.path.rpartition("/")[2].partition(".")[0] in names), None
+    )
+    if own is None:
+        return None
+    return f"this package has {own.path} itself", f"write {package.name} for {asked[1]}"
 
 
 def _other_module(message: str, package: PackageFacts) -> tuple[str, str] | None:

@@ -18,6 +18,7 @@ from grader.checks.support.exceptions import (
     Traceback,
     explain_exception,
     other_name,
+    own_message,
     own_modules,
     tracebacks,
 )
@@ -102,6 +103,7 @@ SLIPS = {
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
+_NUMBER_ASKED = re.compile(r"\b(?:int|float)\(\s*(?:raw_)?input\(")
 _ARITY = re.compile(r"([\w.]+)\(\) (?:takes|missing) ")
 _ADDED = re.compile(
     r"can only concatenate str \(not \"(\w+)\"\) to str|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'"
@@ -303,6 +305,9 @@ def _asks_for_input(
 ) -> tuple[str, str] | None:
     """Return the cause and the hint of a script that asks for input and has a Rate already."""
     rated = {one.file for one in package.slips if one.kind.startswith("rate-")}
+    source = found.own_frames[-1].source if found.own_frames else ""
+    if found.kind == "EOFError" and (number := _NUMBER_ASKED.search(source)):
+        return CAUSES["EOFError"][0], f"write a number in the code in place of `{number[0]}…))`"
     if found.kind != "EOFError" or place is None or place.file not in rated:
         return None
     return CAUSES["EOFError"][0], f"{NO_INPUT}, and make sure that the loop calls `sleep()` of its Rate"
@@ -421,7 +426,7 @@ def _lacking(found: Traceback, package: PackageFacts) -> str:
     sure = found.kind == "ResourceNotFound" or (bool(found.frames) and found.frames[-1].in_library)
     known = name in known_packages() or not _is_module(name, package)
     lacks = exists_somewhere(name, own) and (known or not sure)
-    return name if name and name not in own and lacks else ""
+    return name if name and name not in own and lacks and not own_message(found, package) else ""
 
 
 def _is_module(name: str, package: PackageFacts) -> bool:

@@ -237,6 +237,16 @@ def could_say(said: str, wanted: str) -> bool:
     return at <= end
 
 
+def says(said: str, template: str) -> bool:
+    """Return whether the text of a source can have the template's words right before what is in a message, without
+    regard to capitals and blanks."""
+    words = " ".join(template.replace(VALUE, SAID_DATA).split()).casefold()
+    text = " ".join(said.split()).casefold()
+    before = _GAP.sub("", text[: text.find(SAID_DATA)])
+    unknown = SAID_VALUE in text and not re.search(r"[^\W\d]", before)
+    return words in text or unknown
+
+
 def in_source(said: str) -> str:
     """Return the text of a source as a student reads it: `hello <value>`."""
     return said.replace(SAID_DATA, "<message>").replace(SAID_VALUE, "<value>")

@@ -31,6 +31,7 @@ from grader.package.repairs.files import find_renames, is_own, rename_files, rep
 from grader.package.repairs.names import (
     Wanted,
     is_near,
+    repair_launch_files,
     repair_launch_names,
     repair_script_names,
     repair_yaml_names,
@@ -71,7 +72,7 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     repair_cmake(files, package, name, wanted)
     rename_package(files, package, wanted)
     files_now = [renames.get(f.path, f.path) for f in package.files if is_own(f.path)]
-    repair_launch_names(files, package, files_now, wanted)
+    repair_launch_names(files, repair_launch_files(files, package), files_now, wanted)
     for script in names:
         repair_script_names(files, script, names[script], wanted)
     repair_yaml_names(files, package, names, wanted)

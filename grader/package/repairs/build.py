@@ -13,7 +13,7 @@ from grader.model.package import PackageFacts, meant_command
 from grader.model.repair import RepairKind
 from grader.package.cmake_parse import commands_of
 from grader.package.manifest import parse_manifest
-from grader.package.repairs.editing import CMAKE, MANIFEST, Files, naming_files, rename_word
+from grader.package.repairs.editing import CMAKE, MANIFEST, Files, naming_files, rename_word, repair_xml
 from grader.package.repairs.files import is_own
 from grader.package.repairs.names import Wanted, is_near
 from grader.package.xml import parse_xml
@@ -23,7 +23,6 @@ BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 INSTALL = "catkin_install_python"
 CALL_LINES_MAX = 30
 ALL_NEEDS = re.compile(r"<(build_depend|depend|run_depend|exec_depend)>\s*([\w-]+)\s*<")
-OPEN_TAG = re.compile(r"tag mismatch: (?P<tag>\S+) line (?P<line>\d+)")
 
 
 # ---- package.xml
@@ -34,7 +33,7 @@ def repair_manifest(files: Files, package: PackageFacts, wanted: Wanted) -> str:
     text = files.text(MANIFEST)
     if text is None:
         return package.name
-    _close_tag(files)
+    repair_xml(files, MANIFEST, "package", "manifest-line")
     _add_buildtool(files)
     for name in wanted.dependencies:
         _add_dependency(files, name)
@@ -72,20 +71,6 @@ def _is_meant(files: Files, package: PackageFacts, name: str, wanted: str) -> bo
 
 def _parses(text: str) -> bool:
     return parse_xml(text.encode(), MANIFEST, root="package")[0] is not None
-
-
-def _close_tag(files: Files) -> None:
-    text = files.text(MANIFEST) or ""
-    _, fault = parse_xml(text.encode(), MANIFEST, root="package")
-    found = OPEN_TAG.search(fault.message) if fault is not None else None
-    if found is None:
-        return
-    lines, at = text.split("\n"), int(found["line"]) - 1
-    if 0 <= at < len(lines):
-        lines[at] = f"{lines[at].rstrip()}</{found['tag']}>"
-        if _parses("\n".join(lines)):
-            message = f"line {at + 1} of {MANIFEST}: <{found['tag']}> is never closed"
-            files.change("manifest-line", MANIFEST, "\n".join(lines), message)
 
 
 def _add_buildtool(files: Files) -> None:

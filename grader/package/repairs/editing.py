@@ -19,6 +19,7 @@ from typing import BinaryIO
 from grader.files import atomic_write, open_untrusted
 from grader.model.repair import Repair, RepairKind, added_lines
 from grader.package.reading import LEFT_OUT
+from grader.package.xml import parse_xml, well_formed
 from grader.portable import BINARY, CLOEXEC, DIRECTORY, NOFOLLOW, READ
 
 TEXT_BYTES_MAX = 64_000
@@ -112,6 +113,21 @@ class Files:
         self._texts[file] = after
         words = {"message": message, "fix": fix or added_lines(old, new)}
         self.repairs.append(Repair(kind=kind, file=file, line=line, before=old, after=new, **words))
+
+
+def repair_xml(files: Files, file: str, root: str, kind: RepairKind) -> bool:
+    """Find the edits that make a file well-formed, where such plain ones do; return whether there are any."""
+    text = files.text(file)
+    for after in well_formed(text, file, root=root) if text is not None else ():
+        before = files.text(file) or ""
+        _, fault = parse_xml(before.encode(), file, root=root)
+        line, old, new = changed_lines(before, after)
+        cause = fault.cause or fault.message if fault is not None else ""
+        taken = " ".join(one.strip() for one in old.split("\n") if one not in new.split("\n"))
+        fix = f"write `{added_lines(old, new)}`" if added_lines(old, new) else f"delete `{taken}`"
+        place = f"line {fault.line if fault is not None and fault.line else line} of {file}"
+        files.change(kind, file, after, f"{place}: {cause}", fix)
+    return text is not None and files.text(file) != text
 
 
 def _is_unicode(text: str) -> bool:

@@ -10,8 +10,9 @@ from typing import Any
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.repair import RepairKind
+from grader.package.launch import parse_launch
 from grader.package.manifest import parse_manifest
-from grader.package.repairs.editing import MANIFEST, Files
+from grader.package.repairs.editing import MANIFEST, Files, repair_xml
 from grader.package.repairs.python import Name
 from grader.rubric.model import Criterion, Rubric
 from grader.wording import is_one_edit, plural
@@ -302,6 +303,19 @@ def _keys(text: str) -> Iterator[tuple[int, tuple[str, ...]]]:
 
 
 # ---- launch files
+
+
+def repair_launch_files(files: Files, package: PackageFacts) -> PackageFacts:
+    """Find the edits that make launch files well-formed, and return the package as it is with them."""
+    launches = [
+        parse_launch((files.text(launch.path) or "").encode(), launch.path)
+        if launch.fault is not None
+        and launch.fault.kind == "XMLSyntaxError"
+        and repair_xml(files, launch.path, "launch", "launch-syntax")
+        else launch
+        for launch in package.launch_files
+    ]
+    return package.model_copy(update={"launch_files": tuple(launches)})
 
 
 def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str], wanted: Wanted) -> None:
