@@ -218,12 +218,16 @@ class Run:
     """Files that were kept with the run, by name."""
     package_json: bytes | None = None
     """The package's files as they were read; ask for the fact `package` instead."""
-    _known: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def foreign(self) -> bool:
         """Whether another tool recorded it: then it holds messages, and nothing of processes, graph or console."""
         return not self.metadata
+
+    @cached_property
+    def _known(self) -> dict[tuple[Any, ...], Any]:
+        """Answers of `once_for_each_run`."""
+        return {}
 
     @cached_property
     def grader_nodes(self) -> frozenset[str]:
