@@ -274,8 +274,10 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         self.wfile.write(body)
         self.wfile.flush()
 
-    def log_message(self, *_):
+    def log_request(self, *_):
         """It is not read."""
+
+    log_message = log_request
 
 
 def _ends(request):

@@ -7,7 +7,7 @@ import hashlib
 import re
 import sys
 from contextlib import suppress
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -101,8 +101,9 @@ def _unindent(text: str) -> str:
     return "\n".join(row.strip() for row in text.splitlines())
 
 
+@lru_cache(maxsize=2048)
 def prose(text: str) -> Markup:
-    """Return a text in which what is code is marked as such."""
+    """Return a text in which what is code is marked as such; the reports of a class say much the same."""
     return Markup("").join(
         Markup("<code>{}</code>").format(part) if is_code else escape(part)
         for part, is_code in code_parts(text)
