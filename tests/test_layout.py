@@ -55,7 +55,7 @@ ALLOWED = {
     "intake": BASE | {"files", "host_programs", "limited_child"},
     "checks": BASE | {"evidence", "installable", "syntax_fixes"},
     "rubric": BASE | {"checks", "evidence", "files", "installable", "ros_packages"},
-    "judging": BASE | {"checks", "evidence", "rubric"},
+    "judging": BASE | {"checks", "evidence", "installable", "rubric"},
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
     "arena": BASE | {
         "evidence", "files", "host_programs", "package", "ros_env", "ros_packages", "rubric.course_packages",
