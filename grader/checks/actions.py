@@ -50,7 +50,7 @@ class ActionResultParams(Record):
     def words(self) -> str:
         with_result = f" with {fields_text(self.result)}" if self.result else ""
         limit = f" within {significant(self.within_s)} s" if self.within_s else ""
-        feedback = f", {plural(self.feedback, 'feedback', 'feedbacks')} before" if self.feedback else ""
+        feedback = f", {plural(self.feedback, 'feedback message')} before" if self.feedback else ""
         return f"goal {self.goal} of {self.action} {self.status}{with_result}{limit}{feedback}"
 
 
@@ -192,7 +192,7 @@ def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | 
     came = _feedback(run, goal, params)
     if came >= params.feedback:
         return None
-    count = plural(came, "feedback", "feedbacks")
+    count = plural(came, "feedback message")
     message = f"{count} came on {goal.name} of {params.action}, but {params.feedback} are expected"
     verdict = failed(message, hint="call server.publish_feedback(feedback) each time around the loop")
     return (
@@ -248,7 +248,7 @@ def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> V
 
 
 def _measured_text(run: Run, goal: Goal, params: ActionResultParams) -> str:
-    came = plural(_feedback(run, goal, params), "feedback", "feedbacks")
+    came = plural(_feedback(run, goal, params), "feedback message")
     if goal.end is None or goal.end.value is None:
         return f"{came}, no result"
     return f"{came}, {shown(goal.end.detail)} with {fields_text(goal.end.value)}"

@@ -336,20 +336,24 @@ def _declared_text(found: Manifest) -> str:
 
 
 def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
-    """Return what the manifest does not declare for run time; None where it declares all."""
+    """Return what the manifest does not declare as a run-time dependency; None where it declares all."""
     declared = {d.name for d in found.dependencies if d.kind in RUNTIME_KINDS}
     missing = [n for n in names if n not in declared]
     if not missing:
         return None
     tag = "run_depend" if found.format == 1 else "exec_depend"
     at_build = [d for d in found.dependencies if d.name in missing]
-    only = f"; {join_words(dict.fromkeys(d.name for d in at_build))} only for building" if at_build else ""
+    only = (
+        f"; {join_words(dict.fromkeys(d.name for d in at_build))} only as a build dependency"
+        if at_build
+        else ""
+    )
     near = [n for name in missing for n in near_names(name, declared) if n not in names]
     slip = f"; it declares {join_words(near)}" if near else ""
     last = max((d.line for d in at_build), default=_last_line(found))
     lines = tuple(FileCitation(file=found.file, line=d.line) for d in at_build)
     return failed(
-        f"{found.file} does not declare {join_words(missing)} for run time{only or slip}",
+        f"{found.file} does not declare {join_words(missing)} as a run-time dependency{only or slip}",
         measured=_declared_text(found),
         hint=f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in missing)} below line {last}",
         citations=lines or (FileCitation(file=found.file, line=last),),

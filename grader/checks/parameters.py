@@ -131,7 +131,7 @@ def _error(run: Run, one: Life, path: str) -> Verdict | None:
         cited = (FileCitation(file=path, line=words.line),)
         return failed(f"{path} does not load: {words.why}", hint=words.hint, citations=cited)
     said = f": {shown(lines[-1])}" if lines else ""
-    hint = f"rosparam load {PurePosixPath(path).name} shows the line"
+    hint = f"rosparam load {path} shows the line"
     return failed(f"{path} does not load{said}", hint=hint)
 
 

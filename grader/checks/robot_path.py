@@ -284,7 +284,7 @@ def _too_early(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
     short_m = math.dist(start, end) - along
     if along <= 0 or short_m <= way.tolerance_m or aside * _along(following, start, end)[1] <= 0:
         return None
-    message = f"it leaves the way {metres(short_m)} before {way.name(course.reached)}, {_after(path, pose)}"
+    message = f"it leaves the path {metres(short_m)} before {way.name(course.reached)}, {_after(path, pose)}"
     return Words(message, "drive all the way to the point before you turn: distance is speed times time")
 
 

@@ -94,7 +94,7 @@ def _points(package: PackageFacts) -> Iterator[tuple[FileCitation, str]]:
         if fault is not None and fault.kind in SYNTAX and not is_product(file.path):
             why = fault.cause or fault.message
             hint = syntax_hint(fault)
-            text = f"{file.path} does not parse: {why}" + (
+            text = f"{file.path} has a syntax error: {why}" + (
                 "" if why.endswith(hint.partition(": ")[2]) else f"; {hint}"
             )
             yield FileCitation(file=file.path), text
@@ -507,7 +507,7 @@ def cite_commented_call(verdict: Verdict, build: Run) -> Verdict:
 
 
 _BELOW = re.compile(r" below (the )?catkin_package\(…?\)( of line \d+)?$")
-_UNDECLARED = re.compile(r" does not declare (\w+) for run time")
+_UNDECLARED = re.compile(r" does not declare (\w+) as a run-time dependency")
 _LACKED = re.compile(r": it needs the package (\w+), which this grading machine lacks")
 
 

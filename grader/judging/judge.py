@@ -19,6 +19,7 @@ from grader.checks.registry import NotRecorded
 from grader.checks.support.exit_causes import SYNTAX, explain_by_exception
 from grader.checks.support.parameters import explain_by_unread_parameter
 from grader.checks.support.processes import plain_type
+from grader.checks.support.scripts import without_git
 from grader.checks.support.text import near_names, texts_in
 from grader.checks.support.topics import SYSTEM_TOPICS, account_for_losses, explain_by_unheard_topic
 from grader.errors import EvidenceError
@@ -192,7 +193,9 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
                 found = explain(check, package, run, found)
             found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found)
         found = fill_input_hint(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
-        return _with_package_name(found, criterion, facts)
+        found = _with_package_name(found, criterion, facts)
+        hint = without_git(found.hint, facts.package)
+        return found if hint == found.hint else found.model_copy(update={"hint": hint})
     except NotRecorded as missing:
         return missing.verdict
     except EvidenceError as error:

@@ -165,7 +165,7 @@ _TEXT_ARGUMENTS = r"(?:[^()`]|\((?:[^()`]|\([^()`]*\))*\)){0,200}"
 _FILE = r"(?:[\w.~+-]{0,99}[./*][\w./*~+-]{0,99}[\w*]|FILE)"
 _COMMAND = rf"""
     (?:(?:(?:sudo\ )?chmod\ \+x|dos2unix)(?:\ {_FILE})+
-    | git\ mv\ [\w./-]*\w\ [\w./-]*\w
+    | (?:git\ )?mv\ [\w./-]*\w\ [\w./-]*\w
     | git\ (?:add|commit|push|rm|update-index)\b(?:\ -[\w=+-]+)*(?:\ {_FILE})*
     | (?:mkdir|cd)\ [\w./~-]*\w
     | catkin_create_pkg(?:\ \w+)+

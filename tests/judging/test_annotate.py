@@ -160,7 +160,7 @@ def test_a_call_that_is_commented_out_is_named_by_its_lines(text: str, place: st
 MANIFEST_LINES = (
     "<package>\n  <exec_depend>rospy</exec_depend>\n  <!-- <exec_depend>std_msgs</exec_depend> -->\n"
 )
-UNDECLARED = "package.xml does not declare {} for run time"
+UNDECLARED = "package.xml does not declare {} as a run-time dependency"
 LACKED = "catkin_make failed: CMakeLists.txt:2: it needs the package {}, which this grading machine lacks"
 
 
@@ -199,7 +199,7 @@ def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
     package = facts(tmp_path, **files)
     (told,) = add_advice([criterion()], package, rubric(CMAKE_CHECK))
     assert told.hint.split("; ") == [
-        "src/old.py does not parse: this is Python 2: `print` needs brackets, `print(...)`",
+        "src/old.py has a syntax error: this is Python 2: `print` needs brackets, `print(...)`",
         "line 1: write `print('a')`",
         f'{OUT} there is no talker in the package: type="talker" lacks the .py of src/talker.py',
         'write type="talker.py"',

@@ -319,7 +319,7 @@ def _missing_dependency(found: re.Match[str], _package: PackageFacts, _lines: Se
 
 def _missing_target(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     name = found[1]
-    why = f"it speaks of the target {name}, which no add_executable(…) or add_library(…) above it makes"
+    why = f"it names the target {name}, which no add_executable(…) or add_library(…) above it makes"
     return Explained(why, f"take that line out, or make {name} above it")
 
 
@@ -331,14 +331,14 @@ def _depends(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]
 def _run_dependency(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     name = found[1]
     tag = "run_depend" if package.manifest and package.manifest.format == 1 else "exec_depend"
-    why = f"catkin_package(…) depends on {name}, and package.xml does not declare it for run time"
+    why = f"catkin_package(…) depends on {name}, and package.xml does not declare it as a run-time dependency"
     return Explained(
         why, f"add <{tag}>{name}</{tag}> to package.xml, or take {name} out of catkin_package(…)"
     )
 
 
 def _build_dependency(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    why = f"find_package(…) names {found[1]}, and package.xml does not declare it for building"
+    why = f"find_package(…) names {found[1]}, and package.xml does not declare it as a build dependency"
     return Explained(why, f"add <build_depend>{found[1]}</build_depend> to package.xml")
 
 

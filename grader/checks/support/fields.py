@@ -109,7 +109,9 @@ def bounds_text(low: float | None, high: float | None) -> str:
     """Return bounds in words; at least one of them is given."""
     if low is None:
         return f"at most {significant(high or 0)}"
-    return f"at least {significant(low)}" if high is None else f"{significant(low)} to {significant(high)}"
+    return (
+        f"at least {significant(low)}" if high is None else f"from {significant(low)} to {significant(high)}"
+    )
 
 
 def is_within(value: float, low: float | None, high: float | None) -> bool:

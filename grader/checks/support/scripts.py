@@ -102,6 +102,11 @@ def add_hint(package: PackageFacts, path: str) -> str:
     return f"write {path}{then}"
 
 
+def without_git(hint: str, package: PackageFacts | None) -> str:
+    """Return the hint with commands that work where the package is in no git repository."""
+    return hint if package is None or handed_in_with_git(package) else hint.replace("git mv ", "mv ")
+
+
 def handed_in_with_git(package: PackageFacts) -> bool:
     """Return whether git says what is in the package."""
     return any(file.mode_source == "git" for file in package.files)
@@ -183,6 +188,10 @@ class Obstacle(NamedTuple):
     fix: str
 
 
+def _then_push(file: SourceFile) -> str:
+    return ", then commit and push" if file.mode_source == "git" else ""
+
+
 def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
     """Yield what keeps the system from starting the file, the package facts' own words first."""
     fix = f"write {RIGHT_SHEBANG} as the very first line, with nothing above it"
@@ -190,7 +199,7 @@ def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
         yield Obstacle(f"cannot be run: {file.link_problem}", "hand in the file itself")
     elif file.shebang is not None and file.shebang.crlf:
         problem = file.shebang_problem or "its #! line ends with Windows' CRLF"
-        yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}, then commit and push")
+        yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}{_then_push(file)}")
     elif file.shebang_problem == EMPTY:
         yield Obstacle("is empty", f"write the node in {file.path}, with {RIGHT_SHEBANG} as its first line")
     elif file.bom:
