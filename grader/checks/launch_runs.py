@@ -10,7 +10,7 @@ from pydantic import Field
 
 from grader.checks.launch_files import missing_node
 from grader.checks.launch_params import params_misplaced
-from grader.checks.registry import LaunchName, ProgramName, check
+from grader.checks.registry import DependencyName, LaunchName, ProgramName, check
 from grader.checks.support.launch import (
     Slip,
     is_exact,
@@ -197,7 +197,7 @@ class LaunchRunsParams(Record):
     """A topic over which the nodes are connected, with its slash; null: none is asked for."""
     scripts: tuple[str, ...] = ()
     """The student's scripts that have to run, or C++ programs by their names."""
-    nodes: Annotated[dict[str, str], Field(default_factory=dict)]
+    nodes: Annotated[dict[str, DependencyName], Field(default_factory=dict)]
     """Names of nodes that have to come up, each with the package that it comes from."""
     programs: tuple[ProgramName, ...] = ()
     """Programs of other packages that have to run, under any name: `turtlesim/turtlesim_node`."""

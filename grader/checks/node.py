@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from grader.checks.registry import ProcessName, Refers, check
+from grader.checks.registry import NodeName, ProcessName, Refers, check
 from grader.checks.support.exit_causes import (
     explain_end,
     explain_traceback,
@@ -50,7 +50,7 @@ class NodeLivesParams(Record):
     """The scenario's name for the process."""
     min_s: Annotated[float, Refers("watched_s")] = 5.0
     """So long it has to live after its first message."""
-    names: tuple[str, ...] = ()
+    names: tuple[NodeName, ...] = ()
     """Names of which one has to be the node's, as `node-name` judges it; empty: any name will do."""
     anonymous: Anonymous = "allowed"
     """Whether the node may, must or must not be anonymous."""
@@ -59,7 +59,7 @@ class NodeLivesParams(Record):
 class NodeNameParams(Record):
     """The names that the node may have."""
 
-    names: Annotated[tuple[str, ...], Field(min_length=1)]
+    names: Annotated[tuple[NodeName, ...], Field(min_length=1)]
     """Names without the slash; an anonymous node ends in `_<digits>_<digits>`, as rospy makes it."""
     anonymous: Anonymous = "allowed"
     """Whether the node may, must or must not be anonymous."""

@@ -39,8 +39,9 @@ class Refers:
     which the scenario's probes send. `published`: a topic on which the student publishes. `set`: a parameter that the
     scenario sets. `action`: an action to which its steps send goals. `kept`: a file that it keeps. `served`: a service
     that the grader offers in it. `rostest`: a start of a `.test` file in it. `watched_s`: so long the scenario has to
-    last. `dependency`: a ROS package, or another key of rosdep's. `package`: one that students hand in. `cause`: a
-    condition on a topic that something has to send on.
+    last. `dependency`: a ROS package, or another key of rosdep's. `package`: one that students hand in. `node`: a
+    node's name, in the namespace in which the scenario starts it. `cause`: a condition on a topic that something has to
+    send on.
     """
 
     to: Literal[
@@ -60,6 +61,7 @@ class Refers:
         "watched_s",
         "dependency",
         "package",
+        "node",
         "cause",
     ]
 
@@ -75,6 +77,7 @@ class Reference(NamedTuple):
 ProcessName = Annotated[str, Refers("process")]
 DependencyName = Annotated[str, Refers("dependency")]
 PackageName = Annotated[str, Refers("package")]
+NodeName = Annotated[str, Refers("node")]
 LaunchName = Annotated[str, Refers("launch")]
 ProgramName = Annotated[str, Refers("program")]
 

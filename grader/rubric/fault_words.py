@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import types
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Annotated, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -99,11 +99,19 @@ def _holds(data: object, part: str | int) -> bool:
     return isinstance(data, list) and isinstance(part, int) and part < len(data)
 
 
+def _unknown(key: str, value: object, keys: Collection[str]) -> str:
+    """Return what an unknown key may be: a slip, or the rest of a text that YAML has cut off at a comma."""
+    cut = value is None and " " in key
+    return ": between { and }, a text with a comma needs quotes" if cut else did_you_mean(key, keys)
+
+
 def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str:
     kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
     words: dict[str, Callable[[], str]] = {
         "missing": lambda: "is missing",
-        "extra_forbidden": lambda: "is not known here" + did_you_mean(str(path[-1]), _keys(model, path[:-1])),
+        "extra_forbidden": lambda: (
+            "is not known here" + _unknown(str(path[-1]), value, _keys(model, path[:-1]))
+        ),
         "string_pattern_mismatch": lambda: f"{_pattern(context['pattern'])}, not {shown(value)}",
         "literal_error": lambda: _literal(value, context["expected"]),
         "string_too_long": lambda: f"has at most {context['max_length']} characters, not {len(value)}",

@@ -55,6 +55,7 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
     yield from _misspelt_nodes(rubric, scenarios)
     yield from _own_types(rubric)
     yield from _misspelt_scripts(rubric, scenarios)
+    yield from _other_goals_and_types(rubric, scenarios)
 
 
 def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -73,11 +74,27 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
                 fault = f"is a path in the student's package, from its folder: scripts/{name}, not {file}"
                 yield (*path, "start", index, key), fault
         yield from _of_machine((*path, "start", index, "program"), "program", start.get("program"), rubric)
+        yield from _arguments((*path, "start", index, "args"), start)
+    for at, one in _services_in(scenario):
+        yield from _of_machine((*path, *at, "type"), "service", one.get("type"), rubric)
+
+
+def _services_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
+    """Yield the services that a scenario calls or offers, and where it says so."""
     for key in ("calls", "serves"):
-        for index, one in as_maps(scenario.get(key)):
-            if one.get("action") is not None:
-                continue  # whether there is an action, only its file says
-            yield from _of_machine((*path, key, index, "type"), "service", one.get("type"), rubric)
+        yield from (((key, n), one) for n, one in as_maps(scenario.get(key)) if one.get("action") is None)
+    for index, step in as_maps(scenario.get("steps")):
+        if "call" in step:
+            yield ("steps", index, "call"), as_map(step["call"])
+
+
+def _arguments(path: KeyPath, start: dict[str, Any]) -> Iterator[Fault]:
+    """Yield arguments that ROS would take for others: `_rate=5` sets no parameter, `gui=false` no argument."""
+    launches = start.get("launch") is not None
+    for index, text in as_texts(start.get("args")):
+        name, mark, value = text.partition("=")
+        if mark and re.fullmatch(r"\w+", name) and (launches or name.startswith("_")):
+            yield (*path, index), f"ROS reads {name}:={value}, with a colon, and not {text}"
 
 
 def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -137,6 +154,10 @@ def _misfits(
     elif one.to == "set" and not _is_set(value, scenario):
         there = [str(param.get("name")) for _, param in as_maps(scenario.get("params"))]
         yield f"{name} sets no parameter {value}{did_you_mean(value, there)}: add it to its params"
+    elif one.to == "node":
+        process = as_map(criterion.get("with")).get("process")
+        of_process = [start for start in starts if start.get("name") == process or not process]
+        yield from _named_otherwise(value, of_process if len(of_process) == 1 else [])
     elif one.to == "published":
         yield from _wrong_sender(value, as_map(criterion.get("with")).get("of", "student"), check, starts)
 
@@ -148,6 +169,19 @@ def _wrong_sender(topic: str, of: object, check: Check, starts: list[dict[str, A
         yield f"{program} publishes on {topic}, and {check.name} judges the student's messages: give it of: program"
     if of == "program" and not any(start.get("program") for start in starts):
         yield f"the scenario starts no program, and {check.name} judges the messages of one (of: program)"
+
+
+def _named_otherwise(name: str, starts: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield which name the arguments of a start give its node, where that is another one."""
+    if name.endswith((".py", ".cpp")):
+        yield f"is the name of a node, not of its file: write {name.rpartition('.')[0]}"
+    for args in (as_texts(start.get("args")) for start in starts):
+        given = dict(text.split(":=", 1) for _, text in args if text.startswith(("__ns:=", "__name:=")))
+        own = given.get("__name", name.rpartition("/")[2])
+        whole = "/".join(["", *given.get("__ns", "").strip("/").split("/"), own]).replace("//", "/")
+        if given and "/" + name.strip("/") != whole:
+            words = join_words([f"{key}:={text}" for key, text in given.items()])
+            yield f"the node is started with {words}: write {whole}"
 
 
 def _is_process(name: str, start: dict[str, Any]) -> bool:
@@ -251,6 +285,18 @@ def _unknown_topics(
             if topic.startswith("/") and topic not in known and (near or not open_):
                 meant = f' (did you mean "{near}"?)' if near else ""
                 yield ("scenarios", name, "until", *at), f"no criterion and no probe names {topic}{meant}"
+        for at, topic in _waits_in_steps(scenario):
+            near = (
+                _near(topic, named, cutoff=SURE)
+                if topic
+                not in {
+                    *named,
+                    *_topics_in([step for _, step in as_maps(scenario.get("steps")) if "wait" not in step]),
+                }
+                else ""
+            )
+            if near:
+                yield ("scenarios", name, *at), f'no criterion names {topic} (did you mean "{near}"?)'
 
 
 def _too_many(
@@ -381,15 +427,18 @@ def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
     criteria = list(as_maps(rubric.get("criteria")))
     files = [str(as_map(c.get("with")).get("file")) for _, c in criteria if c.get("check") == "definition"]
     names, own = {PurePosixPath(file).stem for file in files}, packages_in(rubric)
-    for index, criterion in criteria:
-        kind = as_map(criterion.get("with")).get("type")
+    typed: list[tuple[KeyPath, dict[str, Any]]] = [
+        (("criteria", n, "with"), as_map(c.get("with"))) for n, c in criteria
+    ]
+    for scenario, one in as_map(rubric.get("scenarios")).items():
+        steps = [(n, key, as_map(step[key])) for n, step in as_maps(as_map(one).get("steps")) for key in step]
+        typed += [(("scenarios", scenario, "steps", n, key), given) for n, key, given in steps]
+    for path, given in typed:
+        kind = given.get("type")
         package, _, name = kind.partition("/") if isinstance(kind, str) else ("", "", "")
         near = closest(name, names, cutoff=SURE) if package in own and name not in names else ""
         if near:
-            yield (
-                ("criteria", index, "with", "type"),
-                f'no criterion asks for {name} (did you mean "{package}/{near}"?)',
-            )
+            yield (*path, "type"), f'no criterion asks for {name} (did you mean "{package}/{near}"?)'
 
 
 def _misspelt_scripts(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
@@ -403,6 +452,21 @@ def _misspelt_scripts(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any
         near = "" if name in started else _near(name, started - {*named.values()}, cutoff=SURE)
         if near:
             yield ("criteria", index, "with", "path"), f'no scenario starts {name} (did you mean "{near}"?)'
+
+
+def _other_goals_and_types(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield goals that a scenario does not send, and types of services that are not those that it calls."""
+    for index, criterion in as_maps(rubric.get("criteria")):
+        given, name = as_map(criterion.get("with")), str(criterion.get("scenario"))
+        scenario, path = scenarios.get(name, {}), ("criteria", index, "with")
+        steps = [as_map(step.get("action")) for _, step in as_maps(scenario.get("steps"))]
+        goals, goal = [a for a in steps if a.get("name") == given.get("action", "")], given.get("goal")
+        if isinstance(goal, int) and 0 < len(goals) < goal:
+            yield (*path, "goal"), f"{name} sends {len(goals)} goals to {given['action']}"
+        service, kind = given.get("service", ""), given.get("type")
+        called = {str(one.get("type")) for _, one in _services_in(scenario) if one.get("service") == service}
+        if isinstance(kind, str) and called and not closest(kind, called, cutoff=SURE):
+            yield (*path, "type"), f"{name} has {service} as {join_words(sorted(called))}, not as {kind}"
 
 
 @lru_cache(maxsize=256)
@@ -441,6 +505,13 @@ def _misspelt_nodes(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]
             if near:
                 fault = f'the node is called {near}, and not {node} (did you mean "/{near}/{private}"?)'
                 yield ("scenarios", name, *at, "name"), fault
+
+
+def _waits_in_steps(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    for index, step in as_maps(scenario.get("steps")):
+        topic = as_map(step.get("wait")).get("topic")
+        if isinstance(topic, str):
+            yield ("steps", index, "wait", "topic"), topic
 
 
 def _waited_for(until: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:

@@ -45,6 +45,7 @@ REFERRED = {
     "watched_s": "number",
     "dependency": "text",
     "package": "package of the lab",
+    "node": "text",
     "cause": "condition",
 }
 REQUIRED = "required"

@@ -78,6 +78,11 @@ def test_three_faults_are_all_named_with_file_and_line(tmp_path):
         ),
         ("title: 10 Hz\n", "title: 10 Hz\n    zzz: yes\n", "21: criteria[1].zzz: is not known here"),
         (
+            "with: {topic: /chatter, rate_hz: 10}",
+            "with: {topic: /chatter, rate_hz: 10, in real time}",
+            "17: criteria[0].with.in real time: is not known here: between { and }, a text with a comma needs quotes",
+        ),
+        (
             "title: 10 Hz\n",
             "title: 10 Hz\n    titel: x\n",
             '21: criteria[1].titel: is not known here (did you mean "title"?)',

@@ -100,6 +100,49 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
             id="package",
         ),
         pytest.param(
+            "script: src/listener.py}",
+            'script: src/listener.py, args: ["_rate=5"]}',
+            "17: scenarios.listener.start[0].args[0]: ROS reads _rate:=5, with a colon, and not _rate=5",
+            id="argument-without-its-colon",
+        ),
+        pytest.param(
+            "roslaunch, launch: lab1.launch}",
+            "roslaunch, launch: lab1.launch, args: ['gui=false']}",
+            "27: scenarios.launch.start[1].args[0]: ROS reads gui:=false, with a colon, and not gui=false",
+            id="argument-of-a-launch-file",
+        ),
+        pytest.param(
+            "    calls:\n      - {service: /reset, type: std_srvs/Trigger}\n",
+            "    steps:\n      - call: {service: /reset, type: std_srvs/Triger}\n",
+            '21: scenarios.listener.steps[0].call.type: std_srvs has no service type "Triger" '
+            '(did you mean "Trigger"?)',
+            id="type-of-a-service-in-a-step",
+        ),
+        pytest.param(
+            "service: /reset, type: std_srvs/Trigger}, scenario",
+            "service: /reset, type: std_srvs/Empty}, scenario",
+            "35: criteria[5].with.type: listener has /reset as std_srvs/Trigger, not as std_srvs/Empty",
+            id="type-of-the-service-that-is-called",
+        ),
+        pytest.param(
+            "    calls:\n",
+            "    steps: [{wait: {topic: /chater}}]\n    calls:\n",
+            '20: scenarios.listener.steps[0].wait.topic: no criterion names /chater (did you mean "/chatter"?)',
+            id="topic-of-a-wait",
+        ),
+        pytest.param(
+            "programs: [turtlesim/turtlesim_node]}",
+            "nodes: {/recorder: rosbags}}",
+            '36: criteria[6].with.nodes./recorder: there is no ROS package "rosbags" (did you mean "rosbag"?)',
+            id="package-of-a-node",
+        ),
+        pytest.param(
+            "{process: talker}",
+            "{process: talker, names: [talker.py]}",
+            "30: criteria[0].with.names[0]: is the name of a node, not of its file: write talker",
+            id="file-for-a-node",
+        ),
+        pytest.param(
             "{text: a}",
             "{text: a, process: turtlesim}",
             '39: criteria[9].with.process: launch starts no process "turtlesim" of the student\'s: there is roslaunch',
@@ -480,3 +523,25 @@ def test_every_process_topic_and_program_of_a_check_is_known_as_one() -> None:
         if name in {"process", "programs", "launch", "min_s", "min_window_s"}
     }
     assert named <= declared
+
+
+@pytest.mark.parametrize(
+    ("args", "name", "right"),
+    [
+        ("__ns:=green", "talker", "/green/talker"),
+        ("__ns:=/a/b/", "/talker", "/a/b/talker"),
+        ("__name:=voice", "talker", "/voice"),
+        ("__ns:=green", "/green/talker", ""),
+        ("_rate:=5", "talker", ""),
+    ],
+)
+def test_a_node_has_the_name_that_its_start_gives_it(
+    args: str, name: str, right: str, tmp_path: Path
+) -> None:
+    path = _written(tmp_path, "{process: talker}", f"{{process: talker, names: [{name}]}}")
+    path.write_text(path.read_text().replace("src/talker.py}", f"src/talker.py, args: ['{args}']}}"))
+    fault = f"lab.yaml:30: criteria[0].with.names[0]: the node is started with {args}: write {right}"
+    if right:
+        assert faults(path) == [fault]
+    else:
+        assert load_rubric(str(path)).rubric.criteria[0].parameters["names"] == [name]
