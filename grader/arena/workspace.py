@@ -218,8 +218,7 @@ def _repair(path: Path, facts: SourceFile | None) -> Iterator[str]:
         yield "line ending of the shebang" if shebang.crlf else f"shebang ({shebang.text})"
         text = text.partition(b"\n")[2]
     else:
-        yield "shebang (none)"
-        text = text if text.split(b"\n", 1)[0].strip() else text.partition(b"\n")[2]
+        yield "shebang (none)"  # all of its lines move down by one: `exit_causes` counts on that
     path.write_bytes(SHEBANG + text.replace(b"\r\n", b"\n"))
 
 

@@ -132,13 +132,13 @@ def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str
             if slip
             else f"add find_package(catkin REQUIRED){_below(project)}"
         )
-        yield f"find_package(catkin …) is missing{other}", fix, line or (project.line if project else None)
+        yield f"find_package(catkin …) is missing{other}", fix, line
     if slip := _misspelt(facts, "catkin_package"):
         yield _respell(slip, "catkin_package")
     elif _first(facts, "catkin_package") is None:
         above = next((c for c in packages if c.args[:1] == ("catkin",)), project)
         fix = f"add catkin_package(){_below(above)}"
-        yield "catkin_package(…) is missing", fix, above.line if above else None
+        yield "catkin_package(…) is missing", fix, None
 
 
 def _below(call: CMakeCall | None) -> str:
@@ -315,9 +315,8 @@ def _without_call(package: PackageFacts, all_named: Sequence[Installed], path: s
         why = f"line {folder.call.line}: {other} names {{}}, where catkin_install_python(PROGRAMS …) should"
         return Lack(why, f"{fix} below it", _line(folder), path)
     above = _first(package.cmake, "catkin_package") if package.cmake else None
-    place = FileCitation(file=above.file, line=above.line) if above else None
     below = _below(above) or " below catkin_package()"
-    return Lack(f"{NOT_CALLED}, so nothing installs {{}}", f"{fix}{below}", place, path)
+    return Lack(f"{NOT_CALLED}, so nothing installs {{}}", f"{fix}{below}", None, path)
 
 
 def _folder_above(all_named: Sequence[Installed], path: str) -> Installed | None:

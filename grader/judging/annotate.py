@@ -73,19 +73,11 @@ def add_advice(
     visible = {c.id for c in rubric.criteria if c.visibility == "visible"}
     good = [c for c in results if c.status is Status.PASS and c.id in visible]
     host = next((c for check in OF_FILES for c in good if c.check == check), None)
-    absent = {match[1] for c in results if c.status.is_lost and (match := _ABSENT.search(c.message))}
-    points = [
-        text
-        for place, text in _points(package)
-        if not _is_told(place, results) and not any(f"there is no {name} " in text for name in absent)
-    ][:POINTS_MAX]
+    points = [text for place, text in _points(package) if not _is_told(place, text, results)][:POINTS_MAX]
     if host is None or not points:
         return tuple(results)
     told = host.model_copy(update={"hint": "; ".join(filter(None, (host.hint, *points)))})
     return tuple(told if c is host else c for c in results)
-
-
-_ABSENT = re.compile(r"([\w.-]+) is not in the package")
 
 
 def _points(package: PackageFacts) -> Iterator[tuple[FileCitation, str]]:
@@ -133,15 +125,19 @@ def _needs_no_bit(package: PackageFacts, path: str) -> bool:
     )
 
 
-def _is_told(place: FileCitation, results: Sequence[CriterionResult]) -> bool:
-    """Return whether a lost criterion cites the place, or a hint names it. Without a line it is the whole file."""
+def _is_told(place: FileCitation, text: str, results: Sequence[CriterionResult]) -> bool:
+    """Return whether a lost criterion cites the place or says that the file is missing, or a hint names the place.
+    Without a line it is the whole file."""
     words = place.file if place.line is None else f"{place.file}, line {place.line}"
-    return any(words in c.hint or (c.status.is_lost and _cites(c, place)) for c in results)
+    lost = [c for c in results if c.status.is_lost]
+    absent = (found[1] for c in lost if (found := re.search(r"([\w.-]+) is not in the package", c.message)))
+    missing = any(f"there is no {name} " in text for name in absent)
+    return missing or any(words in c.hint for c in results) or any(_cites(c, place) for c in lost)
 
 
 def _cites(criterion: CriterionResult, place: FileCitation) -> bool:
-    cited = (one for one in criterion.citations if isinstance(one, FileCitation))
-    return any(one.file == place.file and place.line in {None, one.line} for one in cited)
+    cited = [(c.file, c.line) for c in criterion.citations if isinstance(c, FileCitation)]
+    return any(file == place.file and place.line in {None, line} for file, line in cited)
 
 
 def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Facts) -> dict[str, Verdict]:
@@ -156,11 +152,11 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
         if verdict.blocked_by and criterion.check == "launch-runs":
-            found = _later_in_launch(criterion, package, facts)
-            if own := _of_its_file(criterion, verdicts, rubric):
-                later.setdefault(own, []).extend(found)
-            else:
-                told += [f"for {criterion.id}, {one}" for one in found]
+            own = _of_its_file(criterion, verdicts, rubric)
+            for one in _later_in_launch(criterion, package, facts):
+                later.setdefault(own or verdict.blocked_by, []).append(
+                    one if own else f"for {criterion.id}, {one}"
+                )
         elif verdict.unjudged or lacking or criterion.check in OF_TOPICS:
             told += Later(criterion, verdict, package, facts).faults()
     return {name: _with_later(verdict, later.get(name, ())) for name, verdict in verdicts.items()}
@@ -271,7 +267,7 @@ class Later:
         unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
         if not unheard or template == VALUE or any(says(one.message, template) for one in said):
             return
-        if len(said) == 1:
+        if len(said) == 1 >= len({one.line for one in heard}):  # else it may be another callback
             yield f"print '{in_words(template)}' in {_line(said[0])}, not '{in_source(said[0].message)}'"
         elif self._lacks_words(template.partition(VALUE)[0]):
             yield f"print '{in_words(template)}'"
@@ -485,14 +481,17 @@ _COMMENTED_CALL = re.compile(rf"\s*#[#\s]*{PYTHON}\s*\(")
 
 
 def cite_commented_call(verdict: Verdict, build: Run) -> Verdict:
-    """Return the verdict; one on a missing catkin_install_python(…) says in which lines it is commented out."""
-    file = "CMakeLists.txt"
-    if NOT_CALLED not in verdict.message or len(verdict.citations) != 1 or not _BELOW.search(verdict.hint):
+    """Return the verdict; one on a missing call of CMake cites the line below which it goes, and one on a missing
+    catkin_install_python(…) the lines in which it is commented out."""
+    file, below = "CMakeLists.txt", _BELOW.search(verdict.hint)
+    if below is None or verdict.citations != (FileCitation(file=file),):
         return verdict
-    lines = build.file_lines(file)[:_LINES_READ]
+    lines = build.file_lines(file)[:_LINES_READ] if NOT_CALLED in verdict.message else ()
     first = next((i for i, text in enumerate(lines) if _COMMENTED_CALL.match(text[:LINE_CHARS])), None)
     if first is None:
-        return verdict
+        return verdict.model_copy(
+            update={"citations": (FileCitation(file=file, line=int(below[1] or 0) or None),)}
+        )
     last = first
     while ")" not in lines[last] and last + 1 < len(lines) and lines[last + 1].lstrip().startswith("#"):
         last += 1
@@ -506,7 +505,7 @@ def cite_commented_call(verdict: Verdict, build: Run) -> Verdict:
     return verdict.model_copy(update=update)
 
 
-_BELOW = re.compile(r" below (the )?catkin_package\(…?\)( of line \d+)?$")
+_BELOW = re.compile(r" below (?:the )?\w+\(…?\)(?: of line (\d+))?$")
 _UNDECLARED = re.compile(r" does not declare (\w+) as a run-time dependency")
 _LACKED = re.compile(r": it needs the package (\w+), which this grading machine lacks")
 

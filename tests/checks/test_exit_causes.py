@@ -48,6 +48,20 @@ def test_the_hint_is_the_line_as_it_should_be(tmp_path, line, source, error, hin
     assert explain_traceback(found, package).hint == hint
 
 
+@pytest.mark.parametrize(("first", "line"), [("", 3), ("#!/usr/bin/env python3\n", 4)])
+def test_a_line_is_counted_without_the_first_line_that_the_arena_writes(tmp_path, first, line):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "talker.py").write_text(f"{first}import rospy\nrospy.init_node('talker')\nrospu.spin()\n")
+    package = facts_of(tmp_path)
+    end = explain_traceback(
+        said(package, ("talker.py", 4, "rospu.spin()"), error="NameError: name 'rospu' is not defined"),
+        package,
+    )
+    assert [place.line for place in end.citations] == [line]
+    assert f"talker.py, line {line}" in end.cause
+    assert end.hint == f"in line {line}, write rospy instead of rospu"
+
+
 def said(package, *frames, error):
     lines = ["Traceback (most recent call last):"]
     for file, line, source in frames:

@@ -145,12 +145,12 @@ def test_a_call_that_is_commented_out_is_named_by_its_lines(text: str, place: st
     lost = failed(
         "CMakeLists.txt: no catkin_install_python(…) is called, so nothing installs a.py",
         hint="write catkin_install_python(PROGRAMS a.py DESTINATION b) below the catkin_package(…) of line 1",
-        citations=(FileCitation(file="CMakeLists.txt", line=1),),
+        citations=(FileCitation(file="CMakeLists.txt"),),
     )
     found = cite_commented_call(lost, build)
     assert found.citations == (FileCitation(file="CMakeLists.txt", line=line or 1),)
     if not place:
-        assert found == lost
+        assert found.hint == lost.hint
         return
     assert f"is called: it is commented out in {place}, so nothing installs a.py" in found.message
     call = "write catkin_install_python(PROGRAMS a.py DESTINATION b)"

@@ -493,12 +493,20 @@ def lifetime_text(life: Life) -> str:
     return seconds((life.end_ns or life.start_ns) - life.start_ns)
 
 
+def _lines_added(package: PackageFacts, path: str) -> int:
+    """Return how many lines the script that ran has more than the one that was handed in: the arena writes a first line
+    into a node's script that has none."""
+    file = package.file(path)
+    is_node = any(slip.file == path and slip.kind == "node-name" for slip in package.slips)
+    return int(is_node and file is not None and file.shebang is None and not file.link_problem)
+
+
 def _place(found: Traceback, package: PackageFacts) -> FileCitation | None:
     """Return the innermost line that lies in a file of the package."""
     for frame in reversed(found.frames):
         path = None if frame.in_library else path_in_package(package, frame.file)
         if path is not None:
-            place = FileCitation(file=path, line=frame.line)
+            place = FileCitation(file=path, line=max(1, frame.line - _lines_added(package, path)))
             if not frame.marked:
                 return place
             begin, end = frame.marked

@@ -249,7 +249,8 @@ def says(said: str, template: str) -> bool:
 
 def in_source(said: str) -> str:
     """Return the text of a source as a student reads it: `hello <value>`."""
-    return said.replace(SAID_DATA, "<message>").replace(SAID_VALUE, "<value>")
+    text = said.replace(SAID_DATA, "<message>").replace(SAID_VALUE, "<value>")
+    return text.replace("\n", r"\n").replace("\t", r"\t")
 
 
 def texts_of_cpp(lines: Iterable[str]) -> Iterator[tuple[Literal["publishes", "prints"], int, str]]:
