@@ -252,8 +252,10 @@ SlipKind = Literal[
     "loop-left",
     "sleep-outside",
     "callback-called",
+    "callback-missing",
     "callback-values",
     "clock-value",
+    "queue-size",
     "deaf",
     "node-name",
     "publisher",
@@ -280,8 +282,9 @@ class PythonSlip(Record):
     node, publishes or waits, which nothing names; `main-guard`: `__name__` beside another word than `__main__`.
     `never-reached`: an endless loop before the first `publish(…)`; `spin-in-loop`: a loop that publishes and waits in
     `spin()`; `loop-left`: one that ends in its first turn; `sleep-outside`: the `sleep()` that one lacks stands after
-    it or around it. `callback-called`, `callback-values`: a callback that is called where it is to be named, or that
-    takes another number of values than ROS has for it. `clock-value`: the values of the topic `message` are read from
+    it or around it. `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it is to
+    be named, that takes another number of values than ROS has for it, or that is not there. `queue-size`: one that is
+    a text, with which rospy sends nothing. `clock-value`: the values of the topic `message` are read from
     a clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C, and behind `: ` how to repair it.
     `outside-method`: a call in a class that stands in none of its methods and uses a name that is not there.
     `undefined`: why a name has no value where it is read, and behind `: ` what to do; `no-effect`: a statement such as

@@ -43,7 +43,16 @@ def slips(tree):
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             found.append({"line": node.lineno, "kind": "input", "message": message})
     finders = (misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops)
-    for find in (*finders, callbacks, graph_names, said_texts, deaf_loops, clock_values, without_effect):
+    for find in (
+        *finders,
+        callbacks,
+        queue_sizes,
+        graph_names,
+        said_texts,
+        deaf_loops,
+        clock_values,
+        without_effect,
+    ):
         found += find(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
     if published is not None and counts(tree):
@@ -212,6 +221,14 @@ def callbacks(tree):
             continue
         keyword, place, values = CALLBACKS[name]
         given = [k.value for k in node.keywords if k.arg == keyword] + node.args[place : place + 1]
+        if (
+            not given
+            and dotted(node.func) == "rospy.Subscriber"
+            and len(node.args) == place
+            and all(k.arg for k in node.keywords)
+        ):
+            message = "`Subscriber(…)` gets no callback: write the function's name as its third value"
+            yield {"line": node.lineno, "kind": "callback-missing", "message": message}
         values += any(k.arg == "callback_args" for k in node.keywords) or len(node.args) > place + 1
         for one in given[:1]:
             called = isinstance(one, ast.Call)
@@ -226,6 +243,20 @@ def callbacks(tree):
                 message = "`%s` takes %d arguments, but ROS passes it %s"
                 message %= (own.name[:TEXT_LIMIT], least, what)
                 yield {"line": own.lineno, "kind": "callback-values", "message": message}
+
+
+def queue_sizes(tree):
+    """Publishers whose `queue_size` is a text: rospy takes it, and sends nothing."""
+    for node in ast.walk(tree):
+        for one in node.keywords if is_call(node, "Publisher") else ():
+            if (
+                one.arg == "queue_size"
+                and isinstance(one.value, ast.Constant)
+                and isinstance(one.value.value, str)
+            ):
+                size = one.value.value[:TEXT_LIMIT]
+                message = "`queue_size` is a text: write `queue_size=%s`, without quotes" % (size or "10")
+                yield {"line": one.value.lineno, "kind": "queue-size", "message": message}
 
 
 def takes(function, bound):

@@ -16,6 +16,23 @@ from grader.wording import join_words, plural
 Meaning = tuple[str, str]
 """The cause, and what to do."""
 ATTRIBUTES_SHOWN = 8
+HIDDEN = (
+    "str",
+    "int",
+    "float",
+    "list",
+    "dict",
+    "len",
+    "max",
+    "min",
+    "sum",
+    "range",
+    "input",
+    "print",
+    "type",
+    "round",
+)
+"""Functions of Python's whose names beginners give to variables."""
 IMPORT_ERRORS = ("ImportError", "ModuleNotFoundError")
 NUMBER_OF_PARTS = "not every message has so many parts"
 _NO_FILE = re.compile(r"No such file or directory: '([^']+)'")
@@ -26,6 +43,11 @@ _NO_NUMBER = re.compile(
 _LOCAL = re.compile(r"local variable '(\w+)'")
 _OPERANDS = re.compile(r"unsupported operand type\(s\) for \S+ '(\w+)' and '(\w+)'")
 _ONE_TOO_MANY = re.compile(r"(\w+)\(\) takes (\d+) positional arguments? but (\d+) (?:was|were) given")
+_TOO_FEW = re.compile(r"^(?:\w+\.)*(\w+)\(\) missing \d+ required positional arguments?: (.+)$")
+_BAD_TOPIC = re.compile(
+    r"^topic name is not a non-empty string|^(?:topic parameter 'data_class'|data_class \[)"
+    r"|^(?:Publisher|Subscriber)\.__init__\(\) missing"
+)
 _COMMAND = re.compile(r"Command '(?:\[')?(.+?)(?:'\])?' returned non-zero exit status (\d+)")
 _CALLED = re.compile(r"'(\w+)' object is not callable")
 _WANTS_NUMBER = re.compile(r"(?:real number|a number) is required, not (\w+)|must be real number, not (\w+)")
@@ -155,7 +177,9 @@ def _key(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning:
     )
 
 
-def _value(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    if meaning := _ros_call(message, source):
+        return meaning
     if found := _UNPACKED.search(message):
         came = f"; {found[3]} came" if found[3] else ""
         hint = f"look at how many there are before you take them apart: {NUMBER_OF_PARTS}"
@@ -167,7 +191,7 @@ def _value(message: str, _source: str, _marked: tuple[int, int] | None) -> Meani
 
 
 def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
-    if meaning := _call(message, source):
+    if meaning := _ros_call(message, source) or _call(message, source):
         return meaning
     if "'NoneType' object" in message:
         return _none()
@@ -188,6 +212,10 @@ def _call(message: str, source: str) -> Meaning | None:
             "call what is in the module (`time.time()`), or import it: `from … import …`",
         )
     if called := _CALLED.search(message):
+        hidden = next((name for name in HIDDEN if _calls(source, name)), "")
+        if hidden:
+            cause = f"`{hidden}` is a variable here, and hides Python's `{hidden}`"
+            return cause, f"give the variable `{hidden}` another name"
         return (
             f"what is called is a value ({called[1]}), no function",
             "give the variable another name than the function",
@@ -196,6 +224,111 @@ def _call(message: str, source: str) -> Meaning | None:
     if given and int(given[3]) == int(given[2]) + 1 and f".{given[1]}(" in source:
         method = given[1]
         return f"`{method}` is called on an object, and takes no `self`", f"write `def {method}(self, …):`"
+    if (lacks := _TOO_FEW.match(message)) and re.search(rf"\b{lacks[1]}\(", source):
+        name, values = lacks.groups()
+        hint = f"put {values} into its brackets, or remove the call: ROS calls a callback by itself"
+        return f"`{name}` is called without {values}", hint
+    return None
+
+
+def _ros_call(message: str, source: str) -> Meaning | None:
+    """Of a call of rospy's: a topic's name, type or order, a rate, a pause, a class in place of a message."""
+    if _BAD_TOPIC.match(message):
+        return _topic(message, source)
+    if re.search(r"between instances of 'Rate' and|^Rate\.sleep\(\) takes 1 positional", message):
+        slept = next(iter(_calls(source, "sleep")), None)
+        rate = "rate"
+        if slept is not None and "instances" in message and slept.args:
+            rate = ast.unparse(slept.args[0])
+        elif slept is not None and isinstance(slept.func, ast.Attribute):
+            rate = ast.unparse(slept.func.value)
+        return "a Rate knows by itself how long it sleeps", f"write `{shown(rate)}.sleep()`"
+    if message == "init_node() missing 1 required positional argument: 'name'":
+        return "a node needs a name", "write the node's name into the brackets, as a text"
+    if serialized := re.match(r"(\w+)\.serialize\(\) missing", message):
+        name = serialized[1]
+        return (
+            f"`{name}` is the type of the messages, and no message",
+            f"publish a value: `{name}(…)`, or the value alone",
+        )
+    if asks_for_rate := _calls(source, "Rate"):
+        return _rate(asks_for_rate[0])
+    return None
+
+
+def _calls(source: str, *names: str) -> list[ast.Call]:
+    """Return the calls in a line of source, of functions or methods with one of these names."""
+    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        found = [n for n in ast.walk(ast.parse(source)) if isinstance(n, ast.Call)]
+        return [n for n in found if getattr(n.func, "attr", getattr(n.func, "id", "")) in names]
+    return []
+
+
+def _topic(message: str, source: str) -> Meaning:
+    """Of `Publisher(…)` or `Subscriber(…)`: the topic's name is a text and comes first, its type is a class."""
+    found = _calls(source, "Publisher", "Subscriber")
+    args = found[0].args if found else []
+    if "<module " in message:
+        module = shown(message.partition("<module '")[2].partition("'")[0])
+        return (
+            "the type's name stands for a whole module",
+            f"import the type itself: `from {module} import …`",
+        )
+    if len(args) < 2:
+        hint = "write the type of the messages behind the topic's name, without quotes"
+        return (
+            "the type of the messages is missing" if found else "a topic's name comes first, then its type",
+            hint,
+        )
+    topic, type_ = args[0], args[1]
+    callback = next(iter(args[2:]), None)
+    if _is_text(type_) and not _is_text(topic):
+        return "the topic's name comes first, then its type", _rewritten(
+            source, (topic, type_), (type_, topic)
+        )
+    if callback is not None and re.search(r"<(?:function|bound method) ", message):
+        return "the type comes before the callback", _rewritten(source, (type_, callback), (callback, type_))
+    return _no_type(message, source, topic, type_)
+
+
+def _is_text(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, str)
+
+
+def _no_type(message: str, source: str, topic: ast.expr, type_: ast.expr) -> Meaning:
+    """Of what stands in the place of the messages' type."""
+    if isinstance(type_, ast.Constant) and _is_text(type_):
+        return "the type is given as a text", _rewritten(
+            source, (type_, re.sub(r".*[./]", "", str(type_.value)))
+        )
+    if isinstance(type_, ast.Call):
+        return f"`{shown(ast.unparse(type_))}` is a message, and no type", _rewritten(
+            source, (type_, type_.func)
+        )
+    if "topic name" in message and not _is_text(topic):
+        return "the topic's name is no text", "write the topic's name in quotes"
+    hint = "import the type of the messages, as in `from std_msgs.msg import String`"
+    return f"`{shown(ast.unparse(type_))}` is no type of messages", hint
+
+
+def _rewritten(source: str, *changes: tuple[ast.expr, ast.expr | str]) -> str:
+    """Return the advice to write the line with other text in these places of it."""
+    line = source.encode()
+    for old, new in sorted(changes, key=lambda change: change[0].col_offset, reverse=True):
+        text = new if isinstance(new, str) else ast.get_source_segment(source, new) or ""
+        line = line[: old.col_offset] + text.encode() + line[old.end_col_offset :]
+    return f"write `{shown(line.decode())}`"
+
+
+def _rate(call: ast.Call) -> Meaning | None:
+    """Of `rospy.Rate(…)` with a text, or with 0."""
+    value = call.args[0].value if call.args and isinstance(call.args[0], ast.Constant) else None
+    if isinstance(value, str):
+        number = re.match(r"\s*(\d+(?:\.\d+)?)", value)
+        hint = f"write `rospy.Rate({number[1]})`" if number else "write the number of rounds in a second"
+        return "a rate is a number, and this is a text", hint
+    if value == 0:
+        return "0 Hz is no rate", "write how often the loop goes round in a second, as in `rospy.Rate(10)`"
     return None
 
 
@@ -227,7 +360,15 @@ def _local(message: str, _source: str, _marked: tuple[int, int] | None) -> Meani
 
 
 def _attribute(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    if found := re.match(r"'(tuple|list|dict)' object has no attribute 'encode'", message):
+        hint = 'put the values into the text with `%`: `"… %s" % value`, not behind a comma'
+        return f"a text is published here, and this is a {found[1]}", hint
     return _none() if "'NoneType' object" in message else None
+
+
+def _zero(_message: str, source: str, _marked: tuple[int, int] | None) -> Meaning:
+    rate = next((meaning for call in _calls(source, "Rate") if (meaning := _rate(call))), None)
+    return rate or ("it divides by zero", "check that the divisor is not 0 before you divide")
 
 
 def _file(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
@@ -267,10 +408,7 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
     "AttributeError": _attribute,
     "FileNotFoundError": _file,
     "CalledProcessError": _command,
-    "ZeroDivisionError": lambda *_: (
-        "it divides by zero",
-        "check that the divisor is not 0 before you divide",
-    ),
+    "ZeroDivisionError": _zero,
     "RecursionError": lambda *_: (
         "a function calls itself without an end",
         "call another function there, or loop",
@@ -320,6 +458,12 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
         return _other_types(wrong[1], wrong[2])
     if wrong := _NO_ATTRIBUTE.search(found.message):
         return _other_attributes(package, wrong[1], wrong[2])
+    if wrong := re.match(r"(\w+) is not an attribute of (\w+)$", found.message):
+        fields = join_words(_fields_of(package, wrong[2])[:ATTRIBUTES_SHOWN])
+        return (
+            f"{wrong[2]} has {fields}" if fields else "",
+            f"leave out `{wrong[1]}=`, or write the field that you mean",
+        )
     if wrong := _KEYWORD.search(found.message):
         near = near_names(wrong[1], KEYWORDS)
         return (f"it is called {near[0]}", f"write {near[0]}= for {wrong[1]}=") if near else None

@@ -82,6 +82,9 @@ SLIPS = {
                         "Continue": "continue"}.items()},
     **{f"'{kind}' object has no attribute 'data'": (f"it is the {kind} inside the message", "leave out `.data` here")
        for kind in ("int", "float", "str", "bool")},
+    **{f"{said} 'publish'{rest}": ("`publish` belongs to what `rospy.Publisher(…)` returns",
+       "write that name in front of it: `pub.publish(…)`")
+       for said, rest in (("name", " is not defined"), ("module 'rospy' has no attribute", ""))},
     "namespaces are not allowed in node names": ("the name in `rospy.init_node(…)` has a slash in it",
      "write the node's name without a slash"),
     "init_node() has already been called with different arguments": ("`rospy.init_node(…)` is called a second time",
@@ -285,8 +288,8 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         cause = source.python_fault.cause or cause
         hint = syntax_hint(source.python_fault)
         place = source.python_fault.place
-    if place is not None and found.kind == "NameError":
-        cause, hint = _misspelt(found, place, package) or (cause, hint)
+    if place is not None:
+        cause, hint = _by_other_lines(found, place, package) or (cause, hint)
     said = found.text
     if (guess := _BY_PYTHON.search(said)) and (hasattr(builtins, guess[1]) or "did you mean" in cause):
         said = said.removesuffix(guess[0])
@@ -298,6 +301,22 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(said.rstrip('.'))}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else (), unbuilt=maker is not None)
+
+
+def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
+    """Return the cause and the hint of an error that other lines of the file explain."""
+    if found.kind == "NameError":
+        return _misspelt(found, place, package)
+    if found.kind == "ROSInitException" and (advice := _late_init(place, package)):
+        return CAUSES[found.kind][0], advice
+    return None
+
+
+def _late_init(place: FileCitation, package: PackageFacts) -> str:
+    """Return the advice to move the script's `init_node` up, if it stands below the line that needs it."""
+    made = [s.line for s in package.slips if s.file == place.file and s.kind == "node-name"]
+    below = [line for line in made if place.line is not None and line > place.line]
+    return f"move `rospy.init_node(…)` from line {below[0]} up, above line {place.line}" if below else ""
 
 
 def _asks_for_input(

@@ -20,7 +20,7 @@ from grader.checks.support.text import (
 )
 from grader.evidence.events import MISFIT, UNHEARD
 from grader.evidence.run import Channel, Run
-from grader.model.package import LaunchNode, PackageFacts, PythonSlip
+from grader.model.package import LaunchNode, PackageFacts, PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.model.verdict import (
     EvidenceCitation,
@@ -164,8 +164,9 @@ def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Calla
     message = f"{what}, although it is advertised"
     if end := explain_error(package, run):
         return end.verdict(of_node, f"{message}: an error comes first: {end.cause}", measured="no message")
-    if slip := why_unreached(package, run):
-        verdict = of_node(f"{message}: {slip.message}", measured="no message", hint=_reach_hint(slip))
+    if slip := why_unreached(package, run) or run_slip(package, run, "queue-size"):
+        cause, _, fix = slip.message.partition(": ")
+        verdict = of_node(f"{message}: {cause}", measured="no message", hint=fix or _reach_hint(slip))
         return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
     if deaf := unheard(run):
         verdict = of_node(f"{message}: {deaf.message}", measured="no message", hint=deaf.hint)
@@ -239,8 +240,12 @@ def explain_by_unheard_topic(
 
 def why_unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
     """Return why a script that runs does not come to its `publish(…)`, or to what it offers."""
+    return run_slip(package, run, "never-reached", "never-called", "spin-in-loop")
+
+
+def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | None:
+    """Return the first slip of one of these kinds in a script that runs."""
     scripts = {one.start.script for one in lives(run)}
-    kinds = ("never-reached", "never-called", "spin-in-loop")
     return next((s for s in package.slips if s.file in scripts and s.kind in kinds), None)
 
 
