@@ -19,6 +19,7 @@ MERGE_MARKER = re.compile(r"(<{7}|={7}|>{7})(\s|$)")
 _BLOCK = re.compile(rf"\s*{BLOCK}")
 _BRACE = rf"(?:\}}\s*)?{BLOCK}(?:.*[\w\])\"])?\s*\{{$"
 _TEXT = re.compile(r"""("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|#.*""")
+_UNITS = r"[kM]?[hH][zZ]|msec|ms|secs?|seconds?|s|min|cm|mm|km|m|rad|deg|degrees"
 _NUMBERS = r"int|float|double|long|short|char|bool|byte|unsigned|size_t"
 _FOR = (
     r"^(\s*)for\s*\(\s*(?:\w+\s+)?(\w+)\s*=\s*(\w+)\s*;\s*\2\s*<\s*([\w.()]+)\s*;"
@@ -144,6 +145,8 @@ _HABITS = (
            ((r"^(\s*)(\w+)\s+(\w+)(\s*=)", r"\1\2_\3\4"),)),
     _Habit(r"^\s*[A-Za-z_]\w*(?:-\w+)+\s*=(?!=)", "a name has no `-` in it",
            tuple([(r"^(\s*\w+)-(\w+)", r"\1_\2")] * 3)),
+    _Habit(rf"(?<![\w.])\d+(?:\.\d+)?\s?({_UNITS})\b", "a number has no unit in Python: leave `{0}` out",
+           ((rf"(?<![\w.])(\d+(?:\.\d+)?)\s?(?:{_UNITS})\b", r"\1"),)),
     _Habit(r"^\s*\d+[A-Za-z_]\w*\s*=(?!=)", "a name begins with a letter, not with a digit: use another name"),
     _Habit(r"[(,=]\s*/\w[\w/]*\s*[,)]", "a topic's name is a string: write it in quotes",
            ((r"([(,=]\s*)(/\w[\w/]*)(?=\s*[,)])", r"\1'\2'"),)),

@@ -352,10 +352,15 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     slip = f"; it declares {join_words(near)}" if near else ""
     last = max((d.line for d in at_build), default=_last_line(found))
     lines = tuple(FileCitation(file=found.file, line=d.line) for d in at_build)
+    misspelt = [d for d in found.dependencies if d.kind in RUNTIME_KINDS and d.name in near]
+    hint = f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in missing)} below line {last}"
+    if len(missing) == len(misspelt) == 1:
+        hint = f"write {missing[0]} for {misspelt[0].name} in line {misspelt[0].line}"
+        lines = (FileCitation(file=found.file, line=misspelt[0].line),)
     return failed(
-        f"{found.file} does not declare {join_words(missing)} as a run-time dependency{only or slip}",
+        f"{found.file} does not declare {join_words(missing)} as a run-time dependency{slip or only}",
         measured=_declared_text(found),
-        hint=f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in missing)} below line {last}",
+        hint=hint,
         citations=lines or (FileCitation(file=found.file, line=last),),
     )
 

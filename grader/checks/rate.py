@@ -27,6 +27,8 @@ from grader.wording import hertz, plural, seconds, significant
 FLOOD_FACTOR = 5
 FLOOD_HZ = 500.0
 """No lab asks for so much: what is slower and even comes from a loop that sleeps, by a wrong number."""
+PAUSES_WAITED = 1.5
+"""A silence of at most so many of the pauses that a script asks for is one of them."""
 NUMBER_SHARE = 0.1
 """So near is a rate that was measured to the number that its script asks for."""
 NEAR_SHARE = 0.25
@@ -222,6 +224,8 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     lasted = seconds(found.times_ns[-1] - found.times_ns[0])
     message = f"{params.topic} falls silent {lasted} after its first message, although its node keeps running"
     callers = (c.callerid for c in run.student_channels(params.topic))
+    if slow := _asked_slow(found, run, package, params):
+        return slow
     slip = next((s for one in callers for s in slips_of(package, run, one, "spin-in-loop")), None)
     if slip is not None:
         cited = (FileCitation(file=slip.file, line=slip.line),)
@@ -232,6 +236,22 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
         )
     hint = f"publish in a loop `{LOOP}`, not a fixed number of times"
     return failed(message, hint=hint).once()
+
+
+def _asked_slow(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
+    """The silence is no longer than the pause for which the node's script asks."""
+    asked = [
+        s
+        for c in run.student_channels(params.topic)
+        for s in slips_of(package, run, c.callerid, "rate-number")
+    ]
+    slow = next((s for s in asked if found.tail_ns * float(s.message) < PAUSES_WAITED * 1e9), None)
+    if slow is None or float(slow.message) >= params.low_hz:
+        return None
+    count = plural(len(found.times_ns), "message")
+    asked_hz = f"{significant(params.rate_hz)} Hz"
+    message = f"{params.topic} is too slow: {count} in {seconds(found.span_ns)} instead of {asked_hz}"
+    return _with_line(failed(message), slow, params)
 
 
 def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -> Verdict | None:
@@ -260,6 +280,11 @@ def _by_number(
     slip = _asked_number(mean_hz, run, package, params)
     if slip is None:
         return None
+    return _with_line(verdict, slip, params)
+
+
+def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdict:
+    """Return the verdict with the line that asks for another rate."""
     where = f"{slip.file}, line {slip.line}"
     message = f"{verdict.message}; {where} asks for {slip.message} Hz"
     hint = (

@@ -169,8 +169,18 @@ def _of_its_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: R
     return next((i for i in of_file if verdicts[i].status.is_lost and not verdicts[i].blocked_by), None)
 
 
+def _imports_again(fix: str, hint: str) -> bool:
+    """Return whether it is an import that the hint has already, in other words."""
+    code = re.findall(r"`((?:import|from) [^`]+)`", fix)
+    return bool(code) and fix.endswith("at the top") and all(f"`{one}`" in hint for one in code)
+
+
 def _with_later(verdict: Verdict, later: Iterable[str]) -> Verdict:
-    told = [one for one in dict.fromkeys(later) if one not in verdict.hint]
+    told = [
+        one
+        for one in dict.fromkeys(later)
+        if one not in verdict.hint and not _imports_again(one, verdict.hint)
+    ]
     if not told or not verdict.hint:
         return verdict
     if verdict.hint.startswith(ON_THE_MACHINE):

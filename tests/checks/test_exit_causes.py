@@ -145,3 +145,15 @@ def test_a_broken_module_of_the_machine_is_not_the_students(tmp_path, files, fra
     end = explain_traceback(said(package, *frames, error=error), package)
     assert end.of_machine == of_machine
     assert (LIBRARY in end.cause) == of_machine
+
+
+def test_a_module_that_is_used_and_not_imported_is_meant_by_one_that_is_not_there(tmp_path):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "a.py").write_text("import ros\nrospy.init_node('a')\n")
+    (tmp_path / "b.py").write_text("import ros\nros.start()\n")
+    package = facts_of(tmp_path)
+    error = "ModuleNotFoundError: No module named 'ros'"
+    here = explain_traceback(said(package, ("a.py", 1, "import ros"), error=error), package)
+    assert here.hint == "write rospy for ros"
+    assert not here.of_machine
+    assert explain_traceback(said(package, ("b.py", 1, "import ros"), error=error), package).of_machine

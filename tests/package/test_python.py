@@ -24,6 +24,8 @@ CASES = {
     "backticks": ("x = `1`\n", 1, "backticks"),
     "unequal": ("if 1 <> 2:\n  pass\n", 1, "`!=`"),
     "long": ("x = 10L\n", 1, "`L`"),
+    "unit": ("rate = rospy.Rate(10Hz)\n", 1, "leave `Hz` out"),
+    "unit-apart": ("wait(2 seconds)\n", 1, "leave `seconds` out"),
     "colon_if": ("if x\n  pass\n", 1, "a colon"),
     "colon_def": ("def f()  # why\n  pass\n", 1, "a colon"),
     "colon_main": ('if __name__ == "__main__"\n  pass\n', 1, "a colon"),

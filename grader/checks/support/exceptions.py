@@ -52,6 +52,7 @@ _COMMAND = re.compile(r"Command '(?:\[')?(.+?)(?:'\])?' returned non-zero exit s
 _CALLED = re.compile(r"'(\w+)' object is not callable")
 _WANTS_NUMBER = re.compile(r"(?:real number|a number) is required, not (\w+)|must be real number, not (\w+)")
 NO_MODULE = re.compile(r"No module named '(\w+)'$")
+_UNIMPORTED = re.compile(r"`(\w+)` is not imported: write `import \1` at the top")
 _KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
 _IN_MODULE = re.compile(r"No module named '(\w+\.(?:msg|srv))\.(\w+)'")
 _FROM_PACKAGE = re.compile(r"cannot import name '(\w+)' from '(\w+)'")
@@ -467,7 +468,7 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
     if wrong := _KEYWORD.search(found.message):
         near = near_names(wrong[1], KEYWORDS)
         return (f"it is called {near[0]}", f"write {near[0]}= for {wrong[1]}=") if near else None
-    return _other_module(found.message, package) if found.kind in IMPORT_ERRORS else None
+    return _other_module(found, package) if found.kind in IMPORT_ERRORS else None
 
 
 def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
@@ -485,8 +486,16 @@ def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | No
     return f"this package has {own.path} itself", f"write {package.name} for {asked[1]}"
 
 
-def _other_module(message: str, package: PackageFacts) -> tuple[str, str] | None:
+def unimported_module(found: Traceback, package: PackageFacts) -> str:
+    """Return a module that the script which imports one that is not there uses, and does not import; "" for none."""
+    file = found.own_frames[-1].file if found.own_frames else ""
+    slips = (s for s in package.slips if s.kind == "undefined" and file.endswith(f"/{s.file}"))
+    return next((name[1] for s in slips if (name := _UNIMPORTED.match(s.message))), "")
+
+
+def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return what a module is meant by one that is not there: a class, one of Python 3, one that is spelt alike."""
+    message = found.message
     if inner := _IN_MODULE.search(message):
         return f"{inner[2]} is a class in {inner[1]}", f"write `from {inner[1]} import {inner[2]}`"
     asked, wanted = NO_MODULE.search(message), _FROM_PACKAGE.search(message)
@@ -497,12 +506,14 @@ def _other_module(message: str, package: PackageFacts) -> tuple[str, str] | None
     if asked and asked[1] in TUTORIALS - {package.name}:
         fix = f"write your package's name for {asked[1]}, or leave the line out"
         return "tutorials call the reader's own package so", fix
+    meant = unimported_module(found, package)
     near = near_names(asked[1], noetic_messages()) if asked and asked[1] not in known_packages() else ()
+    near = () if meant else near
     if wanted and wanted[1] in noetic_messages().get(wanted[2], ()):
         near = (wanted[2],)
     if near:
         return f"messages come from {near[0]}.msg", f"write `from {near[0]}.msg import …`"
-    meant = nearest_module(asked[1], own_modules(package)) if asked else ""
+    meant = meant or (nearest_module(asked[1], own_modules(package)) if asked else "")
     return (f"did you mean {meant}?", f"write {meant} for {asked[1]}") if asked and meant else None
 
 

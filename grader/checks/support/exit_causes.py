@@ -21,6 +21,7 @@ from grader.checks.support.exceptions import (
     own_message,
     own_modules,
     tracebacks,
+    unimported_module,
 )
 from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import EMPTY, cmake_calls, path_in_package
@@ -445,7 +446,8 @@ def _lacking(found: Traceback, package: PackageFacts) -> str:
     sure = found.kind == "ResourceNotFound" or (bool(found.frames) and found.frames[-1].in_library)
     known = name in known_packages() or not _is_module(name, package)
     lacks = exists_somewhere(name, own) and (known or not sure)
-    return name if name and name not in own and lacks and not own_message(found, package) else ""
+    otherwise = own_message(found, package) or unimported_module(found, package)
+    return name if name and name not in own and lacks and not otherwise else ""
 
 
 def _is_module(name: str, package: PackageFacts) -> bool:
