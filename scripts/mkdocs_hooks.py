@@ -1,11 +1,13 @@
 """MkDocs hooks: links that leave docs/ go to the repository, where it has an address, and are plain words elsewhere.
-A terminal's copy button copies the commands alone, and the empty corner of a table is no header.
+A terminal's copy button copies the commands alone, the empty corner of a table is no header, and what the theme writes
+against HTML's rules is put right.
 """
 
 from __future__ import annotations
 
 import html
 import re
+from collections import Counter
 from pathlib import Path, PurePosixPath
 from posixpath import normpath
 
@@ -46,4 +48,34 @@ def on_page_content(content: str, **_: object) -> str:
         copied = f' data-copy="{html.escape(commands)}"' if commands else ""
         return f'<div class="highlight"{copied}>{match[1]}</div>'
 
-    return TERMINAL.sub(with_commands, content).replace("<th></th>", "<td></td>")
+    content = TERMINAL.sub(with_commands, content).replace("<th></th>", "<td></td>")
+    return IMAGE.sub(r"\1>", HEADER.sub(r'<th scope="col"\1>', content))
+
+
+HEADER = re.compile(r"<th(| style=[^>]*)>")
+IMAGE = re.compile(r"(<img[^>]*?) ?/>")
+NAMED_BY_AN_ICON = re.compile(
+    r'(<nav class="md-nav" data-md-level="1" )aria-labelledby="\w+"([^>]*>\s*<label class="md-nav__title"[^>]*>'
+    r"\s*<span[^>]*></span>\s*)([^<]*?)(\s*</label>)"
+)
+NAMED_LIST = re.compile(r'(<nav [^>]*aria-label=")([^"]*)')
+SEARCH_FORM = re.compile(r'(<form class="md-search__form"[^>]*>)')
+PALETTE_FORM = re.compile(r'<form( class="md-header__option"[^>]*>.*?)</form>', re.DOTALL)
+SWITCH = re.compile(r'(<input class="md-toggle[^>]*) autocomplete="off"')
+
+
+def on_post_page(output: str, **_: object) -> str:
+    """The whole page, in which the theme's own markup keeps to HTML's rules: lists of pages have names, forms a button
+    that sends them, and attributes values that are allowed."""
+    output = output.replace(' tabindex=""', "")
+    output = SWITCH.sub(r"\1", output)
+    output = NAMED_BY_AN_ICON.sub(r'\1aria-label="\3"\2\3\4', output)
+    output = PALETTE_FORM.sub(r"<div\1</div>", output)
+    output = SEARCH_FORM.sub(r'\1<button type="submit" hidden>Search</button>', output)
+    names = Counter[str]()
+
+    def with_own_name(match: re.Match[str]) -> str:
+        names[match[2]] += 1
+        return match[0] if names[match[2]] == 1 else f"{match[1]}{match[2]} ({names[match[2]]})"
+
+    return NAMED_LIST.sub(with_own_name, output)  # contents are in the list of pages and beside the text

@@ -38,3 +38,8 @@ def test_every_page_is_accessible_and_loads_nothing_from_elsewhere(browser, axe,
     assert {url for url in asked if not url.startswith((site.as_uri(), "data:"))} == set()
     assert len(pages) > 30
     assert {name: faults for name, faults in found.items() if faults} == {}
+
+
+@pytest.mark.full
+def test_every_page_keeps_to_the_rules_of_html(validate, site) -> None:
+    assert validate(*(path for path in site.rglob("*.html") if path.name != "404.html")) == []
