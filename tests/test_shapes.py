@@ -11,14 +11,16 @@ import pytest
 
 from fixtures.make import labs, rubric_of, solution_of
 from grader.authoring.mutation.package_tree import read_tree, write_tree
+from grader.judging.judge import judge_files
 from grader.model.progress import Silence
 from grader.model.repair import DEFAULT_SHARES, KINDS, Repair
-from grader.model.result import GradingResult
+from grader.model.result import CriterionResult, GradingResult
+from grader.model.verdict import Status
 from grader.package.repairs import apply_repair, find_repairs, wanted_of
 from grader.pipeline import GradeOptions, grade
 from grader.rubric.model import Rubric
 from tests.package.trees import facts_of, plain
-from tests.support.advice import faulty_advice
+from tests.support.advice import apply_advice, faulty_advice
 from tests.support.shapes import LOGIC, REPAIRED_AS, REWORDED, shapes
 
 pytestmark = pytest.mark.usefixtures("without_processes")
@@ -71,6 +73,31 @@ def test_each_fault_is_found_and_undone(shape: str, tmp_path: Path) -> None:
 
 
 # ---- what the report says, done literally
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [pytest.param(name, marks=[] if name.startswith(SHORTER) else pytest.mark.full) for name in shapes()],
+)
+def test_advice_on_files_is_followed_word_by_word(shape: str, tmp_path: Path) -> None:
+    """Nothing is lost then that the files alone show, and on the way nothing that was not named at first."""
+    lab, tree = shapes()[shape]
+    write_tree(tree, tmp_path / "copy")
+    package = tmp_path / "copy" / solution_of(lab).folder
+    first = left = lost_by_files(package, lab)
+    for _ in range(ROUNDS_MAX):
+        for criterion in left.values():
+            apply_advice(criterion, package)
+        left = lost_by_files(package, lab)
+        assert left.keys() <= first.keys()
+    assert {name: criterion.hint for name, criterion in left.items()} == {}
+
+
+def lost_by_files(package: Path, lab: str) -> dict[str, CriterionResult]:
+    loaded = rubric_of(lab)
+    found = judge_files(loaded.rubric, facts_of(package, loaded.rubric.package), loaded.checks)
+    lost = [verdict.criterion for verdict in found if verdict.criterion.status.is_lost]
+    return {c.id: c for c in lost if c.status is not Status.BLOCKED}
 
 
 @pytest.mark.ros

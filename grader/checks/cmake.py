@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import Annotated, NamedTuple
@@ -91,12 +92,8 @@ def _fault(fault: Fault | None) -> Iterator[str]:
 
 def _repair_of(fault: Fault | None) -> Iterator[str]:
     if fault is not None:
-        unclosed = "never closed by `)`" in fault.cause
-        yield (
-            "write `)` at the end of that call"
-            if unclosed
-            else fault.fix or "fix that line, then run catkin_make"
-        )
+        unclosed = re.search(r": write it (at the end of line \d+)$", fault.cause)
+        yield f"write `)` {unclosed[1]}" if unclosed else fault.fix or "fix that line, then run catkin_make"
 
 
 def _misspelt(facts: CMakeFacts, name: str) -> CMakeCall | None:

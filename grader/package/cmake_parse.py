@@ -8,6 +8,7 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Iterable, Iterator
+from itertools import takewhile
 from pathlib import Path
 
 from cmake_parser import CMakeError, Token, parse_raw, parse_tree, resolve_args, tokenize
@@ -278,10 +279,22 @@ def _explain_fault(text: str, end: int, file: str, message: str) -> Fault:
     elif first.kind == "RPAREN":
         cause = "there is one `)` too many"
     elif "unexpected end of file" in message and len(tokens) > 1 and tokens[1].kind == "LPAREN":
-        cause = f"the `(` of `{_word(first)}(` is never closed by `)`"
+        last = _last_line(text, line)
+        cause = f"the `(` of `{_word(first)}(` is never closed by `)`: write it at the end of line {last}"
     elif end == 0 and len(text) <= _LINK_CHARS_MAX and _LINK_TEXT.fullmatch(text):
         cause = "the file holds only the path that a link should lead to, no CMake commands"
     return _fault(file, line, message, cause)
+
+
+def _last_line(text: str, line: int) -> int:
+    """Return the last line of an open call that begins in `line`: then comes a blank line, or another call."""
+    own = takewhile(lambda other: other.strip() and not _BEGINS.match(other), text.split("\n")[line:])
+    return max(
+        (n for n, other in enumerate(own, line + 1) if not other.lstrip().startswith("#")), default=line
+    )
+
+
+_BEGINS = re.compile(r"\s*\w+\s*\(")
 
 
 def _word(token: Token) -> str:

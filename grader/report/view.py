@@ -327,7 +327,7 @@ def headline(text: str, chars: int = HEADLINE_CHARS) -> tuple[str, str]:
 HEADLINE_LEAST = 20
 STEPS = re.compile(r"; (?:and )?(?:then )?")
 ORDERS = re.compile(
-    r"""(\S+\ line\ \d+:\ |in\ line\ \d+,\ |first\ )?
+    r"""(\S+\ line\ \d+:\ |line\ \d+:\ |in\ line\ \d+,\ |first\ )?
     (add|begin|call|change|check|chmod|correct|create|declare|delete|dos2unix|end|fill|fix|git|give|hand|indent|install|keep|let
     |list|look|make|move|name|open|pass|print|publish|put|remove|rename|replace|run|send|set|start|stop|subscribe|take|test_\w+|try|use|write)\b
     """,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation
-from grader.report.view import ON_COPY
+from grader.report.view import ON_COPY, steps
 
 FILE = r"(?P<file>(?:\.\./)?[\w./-]*\w\.(?:py|launch|xml|txt|yaml|yml|msg|srv|action|cpp|sh))"
 PLACE = re.compile(rf"{FILE},? line (?P<line>\d+)|line (?P<line2>\d+) of {FILE.replace('file', 'file2')}")
@@ -97,3 +97,83 @@ def _contradictions(told: Sequence[CriterionResult]) -> Iterator[str]:
         for code in _codes(REMOVE, criterion.hint):
             if code in written:
                 yield f"{criterion.id}: remove {code}, which other advice says to write"
+
+
+def apply_advice(criterion: CriterionResult, package: Path) -> None:
+    """Do in the package's files what the advice says, word by word and one thing after the other. Raises ValueError for
+    advice that no one could follow so."""
+    places = [c for c in criterion.citations if isinstance(c, FileCitation)]
+    for step in steps(criterion.hint):
+        found = [(do, match) for pattern, do in _DEEDS if (match := re.search(pattern, step))]
+        if not found:
+            raise ValueError(f"what is to be done? {step}")
+        do, match = found[0]
+        named = re.search(FILE, step)
+        file = package / (places[0].file if places else named["file"] if named else "")
+        do(package, file, match, next((c.line for c in places if c.line), None))
+
+
+def _edit(file: Path, line: int, new: Sequence[str], *, below: bool = False) -> None:
+    """Write these lines in place of the line, or below it, as far in as it is."""
+    lines = file.read_text(encoding="utf-8").splitlines()
+    indent = lines[line - 1][: len(lines[line - 1]) - len(lines[line - 1].lstrip())]
+    lines[line - (not below) : line] = [indent + one for one in new]
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _replace(file: Path, line: int, old: str, new: str) -> None:
+    text = file.read_text(encoding="utf-8").splitlines()[line - 1]
+    changed = re.sub(old, lambda _: new, text, count=1)
+    if changed == text:
+        raise ValueError(f"there is no {old} in {text}")
+    _edit(file, line, [changed.strip()])
+
+
+def _indent(file: Path, line: int, more: int = 4) -> None:
+    lines = file.read_text(encoding="utf-8").splitlines()
+    above = lines[line - 2]
+    lines[line - 1] = " " * (len(above) - len(above.lstrip()) + more) + lines[line - 1].strip()
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _below_call(file: Path, line: int, code: str) -> None:
+    lines = file.read_text(encoding="utf-8").splitlines()
+    last = next(number for number, text in enumerate(lines, 1) if number >= line and ")" in text)
+    _edit(file, last, [code], below=True)
+
+
+_CODE_AT = r"write (?:`(?P<code>[^`]+)`|(?P<bare>[a-z_]+\(.*\)))"
+_TAG, _NAME = r"<(?:\w+)>[^<]*</\w+>", r"<name>.*</name>"
+_DEEDS: tuple[tuple[str, Callable[[Path, Path, re.Match[str], int | None], object]], ...] = (
+    (r"^chmod \+x ([^,]+)", lambda top, _f, m, _l: [(top / one).chmod(0o755) for one in m[1].split()]),
+    (r"^dos2unix ([^,]+)", lambda top, _f, m, _l: (top / m[1]).write_text((top / m[1]).read_text())),
+    (r"as UTF-8 without BOM$", lambda _t, f, _m, _l: f.write_text(f.read_text(encoding="utf-8-sig"))),
+    (r"^write (#!\S+ \S+) as the very first line",
+     lambda _t, f, m, _l: f.write_text(f"{m[1]}\n{f.read_text()}")),
+    (r"^git mv (\S+) (\S+)$", lambda top, _f, m, _l: (top / m[1]).rename(top / m[2])),
+    (r"^add (<.+>) below line (\d+)$",
+     lambda _t, f, m, _l: _edit(f, int(m[2]), re.findall(_TAG, m[1]), below=True)),
+    (r"^(?:add|write) (.+) below the \w+\(…\) of line (\d+)$",
+     lambda _t, f, m, _l: _below_call(f, int(m[2]), m[1])),
+    (r"^in place of lines? (\d+).* write (.+), without # before it$",
+     lambda _t, f, m, _l: _edit(f, int(m[1]), [m[2]])),
+    (r"^write <name>([\w-]+)</name> in (package\.xml)",
+     lambda top, _f, m, at: _replace(top / m[2], at or 1, _NAME, f"<name>{m[1]}</name>")),
+    (r"^write (\w+) for (\w+)$", lambda _t, f, m, at: _replace(f, at or 1, rf"\b{m[2]}\b", m[1])),
+    (r'^write (\w+)="([\w.-]+)"$',
+     lambda _t, f, m, at: _replace(f, at or 1, rf'\b{m[1]}="[^"]*"', f'{m[1]}="{m[2]}"')),
+    (r"^write project\((\w+)\)$",
+     lambda _t, f, m, at: _replace(f, at or 1, r"project\([^)]*\)", f"project({m[1]})")),
+    (r"line (\d+): end it with `/>` or with `(</\w+>)`$",
+     lambda _t, f, m, _l: _replace(f, int(m[1]), r"$", m[2])),
+    (r"line \d+: use four spaces everywhere$",
+     lambda _t, f, _m, _l: f.write_text(f.read_text().expandtabs())),
+    (rf"line (\d+): {_CODE_AT}", lambda _t, f, m, _l: _edit(f, int(m[1]), [m["code"] or m["bare"]])),
+    (r"^write (\S+) into it, after PROGRAMS$",
+     lambda _t, f, m, at: _replace(f, at or 1, "PROGRAMS", f"PROGRAMS {m[1]}")),
+    (r"^write `\)` at the end of line (\d+)$", lambda _t, f, m, _l: _replace(f, int(m[1]), r"$", ")")),
+    (r"line (\d+): start it exactly below that one$", lambda _t, f, m, _l: _indent(f, int(m[1]), 0)),
+    (r"line (\d+): start it four spaces further to the right than the one above$",
+     lambda _t, f, m, _l: _indent(f, int(m[1]))),
+)  # fmt: skip
+"""What can be told to do to files, and how it is done."""

@@ -203,11 +203,10 @@ def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
     elif file.shebang_problem == EMPTY:
         yield Obstacle("is empty", f"write the node in {file.path}, with {RIGHT_SHEBANG} as its first line")
     elif file.bom:
-        why = file.shebang_problem or "it begins with an invisible byte order mark (BOM)"
+        why = file.shebang_problem or "an invisible byte order mark (BOM) comes first"
         fix = f"in the editor, save {file.path} as UTF-8 without BOM"
-        yield Obstacle(
-            f"cannot be run: {why}", fix if file.shebang else f"{fix}, with {RIGHT_SHEBANG} as its first line"
-        )
+        first = "" if "before `#!`" in why else f", with {RIGHT_SHEBANG} as its first line"
+        yield Obstacle(f"cannot be run: {why}", f"{fix}{first}")
     elif file.shebang_problem:
         yield Obstacle(f"cannot be run: {file.shebang_problem}", fix)
     elif file.shebang is None:
