@@ -93,6 +93,16 @@ def test_where_a_region_is_left_is_marked() -> None:
     assert figure.says.endswith("it is 1.00 m outside at (3, 0).")
 
 
+@pytest.mark.parametrize(
+    ("bound", "words"), [("min_m", "0.50 m too near at (2, 0)"), ("max_m", "0.50 m too far at (1, 0)")]
+)
+def test_the_distance_from_a_wall_is_said_as_such(bound: str, words: str) -> None:
+    wall = [[2, -1], [2, 1]] if bound == "min_m" else [[2.5, -1], [2.5, 1]]
+    asked = criterion("stays-within", topic="/pose", walls=[wall], **{bound: 0.5 if bound == "min_m" else 1})
+    figures, _ = drawn(poses((1, 0), (1.25, 0), (2, 0)), asked)
+    assert only(figures, "stays-within", PlaceFigure).says.endswith(f"it is {words}.")
+
+
 def test_a_path_that_is_right_has_no_mark() -> None:
     asked = criterion("stays-within", topic="/pose", walls=[[[0, 0], [4, 0]]], min_m=0.5, max_m=2)
     figures, _ = drawn(poses((0, 1), (1, 1)), asked)

@@ -406,7 +406,9 @@ def region_figures(run: Run, params: StaysWithinParams) -> Iterator[PlaceFigure]
     out = out_along(taken, region)
     worst = max(range(len(out)), key=out.__getitem__) if any(out) else None
     figure = _place_figure(run, params, taken, worst, params.walls)
-    where = "" if worst is None else f"; it is {out[worst]:.2f} m outside at {spot(taken[worst].point)}"
+    only = {(False, True): "too near", (True, False): "too far"}
+    how = only.get((params.min_m is None, params.max_m is None), "outside")
+    where = "" if worst is None else f"; it is {out[worst]:.2f} m {how} at {spot(taken[worst].point)}"
     says = short(f"It has to be {region.words}{where}.")
     area = tuple(map(_spot, region.outline[:CORNERS_MAX]))
     yield figure.model_copy(update={"area": area, "says": says})

@@ -269,8 +269,8 @@ def _place(figure: PlaceFigure, name: str) -> Drawn:
     return Drawn(
         name=name,
         kind="place",
-        title=f"Where {figure.topic} was, seen from above",
-        words=figure.says,
+        title=f"Where the robot was, seen from above: {figure.topic}",
+        words=f"{figure.says} {'Thick lines are walls. ' if figure.walls else ''}It began at the small circle.",
         points=len(figure.points),
         plots=[place_plot(figure, name)],
         left_out=_thinned_text(len(figure.points), figure.messages),

@@ -238,7 +238,9 @@ def place_plot(figure: PlaceFigure, name: str) -> Markup:
     children.append(element("circle", cx=taken[0][0], cy=taken[0][1], r=4, class_="corner"))
     children += _mark_point(figure.wrong, taken, "here")
     size = (frame.width, frame.height)
-    return drawing(name, size, f"Where {figure.topic} was, seen from above", figure.says, *children)
+    return drawing(
+        name, size, f"Where the robot was, seen from above: {figure.topic}", figure.says, *children
+    )
 
 
 def _frame(spots: Sequence[tuple[float, float]], room: float) -> tuple[Frame, float]:
