@@ -21,14 +21,17 @@ from grader.checks.support.launch import (
     own_script,
     refusal,
     refusals,
+    unset_arg_fixes,
 )
 from grader.checks.support.launch_names import find_renaming
 from grader.checks.support.scripts import (
     BACKUPS,
     PYTHON,
+    commented_call,
     find_script,
     installed,
     is_product,
+    lines_text,
     names_script,
     programs,
 )
@@ -58,6 +61,7 @@ from grader.wording import join_words, significant
 
 POINTS_MAX = 3
 NAMES_SHOWN = 3
+OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
 RATE_SHARE = 0.05
@@ -157,6 +161,10 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
                 later.setdefault(own or verdict.blocked_by, []).append(
                     one if own else f"for {criterion.id}, {one}"
                 )
+        elif criterion.check in OF_LAUNCHES and (
+            file := find_launch(package, str(criterion.parameters["launch"]))
+        ):
+            told += unset_arg_fixes(file, verdict.hint)
         elif verdict.unjudged or lacking or criterion.check in OF_TOPICS:
             told += Later(criterion, verdict, package, facts).faults()
     return {name: _with_later(verdict, later.get(name, ())) for name, verdict in verdicts.items()}
@@ -245,7 +253,7 @@ class Later:
                 yield f"in {_line(slip)}, {slip.message.partition(': ')[2]}"
 
     def _node_name(self) -> Iterator[str]:
-        own, names = self._of("node-name"), [str(name) for name in _listed(self._wanted.get("names"))]
+        own, names = self._of("node-name"), list(texts_in(self._wanted.get("names")))
         if not self._ran and len(own) == 1 and names and own[0].message.lstrip("/") not in names:
             yield f"name the node {names[0]} in {_line(own[0])}, not {own[0].message}"
 
@@ -318,12 +326,13 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     """Yield what a launch file would be lost by next: what roslaunch said of it, and namespaces of the lab's nodes."""
     wanted, run = criterion.parameters, facts.runs.get(criterion.scenario or "")
     file = find_launch(package, str(wanted.get("launch", "")))
-    names = {PurePosixPath(str(script)).name for script in _listed(wanted.get("scripts"))}
+    names = {PurePosixPath(script).name for script in texts_in(wanted.get("scripts"))}
     if file is None or file.fault is not None:
         return
     refused = refusal(run, package) if isinstance(run, Run) else None
     if refused is not None and "first line" not in refused.hint and not any(refusals(package, file)):
         yield f"{refused.hint}: {refused.why}"
+    yield from unset_arg_fixes(file, refused.hint if refused is not None else "")
     nodes = [one for one in file.brings if one.type in names]
     if topic := wanted.get("topic"):
         renaming = find_renaming(package, nodes, str(topic))
@@ -332,10 +341,6 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
 
 def _line(slip: PythonSlip) -> str:
     return f"line {slip.line} of {slip.file}"
-
-
-def _listed(value: object) -> Sequence[object]:
-    return value if isinstance(value, list | tuple) else ()
 
 
 def _scripts(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set[str]:
@@ -487,30 +492,53 @@ def _words_of(line: str, said: str) -> int:
     return max((sum(map(len, words)) for words in strings if spoken.issuperset(words)), default=0)
 
 
-_COMMENTED_CALL = re.compile(rf"\s*#[#\s]*{PYTHON}\s*\(")
+CALLS = ("project", "find_package", "catkin_package", "add_message_files", "add_service_files", "add_action_files",
+         "generate_messages")  # fmt: skip
+"""Of CMake, what a hint may tell to call, beside the call that installs scripts."""
 
 
-def cite_commented_call(verdict: Verdict, build: Run) -> Verdict:
-    """Return the verdict; one on a missing call of CMake cites the line below which it goes, and one on a missing
-    catkin_install_python(…) the lines in which it is commented out."""
-    file, below = "CMakeLists.txt", _BELOW.search(verdict.hint)
-    if below is None or verdict.citations != (FileCitation(file=file),):
+def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: Run) -> Verdict:
+    """Return the verdict; one on a call that is missing in CMakeLists.txt cites the line below which it goes, or those
+    in which it is commented out."""
+    if not verdict.status.is_lost or package is None or package.cmake is None:
         return verdict
-    lines = build.file_lines(file)[:_LINES_READ] if NOT_CALLED in verdict.message else ()
-    first = next((i for i, text in enumerate(lines) if _COMMENTED_CALL.match(text[:LINE_CHARS])), None)
-    if first is None:
-        return verdict.model_copy(
-            update={"citations": (FileCitation(file=file, line=int(below[1] or 0) or None),)}
-        )
-    last = first
-    while ")" not in lines[last] and last + 1 < len(lines) and lines[last + 1].lstrip().startswith("#"):
-        last += 1
-    place = f"line {first + 1}" if last == first else f"lines {first + 1} to {last + 1}"
-    called = f"{NOT_CALLED}: it is commented out in {place}"
+    lines = build.file_lines(CMAKE)[:_LINES_READ]
+    if (below := _BELOW.search(verdict.hint)) and verdict.citations == (FileCitation(file=CMAKE),):
+        return _cite_install(verdict, lines, int(below[1] or 0) or None)
+    called = {call.name for call in package.cmake.calls}
+    kinds = {PurePosixPath(one.path).suffix for one in package.interfaces}
+    asked = [name for name in CALLS if f"{name}(" in verdict.hint and name not in called]
+    asked = [name for name in asked if (kind := _KIND.match(name)) is None or OF_FILES_OF[kind[1]] in kinds]
+    found = {name: place for name in asked if (place := commented_call(lines, name))}
+    if not found:
+        return verdict
+    told = "; ".join(f"{name}(…) is commented out in {lines_text(*place)}" for name, place in found.items())
+    places = join_words(lines_text(*place) for place in found.values())
     update = {
-        "message": verdict.message.replace(NOT_CALLED, called, 1),
-        "hint": f"in place of {place} {_BELOW.sub('', verdict.hint)}, without # before it",
-        "citations": (FileCitation(file=file, line=first + 1),),
+        "message": f"{verdict.message}; {told}",
+        "hint": f"remove the # from {places} of {CMAKE}: {verdict.hint}",
+        "citations": (
+            *(FileCitation(file=CMAKE, line=first + 1) for first, _ in found.values()),
+            *verdict.citations,
+        ),
+    }
+    return verdict.model_copy(update=update)
+
+
+_KIND = re.compile(r"add_(message|service|action)_files")
+OF_FILES_OF = {"message": ".msg", "service": ".srv", "action": ".action"}
+CMAKE = "CMakeLists.txt"
+
+
+def _cite_install(verdict: Verdict, lines: Sequence[str], below: int | None) -> Verdict:
+    place = commented_call(lines, PYTHON) if NOT_CALLED in verdict.message else None
+    if place is None:
+        return verdict.model_copy(update={"citations": (FileCitation(file=CMAKE, line=below),)})
+    where = lines_text(*place)
+    update = {
+        "message": verdict.message.replace(NOT_CALLED, f"{NOT_CALLED}: it is commented out in {where}", 1),
+        "hint": f"in place of {where} {_BELOW.sub('', verdict.hint)}, without # before it",
+        "citations": (FileCitation(file=CMAKE, line=place[0] + 1),),
     }
     return verdict.model_copy(update=update)
 

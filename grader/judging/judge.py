@@ -108,7 +108,8 @@ def judge_all_runs(
     if build is not None:
         for criterion in rubric.criteria:
             placed = cite_words(verdicts[criterion.id], criterion, facts, build)
-            shown[criterion.id] = show_lines(cite_name(cite_commented_call(placed, build), build), build)
+            placed = cite_commented_call(placed, facts.package_of(criterion), build)
+            shown[criterion.id] = show_lines(cite_name(placed, build), build)
     results = tuple(
         result_of(c, shown[c.id], rubric.digits, uses.get(c.id), values_of(rubric, c))
         for c in rubric.criteria

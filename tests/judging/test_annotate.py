@@ -11,6 +11,7 @@ import pytest
 from grader.checks import CHECKS
 from grader.checks.support.exit_causes import CAUSES
 from grader.checks.support.text import LOOP, in_language, init, publisher, set_param
+from grader.evidence.run import Run
 from grader.integrations.bundle import Bundle, add_lab
 from grader.judging import judge
 from grader.judging.annotate import (
@@ -141,13 +142,13 @@ def test_other_words_are_shown_where_the_script_makes_them(line: str, said: str,
     ],
 )
 def test_a_call_that_is_commented_out_is_named_by_its_lines(text: str, place: str, line: int | None) -> None:
-    build = build_runs({"runs": {"package": {"attachments": {"CMakeLists.txt": text}}}})["package"]
+    build, package = commented(text)
     lost = failed(
         "CMakeLists.txt: no catkin_install_python(…) is called, so nothing installs a.py",
         hint="write catkin_install_python(PROGRAMS a.py DESTINATION b) below the catkin_package(…) of line 1",
         citations=(FileCitation(file="CMakeLists.txt"),),
     )
-    found = cite_commented_call(lost, build)
+    found = cite_commented_call(lost, package, build)
     assert found.citations == (FileCitation(file="CMakeLists.txt", line=line or 1),)
     if not place:
         assert found.hint == lost.hint
@@ -155,6 +156,56 @@ def test_a_call_that_is_commented_out_is_named_by_its_lines(text: str, place: st
     assert f"is called: it is commented out in {place}, so nothing installs a.py" in found.message
     call = "write catkin_install_python(PROGRAMS a.py DESTINATION b)"
     assert found.hint == f"in place of {place} {call}, without # before it"
+
+
+def commented(text: str, *interfaces: str) -> tuple[Run, PackageFacts]:
+    """Return the build and the facts of a package with this CMakeLists.txt, whose calls are all comments."""
+    package = {
+        "cmake": {"calls": [["project", "lab1"]]},
+        "interfaces": [{"path": p, "fields": []} for p in interfaces],
+    }
+    runs = build_runs({"runs": {"package": {"package": package, "attachments": {"CMakeLists.txt": text}}}})
+    facts_ = try_facts(rubric(CMAKE_CHECK), runs)
+    assert facts_.package is not None
+    return runs["package"], facts_.package
+
+
+@pytest.mark.parametrize(
+    ("interface", "told", "lines"),
+    [
+        (
+            "msg/Num.msg",
+            "add_message_files(…) is commented out in lines 2 to 5; generate_messages(…) is commented out in line 6",
+            [2, 6],
+        ),
+        ("srv/Add.srv", "generate_messages(…) is commented out in line 6", [6]),
+    ],
+)
+def test_calls_that_make_messages_and_are_commented_out_are_named(
+    interface: str, told: str, lines: list[int]
+) -> None:
+    text = "project(lab1)\n# add_message_files(\n#   FILES\n#   Num.msg\n# )\n# generate_messages()\n"
+    build, package = commented(text, interface)
+    hint = "list them in add_message_files(…) or add_service_files(…), and call generate_messages(…)"
+    lost = failed("talker ended: the build makes the package's own messages", hint=hint)
+    found = cite_commented_call(lost, package, build)
+    assert found.message == f"{lost.message}; {told}"
+    assert found.hint.startswith("remove the # from line")
+    assert found.hint.endswith(hint)
+    assert [one.line for one in found.citations if isinstance(one, FileCitation)] == lines
+    assert cite_commented_call(passed("right"), package, build) == passed("right")
+
+
+@pytest.mark.parametrize(
+    ("call", "cited"),
+    [("catkin_package()", True), ("find_package(catkin REQUIRED)", True), ("find_package(Boost)", False)],
+)
+def test_a_call_of_catkins_that_is_commented_out_is_named(call: str, cited: bool) -> None:
+    build, package = commented(f"project(lab1)\n  #{call}\n")
+    lost = failed(f"{call} is missing", hint=f"add {call}")
+    found = cite_commented_call(lost, package, build)
+    assert (found.citations == (FileCitation(file="CMakeLists.txt", line=2),)) == cited
+    assert ("is commented out in line 2" in found.message) == cited
 
 
 MANIFEST_LINES = (

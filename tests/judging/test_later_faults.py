@@ -11,6 +11,7 @@ from grader.judging import judge
 from grader.judging.annotate import cite_words
 from grader.judging.facts import try_facts
 from grader.model.verdict import FileCitation, partial
+from grader.package.launch import parse_launch_files
 from tests.judging.rubrics import CHATTER, NODE, PACKAGE, RATE, SCENARIO, SCRIPT, rubric
 from tests.support.timeline import build_runs
 
@@ -266,3 +267,33 @@ def test_a_line_of_cpp_says_a_text(line: str, kind: str, text: str) -> None:
 )
 def test_whether_a_text_of_a_source_can_come_out_as_another(said: str, wanted: str, can: bool) -> None:
     assert could_say(said, wanted) is can
+
+
+def test_arguments_without_a_value_are_named_behind_what_roslaunch_says_first() -> None:
+    """roslaunch names the package that it does not find, and comes to the arguments only then."""
+    text = """<launch>
+      <include file="$(find elsewhere)/launch/a.launch"/>
+      <arg name="rate"/>
+      <node pkg="lab1" type="numeric_talker.py" name="talker" args="$(arg rate) $(arg speed)"/>
+    </launch>"""
+    launch = parse_launch_files({"launch/a.launch": text.encode()}, ["lab1"])
+    lab = {
+        "id": "launch",
+        "check": "launch-runs",
+        "with": {"launch": "a.launch", "scripts": [FILE]},
+        "scenario": "talker",
+    }
+    run = {
+        "processes": [{"name": "roslaunch", "exit_s": 0.5, "exit_code": 1}],
+        "console": [{"process": "roslaunch", "stream": "stderr", "lines": ["Resource not found: elsewhere"]}],
+        "outcome": "ended",
+    }
+    package = {**PACKAGE, "launch_files": [one.model_dump() for one in launch]}
+    scenarios = {"talker": {**SCENARIO, "start": [{"name": "roslaunch", "launch": "a.launch"}]}}
+    runs = build_runs({"runs": {"talker": run}, "package": package})
+    (found,) = judge(rubric(lab, scenarios=scenarios), runs)
+    assert "Resource not found: elsewhere" in found.message
+    assert found.hint.endswith(
+        '; then in line 3 of launch/a.launch write <arg name="rate" default="…"/> and '
+        'below <launch> in launch/a.launch add <arg name="speed" default="…"/>'
+    )

@@ -384,6 +384,18 @@ def _unset_args(text: str, package: PackageFacts | None) -> Absence | None:
     return Absence(why, hint, citations=tuple(dict.fromkeys(cited)))
 
 
+def unset_arg_fixes(file: LaunchFile, told: str) -> Iterator[str]:
+    """Yield what to write for each argument of the file that has no value, and that is not told yet."""
+    for arg in file.unset_args:
+        written = f'<arg name="{arg.name}" default="…"/>'
+        if written not in told:
+            yield (
+                f"in line {arg.line} of {arg.file} write {written}"
+                if arg.declared
+                else f"below <launch> in {arg.file} add {written}"
+            )
+
+
 def died(run: Run, node: LaunchNode) -> int | None:
     """Return the exit code with which roslaunch saw it die before Ctrl-C; None where it did not."""
     until_ns = observed_until_ns(run) or run.end_ns

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
@@ -27,6 +28,8 @@ _HERE = tuple(
         "CMAKE_CURRENT_LIST_DIR",
     )
 )
+LINE_CHARS_MAX = 200
+"""Of a line of CMake, to see which call begins in it."""
 BACKUPS = ("~", ".bak", ".orig", ".save", ".swp")
 _BIN = ("${CATKIN_PACKAGE_BIN_DESTINATION}", "lib/${PROJECT_NAME}")
 
@@ -215,3 +218,20 @@ def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
         yield Obstacle(f"names {file.shebang.interpreter}, which is not on a ROS machine", fix)
     elif file.python and "python" not in file.shebang.interpreter:
         yield Obstacle(f"is Python, and its first line names {file.shebang.interpreter}", fix)
+
+
+def commented_call(lines: Sequence[str], name: str) -> tuple[int, int] | None:
+    """Return the first and the last line (from 0) of a call that is commented out."""
+    pattern = re.compile(rf"\s*#[#\s]*{name}\s*\(" + (r"\s*catkin\b" if name == "find_package" else ""))
+    first = next((i for i, text in enumerate(lines) if pattern.match(text[:LINE_CHARS_MAX])), None)
+    if first is None:
+        return None
+    last = first
+    while ")" not in lines[last] and last + 1 < len(lines) and lines[last + 1].lstrip().startswith("#"):
+        last += 1
+    return first, last
+
+
+def lines_text(first: int, last: int) -> str:
+    """Return `line 3`, or `lines 3 to 5`, of lines from 0."""
+    return f"line {first + 1}" if last == first else f"lines {first + 1} to {last + 1}"
