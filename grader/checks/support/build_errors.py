@@ -27,7 +27,7 @@ _CMAKE_ERROR = re.compile(
 )
 _COMPILER_ERROR = re.compile(r"^(?P<file>[^:\s][^:]*):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: (?P<text>.*)")
 _OTHER_ERROR = re.compile(
-    r"(?P<text>.*(?:\b[Ee]rror:|Error\(s\)|undefined reference|No rule to make|[A-Za-z]Error:|\*\*\*).*)"
+    r"(?P<text>.*(?:\b[Ee]rror:|Error\(s\)|undefined reference|cannot find -l|No rule to make|[A-Za-z]Error:|\*\*\*).*)"
 )
 _CALLER = re.compile(r"^\s+(?P<file>[^:()]+):(?P<line>\d+) \(\w+\)$")
 CALL_STACK = "Call Stack (most recent call first):"
@@ -362,6 +362,25 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
     )
 
 
+def _missing_header(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    """A header of no ROS package: a file of the student's own, or a library's, which are included by their folder."""
+    header = found[1]
+    near = near_names(posixpath.basename(header), [posixpath.basename(f.path) for f in package.files])
+    if near or "/" not in header or header.partition("/")[0] == package.name:
+        fix = f"write {near[0]} in the #include" if near else f"push {header}, or correct the #include"
+        return Explained(f"there is no header {header}", fix)
+    why = f"it needs the header {header} of a library that this grading machine lacks"
+    own = "a header of the student's own has to be pushed"
+    hint = f"{ON_THE_MACHINE}install the library of {header}, then grade again; {own}"
+    return Explained(why, hint, of_machine=True)
+
+
+def _missing_link(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    why = f"it is linked with the library {found[1]}, which this grading machine lacks"
+    hint = f"{ON_THE_MACHINE}install the library {found[1]}, then grade again"
+    return Explained(why, hint, of_machine=True)
+
+
 def _no_semicolon(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     where = f"of the statement before `{found[2]}`" if found[1] else "of that line"
     return Explained(f"{found.string}: a `;` is missing", f"write a `;` at the end {where}")
@@ -465,7 +484,9 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"catkin_package\(\) called with unused arguments: (\S+)", _unused_argument),
     (r"catkin_package\(\) DEPENDS on the catkin package '([^']+)' which must", _run_dependency),
     (r"catkin_package\(\) DEPENDS on (?:the catkin package )?'([^']+)'", _depends),
-    (r"(\w+)/(\w+)\.h: No such file or directory", _header_race),
+    (r"(?<![\w+/.-])(\w+)/(\w+)\.h: No such file or directory", _header_race),
+    (r"cannot find -l(\S+?)(?::|$)", _missing_link),
+    (r"([\w+./-]+): No such file or directory", _missing_header),
     (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
     (r"expected '}' at end of input", _no_brace),
     (r"'([^']+)' was not declared in this scope(?:; did you mean '([^']+)')?", _explain_undeclared),
