@@ -12,6 +12,7 @@ import pytest
 from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, advice_of
 from grader.model.submission import chmod_hint
 from grader.package.repairs import NotRepairable, Wanted, apply_repair, find_repairs
+from grader.package.repairs.editing import changed_lines
 from grader.package.repairs.names import is_near, is_one_edit
 from tests.package.repairing import (
     CMAKE,
@@ -351,3 +352,10 @@ def test_one_edit_counts_a_swap_and_not_two_letters() -> None:
     assert is_one_edit("", "a")
     assert not is_one_edit("abc", "abc")
     assert not is_one_edit("abcd", "badc")
+
+
+def test_what_is_added_at_the_end_is_below_the_last_line() -> None:
+    before, after = "a()\nb()\n", "a()\nb()\n\nc()\n"
+    assert changed_lines(before, after) == (2, "b()", "b()\n\nc()")
+    assert changed_lines("a()\nb()", "a()\nb()\nc()") == (2, "b()", "b()\nc()")
+    assert changed_lines("a()\n\nb()\n", "a()\n\nc()\nb()\n") == (2, "", "\nc()")

@@ -155,6 +155,8 @@ def changed_lines(before: str, after: str) -> tuple[int, str, str]:
     end = next((i for i in range(shorter - start) if old[-1 - i] != new[-1 - i]), shorter - start)
     if end in (len(old) - start, len(new) - start):
         start, end = (start - 1, end) if start else (start, end - 1)
+    if 0 < start == len(old) - 1 and old[-1] == new[-1] == "" and not end:
+        start, end = start - 1, 1  # behind the last line end is no line
     first, last = old[start : len(old) - end], new[start : len(new) - end]
     return start + 1, "\n".join(first), "\n".join(last)
 
