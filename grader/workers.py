@@ -198,6 +198,7 @@ class Worker:
         self._template = template
         self._process: subprocess.Popen[bytes] | _Copy | None = None
         self._function: tuple[object, bytes] = None, b""
+        self._told: object = None
         self.stopped = False
         self._lock = threading.Lock()
 
@@ -210,7 +211,6 @@ class Worker:
         answer_type: TypeAdapter[Result] = _answer_type(_plain(function))
         if self._function[0] is not function:
             self._function = function, pickle.dumps(function)
-        message = pickle.dumps((self._function[1], job, self._limits))
         while True:
             with self._lock:
                 if self.stopped:
@@ -218,8 +218,10 @@ class Worker:
                 process, is_new = self._process, False
                 if process is None or process.poll() is not None:
                     process, is_new = self._start(), True
+            function_told = b"" if self._told is function and not is_new else self._function[1]
             try:
-                answer = self._exchange(process, message)
+                answer = self._exchange(process, pickle.dumps((function_told, job, self._limits)))
+                self._told = function
             except (EOFError, OSError) as error:
                 if self.stopped:
                     raise WorkerEnded("interrupted", interrupted=True) from error
@@ -488,26 +490,23 @@ def _work() -> None:
     if hasattr(select, "poll"):  # not on Windows, where only an idle worker hears of its parent's end
         threading.Thread(target=_leave_with_parent, args=(jobs.fileno(),), daemon=True).start()
     limits: WorkerLimits | None = None
+    function: Callable[[Any], object] = id
     with suppress(EOFError, BrokenPipeError, KeyboardInterrupt):
         while not _State.stopped:
             _wait_for_job(jobs.fileno(), limits)
-            known, job, now = pickle.loads(_receive(jobs))  # noqa: S301 - from the parent; see above
+            told, job, now = pickle.loads(_receive(jobs))  # noqa: S301 - from the parent; see above
             _State.busy = True
             try:
                 if _State.stopped:
                     break
                 _limit(now, is_first=limits is None)
-                answer = _answer(_function(known), job)
+                if told:  # with what is bound to it (a rubric, say), it is the same for many jobs
+                    function = pickle.loads(told)  # noqa: S301 - as above
+                answer = _answer(function, job)
             finally:
                 _State.busy = False
             limits = now
             _send(answers, answer)
-
-
-@lru_cache(maxsize=1)
-def _function(pickled: bytes) -> Callable[[Any], object]:
-    """Return the function of a job: with what is bound to it (a rubric, say), it is the same for many jobs."""
-    return pickle.loads(pickled)  # type: ignore[no-any-return]  # noqa: S301 - from the parent; see above
 
 
 def _answer(function: Callable[[Any], object], job: object) -> bytes:
