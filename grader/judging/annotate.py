@@ -28,6 +28,7 @@ from grader.checks.support.scripts import (
     BACKUPS,
     PYTHON,
     commented_call,
+    commented_calls,
     find_script,
     installed,
     is_product,
@@ -492,11 +493,6 @@ def _words_of(line: str, said: str) -> int:
     return max((sum(map(len, words)) for words in strings if spoken.issuperset(words)), default=0)
 
 
-CALLS = ("project", "find_package", "catkin_package", "add_message_files", "add_service_files", "add_action_files",
-         "generate_messages")  # fmt: skip
-"""Of CMake, what a hint may tell to call, beside the call that installs scripts."""
-
-
 def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: Run) -> Verdict:
     """Return the verdict; one on a call that is missing in CMakeLists.txt cites the line below which it goes, or those
     in which it is commented out."""
@@ -505,11 +501,7 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
     lines = build.file_lines(CMAKE)[:_LINES_READ]
     if (below := _BELOW.search(verdict.hint)) and verdict.citations == (FileCitation(file=CMAKE),):
         return _cite_install(verdict, lines, int(below[1] or 0) or None)
-    called = {call.name for call in package.cmake.calls}
-    kinds = {PurePosixPath(one.path).suffix for one in package.interfaces}
-    asked = [name for name in CALLS if f"{name}(" in verdict.hint and name not in called]
-    asked = [name for name in asked if (kind := _KIND.match(name)) is None or OF_FILES_OF[kind[1]] in kinds]
-    found = {name: place for name in asked if (place := commented_call(lines, name))}
+    found = commented_calls(package, lines, verdict.hint)
     if not found:
         return verdict
     told = "; ".join(f"{name}(…) is commented out in {lines_text(*place)}" for name, place in found.items())
@@ -525,8 +517,6 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
     return verdict.model_copy(update=update)
 
 
-_KIND = re.compile(r"add_(message|service|action)_files")
-OF_FILES_OF = {"message": ".msg", "service": ".srv", "action": ".action"}
 CMAKE = "CMakeLists.txt"
 
 

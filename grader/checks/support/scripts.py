@@ -220,6 +220,21 @@ def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
         yield Obstacle(f"is Python, and its first line names {file.shebang.interpreter}", fix)
 
 
+CALLS = ("project", "find_package", "catkin_package", "add_message_files", "add_service_files", "add_action_files",
+         "generate_messages")  # fmt: skip
+"""Of CMake, what a hint may tell to call, beside the call that installs scripts."""
+OF_FILES = {"add_message_files": ".msg", "add_service_files": ".srv", "add_action_files": ".action"}
+
+
+def commented_calls(package: PackageFacts, lines: Sequence[str], hint: str) -> dict[str, tuple[int, int]]:
+    """Return the calls that the hint tells to write, of files that the package has, and that are commented out."""
+    called = {call.name for call in package.cmake.calls} if package.cmake is not None else set[str]()
+    kinds = {PurePosixPath(one.path).suffix for one in package.interfaces}
+    asked = [name for name in CALLS if f"{name}(" in hint and name not in called]
+    asked = [name for name in asked if OF_FILES.get(name) in {None, *kinds}]
+    return {name: place for name in asked if (place := commented_call(lines, name))}
+
+
 def commented_call(lines: Sequence[str], name: str) -> tuple[int, int] | None:
     """Return the first and the last line (from 0) of a call that is commented out."""
     pattern = re.compile(rf"\s*#[#\s]*{name}\s*\(" + (r"\s*catkin\b" if name == "find_package" else ""))
