@@ -35,6 +35,21 @@ MESSAGES = {
     "nav_msgs": "OccupancyGrid Odometry",
     "sensor_msgs": "CompressedImage Image Imu JointState Joy LaserScan NavSatFix PointCloud2 Range",
 }
+SLIP_CHARS = 3
+OF_ROS = {
+    "rosbag",
+    "roscpp",
+    "rosgraph",
+    "roslaunch",
+    "roslib",
+    "rosmsg",
+    "rosnode",
+    "rosparam",
+    "rospkg",
+    "rosservice",
+    "rostopic",
+}
+"""Modules that there are, whose names begin like that of another one."""
 MODULES = frozenset({"math", "os", "random", "rospy", "sys", "time"})
 NAMES_OF_ROSPY = (
     "AnyMsg DEBUG Duration ERROR FATAL Header INFO MasterProxy Message Publisher ROSException ROSInitException "
@@ -221,7 +236,7 @@ def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
         if hasattr(builtins, name):
             continue
         if name in MODULES and name in modules:
-            after = _add_import(text, f"import {name}", "", "")
+            after = _import_meant(text, name) or _add_import(text, f"import {name}", "", "")
         elif name in packages:
             after = _add_import(
                 text, f"from {packages[name]}.msg import {name}", f"{packages[name]}.msg", name
@@ -231,6 +246,19 @@ def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
         for step in _step("import", missing[name], text, after, name):
             text = step["text"]
             yield step
+
+
+def _import_meant(text: str, name: str) -> str:
+    """Return the text with `import rospy` in place of `import ros`, a module that there is none of and that nothing in
+    the script uses; "" where no line imports such a one."""
+    tree, lines = ast.parse(text), text.split("\n")
+    used = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
+    for one in (n for n in tree.body if isinstance(n, ast.Import) and len(n.names) == 1):
+        module = one.names[0].name
+        is_slip = module[:SLIP_CHARS] == name[:SLIP_CHARS] and module not in OF_ROS and module not in used
+        if is_slip and one.names[0].asname is None and lines[one.lineno - 1].strip() == f"import {module}":
+            return with_line(lines, one.lineno - 1, lines[one.lineno - 1].replace(module, name))
+    return ""
 
 
 def _add_import(text: str, statement: str, module: str, name: str) -> str:
