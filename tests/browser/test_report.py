@@ -68,7 +68,7 @@ def test_points_and_what_was_lost_are_what_one_sees_first(visit, written, size) 
     page = visit(written, size=size)
     assert page.locator("#points").bounding_box()["y"] < size.height / 2
     lost = page.locator("article[data-status=fail], article[data-status=partial]").first
-    assert lost.locator(".message").bounding_box()["y"] < 0.6 * size.height
+    assert lost.locator("h3").bounding_box()["y"] < 0.6 * size.height, "the heading says what is wrong"
 
 
 def test_what_is_cut_off_shows_that_it_scrolls_and_is_reached_by_keys(visit, written) -> None:
