@@ -230,20 +230,15 @@ class _Member(tarfile.TarInfo):
     """A header; `tarfile` would take one that is damaged or missing for the end of the archive."""
 
     @classmethod
-    def frombuf(cls, buf: bytes | bytearray, encoding: str, errors: str) -> _Member:
-        try:
-            return super().frombuf(buf, encoding, errors)
-        except tarfile.EOFHeaderError:  # type: ignore[attr-defined]
-            raise
-        except tarfile.HeaderError:
-            raise tarfile.ReadError("the end is missing") from None
-
-    @classmethod
     def fromtarfile(cls, archive: tarfile.TarFile) -> _Member:
         try:
             return super().fromtarfile(archive)
+        except (tarfile.EOFHeaderError, tarfile.SubsequentHeaderError):  # type: ignore[attr-defined]
+            raise
         except tarfile.InvalidHeaderError:  # type: ignore[attr-defined]
             raise tarfile.ReadError("a header is wrong") from None
+        except tarfile.HeaderError:
+            raise tarfile.ReadError("the end is missing") from None
 
 
 def _next(archive: tarfile.TarFile) -> tarfile.TarInfo | None:

@@ -33,6 +33,7 @@ _TYPOGRAPHIC = (
 TEXT_CHARS_MAX = SOURCE_CHARS_MAX = 300
 _VAGUE = (
     *("invalid syntax", "expected ':'", "invalid decimal", "unexpected EOF", "cannot assign", "can't assign"),
+    "Did you mean to use 'from",
 )
 """Messages that say less than the line itself."""
 _NEVER_CLOSED = "a bracket that is opened in line {} is never closed"

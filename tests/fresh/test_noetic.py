@@ -1,6 +1,6 @@
 """ROS as most courses have it, `/opt/ros/noetic`: correct packages keep all marks, and faults lose theirs.
 
-The same for a course's workspace over it, which `GRADER_ROS_SETUP` names.
+The same for a course's workspace over it, which `GRADER_ROS_SETUP` names, and for an active environment of conda.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ import pytest
 from fixtures.make import faulty_package
 from grader.model.result import GradingResult
 from tests.fixture_runs import read_fixture, rubric_of, surprises
-from tests.fresh import noetic
+from tests.fresh import conda, noetic
 from tests.fresh.room import Rooms, Root
 
 pytestmark = [pytest.mark.ros, pytest.mark.full, pytest.mark.slow, pytest.mark.timeout(1500)]
@@ -47,11 +48,26 @@ def ros(rooms: Rooms, tmp_path_factory) -> Root:
     return root
 
 
+@pytest.fixture(scope="module")
+def environment(rooms: Rooms, ros: Root) -> Root:
+    """The same ROS and grader, ROS in an environment of conda."""
+    root = rooms.fresh_root(on=ros)
+    conda.install(root)
+    return root
+
+
 def _grade(
-    root: Root, source: Path, lab: str, locks: Path | None, *, user: str | None = None, **env: str
+    root: Root,
+    source: Path,
+    lab: str,
+    locks: Path | None,
+    *,
+    user: str | None = None,
+    shell: Callable[..., list[str]] = lambda *argv: [*argv],
+    **env: str,
 ) -> GradingResult:
     root.copy_in(source, f"/srv/in/{lab}")
-    command = [GRADER, "grade", f"/srv/in/{lab}", "--rubric", lab, "--out", "/tmp/out"]
+    command = shell(GRADER, "grade", f"/srv/in/{lab}", "--rubric", lab, "--out", "/tmp/out")
     done = root.run(command, privileged=True, locks=locks, env=env, user=user, check=False)
     result = root.path / "tmp" / "out" / lab / "result.json"
     assert result.is_file(), done.stdout + done.stderr
@@ -105,4 +121,24 @@ def test_an_ordinary_user_grades_in_a_sandbox_too(rooms: Rooms, ros: Root) -> No
     source = REPO / "reference_solutions" / lab
     result = _grade(root, source, lab, None, user="someone", HOME="/home/someone")
     assert surprises(result, read_fixture(lab, "reference"), rubric_of(lab)) == []
+    assert "bubblewrap" in result.environment.sandbox
+
+
+def test_nothing_is_missing_in_an_environment_of_conda(environment: Root) -> None:
+    done = environment.run(conda.active(GRADER, "doctor"), privileged=True, env=conda.ENV, check=False)
+    assert "Ready to grade." in done.stdout, done.stdout + done.stderr
+    assert conda.PREFIX in done.stdout
+    assert not [line for line in done.stdout.splitlines() if line.startswith("missing")]
+
+
+@pytest.mark.parametrize("lab", FAULTY)
+@pytest.mark.parametrize("name", ["reference", "faulty"])
+def test_in_an_environment_of_conda(
+    rooms: Rooms, environment: Root, name: str, lab: str, locks: Path
+) -> None:
+    root, name = rooms.fresh_root(on=environment), name if name == "reference" else FAULTY[lab]
+    source = REPO / "reference_solutions" / lab if name == "reference" else faulty_package(lab, name)
+    result = _grade(root, source, lab, locks, shell=conda.active, **conda.ENV)
+    assert surprises(result, read_fixture(lab, name), rubric_of(lab)) == []
+    assert conda.PREFIX in result.environment.ros
     assert "bubblewrap" in result.environment.sandbox

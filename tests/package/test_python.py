@@ -71,7 +71,7 @@ GOOD = {
 }
 
 SYNTAX = Path(__file__).resolve().parents[2] / "grader/arena/ros/syntax.py"
-PYTHONS = [p for p in ("python3.8", "python3.9", "python3.10", "python3.12", "python3.13") if shutil.which(p)]
+PYTHONS = [p for p in (f"python3.{minor}" for minor in (8, 9, 10, 12, 13, 14)) if shutil.which(p)]
 
 
 def write(folder, cases):

@@ -157,5 +157,5 @@ def test_it_says_which_pythons_and_extras(metadata):
     classifiers = metadata.get_all("Classifier")
     pythons = {c.rpartition(" ")[2] for c in classifiers if "Python :: 3." in c}
     assert metadata["Requires-Python"] == ">=3.10"
-    assert pythons == {"3.10", "3.11", "3.12", "3.13"}
+    assert pythons == {"3.10", "3.11", "3.12", "3.13", "3.14"}
     assert {"cluster", "review", "similarity"} <= set(metadata.get_all("Provides-Extra"))

@@ -93,8 +93,28 @@ def check(root, name):
     with contextlib.suppress(
         RecursionError, MemoryError
     ):  # what compiles can be nested too deep to be looked at
-        report["slips"] = slips(ast.parse(data))
+        tree = ast.parse(data)
+        error = bare_except(tree, os.path.basename(name))
+        if error is not None:
+            report["faults"].append(syntax_fault(error, data))
+            return report
+        report["slips"] = slips(tree)
     return report
+
+
+def bare_except(tree, name):
+    """Return as a fault the first `except Error, name:`, which Python 3.14 reads as two kinds of errors.
+
+    All others refuse it, as they did since Python 3.0.
+    """
+    for node in ast.walk(tree):
+        kinds = node.type if isinstance(node, ast.ExceptHandler) else None
+        if isinstance(kinds, ast.Tuple) and kinds.elts:
+            first = kinds.elts[0]
+            if (kinds.lineno, kinds.col_offset) == (first.lineno, first.col_offset):  # no bracket before it
+                place = (name, kinds.lineno, kinds.col_offset + 1, None)
+                return SyntaxError("multiple exception types must be parenthesized", place)
+    return None
 
 
 def fault(kind, line, column, message, *, text="", opened=None, mixed=False):
