@@ -42,7 +42,7 @@ links: setup ## whether the pages' links to other sites still work; needs the ne
 	@$(BIN)/python -m scripts.links
 
 test-pure: setup ## the tests that need no ROS
-	@$(BIN)/python -m pytest -m "not ros and not full" -n 2 --dist loadfile
+	@$(BIN)/python -m pytest -m "not ros and not full" -n 3 --dist loadfile
 
 test-ros: setup ## the tests that run real nodes
 	@$(BIN)/python -m pytest -m "ros and not full" -n 3 --dist loadfile --no-loadscope-reorder

@@ -11,8 +11,8 @@ import pytest
 from grader.classes.batch.folder import open_batch
 from grader.classes.feedback.publish import Publishing, publish
 from grader.classes.review.app import create_app
-from grader.classes.review.blind import Mask
 from grader.classes.review.session import open_session
+from grader.classes.review.submissions import Mask
 from grader.rubric.load import load_rubric
 from tests.review.a_class import INCONCLUSIVE, Who, a_class, overrides_of
 from tests.review.conftest import PORT, QUICK, TOKEN, Page

@@ -34,9 +34,8 @@ from grader.classes.overrides import (
 )
 from grader.classes.overrides.write import write_override, write_overrides
 from grader.classes.review.background import BackgroundWriter, Pace
-from grader.classes.review.blind import Mask, aliases, mask_of
 from grader.classes.review.student_requests import Requests, read_requests, request_files, waiting
-from grader.classes.review.submissions import Item, Submissions, alike, stamp_of
+from grader.classes.review.submissions import Item, Mask, Submissions, aliases, alike, mask_of, stamp_of
 from grader.errors import Busy, GraderError, OutputError, RubricError, UsageError
 from grader.files import unwritable
 from grader.model.batch import Entry, State

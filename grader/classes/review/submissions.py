@@ -1,7 +1,11 @@
-"""The submissions of a class as the list shows them, read again when their files change; filter and search."""
+"""The submissions of a class as the list shows them, read again when their files change; filter and search.
+
+For marking without names: what they are called (`aliases`), and what is taken out of their texts (`Mask`).
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import threading
@@ -10,16 +14,19 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
 
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch
 from grader.classes.gradebook import Row
 from grader.intake import safe_name
 from grader.judging.settle import awarded
 from grader.model.batch import MISSING, ROSTER, Entry
-from grader.model.result import GradingResult, Override
+from grader.model.record import Record
+from grader.model.result import GradingResult, Override, SubmissionInfo
 from grader.model.verdict import Status
-from grader.report.class_page.submissions import reduced
+from grader.report.class_page.submissions import LEFT_OUT, WORDS, order, reduced, words_in
 from grader.results import RESULT
 from grader.untrusted_text import line
 
@@ -42,7 +49,19 @@ FILTERS_OF_ONE = {
 """Those of a list of one criterion across the class."""
 ALL, ASKED, NOTED = "all", "asked", "noted"
 """The last one is no filter: a person said something and left the points to the check."""
+HASH_CHARS = (7, 8, 10, 12)
+KEPT = frozenset(
+    {
+        *("check", "criterion", "digest", "id", "kind", "scenario", "schema", "status", "rubric"),
+        *("at", "before", "date", "deadline"),
+    }
+)
+"""Keys whose values are the rubric's or the grader's own words, or times."""
+_ADDRESS = re.compile(
+    r"[\w.+-]{1,100}@[\w-]{1,100}(?:\.[\w-]{1,60}){0,6}(?::\S{1,200})?|\b(?:https?|ssh|git)://\S{1,300}"
+)
 Stamp = tuple[int, int, int] | None
+T = TypeVar("T", bound=Record)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -421,3 +440,52 @@ def alike(items: Iterable[Item], criterion: str, to: Item) -> list[Item]:
         and one.diagnosis == diagnosis
         and (one.kinds.isdisjoint({"decided", NOTED}) or item.key == to.key)
     ]
+
+
+# ---- marking without names
+
+
+def aliases(ids: Sequence[str], salt: bytes) -> dict[str, str]:
+    """Return what each submission is called in addresses, by its id, in an order that depends on `salt` alone."""
+    return {ids[place]: f"submission-{number}" for number, place in enumerate(order(ids, salt), start=1)}
+
+
+@dataclass(frozen=True)
+class Mask:
+    """Takes `words`, mail addresses and repositories out of texts."""
+
+    words: frozenset[str]
+
+    def text(self, text: str) -> str:
+        """Return the text with `…` for each of them."""
+        found = _ADDRESS.sub(LEFT_OUT, text)
+        return WORDS.sub(lambda word: LEFT_OUT if word[0].casefold() in self.words else word[0], found)
+
+    def record(self, record: T) -> T | None:
+        """Return the record with all its texts so; None where nothing sound is left of it."""
+        data = self._data(record.model_dump(mode="json", by_alias=True))
+        try:
+            return type(record).model_validate_json(json.dumps(data))
+        except ValidationError:
+            return None
+
+    def result(self, result: GradingResult, title: str) -> GradingResult | None:
+        """Return the result under another name."""
+        package = result.submission.package
+        info = SubmissionInfo(id=title, source="", commit=None, digest="", package=self.text(package))
+        return self.record(result.model_copy(update={"submission": info}))
+
+    def _data(self, data: Any) -> Any:  # noqa: ANN401 - JSON
+        if isinstance(data, str):
+            return self.text(data)
+        if isinstance(data, Mapping):
+            return {key: value if key in KEPT else self._data(value) for key, value in data.items()}
+        return [self._data(item) for item in data] if isinstance(data, list) else data
+
+
+def mask_of(entry: Entry, commit: str, common: frozenset[str]) -> Mask:
+    """Return the mask of one submission: words of its id, name and commit, and of its source those that are not
+    `common` to the class."""
+    hashes = [commit[:chars] for chars in HASH_CHARS]
+    own = frozenset(words_in(entry.id, entry.name, commit, *hashes))
+    return Mask(own | (frozenset(words_in(entry.source, entry.ref or "")) - common))
