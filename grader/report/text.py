@@ -220,7 +220,9 @@ def code_parts(text: str) -> Iterator[tuple[str, bool]]:
 
 
 def _mark_code(text: str) -> str:
-    """Return the text with backticks round what shows by itself that it is code."""
+    """Return the text with backticks round what shows by itself that it is code; as it is where one has no partner."""
+    if "`" in _CODE.sub("", text):
+        return text
     marked, end, last = "", 0, -1
     for found in _CODE.finditer(text):
         beside = text[max(0, found.start() - 1) : found.start()] + text[found.end() : found.end() + 1]

@@ -10,7 +10,7 @@ from itertools import chain, pairwise
 import pytest
 from cmarkgfm import github_flavored_markdown_to_html
 from cmarkgfm.cmark import Options
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from lxml import html as parser
 from markdown_it import MarkdownIt
@@ -71,6 +71,7 @@ def test_backticks_within_code_stay(code):
 
 
 @given(TEXTS)
+@example("`:0()")
 def test_markdown_reads_as_the_text_itself_also_where_a_line_begins(text):
     shown = markdown(text)
     if not words(text):
