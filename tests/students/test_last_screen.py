@@ -32,7 +32,7 @@ MISTAKES = [
         "mcr2-basic-comms/message-without-time",
         f"✗ message {MINUS}5",
         "a message reads 'hello world'",
-        "on /chatter",
+        "scripts/talker.py:12",
         'fix: publish "hello world %s" % rospy.get_time()',
     ),
     (
