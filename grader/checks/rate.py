@@ -240,11 +240,7 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
 
 def _asked_slow(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
     """The silence is no longer than the pause for which the node's script asks."""
-    asked = [
-        s
-        for c in run.student_channels(params.topic)
-        for s in slips_of(package, run, c.callerid, "rate-number")
-    ]
+    asked = _asked_rates(run, package, params)
     slow = next((s for s in asked if found.tail_ns * float(s.message) < PAUSES_WAITED * 1e9), None)
     if slow is None or float(slow.message) >= params.low_hz:
         return None
@@ -293,11 +289,19 @@ def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdic
     return _explained(verdict, slip, message, hint)
 
 
+def _asked_rates(run: Run, package: PackageFacts, params: RateParams) -> list[PythonSlip]:
+    """Return the lines in which the scripts of the topic's publishers ask for a rate."""
+    channels = run.student_channels(params.topic)
+    return [s for c in channels for s in slips_of(package, run, c.callerid, "rate-number")]
+
+
 def _asked_number(mean_hz: float, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
     """Return where a script asks for the rate that was measured, which is not the right one."""
-    channels = run.student_channels(params.topic)
-    asked = [s for c in channels for s in slips_of(package, run, c.callerid, "rate-number")]
-    wrong = (s for s in asked if not params.low_hz <= float(s.message) <= params.high_hz)
+    wrong = (
+        s
+        for s in _asked_rates(run, package, params)
+        if not params.low_hz <= float(s.message) <= params.high_hz
+    )
     return next((s for s in wrong if abs(float(s.message) - mean_hz) < NUMBER_SHARE * mean_hz), None)
 
 
