@@ -29,7 +29,7 @@ from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 CONNECT_NS = 1_000_000_000
@@ -193,7 +193,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     if count is None:
         return _nothing(package, run, params.topic).about(expected=expected)
     verdict, seen = judge_wraps(count, run, package, params)
-    verdict = cite_no_effect(verdict, count, run, package, "gives no value")
+    verdict = cite_no_effect(verdict, count, run, package, "compared")
     turn = f"{significant(seen.before)}→{significant(seen.after)}" if seen else "no reset"
     lowest, highest = significant(min(count.values)), significant(max(count.values))
     measured = f"{plural(len(count.values), 'value')}, {lowest} to {highest}, {turn}"
@@ -271,7 +271,7 @@ def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, p
     )
     seen = "" if verdict.status is Status.PASS else f"; {verdict.message}"
     hint = "set a counter before the loop, publish it, and add one to it each time around the loop"
-    return failed(message + seen, hint=hint, citations=(FileCitation(file=slip.file, line=slip.line),))
+    return failed(message + seen, hint=hint, citations=(slip.place,))
 
 
 def _flood_verdict(skips: int, params: StepParams) -> Verdict:

@@ -32,7 +32,7 @@ from grader.checks.support.topics import cite, misfit, refused_type, run_slip, t
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, partial, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 CALLBACK_HINT = (
@@ -184,9 +184,8 @@ def _judge_error(package: PackageFacts, run: Run) -> Verdict | None:
     if end := explain_error(package, run):
         return end.verdict(failed, f"an error stops the node from printing: {end.cause}")
     if slip := run_slip(package, run, "callback-called", "callback-missing"):
-        cause, _, fix = slip.message.partition(": ")
-        verdict = failed(f"ROS calls no function of the script for a message: {cause}", hint=fix)
-        return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
+        message = f"ROS calls no function of the script for a message: {slip.message}"
+        return failed(message, hint=slip.fix, citations=(slip.place,))
     return None
 
 

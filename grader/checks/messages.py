@@ -38,7 +38,7 @@ from grader.checks.support.topics import Sender, cite, losses, no_message, nothi
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, partial, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 ENOUGH = 3
@@ -207,9 +207,8 @@ def _judge_counting(
     if slip is None:
         return None
     message = f"the number in the messages counts them ({told[0]:.0f}, {told[1]:.0f}, …) and is not a time"
-    place = FileCitation(file=slip.file, line=slip.line)
     why = "reads no clock but once" if "once" in slip.message else "reads no clock"
-    return failed(f"{message}: {slip.file} {why}", hint=ASK_AGAIN, citations=(place,))
+    return failed(f"{message}: {slip.file} {why}", hint=ASK_AGAIN, citations=(slip.place,))
 
 
 def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:

@@ -37,7 +37,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, seconds
 
 IN_A_LOOP = f"loop with `{LOOP}`" + both(" and catch rospy.ROSInterruptException around it", "")
@@ -206,10 +206,7 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
         deaf = next((s for s in package.slips if s.kind == "deaf" and s.file == one.start.script), None)
         if deaf is not None:
-            why, _, fix = deaf.message.partition(": ")
-            return failed(
-                f"{message}: {why}", hint=fix, citations=(FileCitation(file=deaf.file, line=deaf.line),)
-            )
+            return failed(f"{message}: {deaf.message}", hint=deaf.fix, citations=(deaf.place,))
         hint = IN_A_LOOP + both("; a bare `except:` in the loop swallows the Ctrl-C", "")
         return failed(message, hint=hint)
     found = process_tracebacks(run, one.name, after_ns=one.interrupt_ns)

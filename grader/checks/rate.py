@@ -169,22 +169,21 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
         return None
     own = (life_of(run, channel.callerid) for channel in run.student_channels(params.topic))
     scripts = {life.start.script for life in own if life is not None and life.start.script}
-    told = [s for s in package.slips if s.kind in SLEEPLESS and "sleep" in s.message]
+    told = [s for s in package.slips if s.kind in SLEEPLESS and "sleep" in s.name + s.fix]
     slips = [s for s in told if not scripts or s.file in scripts]
     if not slips and found.mean_hz < FLOOD_HZ and found.is_even:
         return None
-    why = slips[0].message.partition(": write ")[0] if slips else ""
-    where = f" ({slips[0].file}, line {slips[0].line}: {why})" if slips else ""
+    where = f" ({slips[0].file}, line {slips[0].line}: {slips[0].message})" if slips else ""
     hz = significant(params.rate_hz)
     about = f"{float(f'{found.mean_hz:.2g}'):,.0f}"
     made = both(f"rate = rospy.Rate({hz})", f"ros::Rate rate({hz})")
     hint = f"call rate.sleep(), with parentheses, in every iteration; {made}"
     if slips and slips[0].kind == "sleep-outside":
-        hint = "move it into that loop, as the last line of it"
+        hint = slips[0].fix
     return failed(
         f"{params.topic} runs at about {about} Hz instead of {hz} Hz: the loop does not sleep{where}",
         hint=hint,
-        citations=tuple(FileCitation(file=s.file, line=s.line) for s in slips[:3]),
+        citations=tuple(s.place for s in slips[:3]),
     )
 
 
@@ -228,12 +227,7 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
         return slow
     slip = next((s for one in callers for s in slips_of(package, run, one, "spin-in-loop")), None)
     if slip is not None:
-        cited = (FileCitation(file=slip.file, line=slip.line),)
-        return failed(
-            f"{message}: {slip.message}",
-            hint="remove spin(): the loop keeps the node alive",
-            citations=cited,
-        )
+        return failed(f"{message}: {slip.message}", hint=slip.fix, citations=(slip.place,))
     hint = f"publish in a loop `{LOOP}`, not a fixed number of times"
     return failed(message, hint=hint).once()
 

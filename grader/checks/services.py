@@ -21,7 +21,6 @@ from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import (
     EvidenceCitation,
-    FileCitation,
     Verdict,
     failed,
     inconclusive,
@@ -257,8 +256,7 @@ def not_offered(package: PackageFacts, run: Run, service: str) -> Verdict:
         return absent
     if (slip := why_unreached(package, run)) and not found:
         hint = f"write {service_call(service, '…, callback')} where the script comes to: before the loop or {SPIN}"
-        verdict = failed(f"no node offers {service}: {slip.message}", hint=hint)
-        return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
+        return failed(f"no node offers {service}: {slip.message}", hint=hint, citations=(slip.place,))
     others = f"; it offers {join_words(found)}" if found else ""
     hint = f"add {service_call(service, '…, callback')} before the loop or {SPIN}"
     return failed(f"no node offers {service}{others}", hint=hint)

@@ -97,10 +97,8 @@ def _points(package: PackageFacts) -> Iterator[tuple[FileCitation, str]]:
             yield FileCitation(file=file.path), text
     for slip in package.slips:
         if slip.kind == "misspelt" and not is_product(slip.file):
-            yield (
-                FileCitation(file=slip.file, line=slip.line),
-                f"{slip.file}, line {slip.line}: {slip.message}",
-            )
+            text = f"{slip.file}, line {slip.line}: `{slip.name}` is not defined anywhere: {slip.message}"
+            yield slip.place, text
     for launch in package.launch_files:
         if launch.fault is not None:
             why = launch.fault.cause or launch.fault.message
@@ -250,8 +248,8 @@ class Later:
         if len(numbers) == 1 and abs(float(numbers[0].message) - hz) > RATE_SHARE * hz:
             yield f"make it {significant(hz)} Hz in {_line(numbers[0])}, which asks for {numbers[0].message} Hz"
         for slip in self._of("not-called"):
-            if "sleep" in slip.message:
-                yield f"in {_line(slip)}, {slip.message.partition(': ')[2]}"
+            if "sleep" in slip.name:
+                yield f"in {_line(slip)}, {slip.fix}"
 
     def _node_name(self) -> Iterator[str]:
         own, names = self._of("node-name"), list(texts_in(self._wanted.get("names")))

@@ -265,6 +265,7 @@ SlipKind = Literal[
     "outside-method",
     "undefined",
     "no-effect",
+    "compared",
     "publishes",
     "prints",
 ]
@@ -273,11 +274,15 @@ SlipKind = Literal[
 class PythonSlip(Record):
     """What is remarkable in a Python file that compiles, most of it slips that show only when the node runs.
 
+    `message` says what is wrong in that line, `fix` what to do where that is always the same, and `name` is the
+    function or variable that both speak of. Of a kind that is no slip, `message` is what is written there: a name, a
+    number or a text.
+
     `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and nodes
     get none. `misspelt`: a name that the file does not define, beside one that it does. `no-clock`: it publishes and
     counts, and nothing in what it sends tells the time, but at most the value that it counts on from: a slip only
     where its messages are to tell it. `rate-parameter` and `rate-number`: no slip, but a loop or a timer whose rate
-    is a parameter, `message` its name as written, or a number, `message` in Hz. `reset-value` and `reset-limit`:
+    is a parameter or a number, in Hz. `reset-value` and `reset-limit`:
     where a counter goes back, to the number `message`, or when it reaches it. `never-called`: a function that makes a
     node, publishes or waits, which nothing names; `main-guard`: `__name__` beside another word than `__main__`.
     `never-reached`: an endless loop before the first `publish(…)`; `spin-in-loop`: a loop that publishes and waits in
@@ -285,19 +290,26 @@ class PythonSlip(Record):
     it or around it. `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it is to
     be named, that takes another number of values than ROS has for it, or that is not there. `queue-size`: one that is
     a text, with which rospy sends nothing. `clock-value`: the values of the topic `message` are read from
-    a clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C, and behind `: ` how to repair it.
+    a clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C.
     `outside-method`: a call in a class that stands in none of its methods and uses a name that is not there.
-    `undefined`: why a name has no value where it is read, and behind `: ` what to do; `no-effect`: a statement such as
-    `++i` or `i == 0`, likewise. `publishes` and `prints`: no slips, but a text that is published or printed, `{}` for a
+    `undefined`: why a name has no value where it is read. `no-effect` and `compared`: a statement such as `++i`, or
+    `i == 0`. `publishes` and `prints`: no slips, but a text that is published or printed, `{}` for a
     value in it and `{data}` for that of a message.
-    `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a topic; `message` is
-    the name as written. `publisher-type` and `subscriber-type`: the message type in that line.
+    `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a topic.
+    `publisher-type` and `subscriber-type`: the message type in that line.
     """
 
     file: str
     line: int
     kind: SlipKind
     message: str
+    fix: str = ""
+    name: str = ""
+
+    @property
+    def place(self) -> FileCitation:
+        """The line."""
+        return FileCitation(file=self.file, line=self.line)
 
 
 class LaunchLine(Record):

@@ -125,6 +125,8 @@ class _RawSlip(Record):
     line: int
     kind: SlipKind
     message: str
+    fix: str = ""
+    name: str = ""
 
 
 class _RawEntry(Record):
@@ -145,7 +147,14 @@ def read_syntax_report(output: bytes | str) -> SyntaxReport:
         if entry.faults:
             faults[file] = _fault(file, entry.faults[0])
         slips += [
-            PythonSlip(file=file, line=slip.line, kind=slip.kind, message=printable(slip.message))
+            PythonSlip(
+                file=file,
+                line=slip.line,
+                kind=slip.kind,
+                message=printable(slip.message),
+                fix=printable(slip.fix),
+                name=printable(slip.name),
+            )
             for slip in entry.slips
         ]
     return SyntaxReport(checked=tuple(checked), faults=faults, slips=tuple(slips))

@@ -56,14 +56,12 @@ LOGS = {
     "scenario": "talker",
     "requires": ["node"],
 }
-UNDEFINED = (
-    "nothing in the file gives `countmsg` a value: above line 3, create the message: `countmsg = Int32()`"
-)
+UNDEFINED = {"name": "countmsg", "fix": "above line 3, create the message: `countmsg = Int32()`"}
 ROOT = {"requires": []}
 
 
-def slip(kind: str, message: str, line: int = 5) -> dict[str, Any]:
-    return {"file": FILE, "line": line, "kind": kind, "message": message}
+def slip(kind: str, message: str, line: int = 5, **said: str) -> dict[str, Any]:
+    return {"file": FILE, "line": line, "kind": kind, "message": message, **said}
 
 
 def hint_of(
@@ -81,22 +79,22 @@ def hint_of(
 TALKER = [NODE | ROOT, CHATTER, RATE, MESSAGE]
 CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str, Any]], str]] = {
     "rate behind an undefined name": (
-        "node", DIES, TALKER, [slip("undefined", UNDEFINED, 3), slip("rate-number", "2", 4)],
+        "node", DIES, TALKER, [slip("undefined", "", 3, **UNDEFINED), slip("rate-number", "2", 4)],
         f"above line 3, create the message: `countmsg = Int32()`; then make it 10 Hz in line 4 of {FILE}"),
     "text behind an undefined name": (
         "node", DIES, TALKER, [slip("publishes", "my words {}")],
         f'; then publish `"hello world %s" % rospy.get_time()` in line 5 of {FILE}, not \'my words <value>\''),
     "a second undefined name": (
-        "node", DIES, TALKER, [slip("undefined", "`math` is not imported: write `import math` at the top")],
+        "node", DIES, TALKER, [slip("undefined", "", name="math", fix="write `import math` at the top")],
         "; then write `import math` at the top"),
     "a name in Python 2 behind it": (
-        "node", DIES, TALKER, [slip("undefined", "nothing in the file gives `null` a value: above line 5, …")],
+        "node", DIES, TALKER, [slip("undefined", "", name="null", fix="above line 5, …")],
         "; then in line 5, write `None` for `null`"),
     "a message type that is not imported": (
-        "node", DIES, TALKER, [slip("undefined", "nothing in the file gives `Twist` a value: define <package>")],
+        "node", DIES, TALKER, [slip("undefined", "", name="Twist", fix="define <package>")],
         "; then write `from geometry_msgs.msg import Twist` at the top"),
     "rate.sleep without brackets behind it": (
-        "node", DIES, TALKER, [slip("not-called", "`rate.sleep` is named but not called: write `rate.sleep()`")],
+        "node", DIES, TALKER, [slip("not-called", "", name="rate.sleep", fix="write `rate.sleep()`")],
         f"; then in line 5 of {FILE}, write `rate.sleep()`"),
     "a count where the time belongs": (
         "node", DIES, TALKER, [slip("publishes", "hello world {}"), slip("no-clock", "the script counts")],
@@ -179,7 +177,7 @@ def test_what_a_machine_lacks_does_not_hide_what_is_the_students() -> None:
 
 
 def test_a_name_in_an_except_is_not_reached() -> None:
-    wrong = slip("misspelt", "`rospi` is not defined anywhere: did you mean `rospy`?", 2)
+    wrong = slip("misspelt", "", 2, name="rospi", fix="write rospy instead of rospi")
     sources = {"except": "try:\nexcept rospi.ROSInterruptException:\n", "plain": "x = 1\nrospi.spin()\n"}
     hints = {name: hint_of("node", DIES, TALKER, wrong, source=text) for name, text in sources.items()}
     assert "rospi" not in hints["except"]

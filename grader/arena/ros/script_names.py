@@ -37,6 +37,12 @@ def dotted(node):
     return ".".join(reversed(parts))[:TEXT_LIMIT]
 
 
+def slip(line, kind, message, fix="", name=""):
+    """Return what `PythonSlip` (grader/model/package.py) says of a line of the script."""
+    texts = {"message": message, "fix": fix, "name": name}
+    return {"line": line, "kind": kind, **{key: text[:TEXT_LIMIT] for key, text in texts.items()}}
+
+
 # ---- where ROS is told a name
 
 NAMED = {"init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber"}
@@ -52,10 +58,10 @@ def graph_names(tree):
             continue
         names = node.args[:1] or [k.value for k in node.keywords if k.arg == "name"]
         if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
-            yield {"line": names[0].lineno, "kind": kind, "message": names[0].value[:TEXT_LIMIT]}
+            yield slip(names[0].lineno, kind, names[0].value)
             name = published_type(node)
             if name.isidentifier() and kind != "node-name":
-                yield {"line": names[0].lineno, "kind": kind + "-type", "message": name}
+                yield slip(names[0].lineno, kind + "-type", name)
 
 
 def published_type(call):
@@ -87,18 +93,17 @@ def misspelt(tree):
     outside = {id(n) for n in outside_methods(tree)}
     unbound = unbound_names(tree, known)
     for node in names:
-        kind, message = "", ""
         if id(node) in outside and (node.id == "self" or node.id not in known):
             message = "line %d stands in the class and in none of its methods, so it runs before them"
-            kind, message = "outside-method", message % node.lineno
+            fix = "indent line %d like the lines of the method above it, or delete it" % node.lineno
+            yield slip(node.lineno, "outside-method", message % node.lineno, fix=fix)
         elif node.id not in known and (near := spelt_alike(node.id, own, attributes)):
-            message = "`%s` is not defined anywhere: did you mean `%s`?"
-            kind, message = "misspelt", message % (node.id[:TEXT_LIMIT], near[:TEXT_LIMIT])
+            fix = "write %s instead of %s" % (near, node.id)
+            yield slip(node.lineno, "misspelt", "did you mean %s?" % near, fix=fix, name=node.id)
         elif id(node) in unbound:
-            told = undefined(node, tree) if node.id not in known else known_elsewhere(node.id, tree)
-            kind, message = "undefined", told
-        if message:
-            yield {"line": node.lineno, "kind": kind, "message": message}
+            message, fix = undefined(node, tree) if node.id not in known else known_elsewhere(node, tree)
+            if message:
+                yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
 
 
 def spelt_alike(name, own, attributes):
@@ -193,42 +198,43 @@ MODULES = {
 
 
 def undefined(node, tree):
-    """Return why a name is not there that the file gives no value anywhere, and behind `: ` what to do."""
-    name, line = node.id[:TEXT_LIMIT], node.lineno
-    why = "nothing in the file gives `%s` a value: " % name
+    """Return why a name is not there that the file gives no value anywhere, and what to do."""
+    name, line = node.id, node.lineno
+    why = "nothing in the file gives `%s` a value" % name
     uses = [n for n in ast.walk(tree) if node in (getattr(n, "value", None), getattr(n, "func", None))]
     used = uses[0] if uses else None
     if name in ALIASES or (name in MODULES and isinstance(used, ast.Attribute)):
-        return "`%s` is not imported: write `import %s` at the top" % (name, ALIASES.get(name, name))
+        return "`%s` is not imported" % name, "write `import %s` at the top" % ALIASES.get(name, name)
     if name[:1].isupper():
         how = "above line %d, define %s or import it (a message: `from <package>.msg import %s`)"
-        return why + how % (line, name, name)
+        return why, how % (line, name, name)
     if isinstance(used, ast.Call):
-        return why + "above line %d, define it with `def %s(…):`, or import it" % (line, name)
+        return why, "above line %d, define it with `def %s(…):`, or import it" % (line, name)
     types = {published_type(n) for n in ast.walk(tree) if called_name(n) == "Publisher"} - {""}
     sent = [n for n in ast.walk(tree) if is_call(n, "publish") and node in n.args]
     if sent or (isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)):
         kind = types.pop() if len(types) == 1 else "<Type>"
-        return why + "above line %d, create the message: `%s = %s()`" % (line, name, kind)
-    return why + "above line %d, write `%s = …`, with the value that it is to have" % (line, name)
+        return why, "above line %d, create the message: `%s = %s()`" % (line, name, kind)
+    return why, "above line %d, write `%s = …`, with the value that it is to have" % (line, name)
 
 
-def known_elsewhere(name, tree):
-    """Return why a name is not there that only a function or a class has, and behind `: ` what to do; "" where none
-    has it."""
+def known_elsewhere(node, tree):
+    """Return why a name is not there that only a function or a class has, and what to do; "" where none has it."""
+    name = node.id
     for one in ast.walk(tree):
         if isinstance(one, ast.ClassDef) and name in bound_names(one):
-            return "`{0}` belongs to the class {1}: write `self.{0}` for `{0}`".format(name, one.name)
+            fix = "in line %d, write `self.%s` for `%s`" % (node.lineno, name, name)
+            return "`%s` belongs to the class %s" % (name, one.name), fix
     for one in ast.walk(tree):
         if isinstance(one, ast.FunctionDef) and name in bound_names(one):
             imports = [n for n in ast.walk(one) if isinstance(n, (ast.Import, ast.ImportFrom))]
-            where = "`%s` has a value only in `%s(…)`: " % (name, one.name[:TEXT_LIMIT])
+            where = "`%s` has a value only in `%s(…)`" % (name, one.name)
             if any(name in (a.asname, a.name) for n in imports for a in n.names):
-                return where + "move its import to the top of the file"
+                return where, "move its import to the top of the file"
             if name in {arg.arg for arg in ast.walk(one.args) if isinstance(arg, ast.arg)}:
-                return where + "keep it there in another variable, which is `global` or belongs to `self`"
-            return where + "below line %d, write `global %s`" % (one.lineno, name)
-    return ""
+                return where, "keep it there in another variable, which is `global` or belongs to `self`"
+            return where, "below line %d, write `global %s`" % (one.lineno, name)
+    return "", ""
 
 
 # ---- texts that are published and printed
@@ -262,7 +268,7 @@ def said_texts(tree):
 
 def said(kind, node, text):
     if text and text != VALUE and len(text) <= TEXT_LIMIT:
-        yield {"line": node.lineno, "kind": kind, "message": text}
+        yield slip(node.lineno, kind, text)
 
 
 class Texts:

@@ -10,7 +10,7 @@ import sys
 
 # `-I` leaves this folder out
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
-from script_names import TEXT_LIMIT, called_name, dotted, graph_names, is_call, misspelt, said_texts
+from script_names import TEXT_LIMIT, called_name, dotted, graph_names, is_call, misspelt, said_texts, slip
 
 SLIPS_LIMIT = 100
 """Of a file."""
@@ -36,12 +36,12 @@ def slips(tree):
     for node in ast.walk(tree):
         name = uncalled(node, functions)
         if name:
-            message = "`%s` is named but not called: write `%s()`" % (name, name)
-            found.append({"line": node.lineno, "kind": "not-called", "message": message})
+            message, fix = "`%s` is named but not called" % name, "write `%s()`" % name
+            found.append(slip(node.lineno, "not-called", message, fix=fix, name=name))
         name = asked(node, functions)
         if name:
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
-            found.append({"line": node.lineno, "kind": "input", "message": message})
+            found.append(slip(node.lineno, "input", message))
     finders = (misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops)
     for find in (
         *finders,
@@ -59,8 +59,8 @@ def slips(tree):
         message = "" if knows_time(tree) else "the script counts, and reads no clock"
         message = message or sends_no_time(tree)
         if message:
-            found.append({"line": published.lineno, "kind": "no-clock", "message": message})
-    return sorted(found, key=lambda slip: slip["line"])[:SLIPS_LIMIT]
+            found.append(slip(published.lineno, "no-clock", message))
+    return sorted(found, key=lambda one: one["line"])[:SLIPS_LIMIT]
 
 
 def loop_rates(tree):
@@ -89,10 +89,10 @@ def loop_rates(tree):
             value = given(value.args[0])
         name, number = read_parameter(value) if timed == "Rate" else None, constant(value, given)
         if name:
-            yield {"line": value.lineno, "kind": "rate-parameter", "message": name[:TEXT_LIMIT]}
+            yield slip(value.lineno, "rate-parameter", name)
         elif number:
             hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
-            yield {"line": value.lineno, "kind": "rate-number", "message": hz}
+            yield slip(value.lineno, "rate-number", hz)
 
 
 def never_run(tree):
@@ -107,8 +107,8 @@ def never_run(tree):
                 is_call(inner, work) for inner in ast.walk(node) for work in ("init_node", "publish", "spin")
             )
             if works and not node.name.startswith("__"):
-                message = "nothing calls `%s()`" % node.name[:TEXT_LIMIT]
-                yield {"line": node.lineno, "kind": "never-called", "message": message}
+                message = "nothing calls `%s()`" % node.name
+                yield slip(node.lineno, "never-called", message, name=node.name)
         elif isinstance(node, ast.Compare) and isinstance(node.left, ast.Name) and node.left.id == "__name__":
             word = node.comparators[0]
             if (
@@ -116,8 +116,7 @@ def never_run(tree):
                 and isinstance(node.ops[0], (ast.Eq, ast.Is))
                 and word.value != "__main__"
             ):
-                message = "`__name__` is never %r" % (word.value,)
-                yield {"line": node.lineno, "kind": "main-guard", "message": message[:TEXT_LIMIT]}
+                yield slip(node.lineno, "main-guard", "`__name__` is never %r" % (word.value,))
 
 
 MAKES = ("Publisher", "Subscriber", "Service")
@@ -153,7 +152,7 @@ def never_reached(tree):
                     what = "spin()" if spins else "loop"
                     message = "the %s in line %d never ends, so the %s(…) in line %d is never reached"
                     message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
-                    yield {"line": loop.lineno, "kind": "never-reached", "message": message}
+                    yield slip(loop.lineno, "never-reached", message)
 
 
 def stopped_loops(tree):
@@ -165,12 +164,14 @@ def stopped_loops(tree):
         spin = next((n for n in inside if is_call(n, "spin")), None)
         if spin is not None:
             message = "the loop stops at the spin() in line %d, which waits until the node ends" % spin.lineno
-            yield {"line": spin.lineno, "kind": "spin-in-loop", "message": message}
+            fix = "remove spin(): the loop keeps the node alive"
+            yield slip(spin.lineno, "spin-in-loop", message, fix=fix)
         left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None)
         if left is not None:
             word = "break" if isinstance(left, ast.Break) else "return"
             message = "the loop ends the first time around, at the %s in line %d" % (word, left.lineno)
-            yield {"line": left.lineno, "kind": "loop-left", "message": message}
+            fix = "remove it from line %d, or put it inside an `if`" % left.lineno
+            yield slip(left.lineno, "loop-left", message, fix=fix)
 
 
 WAITS = ("sleep", "spin", "spin_once", "wait_for_message", "wait_for_service", "wait", "join", "input")
@@ -193,7 +194,8 @@ def sleepless_loops(tree):
             continue
         name = dotted(outside[0].func) or "sleep"
         message = "`%s()` is outside the loop of line %d" % (name, loop.lineno)
-        yield {"line": outside[0].lineno, "kind": "sleep-outside", "message": message}
+        fix = "move it into that loop, as the last line of it"
+        yield slip(outside[0].lineno, "sleep-outside", message, fix=fix, name=name)
 
 
 def is_endless(loop):
@@ -227,8 +229,8 @@ def callbacks(tree):
             and len(node.args) == place
             and all(k.arg for k in node.keywords)
         ):
-            message = "`Subscriber(…)` gets no callback: write the function's name as its third value"
-            yield {"line": node.lineno, "kind": "callback-missing", "message": message}
+            fix = "write the function's name as its third value"
+            yield slip(node.lineno, "callback-missing", "`Subscriber(…)` gets no callback", fix=fix)
         values += any(k.arg == "callback_args" for k in node.keywords) or len(node.args) > place + 1
         for one in given[:1]:
             called = isinstance(one, ast.Call)
@@ -236,13 +238,14 @@ def callbacks(tree):
             own = functions.get(dotted(meant).rpartition(".")[2])
             least, most = takes(own, isinstance(meant, ast.Attribute)) if own else (values, values)
             if own and called and least:
-                message = "`{0}()` is called here: write `{0}`, without brackets".format(dotted(meant))
-                yield {"line": one.lineno, "kind": "callback-called", "message": message}
+                message, fix = "`%s()` is called here", "write `%s`, without brackets"
+                name = dotted(meant)
+                yield slip(one.lineno, "callback-called", message % name, fix=fix % name, name=name)
             elif own and not called and not least <= values <= most:
                 what = {"Service": "the request", "Timer": "the event"}.get(name, "the message")
-                message = "`%s` takes %d arguments, but ROS passes it %s"
-                message %= (own.name[:TEXT_LIMIT], least, what)
-                yield {"line": own.lineno, "kind": "callback-values", "message": message}
+                message = "`%s` takes %d arguments, but ROS passes it %s" % (own.name, least, what)
+                fix = "write `def {0}(msg):`, or `def {0}(self, msg):` in a class".format(own.name)
+                yield slip(own.lineno, "callback-values", message, fix=fix, name=own.name)
 
 
 def queue_sizes(tree):
@@ -255,8 +258,8 @@ def queue_sizes(tree):
                 and isinstance(one.value.value, str)
             ):
                 size = one.value.value[:TEXT_LIMIT]
-                message = "`queue_size` is a text: write `queue_size=%s`, without quotes" % (size or "10")
-                yield {"line": one.value.lineno, "kind": "queue-size", "message": message}
+                fix = "write `queue_size=%s`, without quotes" % (size or "10")
+                yield slip(one.value.lineno, "queue-size", "`queue_size` is a text", fix=fix)
 
 
 def takes(function, bound):
@@ -302,9 +305,9 @@ def resets(tree):
             asked = test if value is not None else []
         for part in asked:
             if whole(part) is not None:
-                yield {"line": part.lineno, "kind": "reset-limit", "message": "%d" % whole(part)}
+                yield slip(part.lineno, "reset-limit", "%d" % whole(part))
         if value is not None:
-            yield {"line": value.lineno, "kind": "reset-value", "message": "%d" % whole(value)}
+            yield slip(value.lineno, "reset-value", "%d" % whole(value))
 
 
 def whole(node):
@@ -381,7 +384,7 @@ def clock_values(tree):
         found = source.reached(node.args)
         name = named[0].value if len(named) == 1 and isinstance(named[0], ast.Constant) else None
         if found.clock and not found.counts and not found.unknown and isinstance(name, str):
-            yield {"line": node.lineno, "kind": "clock-value", "message": name[:TEXT_LIMIT]}
+            yield slip(node.lineno, "clock-value", name)
 
 
 class Source:
@@ -476,23 +479,21 @@ def deaf_loops(tree):
         wakes = any(is_call(n, "sleep") and dotted(n.func) != "time.sleep" for n in inside)
         asks = "ask `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
         for handler in caught[:1]:
-            message = (
-                "the `except` in line %d catches what Ctrl-C raises, and the loop in line %d goes on: %s"
-            )
-            catching.append((loop.lineno, message % (handler.lineno, loop.lineno, asks)))
+            message = "the `except` in line %d catches what Ctrl-C raises, and the loop in line %d goes on"
+            message %= (handler.lineno, loop.lineno)
+            catching.append(slip(loop.lineno, "deaf", message, fix=asks))
         if not caught and not wakes:
             known = isinstance(loop, ast.While) and isinstance(loop.test, ast.Constant)
-            message = "the loop in line %d never asks whether the node is to end: %s" % (loop.lineno, asks)
-            (endless if known else others).append((loop.lineno, message))
-    off = "`disable_signals=True` in line %d keeps Ctrl-C from rospy: leave it out"
-    taken = "line %d gives Ctrl-C another meaning: delete it"
+            message = "the loop in line %d never asks whether the node is to end" % loop.lineno
+            (endless if known else others).append(slip(loop.lineno, "deaf", message, fix=asks))
     for node in ast.walk(tree):
         if is_call(node, "init_node") and any(k.arg == "disable_signals" for k in node.keywords):
-            yield {"line": node.lineno, "kind": "deaf", "message": off % node.lineno}
+            message = "`disable_signals=True` in line %d keeps Ctrl-C from rospy" % node.lineno
+            yield slip(node.lineno, "deaf", message, fix="leave it out")
         if is_call(node, "signal") and node.args and dotted(node.args[0]).endswith("SIGINT"):
-            yield {"line": node.lineno, "kind": "deaf", "message": taken % node.lineno}
-    for line, message in catching or endless or others:
-        yield {"line": line, "kind": "deaf", "message": message}
+            message = "line %d gives Ctrl-C another meaning" % node.lineno
+            yield slip(node.lineno, "deaf", message, fix="delete it")
+    yield from catching or endless or others
 
 
 def is_counted_for(loop):
@@ -544,16 +545,16 @@ def without_effect(tree):
             same = type(value.op) is type(value.operand.op) and isinstance(value.op, (ast.UAdd, ast.USub))
             name, sign = dotted(value.operand.operand), "+" if isinstance(value.op, ast.UAdd) else "-"
             if same and "..." not in name:
-                message = "`{1}{1}{0}` changes nothing in Python: write `{0} {1}= 1`".format(name, sign)
-                yield {"line": node.lineno, "kind": "no-effect", "message": message}
+                message = "`%s%s` changes nothing in Python" % (2 * sign, name)
+                yield slip(node.lineno, "no-effect", message, fix="write `%s %s= 1`" % (name, sign))
         elif isinstance(value, ast.BinOp) and isinstance(value.op, (ast.Add, ast.Sub)):
             name, sign = dotted(value.left), "+" if isinstance(value.op, ast.Add) else "-"
             if "..." not in name and isinstance(value.right, ast.Constant):
-                message = "`{0} {1} {2!r}` alone changes nothing: write `{0} {1}= {2!r}`"
-                message = message.format(name, sign, value.right.value)
-                yield {"line": node.lineno, "kind": "no-effect", "message": message[:TEXT_LIMIT]}
+                parts = (name, sign, value.right.value)
+                message, fix = "`%s %s %r` alone changes nothing" % parts, "write `%s %s= %r`" % parts
+                yield slip(node.lineno, "no-effect", message, fix=fix)
         elif isinstance(value, ast.Compare) and isinstance(value.ops[0], ast.Eq):
             name = dotted(value.left)
             if "..." not in name:
-                message = "`%s ==` compares and gives no value: write `%s =`" % (name, name)
-                yield {"line": node.lineno, "kind": "no-effect", "message": message}
+                message = "`%s ==` compares and gives no value" % name
+                yield slip(node.lineno, "compared", message, fix="write `%s =`" % name)

@@ -16,9 +16,9 @@ from grader.checks.support.processes import PublishedTopic, lives, observed_unti
 from grader.checks.support.text import loop_rate
 from grader.checks.support.topics import losses, whole_until_ns
 from grader.evidence.run import Channel, Run, once_for_each_run
-from grader.model.package import PackageFacts, PythonSlip
+from grader.model.package import PackageFacts, PythonSlip, SlipKind
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import plural, significant
 
 FLOOD_FACTOR, FLOOD_HZ = 3, 500
@@ -248,18 +248,16 @@ def judge_wraps(
 
 
 def cite_no_effect(
-    verdict: Verdict, count: Count, run: Run, package: PackageFacts, does: str = "changes nothing"
+    verdict: Verdict, count: Count, run: Run, package: PackageFacts, kind: SlipKind = "no-effect"
 ) -> Verdict:
     """Return the verdict; one that is lost with the line of the node's script that was to change the counter."""
-    slips = slips_of(package, run, count.callerid, "no-effect")
-    slip = next((one for one in slips if does in one.message), None)
+    slip = next(iter(slips_of(package, run, count.callerid, kind)), None)
     if slip is None or not verdict.status.is_lost:
         return verdict
-    why, _, fix = slip.message.rpartition(": ")
-    message = f"{verdict.message}; {slip.file}, line {slip.line}: {why}"
-    cited = (FileCitation(file=slip.file, line=slip.line), *verdict.citations)
-    update = {"message": message, "hint": f"{fix} in line {slip.line} of {slip.file}", "citations": cited}
-    return verdict.model_copy(update=update)
+    message = f"{verdict.message}; {slip.file}, line {slip.line}: {slip.message}"
+    hint = f"{slip.fix} in line {slip.line} of {slip.file}"
+    cited = (slip.place, *verdict.citations)
+    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
 
 
 class Turns(NamedTuple):
@@ -321,12 +319,11 @@ def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], pa
         return verdict
     does = "" if wrong_value else f" compares it with {slip.message}"
     message = f"{verdict.message} ({slip.file}, line {slip.line}{does})"
-    cited = (FileCitation(file=slip.file, line=slip.line),)
     right = params.minimum if wrong_value else params.maximum
     hint = f"in line {slip.line}, write {right} instead of {slip.message}"
     if not wrong_value:
         hint = f"let it count up to {right} there: `if counter > {right}`, or `% {right + 1}`, in line {slip.line}"
-    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+    return verdict.model_copy(update={"message": message, "hint": hint, "citations": (slip.place,)})
 
 
 def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Literal["program", "flood", "lost"]:

@@ -52,7 +52,6 @@ _COMMAND = re.compile(r"Command '(?:\[')?(.+?)(?:'\])?' returned non-zero exit s
 _CALLED = re.compile(r"'(\w+)' object is not callable")
 _WANTS_NUMBER = re.compile(r"(?:real number|a number) is required, not (\w+)|must be real number, not (\w+)")
 NO_MODULE = re.compile(r"No module named '(\w+)'$")
-_UNIMPORTED = re.compile(r"`(\w+)` is not imported: write `import \1` at the top")
 _KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
 _IN_MODULE = re.compile(r"No module named '(\w+\.(?:msg|srv))\.(\w+)'")
 _FROM_PACKAGE = re.compile(r"cannot import name '(\w+)' from '(\w+)'")
@@ -490,7 +489,7 @@ def unimported_module(found: Traceback, package: PackageFacts) -> str:
     """Return a module that the script which imports one that is not there uses, and does not import; "" for none."""
     file = found.own_frames[-1].file if found.own_frames else ""
     slips = (s for s in package.slips if s.kind == "undefined" and file.endswith(f"/{s.file}"))
-    return next((name[1] for s in slips if (name := _UNIMPORTED.match(s.message))), "")
+    return next((s.name for s in slips if s.fix == f"write `import {s.name}` at the top"), "")
 
 
 def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:

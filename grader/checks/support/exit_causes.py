@@ -114,7 +114,6 @@ _ADDED = re.compile(
 )
 _NAME = re.compile(r"name '(\w+)' is not defined")
 _BY_PYTHON = re.compile(r"\. Did you mean: '(\w+)'\?$")
-_MEANT = re.compile(r"`(\w+)` is not defined anywhere: did you mean `([\w.]+)`\?$")
 
 
 def syntax_hint(fault: Fault) -> str:
@@ -200,15 +199,9 @@ def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     if not slips:
         return None
     slip = min(slips, key=lambda one: kinds.index(one.kind))
-    called = re.search(r"`(.+)`", slip.message)
-    hint = f"write {MAIN}"
-    if slip.kind == "loop-left":
-        hint = f"remove it from line {slip.line}, or put it inside an `if`"
-    elif called and slip.kind == "never-called":
-        hint = f"call {called[1]} at the end of the script, below {MAIN}"
+    called = f"call {slip.name}() at the end of the script, below {MAIN}" if slip.name else f"write {MAIN}"
     cause = f"its script ran to the end: {slip.message} ({slip.file}, line {slip.line})"
-    place = FileCitation(file=slip.file, line=slip.line)
-    return Ending(cause, hint, (place,), by_itself=True)
+    return Ending(cause, slip.fix or called, (slip.place,), by_itself=True)
 
 
 def explain_error(package: PackageFacts, run: Run) -> Ending | None:
@@ -295,8 +288,8 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     if (guess := _BY_PYTHON.search(said)) and (hasattr(builtins, guess[1]) or "did you mean" in cause):
         said = said.removesuffix(guess[0])
     if found.kind == "TypeError" and (wrong := _callback(found, place, package)):
-        place = place or FileCitation(file=wrong.file, line=wrong.line)
-        cause, hint = wrong.message, _callback_hint(wrong)
+        place = place or wrong.place
+        cause, hint = wrong.message, wrong.fix
     elif place is not None and found.kind == "TypeError":
         cause, hint = _operand(found) or (cause, hint)
     where = f" ({place.file}, line {place.line})" if place else ""
@@ -359,10 +352,7 @@ def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> t
     name = _NAME.search(found.message)
     slips = [s for s in package.slips if s.file == place.file]
     if outside := next((s for s in slips if (s.line, s.kind) == (place.line, "outside-method")), None):
-        return (
-            outside.message,
-            f"indent line {place.line} like the lines of the method above it, or delete it",
-        )
+        return outside.message, outside.fix
     meant = [one for one in map(name_slip, slips) if one is not None]
     here = next((one for one in meant if name and (one.line, one.name) == (place.line, name[1])), None)
     if here is None:
@@ -383,21 +373,18 @@ class NameSlip(NamedTuple):
 
 def name_slip(slip: PythonSlip) -> NameSlip | None:
     """Return what a slip says of a name that is not there; None of any other slip."""
-    if slip.kind == "misspelt" and (meant := _MEANT.match(slip.message)):
-        fix = f"in line {slip.line}, write {meant[2]} instead of {meant[1]}"
-        return NameSlip(meant[1], slip.line, f"did you mean {meant[2]}?", fix)
-    if slip.kind != "undefined" or (name := re.search(r"`(\w+)`", slip.message)) is None:
+    name, why, fix = slip.name, slip.message, slip.fix
+    if slip.kind == "misspelt":
+        return NameSlip(name, slip.line, why, f"in line {slip.line}, {fix}")
+    if slip.kind != "undefined":
         return None
-    if known := SLIPS.get(f"name '{name[1]}' is not defined"):
-        return NameSlip(name[1], slip.line, known[0], f"in line {slip.line}, {known[1]}")
-    why, _, fix = slip.message.partition(": ")
-    having = [package for package, types in noetic_messages().items() if name[1] in types]
-    if name[1][:1].isupper() and having and "<package>" in fix:
-        lines = join_words([f"`from {package}.msg import {name[1]}`" for package in having], "or")
-        why, fix = f"{name[1]} is not imported", f"write {lines} at the top"
-    return NameSlip(
-        name[1], slip.line, why, fix.replace("write `self.", f"in line {slip.line}, write `self.")
-    )
+    if known := SLIPS.get(f"name '{name}' is not defined"):
+        return NameSlip(name, slip.line, known[0], f"in line {slip.line}, {known[1]}")
+    having = [package for package, types in noetic_messages().items() if name in types]
+    if name[:1].isupper() and having and "<package>" in fix:
+        lines = join_words([f"`from {package}.msg import {name}`" for package in having], "or")
+        why, fix = f"{name} is not imported", f"write {lines} at the top"
+    return NameSlip(name, slip.line, why, fix)
 
 
 def _callback(found: Traceback, place: FileCitation | None, package: PackageFacts) -> PythonSlip | None:
@@ -406,15 +393,8 @@ def _callback(found: Traceback, place: FileCitation | None, package: PackageFact
     here = next((s for s in called if place and (s.file, s.line) == (place.file, place.line)), None)
     match = _ARITY.match(found.message)
     name = match[1].rpartition(".")[2] if match else ""
-    taken = (s for s in package.slips if s.kind == "callback-values" and s.message.startswith(f"`{name}` "))
+    taken = (s for s in package.slips if s.kind == "callback-values" and s.name == name)
     return here or (next(taken, None) if name and not found.own_frames else None)
-
-
-def _callback_hint(slip: PythonSlip) -> str:
-    if slip.kind == "callback-called":
-        return slip.message.partition(": ")[2]
-    name = slip.message.split("`")[1]
-    return f"write `def {name}(msg):`, or `def {name}(self, msg):` in a class"
 
 
 def _operand(found: Traceback) -> tuple[str, str] | None:

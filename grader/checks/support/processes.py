@@ -137,11 +137,7 @@ def named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tupl
     scripts = {one.start.script for one in lives(run)}
     said = [s for s in package.slips if s.kind == kind and s.file in scripts]
     last = name.rpartition("/")[2]
-    found = {
-        FileCitation(file=s.file, line=s.line)
-        for s in said
-        if s.message.rpartition("/")[2].lstrip("~") == last
-    }
+    found = {s.place for s in said if s.message.rpartition("/")[2].lstrip("~") == last}
     return tuple(found) if len(found) == 1 else ()
 
 

@@ -145,7 +145,7 @@ def _not_advertised(package: PackageFacts, run: Run, topic: str, of_node: Callab
     measured = join_words(published) or "no topic"
     if slip := why_unreached(package, run):
         verdict = of_node(f"{what}: {slip.message}", measured=measured, hint=_reach_hint(slip))
-        return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
+        return verdict.about(citations=(slip.place,))
     hint = f"add {publisher(topic)} and publish in the loop"
     if not published:
         return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
@@ -165,9 +165,8 @@ def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Calla
     if end := explain_error(package, run):
         return end.verdict(of_node, f"{message}: an error comes first: {end.cause}", measured="no message")
     if slip := why_unreached(package, run) or run_slip(package, run, "queue-size"):
-        cause, _, fix = slip.message.partition(": ")
-        verdict = of_node(f"{message}: {cause}", measured="no message", hint=fix or _reach_hint(slip))
-        return verdict.about(citations=(FileCitation(file=slip.file, line=slip.line),))
+        verdict = of_node(f"{message}: {slip.message}", measured="no message", hint=_reach_hint(slip))
+        return verdict.about(citations=(slip.place,))
     if deaf := unheard(run):
         verdict = of_node(f"{message}: {deaf.message}", measured="no message", hint=deaf.hint)
         return verdict.model_copy(update={"cause": deaf.message})
@@ -252,9 +251,7 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
 def _reach_hint(slip: PythonSlip) -> str:
     if slip.kind == "never-called":
         return f"call it, or move its lines to where they run: line {slip.line}"
-    if slip.kind == "spin-in-loop":
-        return "remove spin(): the loop keeps the node alive"
-    return f"publish inside the loop `{LOOP}`, not after a loop that never ends"
+    return slip.fix or f"publish inside the loop `{LOOP}`, not after a loop that never ends"
 
 
 def sent_by(run: Run, topic: str, of: Sender) -> tuple[Channel, ...]:
