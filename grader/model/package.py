@@ -263,6 +263,7 @@ SlipKind = Literal[
     "subscriber",
     "subscriber-type",
     "outside-method",
+    "object",
     "undefined",
     "no-effect",
     "compared",
@@ -292,6 +293,7 @@ class PythonSlip(Record):
     a text, with which rospy sends nothing. `clock-value`: the values of the topic `message` are read from
     a clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C.
     `outside-method`: a call in a class that stands in none of its methods and uses a name that is not there.
+    `object`: why an object of a class lacks an attribute where it is read, or that the class stands in its place.
     `undefined`: why a name has no value where it is read. `no-effect` and `compared`: a statement such as `++i`, or
     `i == 0`. `publishes` and `prints`: no slips, but a text that is published or printed, `{}` for a
     value in it and `{data}` for that of a message.

@@ -67,6 +67,7 @@ ROSPY = frozenset(NAMES_OF_ROSPY.split())
 GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "logerr")
 LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
 CALLED = frozenset({"is_shutdown", "sleep", "spin"})
+TAKE_FUNCTIONS = {"Subscriber", "Timer", "Service", "on_shutdown", "signal"}
 ROLES = {
     "Publisher": "publisher",
     "Subscriber": "subscriber",
@@ -350,22 +351,27 @@ def _is_callable(node: ast.expr, own: set[str]) -> bool:
 
 
 def _with_callbacks(text: str) -> Iterator[Step]:
-    """`Subscriber('x', String, on_x())` calls the function, which takes a message, instead of naming it."""
+    """`Subscriber('x', String, on_x())` calls the function instead of naming it: one that takes a message, or that
+    gives nothing back."""
     tree, lines = ast.parse(text), text.split("\n")
-    own = {n.name: n.args for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+    own = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
     called = []
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and _last(node.func) in {"Subscriber", "Timer", "Service"}:
-            given = [*node.args[1:3], *(k.value for k in node.keywords if k.arg in {"callback", "handler"})]
+        if isinstance(node, ast.Call) and _last(node.func) in TAKE_FUNCTIONS:
+            given = [*node.args[:3], *(k.value for k in node.keywords if k.arg in {"callback", "handler"})]
             calls = (n for n in given if isinstance(n, ast.Call) and not n.args and not n.keywords)
-            called += [
-                n for n in calls if (args := own.get(_last(n.func))) and len(args.args) > len(args.defaults)
-            ]
+            called += [n for n in calls if (one := own.get(_last(n.func))) and _is_callback(one)]
     spans = [(span, ast.unparse(n.func)) for n in called if (span := _span(lines, n))]
     if spans:
         after = _edit(text, [(*span, name) for span, name in spans])
         words = ", ".join(dict.fromkeys(name for _, name in spans))
         yield from _step("callback", min(span for span, _ in spans)[0] + 1, text, after, words)
+
+
+def _is_callback(function: ast.FunctionDef) -> bool:
+    returns = (n.value for n in ast.walk(function) if isinstance(n, ast.Return | ast.Yield))
+    given = [a for a in function.args.args if a.arg != "self"]
+    return len(given) > len(function.args.defaults) or not any(returns)
 
 
 def _with_main(text: str) -> Iterator[Step]:

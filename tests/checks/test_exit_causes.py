@@ -15,6 +15,12 @@ class Talker:
         self.pub = rospy.Publisher('chatter', String)
     def run():
         pub.publish('a')
+    def stay(self):
+        self.rate.sleep()
+Talker.stay()
+rospy.on_shutdown(leave())
+def leave():
+    print('over')
 """
 
 
@@ -67,6 +73,12 @@ class Talker:
          "write that name in front of it: `pub.publish(…)`"),
         (6, "publish(3)", "NameError: name 'publish' is not defined",
          "write that name in front of it: `pub.publish(…)`"),
+        (8, "self.rate.sleep()", "AttributeError: 'Talker' object has no attribute 'rate'",
+         "in `__init__`, write `self.rate = …`, with the value that it is to have"),
+        (9, "Talker.stay()", "TypeError: Talker.stay() missing 1 required positional argument: 'self'",
+         "in line 9, write `Talker().stay()`"),
+        (10, "rospy.on_shutdown(leave())", "TypeError: shutdown hook [None] must be a function or callable object",
+         "write `leave`, without brackets"),
         (6, "hear()", "TypeError: hear() missing 1 required positional argument: 'msg'",
          "put 'msg' into its brackets, or remove the call: ROS calls a callback by itself"),
         (6, "text = text + str(3)", "TypeError: 'str' object is not callable", "give the variable `str` another name"),

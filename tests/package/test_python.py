@@ -156,7 +156,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("main-guard", 5, "`__name__` is never 'main'")]),
         (node("    rospy.spin()\n") + "if __name__ != '__main__':\n    pass\nmain()\n", []),
         (node("    rospy.spin()\n") + "threading.Thread(target=main)\n", []),
-        ("class A:\n    def __init__(self):\n        init('a')\n    def go(self):\n        self.p.publish(1)\nA()\n",
+        ("class A:\n    def __init__(self):\n        self.p = 1\n    def go(self):\n        self.p.publish(1)\nA()\n",
          [("never-called", 4, "nothing calls `go()`")]),
         (node("    while True:\n        pass\n    p.publish(1)\n") + CALLED,
          [("never-reached", 4, "the loop in line 4 never ends")]),

@@ -89,3 +89,39 @@ def test_a_statement_that_changes_nothing(tmp_path, code, fix):
     (tmp_path / "a.py").write_text(f"i = 0\n{code}\n")
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in ("no-effect", "compared")]
     assert [(s.line, s.fix) for s in slips] == ([(2, fix)] if fix else [])
+
+
+PAIR = "    def go(self):\n        self.pub.publish(1)\n"
+MADE = "    def __init__(self):\n        self.pub = 1\n"
+OBJECTS = {
+    "good": (f"class A:\n{MADE}{PAIR}a = A()\na.go()\nA.go(a)\n", ""),
+    "inherited": (f"class A(B):\n{PAIR}A().go()\n", ""),
+    "class-level": (f"class A:\n    pub = 1\n{PAIR}A().go()\n", ""),
+    "from-outside": (f"class A:\n{PAIR}a = A()\na.pub = 1\na.go()\n", ""),
+    "single-underscores": (f"class A:\n{MADE.replace('__', '_')}{PAIR}A().go()\n",
+                           "in line 2, write `__init__` for `_init_`"),
+    "int": (f"class A:\n{MADE.replace('init', 'int')}{PAIR}A().go()\n",
+            "in line 2, write `__init__` for `__int__`"),
+    "init": (f"class A:\n{MADE.replace('__', '')}{PAIR}A().go()\n", "in line 2, write `__init__` for `init`"),
+    "init-called": (f"class A:\n{MADE.replace('__', '')}{PAIR}a = A()\na.init()\na.go()\n", ""),
+    "init-outside": (f"class A:\n{PAIR}def __init__(self):\n    self.pub = 1\n",
+                     "indent `def __init__` in line 4 like the other methods of A, and its lines below it"),
+    "without-self": (f"class A:\n{MADE.replace('self.pub', 'pub')}{PAIR}", "in line 3, write `self.pub` for `pub`"),
+    "spelt-otherwise": (f"class A:\n{MADE}{PAIR.replace('pub.', 'pubs.')}",
+                        "in line 5, write `self.pub` for `self.pubs`"),
+    "other-method": (f"class A:\n{MADE.replace('__init__', 'setup')}{PAIR}",
+                     "give `self.pub` its value in `__init__`, or call `self.setup(…)` there"),
+    "nowhere": (f"class A:\n{PAIR}", "in `__init__`, write `self.pub = …`, with the value that it is to have"),
+    "class": (f"class A:\n{MADE}{PAIR}A.go()\n", "in line 6, write `A().go()`"),
+    "class-named": (f"class A:\n{MADE}{PAIR}a = A\na.go()\n", "in line 6, write `a = A()`"),
+    "class-with-values": (f"class A:\n{MADE.replace('self)', 'self, n)')}{PAIR}A.go()\n",
+                          "in line 6, write `A(…).go()`"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", OBJECTS)
+def test_an_object_that_lacks_an_attribute_or_was_never_made(tmp_path, case):
+    code, fix = OBJECTS[case]
+    (tmp_path / "a.py").write_text(code)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "object"]
+    assert [s.fix for s in slips] == ([fix] if fix else [])

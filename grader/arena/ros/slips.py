@@ -10,7 +10,17 @@ import sys
 
 # `-I` leaves this folder out
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
-from script_names import TEXT_LIMIT, called_name, dotted, graph_names, is_call, misspelt, said_texts, slip
+from script_names import (
+    TEXT_LIMIT,
+    called_name,
+    dotted,
+    graph_names,
+    is_call,
+    misspelt,
+    object_slips,
+    said_texts,
+    slip,
+)
 
 SLIPS_LIMIT = 100
 """Of a file."""
@@ -48,6 +58,7 @@ def slips(tree):
         callbacks,
         queue_sizes,
         graph_names,
+        object_slips,
         said_texts,
         deaf_loops,
         clock_values,
@@ -208,7 +219,13 @@ def is_endless(loop):
     return asks and not any(isinstance(n, (ast.Break, ast.Return, ast.Raise)) for n in ast.walk(loop))
 
 
-CALLBACKS = {"Subscriber": ("callback", 2, 1), "Timer": ("callback", 1, 1), "Service": ("handler", 2, 1)}
+CALLBACKS = {
+    "Subscriber": ("callback", 2, 1),
+    "Timer": ("callback", 1, 1),
+    "Service": ("handler", 2, 1),
+    "on_shutdown": ("h", 0, 0),
+    "signal": ("handler", 1, 2),
+}
 """What takes a function: the argument's name, its place, and with how many values ROS calls it."""
 
 
@@ -237,15 +254,24 @@ def callbacks(tree):
             meant = one.func if called else one
             own = functions.get(dotted(meant).rpartition(".")[2])
             least, most = takes(own, isinstance(meant, ast.Attribute)) if own else (values, values)
-            if own and called and least:
+            if own and called and (least or not gives_value(own)):
                 message, fix = "`%s()` is called here", "write `%s`, without brackets"
                 name = dotted(meant)
                 yield slip(one.lineno, "callback-called", message % name, fix=fix % name, name=name)
             elif own and not called and not least <= values <= most:
-                what = {"Service": "the request", "Timer": "the event"}.get(name, "the message")
+                what = {
+                    "Service": "the request",
+                    "Timer": "the event",
+                    "on_shutdown": "nothing",
+                    "signal": "the signal's number and a frame",
+                }.get(name, "the message")
                 message = "`%s` takes %d arguments, but ROS passes it %s" % (own.name, least, what)
                 fix = "write `def {0}(msg):`, or `def {0}(self, msg):` in a class".format(own.name)
                 yield slip(own.lineno, "callback-values", message, fix=fix, name=own.name)
+
+
+def gives_value(function):
+    return any(isinstance(n, (ast.Return, ast.Yield)) and n.value is not None for n in ast.walk(function))
 
 
 def queue_sizes(tree):

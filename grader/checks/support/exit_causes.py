@@ -301,6 +301,13 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
     """Return the cause and the hint of an error that other lines of the file explain."""
     if found.kind == "NameError":
         return _misspelt(found, place, package)
+    if found.kind == "AttributeError" or "missing 1 required positional argument: 'self'" in found.message:
+        here = (
+            s
+            for s in package.slips
+            if s.kind == "object" and s.place == FileCitation(file=place.file, line=place.line)
+        )
+        return next(((s.message, s.fix) for s in here if re.search(rf"\b{s.name}\b", found.message)), None)
     if found.kind == "ROSInitException" and (advice := _late_init(place, package)):
         return CAUSES[found.kind][0], advice
     return None
