@@ -119,14 +119,14 @@ def grade(
         with Results(out / submission.id) as results:
             recording = None
             if isinstance(submission, RecordedSubmission):
-                runs, criteria = copy_and_judge(submission, rubric, results.evidence, progress)
+                runs, judgement = copy_and_judge(submission, rubric, results.evidence, progress)
             else:
                 job = recording_job(submission, rubric, results.evidence, options, progress)
-                recording, (runs, criteria) = record_and_judge(job, keep_hidden=options.keep_hidden)
+                recording, (runs, judgement) = record_and_judge(job, keep_hidden=options.keep_hidden)
             result = assemble_result(
                 context.submission,
                 rubric,
-                criteria,
+                judgement.criteria,
                 runs=runs,
                 environment=environment_info(*(recording.labels if recording else ())),
                 timing=clock.timing(recording),
@@ -254,7 +254,7 @@ def record_and_judge(job: Job, *, keep_hidden: bool) -> tuple[Recording, Judged]
     with make_recorder(job) as recorder:
         record_all(job, recorder)
         judged = judge_recorded(recorder, job.evidence, job.rubric)
-        if record_other_runs(job, recorder, judged[0]):
+        if record_other_runs(job, recorder, judged):
             judged = judge_folder(job.evidence, job.rubric)
     return recorder.recording, judged
 

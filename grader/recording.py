@@ -19,14 +19,11 @@ from typing import TYPE_CHECKING, TypeAlias
 from grader.errors import HostError
 from grader.evidence.run import Run
 from grader.files import make_folder
-from grader.installable import ON_THE_MACHINE
-from grader.judging.judge import judge, judge_all_runs
+from grader.judging.judge import Judgement, judge_all_runs
 from grader.judging.repeats_and_repairs import REPAIRS, was_built
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
-from grader.model.result import CriterionResult
 from grader.model.submission import Submission
-from grader.model.verdict import Status
 from grader.package import read_packages
 from grader.ros_env import why_nodes_cannot_run
 from grader.ros_packages import look_for
@@ -38,7 +35,7 @@ from grader.wording import join_words
 if TYPE_CHECKING:
     from grader.arena.interruption import Stop
     from grader.arena.recorder import Recorder
-    from grader.arena.static_recorder import Recording, StaticRecorder
+    from grader.arena.static_recorder import StaticRecorder
     from grader.model import SandboxMode
 
 LATER = ("grader.evidence.decode", "grader.evidence.reader")
@@ -46,8 +43,8 @@ LATER = ("grader.evidence.decode", "grader.evidence.reader")
 imported when it begins, and what judges or reports recordings when it is called."""
 ROS_TYPES = "rosbags.typesys.stores.ros1_noetic"
 
-Judged: TypeAlias = tuple[dict[str, Run], tuple[CriterionResult, ...]]
-"""The runs by scenario, and the criteria judged by them, in the rubric's order."""
+Judged: TypeAlias = tuple[dict[str, Run], Judgement]
+"""The runs by scenario, and what was judged by them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +149,7 @@ def judge_folder(evidence: Path, rubric: LoadedRubric) -> Judged:
     from grader.evidence.reader import load_evidence  # noqa: PLC0415 - see LATER
 
     runs = load_evidence([evidence])
-    return runs, judge(rubric.rubric, runs, rubric.checks, rubric.handed_out)
+    return runs, judge_all_runs(rubric.rubric, runs, rubric.checks, rubric.handed_out)
 
 
 def judge_recorded(recorder: Recorder | StaticRecorder, evidence: Path, rubric: LoadedRubric) -> Judged:
@@ -160,25 +157,18 @@ def judge_recorded(recorder: Recorder | StaticRecorder, evidence: Path, rubric: 
     recorded again, alone, at most `RETRIES` times."""
     from grader.arena.static_recorder import RETRIES  # noqa: PLC0415 - see LATER
 
-    runs, criteria = judge_folder(evidence, rubric)
+    runs, judged = judge_folder(evidence, rubric)
     for _ in range(RETRIES):
-        again = inconclusive_scenarios(criteria, recorder.recording)
+        again = judged.undecided & {path.stem for path in recorder.recording.files}
         if not again:
             break
-        recorder.record_again(again)
-        runs, criteria = judge_folder(evidence, rubric)
-    return runs, criteria
+        recorder.record_again(sorted(again))
+        runs, judged = judge_folder(evidence, rubric)
+    return runs, judged
 
 
-def inconclusive_scenarios(criteria: tuple[CriterionResult, ...], recording: Recording) -> list[str]:
-    """Return the scenarios that were run and left a criterion inconclusive."""
-    recorded = {path.stem for path in recording.files}
-    late = (c for c in criteria if c.status is Status.INCONCLUSIVE and not c.hint.startswith(ON_THE_MACHINE))
-    return sorted({c.scenario for c in late if c.scenario is not None} & recorded)
-
-
-def record_other_runs(job: Job, recorder: Recorder | StaticRecorder, runs: dict[str, Run]) -> bool:
-    """Record what a lost mark needs besides the first runs, and return whether there was anything.
+def record_other_runs(job: Job, recorder: Recorder | StaticRecorder, judged: Judged) -> bool:
+    """Record what a lost mark needs besides the first runs, which were `judged`, and return whether there was anything.
 
     A run whose timing could have cost the mark is repeated. Where a mechanical repair could be the reason for the loss,
     a repaired copy is run.
@@ -187,12 +177,15 @@ def record_other_runs(job: Job, recorder: Recorder | StaticRecorder, runs: dict[
         return False
     from grader import repaired_copy as copies  # noqa: PLC0415 - only a lost mark needs it
 
-    rubric = job.rubric.rubric
-    judged = judge_all_runs(rubric, runs, job.rubric.checks)
+    runs, judgement = judged
     repairs, scenarios = copies.choose_repairs(
-        job.submission, recorder.recording.facts, rubric, judged.criteria, built=was_built(runs)
+        job.submission,
+        recorder.recording.facts,
+        job.rubric.rubric,
+        judgement.criteria,
+        built=was_built(runs),
     )
-    doubtful = sorted(judged.doubtful - set(scenarios))
+    doubtful = sorted(judgement.doubtful - set(scenarios))
     if doubtful:
         recorder.repeat(doubtful, job.evidence / copies.REPEATED)
     if not repairs:

@@ -28,7 +28,16 @@ from grader.evidence.events import CATKIN_MAKE, STOPPED
 from grader.evidence.run import Run
 from grader.model.package import Executable, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import (
+    FileCitation,
+    Status,
+    Verdict,
+    failed,
+    inconclusive,
+    machine_lacks,
+    passed,
+    unjudged,
+)
 from grader.untrusted_text import without_colours
 from grader.wording import join_words, seconds
 
@@ -155,7 +164,7 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
     place = error.place if error else None
     line = f"{place.file}:{place.line}: " if error and place and error.kind == "cmake" else ""
     explained = package.manifest is None or (error is not None and error.kind == "cmake")
-    kind = inconclusive if told and told.of_machine else unjudged if explained else failed
+    kind = machine_lacks if told and told.of_machine else unjudged if explained else failed
     verdict = kind(
         f"catkin_make failed: {line}{told.why}" if told else "catkin_make failed without naming an error",
         expected=EXPECTED,

@@ -16,7 +16,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, inconclusive, partial, passed, unjudged
+from grader.model.verdict import Status, Verdict, inconclusive, machine_lacks, partial, passed, unjudged
 from grader.wording import plural, shorten, significant
 
 SHOWN, LINE_CHARS = 4, 200
@@ -205,7 +205,7 @@ def _with_cause(verdict: Verdict, dead: Life, run: Run, package: PackageFacts) -
     end = explain_end(dead, run, package)
     message = f"{verdict.message}; {dead.name} ended by itself after {lifetime_text(dead)}: {end.cause}"
     if end.of_machine:
-        return inconclusive(message, hint=end.hint)
+        return machine_lacks(message, hint=end.hint)
     about = {"message": message, "hint": end.hint, "citations": end.citations, "cause": end.cause}
     return verdict.model_copy(update=about)
 

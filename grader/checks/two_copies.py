@@ -31,7 +31,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, machine_lacks, partial, passed, unjudged
 from grader.wording import join_words, plural, seconds
 
 SAME_NAME = "new node registered with same name"
@@ -165,7 +165,7 @@ def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | No
     cited = end.citations or (cite(run, "/grader/process", one.start_ns, one.end_ns),)
     if len(gone) > 1:
         message = f"both copies ended by themselves: {end.cause}"
-        return (inconclusive if end.of_machine else unjudged)(message, hint=end.hint, citations=cited)
+        return (machine_lacks if end.of_machine else unjudged)(message, hint=end.hint, citations=cited)
     message = f"the {word} copy ended by itself after {lifetime_text(one)}, while the other kept running: {end.cause}"
     if word == "second":
         hint = (

@@ -51,7 +51,7 @@ from grader.checks.support.text import (
 )
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
-from grader.installable import NOTHING_TO_DO, ON_THE_MACHINE
+from grader.installable import NOTHING_TO_DO
 from grader.judging.facts import Facts
 from grader.model.package import LaunchFile, PackageFacts, PythonSlip
 from grader.model.result import CriterionResult
@@ -150,8 +150,11 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
     for criterion in rubric.criteria:
         verdict = verdicts[criterion.id]
         package = facts.package_of(criterion)
-        lacking = verdict.status is Status.INCONCLUSIVE and verdict.hint.startswith(ON_THE_MACHINE)
-        if package is None or criterion.visibility != "visible" or not (verdict.status.is_lost or lacking):
+        if (
+            package is None
+            or criterion.visibility != "visible"
+            or not (verdict.status.is_lost or verdict.of_machine)
+        ):
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
         if verdict.blocked_by and criterion.check == "launch-runs":
@@ -164,7 +167,7 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
             file := find_launch(package, str(criterion.parameters["launch"]))
         ):
             told += unset_arg_fixes(file, verdict.hint)
-        elif verdict.unjudged or lacking or criterion.check in OF_TOPICS:
+        elif verdict.unjudged or verdict.of_machine or criterion.check in OF_TOPICS:
             told += Later(criterion, verdict, package, facts).faults()
     return {name: _with_later(verdict, later.get(name, ())) for name, verdict in verdicts.items()}
 
@@ -190,7 +193,7 @@ def _with_later(verdict: Verdict, later: Iterable[str]) -> Verdict:
     ]
     if not told or not verdict.hint:
         return verdict
-    if verdict.hint.startswith(ON_THE_MACHINE):
+    if verdict.of_machine:
         hint = f"{join_words(told)}. {verdict.hint.replace(NOTHING_TO_DO, 'For the rest, ', 1)}"
         return verdict.model_copy(update={"hint": hint})
     return verdict.model_copy(update={"hint": f"{verdict.hint}; then {join_words(told)}"})

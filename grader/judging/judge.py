@@ -72,10 +72,13 @@ def judge(
 
 
 class Judgement(NamedTuple):
-    """The criteria in the rubric's order, and the scenarios whose losses one run's timing could have made."""
+    """The criteria in the rubric's order."""
 
     criteria: tuple[CriterionResult, ...]
     doubtful: frozenset[str]
+    """The scenarios whose losses one run's timing could have made."""
+    undecided: frozenset[str]
+    """The scenarios that left a criterion inconclusive, for no lack of the machine's."""
 
 
 def judge_all_runs(
@@ -118,7 +121,9 @@ def judge_all_runs(
     if package is not None:
         results = tuple(name_unchanged_files(result, rubric, package, handed_out) for result in results)
         results = add_advice(results, package, rubric)
-    return Judgement(leave_out(rubric, results), doubtful)
+    late = {i for i, v in shown.items() if v.status is Status.INCONCLUSIVE and not v.of_machine}
+    undecided = frozenset(c.scenario for c in rubric.criteria if c.id in late and c.scenario)
+    return Judgement(leave_out(rubric, results), doubtful, undecided)
 
 
 def judge_facts(rubric: Rubric, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> dict[str, Verdict]:

@@ -80,7 +80,8 @@ class Verdict(Record):
     `score` is the share of the points, 0 to 1. `unjudged` marks a verdict that rests on the absence of evidence: the
     judge turns it into `blocked` where a required criterion explains the absence; `unbuilt`: what is absent is made
     by the build alone; `silent`: a process was there and alive, and only something that is absent explains it.
-    `timing` marks a loss that one run's timing could have made: it counts only if it is seen twice. `cause` is what a
+    `timing` marks a loss that one run's timing could have made: it counts only if it is seen twice. `of_machine`: it is
+    open until the machine has what it lacks, and grading again before changes nothing. `cause` is what a
     process ended of, in words that are the same in every verdict that rests on it. `blocked_by` is the criterion that
     explains the absence.
     """
@@ -96,6 +97,7 @@ class Verdict(Record):
     unbuilt: bool = False
     silent: bool = False
     timing: bool = False
+    of_machine: bool = False
     cause: str = ""
     blocked_by: str = ""
 
@@ -175,6 +177,14 @@ def inconclusive(
         hint=hint,
         citations=citations,
     )
+
+
+def machine_lacks(
+    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
+) -> Verdict:
+    """Return a verdict that is open until the grading machine has what it lacks."""
+    verdict = inconclusive(message, expected=expected, measured=measured, hint=hint, citations=citations)
+    return verdict.model_copy(update={"of_machine": True})
 
 
 def _verdict(

@@ -24,7 +24,7 @@ import pytest
 from grader.checks import Evidence, PackageFacts, Run, inconclusive
 from grader.checks.registry import NoSuchScenario, NotRecorded
 from grader.installable import exists_somewhere, install_hint
-from grader.model.verdict import Status
+from grader.model.verdict import Status, machine_lacks
 from grader.rubric.pytest_check import Outcome, SessionOutcome, TestOutcome
 from grader.wording import shorten
 
@@ -252,7 +252,7 @@ def _student_error(answer: Answer, shown: str) -> StudentError:
     module = MISSING_MODULE.fullmatch(str(answer.get("message", "")))
     if answer["raised"] == "ModuleNotFoundError" and module and exists_somewhere(module[1], ()):
         hint = install_hint(module[1], module=True)
-        raise NotRecorded(inconclusive(f"{module[1]} is not installed", hint=hint))
+        raise NotRecorded(machine_lacks(f"{module[1]} is not installed", hint=hint))
     place = f" ({file}:{line})" if file else ""
     message = f"{shown} raises {answer['raised']}: {answer.get('message', '')}{place}"
     base = getattr(builtins, str(answer.get("builtin")), None)

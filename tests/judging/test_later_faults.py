@@ -10,6 +10,7 @@ from grader.checks.support.text import could_say, texts_of_cpp
 from grader.judging import judge
 from grader.judging.annotate import cite_words
 from grader.judging.facts import try_facts
+from grader.judging.judge import Judgement, judge_all_runs
 from grader.model.verdict import FileCitation, partial
 from grader.package.launch import parse_launch_files
 from tests.judging.rubrics import CHATTER, NODE, PACKAGE, RATE, SCENARIO, SCRIPT, rubric
@@ -67,13 +68,20 @@ def slip(kind: str, message: str, line: int = 5, **said: str) -> dict[str, Any]:
 def hint_of(
     name: str, run: dict[str, Any], criteria: list[dict[str, Any]], *slips: dict[str, Any], source: str = ""
 ) -> str:
+    found = judgement_of(run, criteria, *slips, source=source).criteria
+    return next(c.hint for c in found if c.id == name)
+
+
+def judgement_of(
+    run: dict[str, Any], criteria: list[dict[str, Any]], *slips: dict[str, Any], source: str = ""
+) -> Judgement:
     package = {**PACKAGE, "slips": list(slips)}
     runs = {"talker": run, "package": {"attachments": {FILE: source}}}
     scenarios = {
         "talker": {**SCENARIO, "probes": [{"topic": "/chatter", "type": "std_msgs/String", "text": 2}]}
     }
-    found = judge(rubric(*criteria, scenarios=scenarios), build_runs({"runs": runs, "package": package}))
-    return next(c.hint for c in found if c.id == name)
+    recorded = build_runs({"runs": runs, "package": package})
+    return judge_all_runs(rubric(*criteria, scenarios=scenarios), recorded)
 
 
 TALKER = [NODE | ROOT, CHATTER, RATE, MESSAGE]
@@ -174,6 +182,12 @@ def test_what_a_machine_lacks_does_not_hide_what_is_the_students() -> None:
         f"make it 10 Hz in line 5 of {FILE}, which asks for 2 Hz. For the rest, tell your instructor"
     )
     assert hints[1].startswith("nothing for you to do: tell your instructor")
+    assert judgement_of(run, TALKER).undecided == frozenset()
+
+
+def test_what_may_be_decided_by_grading_again_is_known() -> None:
+    short = {"topics": [{"topic": "/chatter", "type": "std_msgs/String", "count": 3}]}
+    assert judgement_of(short, TALKER).undecided == {"talker"}
 
 
 def test_a_name_in_an_except_is_not_reached() -> None:

@@ -28,9 +28,9 @@ from grader.checks.support.scripts import EMPTY, cmake_calls, path_in_package
 from grader.checks.support.text import LOOP, SPIN, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
-from grader.installable import exists_somewhere, install_hint, known_packages, noetic_messages
+from grader.installable import ON_THE_MACHINE, exists_somewhere, install_hint, known_packages, noetic_messages
 from grader.model.package import Fault, PackageFacts, PythonSlip
-from grader.model.verdict import Citations, FileCitation, Verdict, inconclusive
+from grader.model.verdict import Citations, FileCitation, Verdict, machine_lacks
 from grader.syntax_fixes import corrected, without_brace
 from grader.wording import join_words, seconds
 
@@ -154,7 +154,7 @@ class Ending(NamedTuple):
     def verdict(self, kind: Callable[..., Verdict], message: str, measured: str = "") -> Verdict:
         """Return a verdict of this kind (`failed`, `unjudged`) with the ending's hint and citations, or
         `inconclusive` where the machine is at fault."""
-        kind = inconclusive if self.of_machine else kind
+        kind = machine_lacks if self.of_machine else kind
         verdict = kind(message, measured=measured, hint=self.hint, citations=self.citations)
         return verdict.model_copy(update={"cause": self.cause, "unbuilt": self.unbuilt})
 
@@ -275,7 +275,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     if broken := _broken(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""
         cause = f"{shown(found.text)}{where}: raised by a file of this grading machine, {broken}"
-        hint = f"repair the grading machine: {shown(_imported(found)) or 'what is imported'} fails there by itself"
+        hint = f"{ON_THE_MACHINE}repair {shown(_imported(found)) or 'what is imported'}, which fails there by itself"
         return Ending(cause, hint, (place,) if place else (), of_machine=True)
     source = package.file(place.file) if place and found.kind in SYNTAX else None
     if place is not None and source is not None and source.python_fault is not None:

@@ -24,7 +24,7 @@ from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.submission import chmod_hint
-from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, machine_lacks, unjudged
 from grader.untrusted_text import without_colours
 from grader.wording import join_words
 
@@ -313,7 +313,7 @@ class Absence(NamedTuple):
 
     def verdict(self, message: str) -> Verdict:
         """Return the verdict: nothing to judge in the launch file where the script or the machine is at fault."""
-        kind = inconclusive if self.of_machine else unjudged if self.of_script else failed
+        kind = machine_lacks if self.of_machine else unjudged if self.of_script else failed
         verdict = kind(message, hint=self.hint, citations=self.citations)
         return verdict.model_copy(update={"unbuilt": self.unbuilt})
 
