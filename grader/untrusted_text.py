@@ -28,7 +28,7 @@ CITATIONS_MAX = 20
 _NAMED = {"\n": "\\n", "\r": "\\r", "\t": "\\t"}
 # `##[error]`, `##vso[…]`, `##teamcity[…]` count anywhere in a line, GitHub's `::error::` at a line's start only.
 _COMMAND = re.compile(r"#(?=#[A-Za-z]{0,20}\[)")
-_COLOUR = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+_COLOUR = re.compile(r"\x1b(?:\[[0-9;]*[A-Za-z]|\][^\x07\x1b]*(?:\x07|\x1b\\))")
 _COMMAND_AT_START = re.compile(r"^((?:[^\S\n]|\x1b\[[0-9;]*m)*):(?=:)", re.MULTILINE)
 
 
@@ -38,7 +38,7 @@ def steers(character: str) -> bool:
 
 
 def without_colours(text: str) -> str:
-    """Return the text without the codes that colour a terminal."""
+    """Return the text without the codes that colour a terminal or name its window."""
     return _COLOUR.sub("", text)
 
 

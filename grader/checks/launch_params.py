@@ -33,7 +33,6 @@ from grader.checks.support.parameters import (
     without_system_params,
 )
 from grader.checks.support.scripts import add_hint, find_script
-from grader.checks.support.text import shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchLoad, LaunchNode, PackageFacts
@@ -164,7 +163,7 @@ def _not_loaded(
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
     if absence := refusal(run):
-        return _refusal_verdict(file, run, params, absence)
+        return _refusal_verdict(file, params, absence)
     loads = [load for load in file.loads if _is_of(load, params)]
     if not loads:
         message = f"{file.path} has no <rosparam> that loads {params.file}"
@@ -187,15 +186,13 @@ def _loaded_otherwise(run: Run, params: LaunchLoadsParams, loads: list[LaunchLoa
     return unjudged(message, hint=f"fix the names in {params.file}")
 
 
-def _refusal_verdict(file: LaunchFile, run: Run, params: LaunchLoadsParams, absence: Absence) -> Verdict:
+def _refusal_verdict(file: LaunchFile, params: LaunchLoadsParams, absence: Absence) -> Verdict:
     """roslaunch starts nothing. Where it found the file and could not read it, the file is at fault."""
     broken = "cannot load its file" in absence.why
     verdict = unjudged if broken else failed
     cited = (FileCitation(file=file.path, line=_line(file, params)),)
-    said = next((c.line for _, c in run.console if "yaml" in c.line.lower() and "XML is" not in c.line), "")
-    return verdict(
-        f"{absence.why}{f': {shown(said)}' if broken and said else ''}", hint=absence.hint, citations=cited
-    )
+    what = f", {params.file}" if broken else ""
+    return verdict(f"{absence.why}{what}", hint=absence.hint, citations=cited)
 
 
 def _is_of(load: LaunchLoad, params: LaunchLoadsParams) -> bool:

@@ -16,6 +16,7 @@ from grader.checks.support.parameters import (
     describe_missing,
     explain_failure,
     explain_yaml,
+    explain_yaml_line,
     is_printed,
     name_in_its_place,
     params_given,
@@ -90,7 +91,7 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
         missing = [name for name in wanted if found.get(name) in (None, {})]
         moved = f"the handout puts it at {params.file}; move it there" if source.path != params.file else ""
         verdict = (
-            _error(run, one, source.path)
+            _error(run, one, source.path, build)
             or (_missing(found, missing, source.path, package, build) if missing else None)
             or passed(
                 f"{source.path} loads and sets {join_words(wanted)}",
@@ -120,13 +121,15 @@ def _no_file(package: PackageFacts, build: Run, path: str, wanted: list[str]) ->
     return failed(f"{path} is not in the package{seen}", hint=hint)
 
 
-def _error(run: Run, one: Life, path: str) -> Verdict | None:
+def _error(run: Run, one: Life, path: str, build: Run) -> Verdict | None:
     """Return what rosparam said where it failed."""
     code = one.end.exit_code if one.end else None
     if code == 0:
         return None
     lines = [line.line for _, line in run.lines(one.name) if line.line.strip()]
     words = explain_yaml(lines)
+    if words is not None and words.line is not None:
+        words = explain_yaml_line(_text_of(build, path), words.line) or words
     if words is not None:
         cited = (FileCitation(file=path, line=words.line),)
         return failed(f"{path} does not load: {words.why}", hint=words.hint, citations=cited)

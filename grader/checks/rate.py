@@ -173,6 +173,8 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     slips = [s for s in told if not scripts or s.file in scripts]
     if not slips and found.mean_hz < FLOOD_HZ and found.is_even:
         return None
+    if not slips and (slip := _asked_flood(found, run, package, params)):
+        return _with_line(_wrong_mean(found, params), slip, params)
     where = f" ({slips[0].file}, line {slips[0].line}: {slips[0].message})" if slips else ""
     hz = significant(params.rate_hz)
     about = f"{float(f'{found.mean_hz:.2g}'):,.0f}"
@@ -185,6 +187,13 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
         hint=hint,
         citations=tuple(s.place for s in slips[:3]),
     )
+
+
+def _asked_flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
+    """Return where the node's script asks for so many messages, or for more than it can send."""
+    asked = _asked_rates(run, package, params)
+    least_hz = max((1 - NUMBER_SHARE) * found.mean_hz, FLOOD_FACTOR * params.rate_hz)
+    return next((slip for slip in asked if float(slip.message) >= least_hz), None)
 
 
 def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:

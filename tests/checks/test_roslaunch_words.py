@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from grader.checks.support.launch import died, finished, is_exact, name_pattern, refusal
-from grader.checks.support.parameters import explain_yaml
+from grader.checks.support.parameters import explain_yaml, explain_yaml_line
 from grader.evidence.run import Run
 from grader.model.package import LaunchNode
 from tests.support.timeline import build_runs
@@ -113,3 +113,22 @@ def test_yaml_words_name_the_last_line() -> None:
     assert words.line == 4
     assert "line 4" in words.why
     assert explain_yaml(["something else"]) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('a:\n  b:"x"  # text\n  c: 1', 'line 2 has no space after its `:`; line 2: write `b: "x"`'),
+        ("a = 3", "line 1 has `=` in place of `:`; line 1: write `a: 3`"),
+        ('a "x y"', 'line 1 has no `:` after its name; line 1: write `a: "x y"`'),
+        ("a\n  b: 3", "line 1 has no `:` after its name; line 1: write `a:`"),
+        ('a: "x', 'line 1 opens " and does not close it; line 1: write `a: "x"`'),
+        ("a: x: y", 'line 1 has a `:` in its value; line 1: write `a: "x: y"`'),
+        ("# a = 3\na: 'x: y'\nb: http://x.y\nc: 12:30\n- d: [1, 2]\ne: it's", ""),
+        ("a: |\n  b = 3", ""),
+        ("a: 3\nb: 4\nc = 5\nd = 6", ""),
+    ],
+)
+def test_the_line_of_a_yaml_file_that_lacks_something(text: str, told: str) -> None:
+    found = explain_yaml_line(text, until=2)
+    assert (f"{found.why}; {found.hint}" if found else "") == told

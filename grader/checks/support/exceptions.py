@@ -50,6 +50,10 @@ _BAD_TOPIC = re.compile(
 )
 _COMMAND = re.compile(r"Command '(?:\[')?(.+?)(?:'\])?' returned non-zero exit status (\d+)")
 _CALLED = re.compile(r"'(\w+)' object is not callable")
+_WHOLE = re.compile(
+    r"\bnot '([A-Z]\w*)'$|^object of type '([A-Z]\w*)'|^type ([A-Z]\w*) doesn't|^'([A-Z]\w*)' object is"
+)
+"""What Python says of a whole message where one of its values is meant."""
 _WANTS_NUMBER = re.compile(r"(?:real number|a number) is required, not (\w+)|must be real number, not (\w+)")
 NO_MODULE = re.compile(r"No module named '(\w+)'$")
 _KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
@@ -195,6 +199,8 @@ def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning
         return meaning
     if "'NoneType' object" in message:
         return _none()
+    if (whole := _WHOLE.search(message)) and (kind := whole[whole.lastindex or 0]) != "NoneType":
+        return f"this is the whole message ({kind})", "take its field: `msg.data`"
     if wanted := _WANTS_NUMBER.search(message):
         kind = wanted[1] or wanted[2]
         hint = "write %s for %d or %f" if "%" in source else "turn the text into a number: `float(…)`"
@@ -282,41 +288,41 @@ def _topic(message: str, source: str) -> Meaning:
         )
     topic, type_ = args[0], args[1]
     callback = next(iter(args[2:]), None)
-    if _is_text(type_) and not _is_text(topic):
-        return "the topic's name comes first, then its type", _rewritten(
+    if is_text(type_) and not is_text(topic):
+        return "the topic's name comes first, then its type", rewritten(
             source, (topic, type_), (type_, topic)
         )
     if callback is not None and re.search(r"<(?:function|bound method) ", message):
-        return "the type comes before the callback", _rewritten(source, (type_, callback), (callback, type_))
+        return "the type comes before the callback", rewritten(source, (type_, callback), (callback, type_))
     return _no_type(message, source, topic, type_)
 
 
-def _is_text(node: ast.expr) -> bool:
+def is_text(node: ast.expr) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, str)
 
 
 def _no_type(message: str, source: str, topic: ast.expr, type_: ast.expr) -> Meaning:
     """Of what stands in the place of the messages' type."""
-    if isinstance(type_, ast.Constant) and _is_text(type_):
-        return "the type is given as a text", _rewritten(
+    if isinstance(type_, ast.Constant) and is_text(type_):
+        return "the type is given as a text", rewritten(
             source, (type_, re.sub(r".*[./]", "", str(type_.value)))
         )
     if isinstance(type_, ast.Call):
-        return f"`{shown(ast.unparse(type_))}` is a message, and no type", _rewritten(
+        return f"`{shown(ast.unparse(type_))}` is a message, and no type", rewritten(
             source, (type_, type_.func)
         )
-    if "topic name" in message and not _is_text(topic):
+    if "topic name" in message and not is_text(topic):
         return "the topic's name is no text", "write the topic's name in quotes"
     hint = "import the type of the messages, as in `from std_msgs.msg import String`"
     return f"`{shown(ast.unparse(type_))}` is no type of messages", hint
 
 
-def _rewritten(source: str, *changes: tuple[ast.expr, ast.expr | str]) -> str:
-    """Return the advice to write the line with other text in these places of it."""
+def rewritten(source: str, *changes: tuple[ast.expr, ast.expr | str], span_to: ast.expr | None = None) -> str:
+    """Return the advice to write the line with other text in these places of it, the first one up to `span_to`."""
     line = source.encode()
     for old, new in sorted(changes, key=lambda change: change[0].col_offset, reverse=True):
         text = new if isinstance(new, str) else ast.get_source_segment(source, new) or ""
-        line = line[: old.col_offset] + text.encode() + line[old.end_col_offset :]
+        line = line[: old.col_offset] + text.encode() + line[(span_to or old).end_col_offset :]
     return f"write `{shown(line.decode())}`"
 
 
@@ -459,7 +465,7 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
     if wrong := _NO_ATTRIBUTE.search(found.message):
         return _other_attributes(package, wrong[1], wrong[2])
     if wrong := re.match(r"(\w+) is not an attribute of (\w+)$", found.message):
-        fields = join_words(_fields_of(package, wrong[2])[:ATTRIBUTES_SHOWN])
+        fields = join_words(fields_of(package, wrong[2])[:ATTRIBUTES_SHOWN])
         return (
             f"{wrong[2]} has {fields}" if fields else "",
             f"leave out `{wrong[1]}=`, or write the field that you mean",
@@ -534,18 +540,20 @@ def _other_types(name: str, package: str) -> tuple[str, str] | None:
 
 def _other_attributes(package: PackageFacts, owner: str, wrong: str) -> tuple[str, str] | None:
     """Return what a message has, or an object of rospy's, in place of an attribute that it has not."""
-    known = ATTRIBUTES.get(owner) or _fields_of(package, owner)
+    known = ATTRIBUTES.get(owner) or fields_of(package, owner)
     if not known:
         return None
     if near := near_names(wrong, known):
         return f"{owner} has {near[0]}", f"write {near[0]} for {wrong}"
     if owner in ATTRIBUTES:
         return None
+    if len(known) == 1 and any(hasattr(kind, wrong) for kind in (str, float, list)):
+        return f"it is the whole message ({owner})", f"write `.{known[0]}.{wrong}` for `.{wrong}`"
     listed = join_words(known[:ATTRIBUTES_SHOWN]) + (", …" if len(known) > ATTRIBUTES_SHOWN else "")
     return f"{owner} has {listed}", f"write the field that you mean for {wrong}"
 
 
-def _fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
+def fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
     """Return the fields of a message type, of the student's own or of ROS's, by the name of its class."""
     for own in (package, *package.also):
         for one in own.interfaces:

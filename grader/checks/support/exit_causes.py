@@ -6,7 +6,7 @@ import ast
 import builtins
 import re
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -17,9 +17,12 @@ from grader.checks.support.exceptions import (
     Frame,
     Traceback,
     explain_exception,
+    fields_of,
+    is_text,
     other_name,
     own_message,
     own_modules,
+    rewritten,
     tracebacks,
     unimported_module,
 )
@@ -92,10 +95,6 @@ SLIPS = {
      "one script is one node: call `rospy.init_node(…)` once"),
     "Inappropriate ioctl for device": ("it reads keys from its terminal, and a node that is started for you has none",
      "leave the keys out: publish in the loop by itself, or read keys in a node of their own"),
-    "not enough arguments for format string": ("the string has more `%` than there are values after it",
-     "give one value for each `%` in the string, or remove one"),
-    "not all arguments converted during string formatting": ("the string has fewer `%` than there are values after it",
-     "put one `%s` for each value into the string"),
     "must be of type bytes or an ascii string": ("the message takes a string but gets something else",
      "publish a string here, `str(…)`; numbers go to the publisher of their own topic"),
     "must be an integer type": ("the message takes a whole number but gets something else",
@@ -291,7 +290,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         place = place or wrong.place
         cause, hint = wrong.message, wrong.fix
     elif place is not None and found.kind == "TypeError":
-        cause, hint = _operand(found) or (cause, hint)
+        cause, hint = _operand(found, package) or (cause, hint)
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(said.rstrip('.'))}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else (), unbuilt=maker is not None)
@@ -350,6 +349,7 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     known = next((known for said, known in SLIPS.items() if said in found.message), None)
     meant = known or other_name(found, package)
     frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
+    meant = meant or _values_of_text(found.message, source)
     return meant or explain_exception(found.kind, found.message, frame.source, frame.marked)
 
 
@@ -404,24 +404,86 @@ def _callback(found: Traceback, place: FileCitation | None, package: PackageFact
     return here or (next(taken, None) if name and not found.own_frames else None)
 
 
-def _operand(found: Traceback) -> tuple[str, str] | None:
+def _operand(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """A text and something else are added: which of both is not a string, where Python marks the place."""
     if not (match := _ADDED.search(found.message)):
         return None
     kind, is_right = (
         (match[1], True) if match[1] else (match[2], False) if match[3] == "str" else (match[3], True)
     )
-    frame = found.own_frames[-1]
-    sides = frame.source[slice(*frame.marked)] if frame.marked else ""
-    with suppress(SyntaxError, ValueError, RecursionError):
-        tree = ast.parse(sides, mode="eval").body
-        if isinstance(tree, ast.BinOp) and isinstance(tree.op, ast.Add):
-            other = shown(ast.unparse(tree.right if is_right else tree.left))
-            return f"{other} is not a string", f"write `str({other})` for `{other}`"
+    other = _other_side(found.own_frames[-1], is_right=is_right)
+    if fields := fields_of(package, kind):
+        value = f"{other or 'msg'}.{fields[0]}"
+        value = value if kind == "String" else f"str({value})"
+        return (
+            f"{other or 'one side'} is the whole message ({kind})",
+            f"write `{value}` for `{other or 'msg'}`",
+        )
+    if other:
+        return f"{other} is not a string", f"write `str({other})` for `{other}`"
     return (
         f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} is not a string",
         "wrap it in `str(…)` before you add it to a string",
     )
+
+
+def _other_side(frame: Frame, *, is_right: bool) -> str:
+    """Return the side of a sum that is no text: of the one that Python marks, or of the line's only one."""
+    source = frame.source[slice(*frame.marked)] if frame.marked else frame.source
+    with suppress(SyntaxError, ValueError, RecursionError):
+        nodes = list(ast.walk(ast.parse(source)))
+        sums = [n for n in nodes if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)]
+        if sums and (frame.marked or len(sums) == 1):
+            return shown(ast.unparse(sums[0].right if is_right else sums[0].left))
+    return ""
+
+
+def _values_of_text(message: str, source: str) -> tuple[str, str] | None:
+    """Of a text with `%`: as many values as it has places, in brackets behind the `%`."""
+    lacks = message == "not enough arguments for format string"
+    if not lacks and message != "not all arguments converted during string formatting":
+        return None
+    there = "more" if lacks else "fewer"
+    why = f"the string has {there} `%` than there are values after it"
+    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        for node in ast.walk(ast.parse(source)):
+            beside = node.args if isinstance(node, ast.Call) else getattr(node, "elts", [])
+            if fix := _values_in_brackets(source, beside) if lacks else _places_added(source, beside):
+                return why, fix
+    fix = "give one value for each `%` in the string, or remove one"
+    return why, fix if lacks else "put one `%s` for each value into the string"
+
+
+def _places_in(node: ast.expr) -> int:
+    """Return how many values a text takes behind its `%`; 0 of all else."""
+    text = node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
+    return len(re.findall(r"%[-+ #0-9.]*[a-zA-Z]", text.replace("%%", "")))
+
+
+def _values_in_brackets(source: str, beside: Sequence[ast.expr]) -> str:
+    """Return the line of `'%s %s' % a, b` with the values in brackets; "" for another line."""
+    for at, one in enumerate(beside):
+        if (
+            isinstance(one, ast.BinOp)
+            and isinstance(one.op, ast.Mod)
+            and not isinstance(one.right, ast.Tuple)
+        ):
+            values = [one.right, *beside[at + 1 :]]
+            if _places_in(one.left) == len(values) > 1:
+                texts = [ast.get_source_segment(source, value) or "" for value in values]
+                return rewritten(source, (values[0], f"({', '.join(texts)})"), span_to=values[-1])
+    return ""
+
+
+def _places_added(source: str, beside: Sequence[ast.expr]) -> str:
+    """Return the line of `loginfo('a', b)` with a place for each value at the end of the text; "" for another line."""
+    first = beside[0] if beside else None
+    text = (ast.get_source_segment(source, first) or "") if first is not None else ""
+    lacking = len(beside) - 1 - (_places_in(first) if first is not None else 0)
+    if first is None or not is_text(first) or lacking < 1 or text[-3:] in ('"""', "'''"):
+        return ""
+    places = " ".join(["%s"] * lacking)
+    return rewritten(source, (first, f"{text[:-1].rstrip()} {places}{text[-1]}"))
 
 
 def _lacking(found: Traceback, package: PackageFacts) -> str:

@@ -491,7 +491,7 @@ def quoted(run: Run) -> str:
 
 def roslaunch_error(run: Run) -> str:
     """Return the first line in which roslaunch, or a node that it started, says what is wrong."""
-    lines = [c.line for _, c in run.console if c.line.strip()]
+    lines = _lines(run)
     found = (line for mark in _ERRORS for line in lines if mark in line)
     return shown(next(found, ""))
 

@@ -269,3 +269,54 @@ def _is_within(lines: Sequence[str]) -> bool:
         if place := _PLACE.search(line):
             return bool(below[PRINTED_INDENT : PRINTED_INDENT + int(place[2]) - 1].strip())
     return False
+
+
+_GOES_ON = ("|", ">", "{", "[", ",")
+"""So ends a line whose value is in the lines below it."""
+_NO_SPACE = re.compile(r"""(?P<key>\s*(?:- )?["']?[A-Za-z_][\w-]*["']?):(?P<value>[^\s:/\\].*)""")
+_NO_COLON = re.compile(r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*)(?:\s*=\s*|\s+)(?P<value>["'\w].*)""")
+_KEY_ALONE = re.compile(r"(?P<key>\s*[A-Za-z_][\w-]*)\s*")
+_OPEN_QUOTE = re.compile(
+    r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*): +(?P<value>(?P<quote>["'])(?:(?!(?P=quote)).)*)"""
+)
+_COLON_INSIDE = re.compile(
+    r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*): +(?P<value>[^\s"'\[{|>&*!#][^"]*:\s[^"]*)"""
+)
+
+
+def explain_yaml_line(text: str, until: int) -> Words | None:
+    """Return what keeps the first lines of a file, up to `until`, from being `name: value`; None where they look right.
+    What YAML's parser names is often a line further down."""
+    lines = text.splitlines()[: min(until, YAML_LINES_MAX)]
+    for number, line in enumerate(lines, start=1):
+        code = re.sub(r"\s+#.*", "", line).rstrip()
+        if not code.strip() or code.lstrip().startswith("#"):
+            continue
+        if code.endswith(_GOES_ON):
+            return None
+        below = next((one for one in lines[number:] if one.strip()), "")
+        if found := _slip_of_line(code, is_above_block=_indent(below) > _indent(code)):
+            why, right = found
+            return Words(f"line {number} {why}", f"line {number}: write `{right}`", number)
+    return None
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip())
+
+
+def _slip_of_line(code: str, *, is_above_block: bool) -> tuple[str, str] | None:
+    """Return what a line of a map lacks, and the line as it should be."""
+    if found := _NO_SPACE.fullmatch(code):
+        return "has no space after its `:`", f"{found['key'].strip()}: {found['value']}"
+    if is_above_block and (found := _KEY_ALONE.fullmatch(code)):
+        return "has no `:` after its name", f"{found['key'].strip()}:"
+    if ":" not in code and (found := _NO_COLON.fullmatch(code)):
+        lacks = "has `=` in place of `:`" if "=" in code else "has no `:` after its name"
+        return lacks, f"{found['key'].strip()}: {found['value']}"
+    if found := _OPEN_QUOTE.fullmatch(code):
+        lacks = f"opens {found['quote']} and does not close it"
+        return lacks, f"{found['key'].strip()}: {found['value']}{found['quote']}"
+    if found := _COLON_INSIDE.fullmatch(code):
+        return "has a `:` in its value", f'{found["key"].strip()}: "{found["value"]}"'
+    return None
