@@ -322,9 +322,8 @@ def _script(package: PackageFacts, build: Run, file: LaunchFile, params: OpensPa
 
 
 def _of_shell(verdict: Verdict) -> Verdict:
-    """Return the executable check's words with the shell's first line."""
-    words = {name: getattr(verdict, name).replace(RIGHT_SHEBANG, SHELL) for name in ("message", "hint")}
-    return verdict.model_copy(update=words)
+    """Return the executable check's verdict with the shell's first line."""
+    return verdict.model_copy(update={"hint": verdict.hint.replace(RIGHT_SHEBANG, SHELL)})
 
 
 def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> Verdict:

@@ -209,6 +209,9 @@ class Shebang(Record):
     found: bool | None
 
 
+ShebangFault = Literal["", "empty-file", "byte-order-mark", "line-end", "other"]
+
+
 class SourceFile(Record):
     """One file of the package. `executable` is None where the source carries no modes.
 
@@ -216,7 +219,8 @@ class SourceFile(Record):
     that file's facts; any other has `link_problem`, size 0 and the digest of its target's text. `python`
     marks files that are Python by name or shebang, `python_fault` those of them that ROS's Python does not
     compile. `shebang_problem` says why the system cannot start a script by its first line ("" where it can,
-    and for files that are no scripts). `sha256` is empty for a file that cannot be read.
+    and for files that are no scripts), and `shebang_fault` whether more than that line is wrong. `sha256` is
+    empty for a file that cannot be read.
     """
 
     path: str
@@ -228,6 +232,7 @@ class SourceFile(Record):
     link_problem: str = ""
     shebang: Shebang | None = None
     shebang_problem: str = ""
+    shebang_fault: ShebangFault = ""
     crlf: bool = False
     bom: bool = False
     encoding: str = "utf-8"

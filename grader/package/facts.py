@@ -21,7 +21,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
 from grader.model.message_definitions import PARTS, parse_interface
-from grader.model.package import Fault, Interface, PackageFacts, PythonSlip, Shebang, SourceFile
+from grader.model.package import Fault, Interface, PackageFacts, PythonSlip, Shebang, ShebangFault, SourceFile
 from grader.model.submission import SourcePackage, Submission
 from grader.package.python import check_syntax
 from grader.package.reading import (
@@ -46,7 +46,6 @@ _BOM = b"\xef\xbb\xbf"
 _EVERYWHERE = frozenset({"awk", "bash", "dash", "env", "perl", "rbash", "sed", "sh"})
 _ENV = frozenset({"/usr/bin/env", "/bin/env"})
 _SPLIT_STRING = re.compile(r"^(-[iv0]*S|--split-string[= ])\s*")
-_ADVICE = "write `#!/usr/bin/env python3`"
 _NO_SHEBANG = re.compile(r"#\s*!?\s*(/usr)?/bin/|#\s+!|!\s*#|/usr/bin/env ")
 
 # The arena provides these names wherever the system keeps its programs.
@@ -142,11 +141,13 @@ def _text_facts(
     binary = b"\0" in data and not utf16
     suffix = PurePosixPath(path).suffix.lower()
     python = suffix == ".py" or is_near_python(data)
-    shebang, problem = read_shebang(data, interpreters)
-    script = suffix in _SCRIPTS or bool(executable) or shebang is not None or python
+    shebang, fault, problem = read_shebang(data, interpreters)
+    if not (suffix in _SCRIPTS or ((executable or shebang is not None or python) and not binary)):
+        fault, problem = "", ""
     return {
         "shebang": shebang,
-        "shebang_problem": problem if script and (not binary or suffix in _SCRIPTS) else "",
+        "shebang_problem": problem,
+        "shebang_fault": fault,
         "crlf": b"\r\n" in data and not binary,
         "bom": data.startswith(_BOM) or utf16,
         "encoding": _encoding(data, python=python),
@@ -180,14 +181,17 @@ def on_system(program: str) -> bool:
     return shutil.which(program, path=SYSTEM_PATH) is not None
 
 
-def read_shebang(data: bytes, interpreters: Interpreters | None = None) -> tuple[Shebang | None, str]:
-    """Return the shebang of a file that begins with `data`, and why the system cannot use it ("" where it can).
+def read_shebang(
+    data: bytes, interpreters: Interpreters | None = None
+) -> tuple[Shebang | None, ShebangFault, str]:
+    """Return the shebang of a file that begins with `data`, and why the system cannot use it ("" where it can): as a
+    kind, and in words.
 
     `interpreters` is asked for absolute paths and names behind `env`; `python` and `python3` are always
     there.
     """
     if not data.startswith(b"#!"):
-        return None, _near(data)
+        return None, *_near(data)
     line = data[: data.find(b"\n")] if b"\n" in data else data
     crlf = line.endswith(b"\r")
     text = line[2 : _LENGTH_LIMIT_BYTES + 1].decode("utf-8", "replace").rstrip("\r").strip(" \t")
@@ -198,17 +202,18 @@ def read_shebang(data: bytes, interpreters: Interpreters | None = None) -> tuple
             f"line 1 ends with Windows' CRLF, and there is no `{interpreter}\\r`: save with LF line endings"
         )
     elif not problem and not found:
-        problem = f"there is no `{program}` on a ROS machine: {_ADVICE}"
-    return Shebang(text=text, interpreter=interpreter, crlf=crlf, found=found), problem
+        problem = f"there is no `{program}` on a ROS machine"
+    fault: ShebangFault = "line-end" if crlf else "other" if problem else ""
+    return Shebang(text=text, interpreter=interpreter, crlf=crlf, found=found), fault, problem
 
 
 def resolve(text: str) -> tuple[str, str, str]:
     """Return what `#!text` comes down to: the interpreter's name, the program to look for, and what is wrong."""
     if not text:
-        return "", "", f"nothing follows `#!`: {_ADVICE}"
+        return "", "", "nothing follows `#!`"
     program, *rest = text.split(None, 1)
     if not program.startswith("/"):
-        return posixpath.basename(program), "", f"`{program}` is not an absolute path: {_ADVICE}"
+        return posixpath.basename(program), "", f"`{program}` is not an absolute path"
     if program not in _ENV:
         return posixpath.basename(program), posixpath.normpath(program), ""
     return _behind_env(rest[0] if rest else "")
@@ -221,7 +226,7 @@ def _behind_env(argument: str) -> tuple[str, str, str]:
     while split and words and (words[0].startswith("-") or "=" in words[0]):
         words = words[1:]
     if not words:
-        return "", "", f"`env` is given no program: {_ADVICE}"
+        return "", "", "`env` is given no program"
     name = posixpath.basename(words[0])
     if not split and len(words) > 1:
         return name, "", f"`env` looks for one program called `{argument}`: keep only `{words[0]}`"
@@ -235,23 +240,26 @@ def _words(text: str) -> list[str]:
         return text.split()
 
 
-def _near(data: bytes) -> str:
-    """Return why a file that does not begin with `#!` has no usable shebang."""
+def _near(data: bytes) -> tuple[ShebangFault, str]:
+    """Return why a file that does not begin with `#!` has no usable shebang, as a kind and in words."""
     lines = data[:_LOOKED_AT_BYTES].splitlines()[:50]
     first = lines[0][:_LENGTH_LIMIT_BYTES].decode("utf-8", "replace").strip() if lines else ""
     later = next((n for n, line in enumerate(lines, 1) if line.strip().startswith(b"#!")), None)
     if not data.strip():
-        return "the file is empty"
+        return "empty-file", "the file is empty"
     if data.startswith(_BOM + b"#!"):
-        return "an invisible byte order mark (BOM) comes before `#!`: save as UTF-8 without BOM"
+        return (
+            "byte-order-mark",
+            "an invisible byte order mark (BOM) comes before `#!`: save as UTF-8 without BOM",
+        )
     if later == 1:
-        return "a space comes before `#!`: it must be the very first thing in the file"
+        return "other", "a space comes before `#!`: it must be the very first thing in the file"
     if _NO_SHEBANG.match(first):
-        return f"line 1 is `{first[:60]}`, which is not a shebang: {_ADVICE}"
+        return "other", f"line 1 is `{first[:60]}`, which is not a shebang"
     if later is None:
-        return f"there is no `#!` line at the top: {_ADVICE}"
+        return "other", "there is no `#!` line at the top"
     before = f"line 1 is `{first[:40]}`" if first else "line 1 is blank"
-    return f"{before} and `#!` comes in line {later}: it must be line 1"
+    return "other", f"{before} and `#!` comes in line {later}: it must be line 1"
 
 
 def is_near_python(data: bytes) -> bool:

@@ -30,8 +30,9 @@ def none_found(_program):
     ],
 )
 def test_usable_shebangs_of_python(text, interpreter):
-    shebang, problem = read_shebang(text.encode() + b"\nimport rospy\n", none_found)
-    assert (shebang.interpreter, shebang.found, shebang.crlf, problem) == (interpreter, True, False, "")
+    shebang, fault, problem = read_shebang(text.encode() + b"\nimport rospy\n", none_found)
+    assert (shebang.interpreter, shebang.found, shebang.crlf) == (interpreter, True, False)
+    assert (fault, problem) == ("", "")
     assert shebang.text == text[2:].strip()
 
 
@@ -51,19 +52,20 @@ def test_usable_shebangs_of_python(text, interpreter):
     ],
 )
 def test_interpreters_that_are_not_there(data, interpreter, problem):
-    shebang, said = read_shebang(data, none_found)
-    assert (shebang.interpreter, shebang.found) == (interpreter, False)
+    shebang, fault, said = read_shebang(data, none_found)
+    assert (shebang.interpreter, shebang.found, fault) == (interpreter, False, "other")
     assert problem in said
 
 
 def test_crlf_spoils_a_good_shebang():
-    shebang, problem = read_shebang(b"#!/usr/bin/env python3\r\nimport rospy\r\n")
+    shebang, fault, problem = read_shebang(b"#!/usr/bin/env python3\r\nimport rospy\r\n")
     assert (shebang.text, shebang.interpreter, shebang.found, shebang.crlf) == (
         "/usr/bin/env python3",
         "python3",
         True,
         True,
     )
+    assert fault == "line-end"
     assert "CRLF" in problem
     assert "python3\\r" in problem
 
@@ -71,9 +73,9 @@ def test_crlf_spoils_a_good_shebang():
 @pytest.mark.parametrize(
     ("data", "problem"),
     [
-        (b"", "the file is empty"),
-        (b"\n\n", "the file is empty"),
-        (b"\xef\xbb\xbf#!/usr/bin/env python\n", "byte order mark"),
+        (b"", "empty-file: the file is empty"),
+        (b"\n\n", "empty-file: the file is empty"),
+        (b"\xef\xbb\xbf#!/usr/bin/env python\n", "byte-order-mark: an invisible byte order mark"),
         (b"\n#!/usr/bin/env python\n", "line 1 is blank and `#!` comes in line 2"),
         (b"# my node\n\n#!/usr/bin/env python\n", "line 1 is `# my node` and `#!` comes in line 3"),
         (b" #!/usr/bin/env python\n", "a space comes before"),
@@ -85,9 +87,9 @@ def test_crlf_spoils_a_good_shebang():
     ],
 )
 def test_why_there_is_no_shebang(data, problem):
-    shebang, said = read_shebang(data)
+    shebang, fault, said = read_shebang(data)
     assert shebang is None
-    assert problem in said
+    assert problem in f"{fault}: {said}"
 
 
 def test_the_machine_is_asked_for_other_programs():

@@ -27,7 +27,7 @@ from grader.checks.support.exceptions import (
     unimported_module,
 )
 from grader.checks.support.processes import Life, early_end, lives
-from grader.checks.support.scripts import EMPTY, cmake_calls, path_in_package
+from grader.checks.support.scripts import cmake_calls, path_in_package
 from grader.checks.support.text import LOOP, SPIN, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
@@ -191,7 +191,7 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
 def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     """Explain a script that comes to its end because nothing calls what it defines, or because its loop is left."""
     script = next((f for f in package.files if f.path == life.start.script), None)
-    if script is not None and script.shebang_problem == EMPTY:
+    if script is not None and script.shebang_fault == "empty-file":
         return Ending("its file is empty", f"write the node in {script.path}", by_itself=True)
     kinds = ("main-guard", "never-called", "loop-left")
     slips = [s for s in package.slips if s.file == life.start.script and s.kind in kinds]

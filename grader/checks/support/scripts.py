@@ -12,7 +12,6 @@ from grader.model.package import CMakeCall, Executable, PackageFacts, SourceFile
 
 PYTHON = "catkin_install_python"
 RIGHT_SHEBANG = "#!/usr/bin/env python3"
-EMPTY = "the file is empty"
 NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
 _KINDS = ("PROGRAMS", "FILES", "TARGETS", "DIRECTORY", "SCRIPT", "CODE")
 _OPTIONS = (
@@ -203,12 +202,12 @@ def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
     elif file.shebang is not None and file.shebang.crlf:
         problem = file.shebang_problem or "its #! line ends with Windows' CRLF"
         yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}{_then_push(file)}")
-    elif file.shebang_problem == EMPTY:
+    elif file.shebang_fault == "empty-file":
         yield Obstacle("is empty", f"write the node in {file.path}, with {RIGHT_SHEBANG} as its first line")
     elif file.bom:
         why = file.shebang_problem or "an invisible byte order mark (BOM) comes first"
         fix = f"in the editor, save {file.path} as UTF-8 without BOM"
-        first = "" if "before `#!`" in why else f", with {RIGHT_SHEBANG} as its first line"
+        first = "" if file.shebang_fault == "byte-order-mark" else f", with {RIGHT_SHEBANG} as its first line"
         yield Obstacle(f"cannot be run: {why}", f"{fix}{first}")
     elif file.shebang_problem:
         yield Obstacle(f"cannot be run: {file.shebang_problem}", fix)

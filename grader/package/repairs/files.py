@@ -114,10 +114,10 @@ def _repair_shebang(files: Files, script: SourceFile, text: str) -> None:
     lines = text.split("\n")
     wanted = SHELL if script.path.endswith((".sh", ".bash")) else SHEBANG if script.python else ""
     problem = script.shebang_problem
-    if "byte order mark" in problem or "CRLF" in problem:
+    if script.shebang_fault in ("byte-order-mark", "line-end"):
         usable = script.shebang is None or script.shebang.found
         problem = "" if usable else f"there is no {script.shebang.interpreter} on a ROS machine"  # type: ignore[union-attr]
-    if not wanted or not problem or problem == "the file is empty":
+    if not wanted or not problem or script.shebang_fault == "empty-file":
         return
     first = next((i for i, line in enumerate(lines[:50]) if re.match(r"\s*(#\s*!|!\s*#)", line)), None)
     looks_like = first is not None and bool(re.search(r"python|/(ba)?sh|bin/", lines[first]))
@@ -127,7 +127,7 @@ def _repair_shebang(files: Files, script: SourceFile, text: str) -> None:
         after = [wanted, *(line for line in above if line.strip()), *rest]
     else:
         after = [wanted, *lines]
-    message = f"{script.path} cannot be started: {problem.split(': write')[0]}"
+    message = f"{script.path} cannot be started: {problem}"
     files.change("shebang", script.path, "\n".join(after), message, f"write {wanted} as the very first line")
 
 
