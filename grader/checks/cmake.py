@@ -184,7 +184,7 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
     How it is measured
         By what CMake itself was told while the package was built: variables and `file(GLOB …)` are
         expanded, comments and `if(FALSE)` ignored. Where it was not built, the file is parsed.
-        `install(PROGRAMS …)` is another command and does not count.
+        `install(PROGRAMS …)` is another command and does not count. Each script earns its share.
 
     How to fix
         Take away the `#` before each line of the block that `catkin_create_pkg` wrote, and name your
@@ -211,13 +211,15 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
     cited = tuple(dict.fromkeys([*(lack.line for lack in lacks.values() if lack.line), *calls]))
     verdict = inconclusive if any(lack.unsure for lack in lacks.values()) else failed
     follows = all(lack.follows for lack in lacks.values())
-    return (unjudged if facts.fault or follows else verdict)(
+    found = (unjudged if facts.fault or follows else verdict)(
         f"{facts.file}: {'; '.join(_reasons(lacks))}",
         expected=expected,
         measured=measured,
         hint="; ".join(_fixes(lacks)),
         citations=cited or (FileCitation(file=facts.file),),
     )
+    right = [script for script in params.scripts if script not in lacks]
+    return found.in_part(len(right) / len(params.scripts), join_words(right))
 
 
 def _reasons(lacks: dict[str, Lack]) -> Iterator[str]:

@@ -26,7 +26,7 @@ from grader.evidence.events import ConsoleLine
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 PLACE = "{number}"
@@ -239,7 +239,8 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
     How it is measured
         By the messages on /rosout, where every `rospy.loginfo(…)`, `logwarn(…)` and `logerr(…)` goes. The
         text has to stand in one of them letter by letter, capitals and punctuation included; more may stand
-        around it. Other words of the same kind (`Hello ROS!` for `Hello World!`) earn half of the points.
+        around it. Other words of the same kind (`Hello ROS!` for `Hello World!`) at the right level earn half of the
+        points.
 
     How to fix
         `rospy.loginfo("…")` after `rospy.init_node(…)` for the level INFO. `print(…)` does not log.
@@ -314,18 +315,20 @@ def _asked_lines(run: Run, params: LogsParams) -> list[tuple[int, ConsoleLine]]:
 
 def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | None:
     """Other capitals, a missing sign, a typing error: in what was logged, or else in what was printed."""
-    logged = [one.text for one in lines]
+    logged = [one.text for one in lines if one.level == params.level]
+    otherwise = [one.text for one in lines if one.level != params.level]
     printed = [line.line for _, line in _asked_lines(run, params)]
-    for texts, how in ((logged, "is logged"), (printed, "is printed")):
+    for texts, how in (
+        (logged, "is logged"),
+        (otherwise, "is logged at another level"),
+        (printed, "is printed"),
+    ):
         alike = max(texts, key=lambda text: _likeness(text, params.text), default="")
         if _likeness(alike, params.text) >= ALIKE:
             text = (split_log_line(alike) or ("", alike))[1]
             message, hint = f"{shown(text)!r} {how}, not {params.text!r}", _call(params)
-            return (
-                partial(OTHER_WORDS_SHARE, message, hint=hint)
-                if texts is logged
-                else failed(message, hint=hint)
-            )
+            share = OTHER_WORDS_SHARE if texts is logged else 0.0
+            return failed(message, hint=hint).in_part(share, "the level, and nearly the text")
     return None
 
 

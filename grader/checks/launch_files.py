@@ -32,7 +32,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Status, Verdict, failed, passed, unjudged
+from grader.model.verdict import FileCitation, Status, Verdict, failed, joined, passed, unjudged
 from grader.untrusted_text import without_colours
 from grader.wording import join_words, plural
 
@@ -64,7 +64,8 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
     How it is measured
         The file is found by its name anywhere in the package and read without being run, with the files of
         the package that it includes, its `<arg>`s and groups. What `if` or `unless` switches off does not
-        count, nor does `<test>`. Whether the scripts are executable is judged elsewhere.
+        count, nor does `<test>`. Whether the scripts are executable is judged elsewhere. In a file that roslaunch
+        reads, each node earns its share.
 
     How to fix
         One `<node pkg="<package>" type="<file>.py" name="<name>" output="screen"/>` for each script, all of
@@ -76,8 +77,7 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
     file = read_launch(package, params.launch, wanted)
     if isinstance(file, Verdict):
         return _with_next(file, package, params).about(expected=expected)
-    refused = next(refusals(package, file), None)
-    verdict = _all_lacking(package, file, params, refused) or passed(
+    verdict = _lacking(package, file, params) or passed(
         f"{file.path} has a <node> for {join_words(wanted)}", hint=_advice(package, file)
     )
     seen = f"{plural(len(file.brings), 'node')}: {join_words(map(_node_text, file.brings))}"
@@ -110,23 +110,15 @@ def _with_next(verdict: Verdict, package: PackageFacts, params: LaunchXmlParams)
     )
 
 
-def _all_lacking(
-    package: PackageFacts, file: LaunchFile, params: LaunchXmlParams, refused: Slip | None
-) -> Verdict | None:
-    """Return why roslaunch starts nothing, and why nodes are not there, each reason once; None where all are."""
-    verdicts = [refused.verdict() if refused else None]
-    verdicts += [missing_node(package, file, script) for script in params.scripts]
-    verdicts += [_program(file, program) for program in params.programs]
-    lacking = list({one.message: one for one in verdicts if one}.values())
-    if len(lacking) < 2:
-        return lacking[0] if lacking else None
-    first = next((one for one in lacking if not one.unjudged), lacking[0])
-    update = {
-        "message": "; ".join(one.message for one in lacking),
-        "hint": "; ".join(dict.fromkeys(one.hint for one in lacking)),
-        "citations": tuple(dict.fromkeys(place for one in lacking for place in one.citations)),
-    }
-    return first.model_copy(update=update)
+def _lacking(package: PackageFacts, file: LaunchFile, params: LaunchXmlParams) -> Verdict | None:
+    """Return why roslaunch starts nothing, and why nodes are not there; None where all are. Those that are there earn
+    their share."""
+    refused = next(refusals(package, file), None)
+    found = {PurePosixPath(script).name: missing_node(package, file, script) for script in params.scripts}
+    found |= {program: _program(file, program) for program in params.programs}
+    lost = joined([one for one in (refused.verdict() if refused else None, *found.values()) if one])
+    right = [name for name, one in found.items() if one is None]
+    return lost and lost.in_part(0.0 if refused else len(right) / len(found), join_words(right))
 
 
 def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdict | None:
@@ -262,7 +254,8 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
 
     How it is measured
         The program's place is taken by one that notes what it is asked to open. The script's mode and first
-        line are those of the file as handed in. A `/` at the end of the page's address does not matter.
+        line are those of the file as handed in. A `/` at the end of the page's address does not matter. The page and
+        the node earn half each.
 
     How to fix
         Begin the script with `#!/bin/bash`, `chmod +x` it, and write `<node pkg="<package>" type="<script>.sh"
@@ -285,6 +278,10 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
             f"{_url(pages, params)} in {params.program}"
         )
     )
+    opened = (_script(package, build, file, params) or _page(package, file, run, params)) is None
+    alone = missing_node(package, file, params.script) or _beside(package, file, run, params)
+    right = "the page" if opened else "the node beside it"
+    verdict = verdict.in_part(0.5 if opened or alone is None else 0.0, right)
     citations = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/actor"))
     return verdict.about(expected=expected, measured=measured, citations=citations)
 

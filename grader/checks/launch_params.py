@@ -73,7 +73,8 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
     How it is measured
         By every change of the parameter server up to the node's registration, and by what `roslaunch` says of
         the node. `<rosparam>` may stand before or after the `<node>`: `roslaunch` sets parameters first. In a
-        namespace, the file counts as loaded where the node prints all of its values from there.
+        namespace, the file counts as loaded where the node prints all of its values from there. Where some of the
+        names are loaded, each earns its share of one half, and the running node earns the other.
 
     How to fix
         `<rosparam file="$(find <package>)/config/<file>.yaml"/>` beside the `<node>`, not inside it and without
@@ -109,7 +110,11 @@ def _judge_loaded(
     if missing and not (
         _read_where_loaded(file, run, params, before) or _read_by_other_names(run, params, before)
     ):
-        return _not_loaded(package, file, run, params, missing)
+        there = [name for name in map(absolute_name, params.names) if name not in missing]
+        runs = _not_running(package, run, node) is None
+        share = (len(there) / len(params.names) + runs) / 2
+        lost = _not_loaded(package, file, run, params, missing, judged=bool(there))
+        return lost.in_part(share if there else 0.0, join_words([*there, *[f"{node.type} runs"] * runs]))
     if not (
         any(_is_of(load, params) for load in file.loads)
         or _by_node(file, params)
@@ -155,7 +160,13 @@ def _not_running(package: PackageFacts, run: Run, node: LaunchNode) -> Verdict |
 
 
 def _not_loaded(
-    package: PackageFacts, file: LaunchFile, run: Run, params: LaunchLoadsParams, missing: list[str]
+    package: PackageFacts,
+    file: LaunchFile,
+    run: Run,
+    params: LaunchLoadsParams,
+    missing: list[str],
+    *,
+    judged: bool,
 ) -> Verdict:
     if find_script(package, params.file) is None:
         message = f"there is no {PurePosixPath(params.file).name} in the package to load"
@@ -168,7 +179,8 @@ def _not_loaded(
     if not loads:
         message = f"{file.path} has no <rosparam> that loads {params.file}"
         return failed(message, hint=OUTSIDE.format(params.file))
-    return _loaded_otherwise(run, params, loads, missing[0])
+    other = _loaded_otherwise(run, params, loads, missing[0])
+    return other.model_copy(update={"unjudged": other.unjudged and not judged})
 
 
 def _loaded_otherwise(run: Run, params: LaunchLoadsParams, loads: list[LaunchLoad], missing: str) -> Verdict:
@@ -228,10 +240,25 @@ def params_misplaced(run: Run, file: LaunchFile, nodes: Iterable[str], wanted: W
     return None if None in verdicts else verdicts[0]
 
 
-def _of_node(run: Run, file: LaunchFile, node: str, wanted: Wanted) -> Verdict | None:
+def params_in_place(run: Run, nodes: Iterable[str], wanted: Wanted) -> list[str]:
+    """Return the names of those of `wanted` that are where one of the nodes reads them."""
+    read = [_read_by(run, node) for node in nodes]
+    return [
+        name
+        for name, value in wanted.items()
+        if any(_is_there(before, places, {name: value}) for before, places in read)
+    ]
+
+
+def _read_by(run: Run, node: str) -> tuple[dict[str, Any], tuple[str, str]]:
+    """Return the parameters as they were when the node started, and where it reads its own."""
     start_ns = next((t for t, event in run.graph if node in event.nodes), run.end_ns)
     before = params_on_server(run, until_ns=start_ns, by=lambda caller: caller != node)
-    places = (f"{node}/", f"{node.rpartition('/')[0]}/")
+    return before, (f"{node}/", f"{node.rpartition('/')[0]}/")
+
+
+def _of_node(run: Run, file: LaunchFile, node: str, wanted: Wanted) -> Verdict | None:
+    before, places = _read_by(run, node)
     if _is_there(before, places, wanted):
         return None
     if _is_there(params_on_server(run, by=lambda caller: caller != node), places, wanted):

@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from grader.checks.launch_files import missing_node
-from grader.checks.launch_params import params_misplaced
+from grader.checks.launch_params import params_in_place, params_misplaced
 from grader.checks.registry import DependencyName, LaunchName, ProgramName, check
 from grader.checks.support.launch import (
     Slip,
@@ -67,7 +67,7 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
     How it is measured
         `roslaunch` runs the file, which is found by its name anywhere in the package, and both nodes are
         asked whom they are connected to; the kernel's table of connections has to bear it out. Any two
-        nodes of the package do, under any names.
+        nodes of the package do, under any names. What comes up earns half, and the connection the other half.
 
     How to fix
         One `<node pkg="…" type="….py" name="…"/>` for each script, with the `.py`; the scripts have to be executable.
@@ -85,11 +85,19 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
         or (None if found else _why_unconnected(package, file, run, params))
         or passed(f"roslaunch connects {found[0][0]} and {found[0][1]} over {params.topic}")
     )
+    up = [name for name in params.nodes if f"/{name.lstrip('/')}" in nodes] if params.nodes else nodes[:2]
+    share = len(up) / (len(params.nodes) or 2) / 2 + (0.5 if found else 0.0)
+    verdict = verdict.in_part(share if up else 0.0, _came_up(up, connected=bool(found)))
     return verdict.about(
         expected=expected,
         measured=_listed_nodes(run),
         citations=verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph")),
     )
+
+
+def _came_up(names: Sequence[str], *, connected: bool = False) -> str:
+    over = ", and there is a connection" if connected else ""
+    return f"{join_words(names)} {'comes' if len(names) == 1 else 'come'} up{over}"
 
 
 def _listed_nodes(run: Run) -> str:
@@ -137,11 +145,7 @@ def _why_unconnected(
 
 
 def _comes_up(nodes: Sequence[str]) -> str:
-    return (
-        f"only {join_words(nodes)} {'comes' if len(nodes) == 1 else 'come'} up"
-        if nodes
-        else "no node comes up"
-    )
+    return f"only {_came_up(nodes)}" if nodes else "no node comes up"
 
 
 def _absent(package: PackageFacts, run: Run, nodes: Sequence[str], absent: Sequence[LaunchNode]) -> Verdict:
@@ -228,7 +232,8 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     How it is measured
         `roslaunch` runs the file; names come from the master, connections from both nodes and the kernel.
         `<arg>`, `ns` and `<group>` are worked out, and `$(anon x)` may be followed by anything. Names given to
-        `init_node` do not matter. Parameters are read as they were when the node started.
+        `init_node` do not matter. Parameters are read as they were when the node started. Nodes, connection and
+        parameters count alike, and of several nodes or parameters each earns its share.
 
     How to fix
         `roslaunch <package> <file>` prints in red what it could not start; `rosnode list`, `rostopic info
@@ -236,7 +241,7 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     """
     what = [
         *(PurePosixPath(s).name for s in params.scripts),
-        *(f"/{n}" for n in params.nodes),
+        *(f"/{n.lstrip('/')}" for n in params.nodes),
         *params.programs,
     ]
     over = f", connected over {params.topic}" if params.topic else ""
@@ -245,7 +250,12 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     if isinstance(file, Verdict):
         unjudged_too = {"unjudged": bool(params.scripts)}
         return file.about(expected=expected).model_copy(update=unjudged_too)
-    verdict = not_run(run) or _find_unnamed(package, file, params) or _judge_nodes(package, file, run, params)
+    share, right = _right_parts(package, file, run, params)
+    verdict = (
+        not_run(run)
+        or _find_unnamed(package, file, params, found=bool(right))
+        or _judge_nodes(package, file, run, params)
+    ).in_part(share, right)
     citations = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph"))
     return verdict.about(expected=expected, measured=_listed_nodes(run), citations=citations)
 
@@ -270,6 +280,34 @@ def _judge_nodes(package: PackageFacts, file: LaunchFile, run: Run, params: Laun
     return passed(f"roslaunch brings up {join_words(dict.fromkeys(names))}{over}")
 
 
+def _right_parts(
+    package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams
+) -> tuple[float, str]:
+    """Return the share of what is asked that is right, and what that is: nodes that came up and live, their
+    connection, and parameters. Nothing is where no node came up."""
+    nodes = {PurePosixPath(script).name: _of_script(package, file, run, script) for script in params.scripts}
+    for name, pkg in params.nodes.items():
+        wrong = _wrong_name(file, name, pkg) or _find_swap(file, name, params)
+        nodes[f"/{name.lstrip('/')}"] = [] if wrong else _nodes_named(file, name)[:1]
+    nodes |= {program: list(nodes_of_program(file, program)[:1]) for program in params.programs}
+    up = [
+        name
+        for name, found in nodes.items()
+        if found and all(nodes_up(run, one) and why_died(package, run, one) is None for one in found)
+    ]
+    if not up:
+        return 0.0, ""
+    connected = params.topic is not None and any(connections(run, params.topic))
+    shares, right = [len(up) / len(nodes)], _came_up(up, connected=connected)
+    shares += [float(connected)] if params.topic else []
+    if params.programs and params.params:
+        of = [name for one in nodes[params.programs[0]] for name in nodes_up(run, one)]
+        set_right = params_in_place(run, of, params.params)
+        shares.append(len(set_right) / len(params.params))
+        right += f", with the right {join_words(set_right)}" if set_right else ""
+    return sum(shares) / len(shares), right
+
+
 def _wanted_nodes(
     package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams
 ) -> Iterator[Wanted]:
@@ -291,11 +329,14 @@ def _of_script(package: PackageFacts, file: LaunchFile, run: Run, script: str) -
     return certain or [n for n in exact if nodes_up(run, n)] or exact[:1]
 
 
-def _find_unnamed(package: PackageFacts, file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
-    """The file does not even name a node that is wanted. For scripts that is launch-xml's to judge."""
+def _find_unnamed(
+    package: PackageFacts, file: LaunchFile, params: LaunchRunsParams, *, found: bool
+) -> Verdict | None:
+    """The file does not even name a node that is wanted. For scripts that is launch-xml's to judge, unless there is
+    something to judge here: others that are `found` running."""
     for script in params.scripts:
         if verdict := missing_node(package, file, script):
-            return verdict.model_copy(update={"unjudged": True})
+            return verdict.model_copy(update={"unjudged": verdict.unjudged or not found})
     for name, pkg in params.nodes.items():
         if verdict := _wrong_name(file, name, pkg) or _find_swap(file, name, params):
             return verdict

@@ -32,7 +32,7 @@ from grader.checks.support.topics import cite, misfit, refused_type, run_slip, t
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 CALLBACK_HINT = (
@@ -126,7 +126,7 @@ def _other_words(
     share = 1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes)
     all_of = plural(len(probes), "message")
     measured = f"{len(probes)} of {all_of} printed, {len(missing)} of them in other words"
-    return partial(share, message, hint=hint, measured=measured)
+    return failed(message, hint=hint, measured=measured).in_part(share, "what is printed of each message")
 
 
 def _how_many(missing: Sequence[Probe], probes: Sequence[Probe]) -> str:

@@ -38,7 +38,7 @@ from grader.checks.support.topics import Sender, cite, losses, no_message, nothi
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 ENOUGH = 3
@@ -137,7 +137,7 @@ def _misfit(
     value = TIMED if SECONDS in params.template else ""
     hint = f"publish {code_of(params.template)}"
     if value and _tells_time(package, run, heard):
-        return partial(OTHER_WORDS_SHARE, f"{message}; its time is right", hint=hint, citations=(cited,))
+        return failed(message, hint=hint, citations=(cited,)).in_part(OTHER_WORDS_SHARE, "the time")
     return failed(message, hint=hint, citations=(cited,))
 
 

@@ -38,7 +38,7 @@ from grader.model.verdict import (
     Verdict,
     failed,
     inconclusive,
-    partial,
+    joined,
     passed,
     unjudged,
 )
@@ -72,7 +72,8 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
         starts, and a value under another name is one that no one reads.
 
     How it is measured
-        `rosparam load` loads the file as it was handed in; what it sets is compared by name. Values are free.
+        `rosparam load` loads the file as it was handed in; what it sets is compared by name. Values are free. Each
+        name earns its share.
 
     How to fix
         Indent with spaces, two for each level, and write `name: value` with a space after the colon.
@@ -89,10 +90,17 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
         verdict = inconclusive(f"rosparam load {source.path} was not run to its end", hint="grade again")
     else:
         missing = [name for name in wanted if found.get(name) in (None, {})]
+        there = [name for name in wanted if name not in missing]
         moved = f"the handout puts it at {params.file}; move it there" if source.path != params.file else ""
         verdict = (
             _error(run, one, source.path, build)
-            or (_missing(found, missing, source.path, package, build) if missing else None)
+            or (
+                _missing(found, missing, source.path, package, build).in_part(
+                    len(there) / len(wanted), join_words(there)
+                )
+                if missing
+                else None
+            )
             or passed(
                 f"{source.path} loads and sets {join_words(wanted)}",
                 hint="; ".join(
@@ -332,10 +340,8 @@ def _not_printed(
 
 def _share_printed(params: ParamsReadParams, missing: Sequence[str], message: str, hint: str) -> Verdict:
     """Return what is earned by those that are printed."""
-    printed = len(params.names) - len(missing)
-    if not printed:
-        return failed(message, hint=hint)
-    return partial(printed / len(params.names), f"{message}; {printed} of {len(params.names)} are", hint=hint)
+    printed = [name for name in params.names if name not in missing]
+    return failed(message, hint=hint).in_part(len(printed) / len(params.names), join_words(printed))
 
 
 def _in_file(build: Run, file: str, name: str) -> list[str]:
@@ -382,7 +388,7 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
 
     How it is measured
         By every change of the parameter server up to Ctrl-C or the node's own end. The value may be a number or
-        text.
+        text. Once it is set, it, the others and the printed value earn equal shares.
 
     How to fix
         `rospy.set_param('/details/contact/phone', 55555)`: the whole name of the one value, never a map. Read it
@@ -395,13 +401,22 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
     expected = f"{params.name} is {params.value}{others}" + (", and it is logged" if params.logged else "")
     verdict = (
         (None if _is_value(got, params.value) else _not_set(package, run, after, params, until_ns))
-        or _judge_unchanged(run, after, params)
-        or _not_logged(run, params)
+        or _set_in_part(run, after, params)
         or passed(f"sets {params.name} to {params.value}{' and logs it' if params.logged else ''}")
     )
     cited = cite(run, "/grader/param")
     measured = f"{params.name}: {'not there' if got is None else shown(str(got))}"
     return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cited))
+
+
+def _set_in_part(run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verdict | None:
+    """Return what is wrong besides where the value is set, with the share of what is right."""
+    asked: dict[str, Verdict | None] = {f"{params.name} is set": None}
+    asked |= {"the others are as before": _judge_unchanged(run, after, params)} if params.unchanged else {}
+    asked |= {"the new value is printed": _not_logged(run, params)} if params.logged else {}
+    lost = joined([one for one in asked.values() if one])
+    right = [what for what, one in asked.items() if one is None]
+    return lost and lost.in_part(len(right) / len(asked), join_words(right))
 
 
 def _is_value(got: object, wanted: object) -> bool:

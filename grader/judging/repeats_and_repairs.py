@@ -22,7 +22,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.repair import Repair, advice_of, place_of
 from grader.model.result import CriterionResult, Repaired
-from grader.model.verdict import FileCitation, Status, Verdict, failed
+from grader.model.verdict import FileCitation, Status, Verdict, failed, share_text
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Scenario
 from grader.wording import join_words
@@ -37,8 +37,6 @@ DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark",
 """The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 OF_PACKAGES = {"package.xml", "CMakeLists.txt"}
-SHARE_WORDS = {1.0: "all", 0.5: "half"}
-"""How a share is written; `model.repair.DEFAULT_SHARES` and a rubric's `repairs` say how large it is."""
 NUMBER = re.compile(r"\d+(\.\d+)?")
 
 Runs = dict[str, Run]
@@ -130,12 +128,17 @@ def apply_repaired_copy(
             continue
         verdict, copy = first[criterion.id], on_copy[criterion.id]
         share = min(rubric.share_of(one.kind) for one in needed) if criterion.points else 1.0
-        if charged:
-            verdicts[criterion.id] = _charge(verdict, copy, charged)
-        else:
-            verdicts[criterion.id] = _share(copy, needed, share)
-        uses[criterion.id] = Repaired(repairs=charged or needed, share=share, charged=bool(charged))
+        told = _as_handed_in(charged or needed, repairs)
+        verdicts[criterion.id] = _charge(verdict, copy, told) if charged else _share(copy, told, share)
+        uses[criterion.id] = Repaired(repairs=told, share=share, charged=bool(charged))
     return verdicts, uses
+
+
+def _as_handed_in(needed: Sequence[Repair], repairs: Sequence[Repair]) -> tuple[Repair, ...]:
+    """Return the repairs with the names that their files have in the package as it is: on the copy, a file may have
+    got its right name first."""
+    names = {one.after: one.before for one in repairs if one.kind == "file-name"}
+    return tuple(one.model_copy(update={"file": names.get(one.file, one.file)}) for one in needed)
 
 
 def concerns(
@@ -330,9 +333,9 @@ def _is_told(repair: Repair, hint: str) -> bool:
 
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:
     where = join_words(dict.fromkeys(place_of(repair) for repair in repairs))
-    earned = SHARE_WORDS.get(share, f"{share:.0%}")
     score = copy.score * share
     status = Status.PARTIAL if share < 1 and copy.status is Status.PASS else copy.status
-    points = f"{earned} of the points; " if copy.score else ""
+    of = "the points" if copy.status is Status.PASS else "what is right there"
+    points = f"{share_text(share)} of {of}; " if copy.score else ""
     message = f"judged on a copy with {where} repaired: {points}{copy.message}"
     return copy.model_copy(update={"status": status, "score": score, "message": message})

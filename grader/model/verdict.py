@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import posixpath
+from collections.abc import Sequence
 from enum import Enum
 
 from pydantic import Field
@@ -115,9 +116,37 @@ class Verdict(Record):
         cited = (one.below(folder) if isinstance(one, FileCitation) else one for one in self.citations)
         return self.model_copy(update={"citations": tuple(cited)})
 
+    def in_part(self, share: float, right: str) -> Verdict:
+        """Return a fail as one that earns `share` of the points, 0 to 1, for what is right, and says so. Where nothing
+        is, and where nothing could be judged, it stays as it is."""
+        if self.status is not Status.FAIL or self.unjudged or share <= 0:
+            return self
+        message = f"{self.message}; {share_text(share)} of the points for what is right: {right}"
+        return self.model_copy(update={"status": Status.PARTIAL, "score": share, "message": message})
+
     def once(self) -> Verdict:
         """Return the verdict marked as a loss that one run's timing could have made."""
         return self.model_copy(update={"timing": True})
+
+
+def joined(losses: Sequence[Verdict]) -> Verdict | None:
+    """Return several losses as one, each reason once, with the fields of the first that could be judged; None where
+    there is none."""
+    different = list({one.message: one for one in losses}.values())
+    if len(different) < 2:
+        return different[0] if different else None
+    first = next((one for one in different if not one.unjudged), different[0])
+    update = {
+        "message": "; ".join(one.message for one in different),
+        "hint": "; ".join(dict.fromkeys(one.hint for one in different)),
+        "citations": tuple(dict.fromkeys(place for one in different for place in one.citations)),
+    }
+    return first.model_copy(update=update)
+
+
+def share_text(share: float) -> str:
+    """Return a share of the points in words: `half`, `75 %`."""
+    return {1.0: "all", 0.5: "half"}.get(share, f"{share * 100:.0f} %")
 
 
 def passed(

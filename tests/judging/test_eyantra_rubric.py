@@ -181,6 +181,33 @@ def test_full_marks(rubric: Rubric, changes: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
+    ("changes", "points"),
+    [
+        ({"log": {"level": 2, "msg": "hello world!"}}, {"hello-log": 5}),
+        ({"log": {"level": 2, "msg": "Hello ROS World!"}}, {"hello-log": 5}),
+        ({"log": {"level": 2, "msg": "Hello, World"}}, {"hello-log": 5}),
+        ({"log": {"level": 2, "msg": "Good morning"}}, {"hello-log": 0}),
+        ({"log": {"level": 4, "msg": "Hello World"}}, {"hello-log": 0}),
+        ({"loaded": dict([*DETAILS.items()][:2])}, {"config-yaml": 5, "load-yaml-launch": 7.5}),
+        ({"loaded": dict([*DETAILS.items()][1:])}, {"config-yaml": 7.5, "load-yaml-launch": 8.8}),
+        ({"printed": dict([*DETAILS.items()][:1])}, {"param-get": 2.5}),
+        ({"after": {"contact/phone": 55555, "name/last": "X"}}, {"param-set": 6.7}),
+        ({"after": {"contact/phone": 5555}}, {"param-set": 0}),
+        ({"launch": {"turtlesim.launch": ('"background_b"', '"blue"')}}, {"turtlesim-launch": 4.2}),
+        ({"launch": {"turtlesim.launch": ('"background_', '"bg_')}}, {"turtlesim-launch": 2.5}),
+        ({"url": "https://www.ros.org/"}, {"web-launch": 2.5}),
+    ],
+)
+def test_what_is_right_earns_its_share(
+    rubric: Rubric, changes: dict[str, Any], points: dict[str, float]
+) -> None:
+    results = judge(rubric, build_runs(submission(**changes)))
+    assert {r.id: r.points for r in results if r.status.value != "pass"} == points
+    for one in results:
+        assert ("of the points for what is right: " in one.message) == (0 < one.points < one.max_points)
+
+
+@pytest.mark.parametrize(
     ("changes", "wanted"),
     [
         ({"depends": ("rospy", "std_msgs")}, {"manifest": "fail"}),
@@ -188,11 +215,11 @@ def test_full_marks(rubric: Rubric, changes: dict[str, Any]) -> None:
         ({"node": "/hello_11_1700000000001"}, {"hello-node": "fail"}),
         ({"log": {"level": 4, "msg": "Hello World!"}}, {"hello-log": "fail"}),
         ({"log": {"level": 2, "msg": "Hello World"}}, {"hello-log": "partial"}),
-        ({"loaded": {"name/first": "a"}}, {"config-yaml": "fail", "load-yaml-launch": "blocked"}),
+        ({"loaded": {"name/first": "a"}}, {"config-yaml": "partial", "load-yaml-launch": "partial"}),
         ({"printed": {**DETAILS, "name/last": "Kulkarni"}}, {"param-get": "partial"}),
         ({"after": {"phone": 55555}}, {"param-set": "fail"}),
-        ({"after": {"contact/phone": 55555, "name/first": "Asha"}}, {"param-set": "fail"}),
-        ({"url": "https://www.ros.org/"}, {"web-launch": "fail"}),
+        ({"after": {"contact/phone": 55555, "name/first": "Asha"}}, {"param-set": "partial"}),
+        ({"url": "https://www.ros.org/"}, {"web-launch": "partial"}),
         (
             {
                 "launch": {
@@ -202,9 +229,9 @@ def test_full_marks(rubric: Rubric, changes: dict[str, Any]) -> None:
                     )
                 }
             },
-            {"chatter-launch": "fail"},
+            {"chatter-launch": "partial"},
         ),
-        ({"launch": {"turtlesim.launch": ("background_g", "background_r")}}, {"turtlesim-launch": "fail"}),
+        ({"launch": {"turtlesim.launch": ("background_g", "background_r")}}, {"turtlesim-launch": "partial"}),
         ({"launch": {"turtlesim.launch": ("</node>", "")}}, {"turtlesim-launch": "fail"}),
         (
             {"launch": {"load_yaml.launch": ("node_param_get_set.py", "node_hello_ros.py")}},

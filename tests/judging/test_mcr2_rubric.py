@@ -63,7 +63,7 @@ def test_full_marks(changes: dict[str, Any]) -> None:
     ("changes", "lost"),
     [
         ({"depends": ("std_msgs",)}, {"manifest": "fail"}),
-        ({"calls": LAB.calls("scripts/talker.py")}, {"cmake-install": "fail"}),
+        ({"calls": LAB.calls("scripts/talker.py")}, {"cmake-install": "partial"}),
         ({"channel": {"callerid": "/talker_4711_1700000000000"}}, {"talker-node": "fail"}),
         ({"listener_node": "/listener_4711_1700000000000"}, {"listener-node": "fail"}),
         ({"channel": {"rate_hz": 5, "count": 40}}, {"chatter-rate": "fail"}),
@@ -82,10 +82,49 @@ def test_one_fault_costs_its_own_criterion(changes: dict[str, Any], lost: dict[s
     assert LAB.lost(launched=UP, **changes) == lost
 
 
+@pytest.mark.parametrize(
+    ("changes", "criterion", "points"),
+    [
+        ({"heard": "I heard: %s"}, "listener-hears", 5),
+        ({"heard": "I have heard %s"}, "listener-hears", 5),
+        ({"heard": "Heard '%s'"}, "listener-hears", 5),
+        ({"heard": "I HEARD %s!"}, "listener-hears", 10),
+        ({"channel": {"values": {"text": "hello, world: {time_s}"}}}, "message", 2.5),
+        ({"channel": {"values": {"text": "hello world, it is {time_s}"}}}, "message", 2.5),
+        ({"channel": {"values": {"text": "hello world {time_s} s"}}}, "message", 2.5),
+        ({"channel": {"values": {"text": "hello world"}}}, "message", 0),
+        ({"calls": LAB.calls("scripts/listener.py")}, "cmake-install", 5),
+    ],
+)
+def test_what_is_right_earns_its_share(changes: dict[str, Any], criterion: str, points: float) -> None:
+    found = {one.id: one for one in LAB.judge(launched=UP, **changes)}
+    assert found[criterion].points == points
+    shared = 0 < points < found[criterion].max_points
+    assert ("of the points for what is right: " in found[criterion].message) == shared
+    lost = sum(one.max_points - one.points for one in found.values())
+    assert lost == found[criterion].max_points - points
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "up", "points"),
+    [
+        ('type="listener.py"', 'type="speaker.py"', {"subscribers": {}}, 5 + 2.5),
+        ("output", "output", {"subscribers": {}}, 10 + 2.5),
+        ('name="listener"', 'name="ears"', {"subscribers": {"/chatter": ["/ears"]}}, 20),
+        ('name="talker"', 'name="mouth"', {"topics": [{"topic": "/chatter", "callerid": "/mouth"}]}, 20),
+    ],
+)
+def test_one_of_two_nodes(old: str, new: str, up: dict[str, Any], points: float) -> None:
+    """Names in the launch file are the student's own."""
+    assert old in LAB.launch_text
+    found = LAB.judge(launch=LAB.launch_text.replace(old, new), launched={**UP, **up})
+    assert sum(one.points for one in found if one.id.startswith("launch")) == points
+
+
 def test_apart_by_a_namespace() -> None:
     apart = LAB.launch_text.replace('name="listener"', 'name="listener" ns="ears"')
     up = {**UP, "subscribers": {"/ears/chatter": ["/ears/listener"]}}
-    assert LAB.lost(launch=apart, launched=up) == {"launch-runs": "fail"}
+    assert LAB.lost(launch=apart, launched=up) == {"launch-runs": "partial"}
 
 
 def test_a_node_without_a_name() -> None:

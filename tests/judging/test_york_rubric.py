@@ -165,3 +165,22 @@ def test_a_name_taken_over_earns_a_third(rubric: Rubric) -> None:
     results = judge(rubric, build_runs(submission(copies=("/sender", "/sender"))))
     assert {r.points for r in results if r.id == "two-senders"} == {5}
     assert total_points(rubric, results) == 90
+
+
+@pytest.mark.parametrize(
+    ("changes", "criterion", "points"),
+    [
+        ({"heard": "Recieved: %s"}, "receiver-hears", 5),
+        ({"heard": "Received %s"}, "receiver-hears", 5),
+        ({"heard": "I received: %s"}, "receiver-hears", 10),
+        ({"values": {"text": "The current time is {time_s}"}}, "message", 2.5),
+        ({"values": {"text": "the TIME is {time_s:.0f}"}}, "message", 5),
+        ({"values": {"text": "The time is noon"}}, "message", 0),
+    ],
+)
+def test_other_words_earn_half(
+    rubric: Rubric, changes: dict[str, Any], criterion: str, points: float
+) -> None:
+    results = judge(rubric, build_runs(submission(**changes)))
+    lost = {r.id: r.points for r in results if r.points < r.max_points}
+    assert lost == ({} if points == POINTS[criterion] else {criterion: points})

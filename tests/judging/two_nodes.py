@@ -11,6 +11,7 @@ import yaml
 
 from grader.checks import CHECKS
 from grader.judging import judge, total_points
+from grader.model.result import CriterionResult
 from grader.package.launch import parse_launch_files
 from grader.rubric.model import Rubric
 from tests.support.timeline import build_runs
@@ -110,9 +111,13 @@ class Lab:
         install = ["catkin_install_python", "PROGRAMS", *named, "DESTINATION", f"lib/{self.package}"]
         return (["project", self.package], ["find_package", "catkin"], ["catkin_package"], install)
 
+    def judge(self, **changes: Any) -> tuple[CriterionResult, ...]:
+        """Return the results where the submission has these changes."""
+        return judge(self.rubric, build_runs(self.submission(**changes)))
+
     def lost(self, **changes: Any) -> dict[str, str]:
         """The status of each criterion that is not reached, where the submission has these changes."""
-        results = judge(self.rubric, build_runs(self.submission(**changes)))
+        results = self.judge(**changes)
         lost = {r.id: r.status.value for r in results if r.status.value != "pass"}
         assert bool(lost) == (total_points(self.rubric, results) < 100)
         for result in results:
