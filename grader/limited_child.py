@@ -9,6 +9,7 @@ its business (`workers.py`), and neither are students' programs (`arena/`).
 from __future__ import annotations
 
 import contextlib
+import gc
 import json
 import os
 import sys
@@ -22,6 +23,8 @@ except ImportError:  # Windows
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120 - see above
 BOOTSTRAP = "import sys; sys.path.append(sys.argv[1]); from grader.limited_child import main; main()"
+COLLECT_AFTER = 50_000
+"""As in `workers.py`: what it parses is many small objects."""
 
 
 class ChildLimits(NamedTuple):
@@ -71,11 +74,13 @@ def run_limited(function: str, *arguments: object, limits: ChildLimits) -> Answe
 
 def main() -> None:
     """Answer the request on standard input, as the child."""
+    gc.set_threshold(COLLECT_AFTER)
     request = json.load(sys.stdin)
     _set_limits(ChildLimits(**request["limits"]))
     module, _, name = request["function"].partition(":")
     for value in getattr(import_module(module), name)(*request["arguments"]):
         print(json.dumps(value), flush=True)
+    gc.freeze()  # as in `grader/__main__.py`
 
 
 def _set_limits(limits: ChildLimits) -> None:

@@ -444,12 +444,14 @@ def main() -> None:
     stand by, until this is a copy that is to do jobs."""
     if len(sys.argv) == 1 or _stand_by(sys.argv[1]):
         _work()
+    gc.freeze()  # as in `grader/__main__.py`
 
 
 def _stand_by(warm_up: str) -> bool:
     """Answer `Template`'s requests; False at their end, True in each copy."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # it ends with its socket
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    gc.disable()  # until all is imported, to be looked through once
     module, _, name = warm_up.partition(":")
     with suppress(Exception):  # then a job says what is wrong
         found = import_module(module)
@@ -457,6 +459,7 @@ def _stand_by(warm_up: str) -> bool:
             getattr(found, name)()
     gc.collect()
     gc.freeze()  # what is here is shared with every copy for as long as no one touches it
+    gc.enable()
     with socket.socket(fileno=os.dup(0)) as sock:
         while True:
             request, descriptors, _, _ = socket.recv_fds(sock, REQUEST_BYTES, 2)

@@ -43,6 +43,8 @@ ANSWER = struct.Struct("<id")
 DESCRIPTORS = 3
 REQUEST_BYTES = 64
 OPEN_MAX = 4096
+COLLECT_AFTER = 10000
+"""So many new objects until Python looks for cycles, of which an arena makes few."""
 PYTHONS = (signal.SIGPIPE, signal.SIGXFSZ)
 """Ignored by Python itself, and not in what it starts."""
 
@@ -402,6 +404,7 @@ def stand_by(live, modules):
     """Run the template, from its start to its end. `modules` are loaded now; one that cannot be loaded is missed by
     what needs it."""
     reset_signals()
+    gc.set_threshold(COLLECT_AFTER)
     for name in modules:
         with contextlib.suppress(Exception):
             importlib.import_module(name)
