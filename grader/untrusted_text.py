@@ -127,7 +127,9 @@ def _surrogates_written_out(text: str) -> str:
 
 
 def _json_escaped(text: str) -> str:
-    text = text if text.isascii() and text.isprintable() else text.translate(_JSON)
+    if not (text.isascii() and text.isprintable()):  # of a document, most rows have nothing to escape
+        rows = text.split("\n")
+        text = "\n".join(row if row.isascii() and row.isprintable() else row.translate(_JSON) for row in rows)
     return _COMMAND.sub(r"\\u0023", text) if "##" in text else text
 
 
@@ -174,4 +176,4 @@ def _is_mark(character: str) -> bool:
     return unicodedata.category(character) in {"Mn", "Me"}
 
 
-_LINE, _LINES, _JSON = _Signs("", _written_out), _Signs("\n\t", _written_out), _Signs("\n", _json_escape)
+_LINE, _LINES, _JSON = _Signs("", _written_out), _Signs("\n\t", _written_out), _Signs("", _json_escape)

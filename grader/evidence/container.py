@@ -154,13 +154,13 @@ def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord | Messages]:
     plain = _unpack(chunk)
     meter.unpacked(len(plain))
     _verify(chunk.uncompressed_crc, zlib.crc32(plain), "a chunk")
-    size_bytes, at, count = len(plain), 0, 0
+    size_bytes, at, count, head_bytes = len(plain), 0, 0, _HEAD.size
     padded = plain + bytes(_WHOLE_HEAD.size)  # so that the head of a message can be read of any record
     read_head, new, message_op = _WHOLE_HEAD.unpack_from, tuple.__new__, int(Opcode.MESSAGE)
     messages: Messages = defaultdict(list)
     while at < size_bytes:
         opcode, length, channel_id, sequence, time_ns, _ = read_head(padded, at)
-        begin = at + _HEAD.size
+        begin = at + head_bytes
         at = begin + length
         if at > size_bytes:
             meter.record(length)
@@ -169,11 +169,14 @@ def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord | Messages]:
         if opcode == message_op and length >= MESSAGE_HEAD_BYTES:
             row = (time_ns, sequence, plain[begin + MESSAGE_HEAD_BYTES : at])
             messages[channel_id].append(new(Message, row))
-        if count == BATCH or opcode in _IN_CHUNK:
+            if count < BATCH:
+                continue
+        described = opcode in _IN_CHUNK
+        if count >= BATCH or (described and messages):
             meter.records(count)
             yield messages
             messages, count = defaultdict(list), 0
-        if opcode in _IN_CHUNK:
+        if described:
             yield _IN_CHUNK[opcode](plain[begin:at])
     meter.records(count)
     yield messages
