@@ -47,7 +47,14 @@ class ActionResultParams(Record):
     """How long after the goal, or after it was cancelled, the result may come; null: as long as the step waits."""
 
     @property
+    def of_feedback_alone(self) -> bool:
+        """Whether nothing is asked of the goal's end."""
+        return self.feedback > 0 and not self.model_fields_set & {"status", "result", "within_s"}
+
+    @property
     def words(self) -> str:
+        if self.of_feedback_alone:
+            return f"{plural(self.feedback, 'feedback message')} on goal {self.goal} of {self.action}"
         with_result = f" with {fields_text(self.result)}" if self.result else ""
         limit = f" within {significant(self.within_s)} s" if self.within_s else ""
         feedback = f", {plural(self.feedback, 'feedback message')} before" if self.feedback else ""
@@ -94,8 +101,7 @@ def action_result(package: PackageFacts, run: Run, params: ActionResultParams) -
     verdict = (
         _not_sent(package, run, goals, params)
         if goal is None
-        else _fault(package, run, goal, params)
-        or passed(f"{goal.name} of {params.action} ends {params.status}")
+        else _fault(package, run, goal, params) or _passed(run, goal, params)
     )
     span = (goal.at_ns, goal.ended_ns) if goal else (None, None)
     return verdict.about(
@@ -124,6 +130,8 @@ def _fault(package: PackageFacts, run: Run, goal: Goal, params: ActionResultPara
     if goal.end.value is None:
         return _no_result(package, run, goal, params)
     status, hint = goal.end.detail, HINTS[params.status]
+    if params.of_feedback_alone and _feedback(run, goal, params) >= params.feedback:
+        return None  # how it ends is another criterion's
     if status != params.status:
         return _other_end(package, run, goal, params)
     found = list(differences(goal.end.value, params.result, params.tolerance))
@@ -131,6 +139,13 @@ def _fault(package: PackageFacts, run: Run, goal: Goal, params: ActionResultPara
         message = f"{goal.name} of {params.action} ends {status} with {join_words(map(str, found))}"
         return failed(message, hint=f"fill in the result before you send it: {hint}")
     return _too_late(run, goal, params) or _no_feedback(run, goal, params)
+
+
+def _passed(run: Run, goal: Goal, params: ActionResultParams) -> Verdict:
+    if params.of_feedback_alone:
+        count = plural(_feedback(run, goal, params), "feedback message")
+        return passed(f"{count} came on {goal.name} of {params.action}")
+    return passed(f"{goal.name} of {params.action} ends {params.status}")
 
 
 def _no_result(package: PackageFacts, run: Run, goal: Goal, params: ActionResultParams) -> Verdict:
@@ -165,6 +180,9 @@ def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
             hint="let it take as long as the handout says",
         )
         return excused(verdict.once(), run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
+    unset = any("did not set the goal to a terminal status" in line.line for _, line in run.console)
+    if status == "ABORTED" and unset:
+        message += ": the callback returns without saying how the goal ends"
     return failed(message, hint=HINTS[params.status])
 
 
@@ -242,6 +260,8 @@ def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> V
         return unjudged(f"{what}; there is {join_words(near)}", hint=hint, measured=join_words(servers))
     if absent := no_node(package, run, what):
         return absent
+    if end := explain_error(package, run):
+        return end.verdict(failed, f"{what}: {end.cause}")
     others = f"; there is {join_words(servers)}" if servers else ""
     hint = f"actionlib.SimpleActionServer('{bare}', …, auto_start=False), and then start()"
     return unjudged(f"{what}{others}", hint=hint, measured=join_words(servers) or "no action server")

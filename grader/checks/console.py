@@ -14,6 +14,7 @@ from grader.checks.registry import ProcessName, check
 from grader.checks.support.console_output import Level, Line, Logged, logged_by, split_log_line, stream_lines
 from grader.checks.support.exit_causes import (
     explain_end,
+    explain_error,
     explain_traceback,
     is_rospys_own,
     lifetime_text,
@@ -138,7 +139,12 @@ def _not_printed(
     if one.ended_early and (one.end is None or one.end.exit_code != 0):
         end = explain_end(one, run, package)
         return end.verdict(unjudged, f"it ended before it printed {params.words}: {end.cause}")
+    if error := explain_error(package, run):
+        return error.verdict(unjudged, f"it never prints {params.words}: {error.cause}")
     own = [line for line in lines if one.interrupt_ns is None or line.at_ns < one.interrupt_ns]
+    if any(NO_ANSWER in line.text for line in own):
+        hint = "end the service's callback with `return …Response(…)`"
+        return unjudged(f"it never prints {params.words}: the service's callback returns nothing", hint=hint)
     if not own:
         nothing = unjudged(f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True").once()
         return nothing.model_copy(update={"silent": True})
@@ -212,6 +218,8 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
 
 
 ALIKE = 0.7
+NO_ANSWER = "service handler returned None"
+"""What rospy tells a client whose server's callback returns nothing."""
 
 
 class LogsParams(Record):

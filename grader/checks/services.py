@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.exceptions import HEADING, Traceback, tracebacks
-from grader.checks.support.exit_causes import explain_end, explain_traceback
+from grader.checks.support.exceptions import Traceback
+from grader.checks.support.exit_causes import explain_end, explain_traceback, process_tracebacks
 from grader.checks.support.fields import differences, fields_text
 from grader.checks.support.processes import GlobalName, TypeName, life_of, plain_type
 from grader.checks.support.text import SERVICE, SPIN, imports, near_names, service_call, shown
@@ -276,25 +275,12 @@ def _rename_hint(wanted: str, found: str, node: str) -> str:
 
 
 def handler_traceback(run: Run, service: str, since_ns: int) -> Traceback | None:
-    """Return the first traceback of the service's node since a call; rospy logs a handler's as a list on one line."""
+    """Return the first traceback of the service's node since a call."""
     offer = offers(run).get(service)
     one = life_of(run, offer.node) if offer else None
     if one is None:
         return None
-    printed = [c.line for t, c in run.lines(one.name) if c.stream == "stderr" and t >= since_ns]
-    lines = [part for line in printed for part in _unpack_traceback(line)]
-    return next(iter(tracebacks(lines)), None)
-
-
-def _unpack_traceback(line: str) -> list[str]:
-    start = line.find("['" + HEADING)
-    if start < 0:
-        return [line]
-    try:
-        parts = ast.literal_eval(line[start:].strip())
-    except (SyntaxError, ValueError):
-        return [line]
-    return "".join(map(str, parts)).splitlines()
+    return next(iter(process_tracebacks(run, one.name, after_ns=since_ns)), None)
 
 
 def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> Verdict:

@@ -419,6 +419,16 @@ class LaunchFile(Record):
     readable: tuple[LaunchNode, ...] = ()
 
 
+CLASSES_OF = {
+    "srv": ("", "Request", "Response"),
+    "action": (
+        *("Action", "Goal", "Result", "Feedback"),
+        *("ActionGoal", "ActionResult", "ActionFeedback"),
+    ),
+}
+"""What follows a definition's name in the names of its classes."""
+
+
 class InterfaceField(Record):
     """A line of a `.msg`, `.srv` or `.action` file: a field, or a constant, which has a `value` as written.
 
@@ -438,6 +448,17 @@ class Interface(Record):
     path: str
     fields: tuple[InterfaceField, ...]
     fault: Fault | None = None
+
+    @property
+    def module(self) -> str:
+        """The module of the package in which the build puts its classes: `msg` or `srv`."""
+        return "srv" if self.path.endswith(".srv") else "msg"
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """The classes that the build makes of it."""
+        name, _, suffix = posixpath.basename(self.path).partition(".")
+        return tuple(f"{name}{part}" for part in CLASSES_OF.get(suffix, ("",)))
 
 
 class PackageFacts(Record):

@@ -268,6 +268,10 @@ def _add_import(text: str, statement: str, module: str, name: str) -> str:
     imports = [s for s in body if isinstance(s, ast.Import | ast.ImportFrom)]
     for one in imports:
         if module and isinstance(one, ast.ImportFrom) and one.module == module and not one.level:
+            other = next((a for a in one.names if a.name.lower() == name.lower() and not a.asname), None)
+            place = _span(lines, other) if other is not None else None  # type: ignore[arg-type] # as below
+            if place is not None:
+                return _edit(text, [(*place, name)])
             span = _span(lines, one.names[-1])  # type: ignore[arg-type] # an alias has a place too
             if span is not None:
                 return _edit(text, [(span[0], span[2], span[2], f", {name}")])

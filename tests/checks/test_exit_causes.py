@@ -101,6 +101,21 @@ def leave():
         (6, "hear()", "TypeError: hear() missing 1 required positional argument: 'msg'",
          "put 'msg' into its brackets, or remove the call: ROS calls a callback by itself"),
         (6, "text = text + str(3)", "TypeError: 'str' object is not callable", "give the variable `str` another name"),
+        (6, "add = rospy.ServiceProxy('/add', AddRequest)", "NameError: name 'AddRequest' is not defined",
+         "write `add = rospy.ServiceProxy('/add', Add)`"),
+        (6, "rospy.Service('/add', AddResponse, add)",
+         "AttributeError: type object 'AddResponse' has no attribute '_request_class'",
+         "write `rospy.Service('/add', Add, add)`"),
+        (6, "rospy.ServiceProxy('/add', 'lab/Add')", "AttributeError: 'str' object has no attribute '_md5sum'",
+         "write `rospy.ServiceProxy('/add', Add)`"),
+        (6, "rospy.ServiceProxy(Add, '/add')", "AttributeError: type object 'Add' has no attribute 'startswith'",
+         "write `rospy.ServiceProxy('/add', Add)`"),
+        (6, "self.server = actionlib.SimpleActionServer('/count', Count, execute_cb=self.go)",
+         "RecursionError: maximum recursion depth exceeded",
+         "write `self.server = actionlib.SimpleActionServer('/count', CountAction, execute_cb=self.go)`"),
+        (6, "actionlib.SimpleActionClient('/count', CountGoal)",
+         "AttributeError: 'CountGoal' object has no attribute 'action_goal'",
+         "write `actionlib.SimpleActionClient('/count', CountAction)`"),
         (1, "import std_msgs.msg.String",
          "ModuleNotFoundError: No module named 'std_msgs.msg.String'; 'std_msgs.msg' is not a package",
          "write `from std_msgs.msg import String`"),
@@ -149,6 +164,55 @@ def said(package, *frames, error):
 LIBRARY = "/opt/ros/noetic/lib/python3/dist-packages/rospy/__init__.py"
 IMPORTS = ("src/talker.py", 1, "import rospy")
 INSIDE = (LIBRARY, 47, "from .client import spin")
+
+
+@pytest.mark.parametrize(
+    ("source", "error", "hint"),
+    [
+        ("from lab.action import CountAction, CountResult",
+         "ModuleNotFoundError: No module named 'lab.action'",
+         "write `from lab.msg import CountAction, CountResult`"),
+        ("from lab.srv import Reading", "ImportError: cannot import name 'Reading' from 'lab.srv' (/d/__init__.py)",
+         "write `from lab.msg import Reading`"),
+        ("import lab.Reading", "ModuleNotFoundError: No module named 'lab.Reading'",
+         "write `from lab.msg import Reading`"),
+        ("from lab import Reading", "ImportError: cannot import name 'Reading' from 'lab' (/d/__init__.py)",
+         "write `from lab.msg import Reading`"),
+        ("from lab.msg import reading", "ImportError: cannot import name 'reading' from 'lab.msg' (/d/__init__.py)",
+         "write `from lab.msg import Reading`"),
+        ("from lab.msg import Count", "ImportError: cannot import name 'Count' from 'lab.msg' (/d/__init__.py)",
+         "write `from lab.msg import CountAction`"),
+        ("from std_msgs.msg import String, Reading",
+         "ImportError: cannot import name 'Reading' from 'std_msgs.msg' (/d/__init__.py)",
+         "write `from std_msgs.msg import String` and `from lab.msg import Reading`"),
+        ("from beginner_tutorials.srv import Add, AddResponse",
+         "ModuleNotFoundError: No module named 'beginner_tutorials'",
+         "write `from lab.srv import Add, AddResponse`"),
+        # the build has made some of them, and not these
+        ("from lab.msg import Reading", "ImportError: cannot import name 'Reading' from 'lab.msg' (/d/__init__.py)",
+         "list Reading.msg in add_message_files(…)"),
+        ("from lab.srv import Sum", "ImportError: cannot import name 'Sum' from 'lab.srv' (/d/__init__.py)",
+         "write the one that you mean for Sum"),
+        # it has made none
+        ("from lab.msg import Reading", "ModuleNotFoundError: No module named 'lab'",
+         "first get the build to pass: catkin_make"),
+    ],
+)  # fmt: skip
+def test_a_class_that_the_build_makes_is_imported_from_its_module(tmp_path, source, error, hint):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "CMakeLists.txt").write_text("generate_messages()\n")
+    for path, text in {
+        "msg/Reading.msg": "",
+        "srv/Add.srv": "---\n",
+        "action/Count.action": "---\n---\n",
+    }.items():
+        (tmp_path / path).parent.mkdir()
+        (tmp_path / path).write_text(text)
+    (tmp_path / "node.py").write_text(SCRIPT)
+    package = facts_of(tmp_path)
+    end = explain_traceback(said(package, ("node.py", 1, source), error=error), package)
+    assert end.hint == hint
+    assert end.unbuilt == (not hint.startswith("write `from"))
 
 
 @pytest.mark.parametrize(

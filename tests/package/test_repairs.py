@@ -150,6 +150,7 @@ CASES = {
     "terminal": Case(swapped(TALKER, ("import rospy\n", "$ chmod +x talker.py\nimport rospy\n")), ["python-syntax"],
                  "a command for the terminal"),
     "import": Case(swapped(TALKER, ("import Int8", "import String")), ["missing-import"], "talker.py uses Int8"),
+    "import-capitals": Case(swapped(TALKER, ("import Int8", "import int8")), ["missing-import"], "talker.py uses Int8"),
     "import-ros": Case(swapped(TALKER, ("import rospy\n", "import ros\n")), ["missing-import"], "import rospy"),
     "no-rospy": Case(swapped(TALKER, ("import rospy\n", "")), ["missing-import"], "uses rospy"),
     "attribute": Case(swapped(TALKER, ("rospy.Publisher", "rospy.publisher")), ["missing-call"],

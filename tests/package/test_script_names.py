@@ -26,6 +26,8 @@ UNDEFINED = {
     "enclosing": ("def a(x):\n    def b():\n        return x\n    return [b, lambda y: x + y, [z for z in x]]\n", ""),
     "class-level": ("class A:\n    n = 3\n    m = n + 1\n", ""),
     "caught": ("try:\n    text = unicode\nexcept NameError:\n    text = str\n", ""),
+    # the import fails by itself
+    "class-in-other-capitals": ("from lab.msg import reading\nx = Reading()\n", ""),
     "star": ("from math import *\nx = sin(3)\n", ""),
     "made": ("exec('y = 3')\nx = y\n", ""),
     "handled": ("try:\n    pass\nexcept OSError as error:\n    print(error)\n", ""),

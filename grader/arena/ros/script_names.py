@@ -89,7 +89,7 @@ def misspelt(tree):
     attributes = {
         dotted(n) for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)
     }
-    known = own | set(dir(builtins)) | MODULE_NAMES
+    known = own | set(dir(builtins)) | MODULE_NAMES | imported_otherwise(tree, {n.id for n in names})
     outside = {id(n) for n in outside_methods(tree)}
     unbound = unbound_names(tree, known)
     for node in names:
@@ -104,6 +104,15 @@ def misspelt(tree):
             message, fix = undefined(node, tree) if node.id not in known else known_elsewhere(node, tree)
             if message:
                 yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
+
+
+def imported_otherwise(tree, names):
+    """Return those of the names that are classes of messages or services, and are imported with other capitals: it is
+    the import that fails."""
+    froms = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)]
+    modules = [n for n in froms if (n.module or "").endswith((".msg", ".srv"))]
+    imported = {alias.name.lower() for n in modules for alias in n.names}
+    return {name for name in names if name.lower() in imported}
 
 
 def spelt_alike(name, own, attributes):

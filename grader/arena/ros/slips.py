@@ -106,6 +106,10 @@ def loop_rates(tree):
             yield slip(value.lineno, "rate-number", hz)
 
 
+WORKS = ("init_node", "publish", "spin", "sendTransform", "send_goal")
+"""What a function is there for: one that calls none of these may be a spare one."""
+
+
 def never_run(tree):
     """Functions that make a node, publish or wait, and that nothing names; and `__name__` beside another word than
     `__main__`.
@@ -114,9 +118,7 @@ def never_run(tree):
     named |= {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
-            works = any(
-                is_call(inner, work) for inner in ast.walk(node) for work in ("init_node", "publish", "spin")
-            )
+            works = any(is_call(inner, work) for inner in ast.walk(node) for work in WORKS)
             if works and not node.name.startswith("__"):
                 message = "nothing calls `%s()`" % node.name
                 yield slip(node.lineno, "never-called", message, name=node.name)

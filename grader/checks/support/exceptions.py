@@ -1,4 +1,4 @@
-"""Python's tracebacks as records, what the exceptions of a first script mean, and names that are not there."""
+"""Python's tracebacks as records, and what the exceptions of a first script mean."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
-from grader.checks.support.text import near_names, shown
-from grader.installable import PYTHON_2, ROS_2, TUTORIALS, known_packages, nearest_module, noetic_messages
-from grader.model.package import PackageFacts
-from grader.wording import join_words, plural
+from grader.checks.support.text import shown
+from grader.wording import plural
 
 Meaning = tuple[str, str]
 """The cause, and what to do."""
-ATTRIBUTES_SHOWN = 8
 HIDDEN = (
     "str",
     "int",
@@ -33,7 +30,6 @@ HIDDEN = (
     "round",
 )
 """Functions of Python's whose names beginners give to variables."""
-IMPORT_ERRORS = ("ImportError", "ModuleNotFoundError")
 NUMBER_OF_PARTS = "not every message has so many parts"
 _NO_FILE = re.compile(r"No such file or directory: '([^']+)'")
 _UNPACKED = re.compile(r"(not enough|too many) values to unpack \(expected (\d+)(?:, got (\d+))?")
@@ -55,12 +51,6 @@ _WHOLE = re.compile(
 )
 """What Python says of a whole message where one of its values is meant."""
 _WANTS_NUMBER = re.compile(r"(?:real number|a number) is required, not (\w+)|must be real number, not (\w+)")
-NO_MODULE = re.compile(r"No module named '(\w+)'$")
-_KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
-_IN_MODULE = re.compile(r"No module named '(\w+\.(?:msg|srv))\.(\w+)'")
-_FROM_PACKAGE = re.compile(r"cannot import name '(\w+)' from '(\w+)'")
-_NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
-_NO_ATTRIBUTE = re.compile(r"(?:module|type object)? ?'([\w.]+)'(?: object)? has no attribute '(\w+)'")
 HEADING = "Traceback (most recent call last):"
 _FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
 _CARETS = re.compile(r"    \s*([~^]*\^[~^]*)")
@@ -126,6 +116,19 @@ def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
                 found.append(Traceback(kind, (last[2] or "").strip(), tuple(frames), first, index))
             first = None
     return tuple(found)
+
+
+def unpack_traceback(line: str) -> list[str]:
+    """Return the lines of a traceback that rospy logs as a list on one line: that of a service's callback. Any other
+    line stays as it is."""
+    start = line.find("['" + HEADING)
+    if start < 0:
+        return [line]
+    try:
+        parts = ast.literal_eval(line[start:].strip())
+    except (SyntaxError, ValueError):
+        return [line]
+    return "".join(map(str, parts)).splitlines()
 
 
 def _followed_by_syntax_error(lines: Sequence[str]) -> list[bool]:
@@ -260,6 +263,30 @@ def _ros_call(message: str, source: str) -> Meaning | None:
     if asks_for_rate := _calls(source, "Rate"):
         return _rate(asks_for_rate[0])
     return None
+
+
+SERVICES = ("Service", "ServiceProxy")
+ACTIONS = ("SimpleActionServer", "SimpleActionClient", "ActionServer", "ActionClient")
+
+
+def wrong_class(source: str) -> Meaning | None:
+    """Return what is wrong with the type that a line gives a service or an action: one half of it, a value, a text, or
+    the place of the name."""
+    call = next(iter(_calls(source, *SERVICES, *ACTIONS)), None)
+    if call is None or len(call.args) < 2:
+        return None
+    name, type_ = call.args[:2]
+    if is_text(type_) and not is_text(name):
+        return "the name comes first, then the type", rewritten(source, (name, type_), (type_, name))
+    plain = type_.func if isinstance(type_, ast.Call) else type_
+    written = str(plain.value) if isinstance(plain, ast.Constant) else ast.unparse(plain)
+    of_action = getattr(call.func, "attr", getattr(call.func, "id", "")) in ACTIONS
+    halves = r"(?:Action)?(?:Goal|Result|Feedback|Action)?$" if of_action else r"(?:Request|Response)$"
+    right = re.sub(halves, "Action" if of_action else "", re.sub(r".*/", "", written), count=1)
+    if ast.unparse(type_) == right:
+        return None
+    kind = "an action" if of_action else "a service"
+    return f"the type of {kind} is the class `{shown(right)}`", rewritten(source, (type_, right))
 
 
 def _calls(source: str, *names: str) -> list[ast.Call]:
@@ -420,146 +447,3 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
         "call another function there, or loop",
     ),
 }
-
-
-# ---- names that are not there, and what is meant
-
-KEYWORDS = (
-    *("anonymous", "log_level", "disable_signals", "argv", "queue_size", "latch", "tcp_nodelay", "headers"),
-    *(
-        "callback",
-        "callback_args",
-        "buff_size",
-        "subscriber_listener",
-        "data_class",
-        "oneshot",
-        "timeout",
-        "default",
-    ),
-)
-"""Arguments of rospy's functions that are given by their names."""
-ATTRIBUTES = {
-    "rospy": (
-        *("init_node", "Publisher", "Subscriber", "Service", "ServiceProxy", "Rate", "Timer", "Time", "Duration"),
-        *("sleep", "spin", "is_shutdown", "on_shutdown", "signal_shutdown", "loginfo", "logwarn", "logerr", "logdebug"),
-        *("logfatal", "get_param", "set_param", "has_param", "delete_param", "search_param", "get_time", "get_rostime"),
-        *("get_name", "wait_for_message", "wait_for_service", "get_namespace", "get_published_topics", "myargv"),
-        *("ROSException", "ROSInterruptException", "ROSInitException", "ServiceException"),
-    ),
-    "Publisher": ("publish", "unregister", "get_num_connections"),
-    "Subscriber": ("unregister", "get_num_connections"),
-    "Rate": ("sleep", "remaining"),
-    "Time": ("now", "to_sec", "to_nsec", "secs", "nsecs", "is_zero"),
-    "Duration": ("to_sec", "to_nsec", "secs", "nsecs"),
-    "ServiceProxy": ("wait_for_service", "close"),
-}  # fmt: skip
-"""What a lab's scripts use of rospy (http://docs.ros.org/en/noetic/api/rospy/html/)."""
-
-
-def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
-    """A message type, a module, an attribute or an argument that there is none of, and what is meant."""
-    if meant := own_message(found, package):
-        return meant
-    if wrong := _NO_TYPE.match(found.message):
-        return _other_types(wrong[1], wrong[2])
-    if wrong := _NO_ATTRIBUTE.search(found.message):
-        return _other_attributes(package, wrong[1], wrong[2])
-    if wrong := re.match(r"(\w+) is not an attribute of (\w+)$", found.message):
-        fields = join_words(fields_of(package, wrong[2])[:ATTRIBUTES_SHOWN])
-        return (
-            f"{wrong[2]} has {fields}" if fields else "",
-            f"leave out `{wrong[1]}=`, or write the field that you mean",
-        )
-    if wrong := _KEYWORD.search(found.message):
-        near = near_names(wrong[1], KEYWORDS)
-        return (f"it is called {near[0]}", f"write {near[0]}= for {wrong[1]}=") if near else None
-    return _other_module(found, package) if found.kind in IMPORT_ERRORS else None
-
-
-def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
-    """Return what is meant where a message that the package has itself is imported from one that is not there."""
-    source = found.own_frames[-1].source if found.own_frames else ""
-    asked = re.match(r"from\s+(\w+)\.(?:msg|srv)\s+import\s+(.+)", source)
-    if asked is None or not NO_MODULE.search(found.message) or asked[1] == package.name:
-        return None
-    names = set(re.findall(r"\w+", asked[2]))
-    own = next(
-        (one for one in package.interfaces if one.path.rpartition("/")[2].partition(".")[0] in names), None
-    )
-    if own is None:
-        return None
-    return f"this package has {own.path} itself", f"write {package.name} for {asked[1]}"
-
-
-def unimported_module(found: Traceback, package: PackageFacts) -> str:
-    """Return a module that the script which imports one that is not there uses, and does not import; "" for none."""
-    file = found.own_frames[-1].file if found.own_frames else ""
-    slips = (s for s in package.slips if s.kind == "undefined" and file.endswith(f"/{s.file}"))
-    return next((s.name for s in slips if s.fix == f"write `import {s.name}` at the top"), "")
-
-
-def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
-    """Return what a module is meant by one that is not there: a class, one of Python 3, one that is spelt alike."""
-    message = found.message
-    if inner := _IN_MODULE.search(message):
-        return f"{inner[2]} is a class in {inner[1]}", f"write `from {inner[1]} import {inner[2]}`"
-    asked, wanted = NO_MODULE.search(message), _FROM_PACKAGE.search(message)
-    if asked and asked[1] in ROS_2:
-        return f"{asked[1]} is of ROS 2", "this lab is for ROS 1: write the node with rospy"
-    if asked and asked[1] in PYTHON_2:
-        return f"{asked[1]} is a module of Python 2", f"write {PYTHON_2[asked[1]]} for {asked[1]}"
-    if asked and asked[1] in TUTORIALS - {package.name}:
-        fix = f"write your package's name for {asked[1]}, or leave the line out"
-        return "tutorials call the reader's own package so", fix
-    meant = unimported_module(found, package)
-    near = near_names(asked[1], noetic_messages()) if asked and asked[1] not in known_packages() else ()
-    near = () if meant else near
-    if wanted and wanted[1] in noetic_messages().get(wanted[2], ()):
-        near = (wanted[2],)
-    if near:
-        return f"messages come from {near[0]}.msg", f"write `from {near[0]}.msg import …`"
-    meant = meant or (nearest_module(asked[1], own_modules(package)) if asked else "")
-    return (f"did you mean {meant}?", f"write {meant} for {asked[1]}") if asked and meant else None
-
-
-def own_modules(package: PackageFacts) -> set[str]:
-    """Return what a script of the package may import of the student's own."""
-    files = {f.path.rpartition("/")[2].removesuffix(".py") for f in package.files}
-    return {package.name, *(one.name for one in package.also), *files}
-
-
-def _other_types(name: str, package: str) -> tuple[str, str] | None:
-    """Return which packages of ROS have the message, or what the one that was asked has that is spelt alike."""
-    having = [other for other, names in noetic_messages().items() if name in names]
-    near = near_names(name, noetic_messages().get(package, ()))
-    if having:
-        lines = join_words([f"from {other}.msg import {name}" for other in having], "or")
-        return f"{package} has no {name}, {join_words(having)} has", lines
-    return (f"{package} has {near[0]}", f"from {package}.msg import {near[0]}") if near else None
-
-
-def _other_attributes(package: PackageFacts, owner: str, wrong: str) -> tuple[str, str] | None:
-    """Return what a message has, or an object of rospy's, in place of an attribute that it has not."""
-    known = ATTRIBUTES.get(owner) or fields_of(package, owner)
-    if not known:
-        return None
-    if near := near_names(wrong, known):
-        return f"{owner} has {near[0]}", f"write {near[0]} for {wrong}"
-    if owner in ATTRIBUTES:
-        return None
-    if len(known) == 1 and any(hasattr(kind, wrong) for kind in (str, float, list)):
-        return f"it is the whole message ({owner})", f"write `.{known[0]}.{wrong}` for `.{wrong}`"
-    listed = join_words(known[:ATTRIBUTES_SHOWN]) + (", …" if len(known) > ATTRIBUTES_SHOWN else "")
-    return f"{owner} has {listed}", f"write the field that you mean for {wrong}"
-
-
-def fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
-    """Return the fields of a message type, of the student's own or of ROS's, by the name of its class."""
-    for own in (package, *package.also):
-        for one in own.interfaces:
-            stem = one.path.rpartition("/")[2].partition(".")[0]
-            part = name[len(stem) :].lower()
-            fields = tuple(field.name for field in one.fields if field.part == part)
-            if name.startswith(stem) and fields:
-                return fields
-    return next((fields for types in noetic_messages().values() if (fields := types.get(name, ()))), ())

@@ -12,22 +12,27 @@ from typing import NamedTuple
 
 from grader.checks.registry import Check
 from grader.checks.support.exceptions import (
-    IMPORT_ERRORS,
-    NO_MODULE,
     Frame,
     Traceback,
     explain_exception,
-    fields_of,
     is_text,
+    rewritten,
+    tracebacks,
+    unpack_traceback,
+    wrong_class,
+)
+from grader.checks.support.missing_names import (
+    IMPORT_ERRORS,
+    NO_MODULE,
+    fields_of,
     other_name,
     own_message,
     own_modules,
-    rewritten,
-    tracebacks,
     unimported_module,
+    unmade,
 )
 from grader.checks.support.processes import Life, early_end, lives
-from grader.checks.support.scripts import cmake_calls, path_in_package
+from grader.checks.support.scripts import path_in_package
 from grader.checks.support.text import LOOP, SPIN, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
@@ -256,16 +261,13 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     """Explain one traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
-    slip = _slip(found, package) or _asks_for_input(found, place, package)
+    misplaced = wrong_class(found.own_frames[-1].source) if found.own_frames else None
+    slip = misplaced or _slip(found, package) or _asks_for_input(found, place, package)
     cause, hint = slip or CAUSES.get(
         found.kind, ("", "look at that line: the last words say what Python cannot do there")
     )
-    maker = next((one for one in (package, *package.also) if _makes(one, found.message)), None)
-    if maker is not None:
-        whose = "the package's own messages" if maker is package else f"the messages of {maker.name}"
-        cause, hint = f"the build makes {whose}", "first get the build to pass: catkin_make"
-        if not cmake_calls(maker, "generate_messages"):
-            hint = "list them in add_message_files(…) or add_service_files(…), and call generate_messages(…)"
+    unbuilt = unmade(found, package)
+    cause, hint = unbuilt or (cause, hint)
     if lacking := _lacking(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""
         cause = f"{shown(found.text)}{where}: this grading machine lacks {lacking}"
@@ -281,9 +283,9 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         cause = source.python_fault.cause or cause
         hint = syntax_hint(source.python_fault)
         place = source.python_fault.place
-    if place is not None:
+    if place is not None and misplaced is None:
         cause, hint = _by_other_lines(found, place, package) or (cause, hint)
-    said = found.text
+    said = re.sub(r" \(/\S+/__init__\.py\)$", "", found.text)
     if (guess := _BY_PYTHON.search(said)) and (hasattr(builtins, guess[1]) or "did you mean" in cause):
         said = said.removesuffix(guess[0])
     if found.kind == "TypeError" and (wrong := _callback(found, place, package)):
@@ -293,7 +295,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         cause, hint = _operand(found, package) or (cause, hint)
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(said.rstrip('.'))}{where}" + (f": {cause}" if cause else "")
-    return Ending(text, hint, (place,) if place else (), unbuilt=maker is not None)
+    return Ending(text, hint, (place,) if place else (), unbuilt=unbuilt is not None)
 
 
 def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
@@ -330,12 +332,6 @@ def _asks_for_input(
     if found.kind != "EOFError" or place is None or place.file not in rated:
         return None
     return CAUSES["EOFError"][0], f"{NO_INPUT}, and make sure that the loop calls `sleep()` of its Rate"
-
-
-def _makes(package: PackageFacts, message: str) -> bool:
-    """Return whether the build makes the module that the message names."""
-    named = any(f"'{package.name}{inner}'" in message for inner in ("", ".msg", ".srv"))
-    return named and bool(package.interfaces)
 
 
 def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
@@ -544,15 +540,23 @@ def process_tracebacks(
     run: Run, process: str, *, after_ns: int | None = None, before_ns: int | None = None
 ) -> tuple[Traceback, ...]:
     """Return the tracebacks on a process's stderr that began at `after_ns` or later, and before `before_ns`."""
-    lines = [(t, c.line) for t, c in run.lines(process) if c.stream == "stderr"]
+    printed = [(t, c.line) for t, c in run.lines(process) if c.stream == "stderr"]
+    lines = [(t, part) for t, line in printed for part in unpack_traceback(line)]
     found = tracebacks([line for _, line in lines])
     first_ns = after_ns if after_ns is not None else run.start_ns
     end_ns = before_ns if before_ns is not None else run.end_ns + 1
     return tuple(f for f in found if first_ns <= lines[f.first][0] < end_ns)
 
 
+def _is_answer(found: Traceback) -> bool:
+    return any(frame.file.endswith("/tcpros_service.py") and frame.in_library for frame in found.frames)
+
+
 def is_rospys_own(found: Traceback) -> bool:
-    """Return whether it is a race of rospy's own shutdown, or a thread in which no line of the student's takes part."""
+    """Return whether it is a race of rospy's own shutdown, a thread in which no line of the student's takes part, or
+    how a service refuses a call."""
+    if found.own_frames and found.own_frames[-1].source.startswith("raise ") and _is_answer(found):
+        return True
     race = found.kind == "ROSException" and RACE in found.message
     if found.kind == "TypeError" and _ARITY.match(found.message):
         return False  # a callback that takes other values: rospy's line calls it

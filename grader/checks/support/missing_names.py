@@ -1,0 +1,239 @@
+"""Names that a script asks for and that are not there: modules, classes of messages, attributes, arguments; and what is
+meant by them."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Collection
+from contextlib import suppress
+
+from grader.checks.support.exceptions import Traceback
+from grader.checks.support.scripts import cmake_calls
+from grader.checks.support.text import near_names, shown
+from grader.installable import PYTHON_2, ROS_2, TUTORIALS, known_packages, nearest_module, noetic_messages
+from grader.model.package import PackageFacts
+from grader.wording import join_words
+
+IMPORT_ERRORS = ("ImportError", "ModuleNotFoundError")
+ATTRIBUTES_SHOWN = 8
+_NO_ATTRIBUTE = re.compile(r"(?:module|type object)? ?'([\w.]+)'(?: object)? has no attribute '(\w+)'")
+_NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
+_FROM_PACKAGE = re.compile(r"cannot import name '(\w+)' from '(\w+)'")
+_IN_MODULE = re.compile(r"No module named '(\w+\.(?:msg|srv))\.(\w+)'")
+_KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
+NO_MODULE = re.compile(r"No module named '(\w+)'$")
+KEYWORDS = (
+    *("anonymous", "log_level", "disable_signals", "argv", "queue_size", "latch", "tcp_nodelay", "headers"),
+    *(
+        "callback",
+        "callback_args",
+        "buff_size",
+        "subscriber_listener",
+        "data_class",
+        "oneshot",
+        "timeout",
+        "default",
+    ),
+)
+"""Arguments of rospy's functions that are given by their names."""
+ATTRIBUTES = {
+    "rospy": (
+        *("init_node", "Publisher", "Subscriber", "Service", "ServiceProxy", "Rate", "Timer", "Time", "Duration"),
+        *("sleep", "spin", "is_shutdown", "on_shutdown", "signal_shutdown", "loginfo", "logwarn", "logerr", "logdebug"),
+        *("logfatal", "get_param", "set_param", "has_param", "delete_param", "search_param", "get_time", "get_rostime"),
+        *("get_name", "wait_for_message", "wait_for_service", "get_namespace", "get_published_topics", "myargv"),
+        *("ROSException", "ROSInterruptException", "ROSInitException", "ServiceException"),
+    ),
+    "Publisher": ("publish", "unregister", "get_num_connections"),
+    "Subscriber": ("unregister", "get_num_connections"),
+    "Rate": ("sleep", "remaining"),
+    "Time": ("now", "to_sec", "to_nsec", "secs", "nsecs", "is_zero"),
+    "Duration": ("to_sec", "to_nsec", "secs", "nsecs"),
+    "ServiceProxy": ("wait_for_service", "close"),
+}  # fmt: skip
+"""What a lab's scripts use of rospy (http://docs.ros.org/en/noetic/api/rospy/html/)."""
+
+
+def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """A message type, a module, an attribute or an argument that there is none of, and what is meant."""
+    if meant := own_message(found, package):
+        return meant
+    if wrong := _NO_TYPE.match(found.message):
+        return _other_types(wrong[1], wrong[2])
+    if wrong := _NO_ATTRIBUTE.search(found.message):
+        source = found.own_frames[-1].source if found.own_frames else ""
+        return _other_attributes(package, wrong[1], wrong[2], source)
+    if wrong := re.match(r"(\w+) is not an attribute of (\w+)$", found.message):
+        fields = join_words(fields_of(package, wrong[2])[:ATTRIBUTES_SHOWN])
+        return (
+            f"{wrong[2]} has {fields}" if fields else "",
+            f"leave out `{wrong[1]}=`, or write the field that you mean",
+        )
+    if wrong := _KEYWORD.search(found.message):
+        near = near_names(wrong[1], KEYWORDS)
+        return (f"it is called {near[0]}", f"write {near[0]}= for {wrong[1]}=") if near else None
+    return _other_module(found, package) if found.kind in IMPORT_ERRORS else None
+
+
+def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """Return the import as it has to be where the line looks for what the build makes of the package's own messages,
+    services and actions in another place, or by another name."""
+    source = found.own_frames[-1].source if found.own_frames else ""
+    asked = _imported_names(source) if found.kind in IMPORT_ERRORS else None
+    if asked is None:
+        return None
+    module, names = asked
+    made = {
+        name: f"{one.name}.{own.module}"
+        for one in (*package.also, package)
+        for own in one.interfaces
+        for name in own.classes
+    }
+    near_by = module.partition(".")[0] in {package.name, *(one.name for one in package.also)}
+    meant = {name: _class_of(name, made, near=near_by) for name in names}
+    lines: dict[str, list[str]] = {}
+    for name in names:
+        lines.setdefault(made.get(meant[name], module), []).append(meant[name])
+    right = [f"from {place} import {', '.join(several)}" for place, several in lines.items()]
+    own = [meant[name] for name in names if meant[name] in made]
+    if not own or right == [f"from {module} import {', '.join(names)}"]:
+        return None
+    cause = f"the build makes {join_words(own)}, in {made[own[0]]}"
+    return cause, f"write {join_words(f'`{line}`' for line in right)}"
+
+
+def _imported_names(source: str) -> tuple[str, tuple[str, ...]] | None:
+    """Return the module and the names of a line that imports, None of any other: `import a.b` is `b` of `a`."""
+    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        for node in ast.parse(source).body[:1]:
+            if isinstance(node, ast.ImportFrom) and node.module:
+                return node.module, tuple(alias.name for alias in node.names)
+            if isinstance(node, ast.Import) and "." in node.names[0].name:
+                module, _, name = node.names[0].name.rpartition(".")
+                return module, (name,)
+    return None
+
+
+def _class_of(name: str, made: Collection[str], *, near: bool) -> str:
+    """Return the class that is meant by a name; the name itself where none is."""
+    if name in made or not near:
+        return name
+    of_action = f"{name}Action"
+    return of_action if of_action in made else next(iter(near_names(name, made)), name)
+
+
+def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """Return the cause and the hint of an import of what the build makes, and has not made; None of any other."""
+    makers = (one for one in (package, *package.also) if _makes(one, found.message))
+    maker = None if own_message(found, package) else next(makers, None)
+    if maker is None:
+        return None
+    wanted = re.match(r"cannot import name '(\w+)'", found.message)
+    if wanted is not None and "__init__.py" in found.message:  # the build made others
+        own = next((one for one in maker.interfaces if wanted[1] in one.classes), None)
+        if own is None:
+            made = join_words(name for one in maker.interfaces for name in one.classes)
+            return f"the build makes {made}", f"write the one that you mean for {wanted[1]}"
+        kind = own.path.rpartition(".")[2].replace("msg", "message").replace("srv", "service")
+        hint = f"list {own.path.rpartition('/')[2]} in add_{kind}_files(…)"
+        return f"the build has not made it of {own.path}", hint
+    whose = "the package's own messages" if maker is package else f"the messages of {maker.name}"
+    hint = "first get the build to pass: catkin_make"
+    if not cmake_calls(maker, "generate_messages"):
+        hint = "list them in add_message_files(…) or add_service_files(…), and call generate_messages(…)"
+    return f"the build makes {whose}", hint
+
+
+def _makes(package: PackageFacts, message: str) -> bool:
+    """Return whether the build makes the module that the message names."""
+    named = any(f"'{package.name}{inner}'" in message for inner in ("", ".msg", ".srv"))
+    return named and bool(package.interfaces)
+
+
+def unimported_module(found: Traceback, package: PackageFacts) -> str:
+    """Return a module that the script which imports one that is not there uses, and does not import; "" for none."""
+    file = found.own_frames[-1].file if found.own_frames else ""
+    slips = (s for s in package.slips if s.kind == "undefined" and file.endswith(f"/{s.file}"))
+    return next((s.name for s in slips if s.fix == f"write `import {s.name}` at the top"), "")
+
+
+def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """Return what a module is meant by one that is not there: a class, one of Python 3, one that is spelt alike."""
+    message = found.message
+    if inner := _IN_MODULE.search(message):
+        return f"{inner[2]} is a class in {inner[1]}", f"write `from {inner[1]} import {inner[2]}`"
+    asked, wanted = NO_MODULE.search(message), _FROM_PACKAGE.search(message)
+    if asked and asked[1] in ROS_2:
+        return f"{asked[1]} is of ROS 2", "this lab is for ROS 1: write the node with rospy"
+    if asked and asked[1] in PYTHON_2:
+        return f"{asked[1]} is a module of Python 2", f"write {PYTHON_2[asked[1]]} for {asked[1]}"
+    if asked and asked[1] in TUTORIALS - {package.name}:
+        fix = f"write your package's name for {asked[1]}, or leave the line out"
+        return "tutorials call the reader's own package so", fix
+    meant = unimported_module(found, package)
+    near = near_names(asked[1], noetic_messages()) if asked and asked[1] not in known_packages() else ()
+    near = () if meant else near
+    if wanted and wanted[1] in noetic_messages().get(wanted[2], ()):
+        near = (wanted[2],)
+    if near:
+        return f"messages come from {near[0]}.msg", f"write `from {near[0]}.msg import …`"
+    meant = meant or (nearest_module(asked[1], own_modules(package)) if asked else "")
+    return (f"did you mean {meant}?", f"write {meant} for {asked[1]}") if asked and meant else None
+
+
+def own_modules(package: PackageFacts) -> set[str]:
+    """Return what a script of the package may import of the student's own."""
+    files = {f.path.rpartition("/")[2].removesuffix(".py") for f in package.files}
+    return {package.name, *(one.name for one in package.also), *files}
+
+
+def _other_types(name: str, package: str) -> tuple[str, str] | None:
+    """Return which packages of ROS have the message, or what the one that was asked has that is spelt alike."""
+    having = [other for other, names in noetic_messages().items() if name in names]
+    near = near_names(name, noetic_messages().get(package, ()))
+    if having:
+        lines = join_words([f"from {other}.msg import {name}" for other in having], "or")
+        return f"{package} has no {name}, {join_words(having)} has", lines
+    return (f"{package} has {near[0]}", f"from {package}.msg import {near[0]}") if near else None
+
+
+def _other_attributes(package: PackageFacts, owner: str, wrong: str, source: str) -> tuple[str, str] | None:
+    """Return what a message has, or an object of rospy's, in place of an attribute that it has not."""
+    known = ATTRIBUTES.get(owner) or fields_of(package, owner)
+    if not known:
+        return None
+    alike = [name for name in known if min(len(name), len(wrong)) > 2 and _begins_alike(name, wrong)]
+    near = near_names(wrong, known) or (tuple(alike) if len(alike) == 1 else ())
+    if near:
+        return f"{owner} has {near[0]}", _line_with(source, wrong, near[0])
+    if owner in ATTRIBUTES:
+        return None
+    if len(known) == 1 and any(hasattr(kind, wrong) for kind in (str, float, list)):
+        return f"it is the whole message ({owner})", f"write `.{known[0]}.{wrong}` for `.{wrong}`"
+    if len(known) == 1:
+        return f"{owner} has only {known[0]}", _line_with(source, wrong, known[0])
+    listed = join_words(known[:ATTRIBUTES_SHOWN]) + (", …" if len(known) > ATTRIBUTES_SHOWN else "")
+    return f"{owner} has {listed}", f"write the field that you mean for {wrong}"
+
+
+def _begins_alike(name: str, wrong: str) -> bool:
+    return name.startswith(wrong) or wrong.startswith(name)
+
+
+def _line_with(source: str, wrong: str, right: str) -> str:
+    """Return the advice to write the line with another attribute, where it has the wrong one once."""
+    line, count = re.subn(rf"\.{wrong}\b", f".{right}", source)
+    return f"write `{shown(line)}`" if count == 1 else f"write {right} for {wrong}"
+
+
+def fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
+    """Return the fields of a message type, of the student's own or of ROS's, by the name of its class."""
+    for own in (package, *package.also):
+        for one in own.interfaces:
+            stem = one.path.rpartition("/")[2].partition(".")[0]
+            part = name[len(stem) :].lower()
+            fields = tuple(field.name for field in one.fields if field.part == part)
+            if name.startswith(stem) and fields:
+                return fields
+    return next((fields for types in noetic_messages().values() if (fields := types.get(name, ()))), ())
