@@ -104,13 +104,22 @@ def apply_advice(criterion: CriterionResult, package: Path) -> None:
     advice that no one could follow so."""
     places = [c for c in criterion.citations if isinstance(c, FileCitation)]
     for step in steps(criterion.hint):
-        found = [(do, match) for pattern, do in _DEEDS if (match := re.search(pattern, step))]
+        placed = re.match(rf"{FILE}(?: line (?P<line>\d+))?: (?P<rest>.+)", step)
+        texts = [step, placed["rest"]] if placed else [step]
+        found = [
+            (do, match) for text in texts for pattern, do in _DEEDS if (match := re.search(pattern, text))
+        ]
         if not found:
             raise ValueError(f"what is to be done? {step}")
         do, match = found[0]
-        named = re.search(FILE, step)
-        file = package / (places[0].file if places else named["file"] if named else "")
-        do(package, file, match, next((c.line for c in places if c.line), None))
+        named = placed or re.search(FILE, step)
+        cited = places[0].file if places and not placed else named["file"] if named else ""
+        at = (
+            int(placed["line"])
+            if placed and placed["line"]
+            else next((c.line for c in places if c.line), None)
+        )
+        do(package, package / cited, match, at)
 
 
 def _edit(file: Path, line: int, new: Sequence[str], *, below: bool = False) -> None:
@@ -129,10 +138,12 @@ def _replace(file: Path, line: int, old: str, new: str) -> None:
     _edit(file, line, [changed.strip()])
 
 
-def _indent(file: Path, line: int, more: int = 4) -> None:
+def _indent(file: Path, line: int, more: int = 4, *, to: int | None = None) -> None:
+    """Start the line so many spaces further in than the one above, or with so many."""
     lines = file.read_text(encoding="utf-8").splitlines()
     above = lines[line - 2]
-    lines[line - 1] = " " * (len(above) - len(above.lstrip()) + more) + lines[line - 1].strip()
+    beside = len(above) - len(above.lstrip()) + more
+    lines[line - 1] = " " * (beside if to is None else to) + lines[line - 1].strip()
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -151,6 +162,10 @@ _DEEDS: tuple[tuple[str, Callable[[Path, Path, re.Match[str], int | None], objec
     (r"^write (#!\S+ \S+) as the very first line",
      lambda _t, f, m, _l: f.write_text(f"{m[1]}\n{f.read_text()}")),
     (r"^git mv (\S+) (\S+)$", lambda top, _f, m, _l: (top / m[1]).rename(top / m[2])),
+    (r"^replace the tabs: start line (\d+) with (\d+) spaces$",
+     lambda _t, f, m, _l: _indent(f, int(m[1]), to=int(m[2]))),
+    (r"^below line (\d+) add `(<.+>)`$",
+     lambda _t, f, m, _l: _edit(f, int(m[1]), re.findall(_TAG, m[2]), below=True)),
     (r"^add (<.+>) below line (\d+)$",
      lambda _t, f, m, _l: _edit(f, int(m[2]), re.findall(_TAG, m[1]), below=True)),
     (r"^(?:add|write) (.+) below the \w+\(…\) of line (\d+)$",
