@@ -14,7 +14,7 @@ from grader.checks.support.counters import (
     Step,
     WrapParams,
     Wrong,
-    cite_no_effect,
+    cite_slip,
     counts,
     first_values,
     judge_wraps,
@@ -157,7 +157,8 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
         or _too_few(len(steps), run, package, params)
         or passed(f"the counter goes up by one, {plural(right, 'time')}")
     )
-    verdict = cite_no_effect(_of_clock(verdict, count, run, package, params), count, run, package)
+    verdict = _of_clock(verdict, count, run, package, params)
+    verdict = cite_slip(verdict, count, run, package, "no-effect", "set-in-loop")
     at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0, 0)
     return verdict.about(
         expected=expected,
@@ -193,7 +194,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     if count is None:
         return _nothing(package, run, params.topic).about(expected=expected)
     verdict, seen = judge_wraps(count, run, package, params)
-    verdict = cite_no_effect(verdict, count, run, package, "compared")
+    verdict = cite_slip(verdict, count, run, package, "compared", "reset-early")
     turn = f"{significant(seen.before)}→{significant(seen.after)}" if seen else "no reset"
     lowest, highest = significant(min(count.values)), significant(max(count.values))
     measured = f"{plural(len(count.values), 'value')}, {lowest} to {highest}, {turn}"

@@ -154,6 +154,9 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     if verdict is None and topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
         verdict = inconclusive(message, hint="grade again")
+    elif verdict is None and (slip := run_slip(package, run, "never-reached")):
+        message = f"the node never subscribes to {topic}: {slip.message}"
+        verdict = failed(message, hint=f"in {slip.file}, {slip.fix}", citations=(slip.place,))
     elif verdict is None:
         near = near_names(topic, subscribed)
         other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""

@@ -220,6 +220,11 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
     if other is not None:
         return other
     wrong = _wrong_mean(found, params)
+    callers = (c.callerid for c in run.student_channels(params.topic))
+    twice = next((s for one in callers for s in slips_of(package, run, one, "sleep-twice")), None)
+    if twice is not None and mean_hz < params.rate_hz:
+        message = f"{wrong.message}; {twice.file}: {twice.message}"
+        return _explained(wrong, twice, message, f"in {twice.file}, {twice.fix}")
     by_number = _by_number(wrong, found.mean_hz, run, package, params)
     return by_number or _by_parameter(wrong, run, package, params, mean_hz)
 

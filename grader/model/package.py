@@ -250,12 +250,15 @@ SlipKind = Literal[
     "rate-number",
     "reset-value",
     "reset-limit",
+    "set-in-loop",
+    "reset-early",
     "never-called",
     "main-guard",
     "never-reached",
     "spin-in-loop",
     "loop-left",
     "sleep-outside",
+    "sleep-twice",
     "callback-called",
     "callback-missing",
     "callback-values",
@@ -288,22 +291,23 @@ class PythonSlip(Record):
     get none. `misspelt`: a name that the file does not define, beside one that it does. `no-clock`: it publishes and
     counts, and nothing in what it sends tells the time, but at most the value that it counts on from: a slip only
     where its messages are to tell it. `rate-parameter` and `rate-number`: no slip, but a loop or a timer whose rate
-    is a parameter or a number, in Hz. `reset-value` and `reset-limit`:
-    where a counter goes back, to the number `message`, or when it reaches it. `never-called`: a function that makes a
-    node, publishes or waits, which nothing names; `main-guard`: `__name__` beside another word than `__main__`.
-    `never-reached`: an endless loop before the first `publish(…)`; `spin-in-loop`: a loop that publishes and waits in
-    `spin()`; `loop-left`: one that ends in its first turn; `sleep-outside`: the `sleep()` that one lacks stands after
-    it or around it. `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it is to
-    be named, that takes another number of values than ROS has for it, or that is not there. `queue-size`: one that is
-    a text, with which rospy sends nothing. `clock-value`: the values of the topic `message` are read from
-    a clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C.
-    `outside-method`: a call in a class that stands in none of its methods and uses a name that is not there.
-    `object`: why an object of a class lacks an attribute where it is read, or that the class stands in its place.
-    `undefined`: why a name has no value where it is read. `no-effect` and `compared`: a statement such as `++i`, or
-    `i == 0`. `publishes` and `prints`: no slips, but a text that is published or printed, `{}` for a
-    value in it and `{data}` for that of a message.
-    `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a topic.
-    `publisher-type` and `subscriber-type`: the message type in that line.
+    is a parameter or a number, in Hz. `reset-value` and `reset-limit`: where a counter goes back, to the number
+    `message`, or when it reaches it. `set-in-loop` and `reset-early`: a counter that is set in each turn of its loop,
+    or goes back before one is added. `never-called`: a function that makes a node, publishes or waits, which nothing
+    names; `main-guard`: `__name__` beside another word than `__main__`. `never-reached`: an endless loop before the
+    first `publish(…)`; `spin-in-loop`: a loop that publishes and waits in `spin()`; `loop-left`: one that ends in its
+    first turn; `sleep-outside`: the `sleep()` that one lacks stands after it or around it; `sleep-twice`: one that
+    waits twice in each turn. `callback-called`, `callback-values`, `callback-missing`: a callback that is called
+    where it is to be named, that takes another number of values than ROS has for it, or that is not there.
+    `queue-size`: one that is a text, with which rospy sends nothing. `clock-value`: the values of the topic `message`
+    are read from a clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C. `outside-method`: a call
+    in a class that stands in none of its methods and uses a name that is not there. `object`: why an object of a
+    class lacks an attribute where it is read, or that the class stands in its place. `undefined`: why a name has no
+    value where it is read. `no-effect` and `compared`: a statement such as `++i`, or `i == 0`. `publishes` and
+    `prints`: no slips, but a text that is published or printed, `{}` for a value in it and `{data}` for that of a
+    message. `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a topic;
+    `name` is the variable that is given the publisher. `publisher-type` and `subscriber-type`: the message type in
+    that line.
     """
 
     file: str

@@ -21,6 +21,9 @@ Talker.stay()
 rospy.on_shutdown(leave())
 def leave():
     print('over')
+number_pub = rospy.Publisher('chatter', String)
+text_pub = rospy.Publisher('numbers', Int8)
+from std_msgs.msg import Int8
 """
 
 
@@ -98,6 +101,12 @@ def leave():
          "take its field: `msg.data`"),
         (6, "words = msg.split()", "AttributeError: 'String' object has no attribute 'split'",
          "write `.data.split` for `.split`"),
+        (6, "number_pub.publish(Int8(data=str(n)))",
+         "ROSSerializationException: field data must be an integer type", "write `number_pub.publish(Int8(data=n))`"),
+        (6, "number_pub.publish(n)", "TypeError: field data must be of type bytes or an ascii string",
+         "swap `number_pub` and `text_pub` in lines 13 and 14, or where they publish"),
+        (6, "other_pub.publish(n)", "TypeError: field data must be of type bytes or an ascii string",
+         "publish a string here, `str(…)`; numbers go to the publisher of their own topic"),
         (6, "hear()", "TypeError: hear() missing 1 required positional argument: 'msg'",
          "put 'msg' into its brackets, or remove the call: ROS calls a callback by itself"),
         (6, "text = text + str(3)", "TypeError: 'str' object is not callable", "give the variable `str` another name"),

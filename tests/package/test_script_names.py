@@ -127,3 +127,31 @@ def test_an_object_that_lacks_an_attribute_or_was_never_made(tmp_path, case):
     (tmp_path / "a.py").write_text(code)
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "object"]
     assert [s.fix for s in slips] == ([fix] if fix else [])
+
+
+LOOP = "c = 0\nwhile True:\n"
+COUNTERS = {
+    "good": (f"{LOOP}    p.publish(c)\n    c += 1\n    if c > 127:\n        c = 0\n", None),
+    "modulo": (f"{LOOP}    p.publish(c)\n    c = (c + 1) % 128\n", None),
+    "published-last": (f"{LOOP}    c += 1\n    if c > 127:\n        c = 0\n    p.publish(c)\n", None),
+    "set": (f"{LOOP}    c = 0\n    p.publish(c)\n    c += 1\n",
+            ("set-in-loop", 3, "move line 3 above the loop of line 2")),
+    "reset-before": (f"{LOOP}    p.publish(c)\n    if c > 127:\n        c = 0\n    c += 1\n",
+                     ("reset-early", 4, "move line 6 above the `if` in line 4")),
+    "reset-first": (f"{LOOP}    if c > 127:\n        c = 0\n    c += 1\n    p.publish(c)\n",
+                    ("reset-early", 3, "move line 5 above the `if` in line 3")),
+    "of-self": (f"{LOOP}    p.publish(self.c)\n    if self.c == 127:\n        self.c = 0\n    self.c += 1\n",
+                ("reset-early", 4, "move line 6 above the `if` in line 4")),
+    "two-sleeps": (f"{LOOP}    p.publish(c)\n    r.sleep()\n    rospy.sleep(1)\n", ("sleep-twice", 5, "delete line 5")),
+    "sleeps-apart": (f"{LOOP}    r.sleep()\n    p.publish(c)\n    r.sleep()\n", ("sleep-twice", 5, "delete line 5")),
+    "two-messages": (f"{LOOP}    p.publish(c)\n    r.sleep()\n    p.publish(c)\n    r.sleep()\n", None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", COUNTERS)
+def test_what_a_loop_does_to_its_counter_and_its_rate(tmp_path, case):
+    code, found = COUNTERS[case]
+    (tmp_path / "a.py").write_text(code)
+    kinds = ("set-in-loop", "reset-early", "sleep-twice")
+    slips = [(s.kind, s.line, s.fix) for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in kinds]
+    assert slips == ([found] if found else [])

@@ -1,7 +1,7 @@
-"""Finds the names and texts in a student's Python that its run depends on, for `slips.py`.
+"""Finds the names, counters and texts in a student's Python that its run depends on, for `slips.py`.
 
-Names that are not there when they are read; where a script names its node and its topics, and what it publishes and
-prints. Nothing is executed. Python 3.8, standard library only.
+Names that are not there when they are read; where a script names its node and its topics, where its counters are set,
+and what it publishes and prints. Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
@@ -52,13 +52,15 @@ NAMED = {"init_node": "node-name", "Publisher": "publisher", "Subscriber": "subs
 def graph_names(tree):
     """Where a script names its node, and the topics that it publishes and subscribes to, as written; and the types that
     it publishes."""
+    owners = {id(n.value): dotted(n.targets[0]) for n in ast.walk(tree) if isinstance(n, ast.Assign)}
     for node in ast.walk(tree):
         kind = NAMED.get(called_name(node))
         if not kind:
             continue
+        owner = owners.get(id(node), "")
         names = node.args[:1] or [k.value for k in node.keywords if k.arg == "name"]
         if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
-            yield slip(names[0].lineno, kind, names[0].value)
+            yield slip(names[0].lineno, kind, names[0].value, name=owner)
             name = published_type(node)
             if name.isidentifier() and kind != "node-name":
                 yield slip(names[0].lineno, kind + "-type", name)
@@ -366,6 +368,95 @@ def classes_as_objects(classes, tree):
         yield slip(
             n.lineno, "object", message, fix="in line %d, write `%s`" % (line, right), name=method.name
         )
+
+
+# ---- counters
+
+
+def resets(tree):
+    """Where a counter goes back: the number that it is set to in an `if` that asks for it, and the number in that `if`,
+    or behind a `%`.
+    """
+    for node in ast.walk(tree):
+        value, done, asked = None, (), []
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
+            asked = [node.right]
+        elif isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Mod):
+            asked = [node.value]
+        elif isinstance(node, ast.If):
+            done = [(one.targets[0], one.value) for one in node.body if isinstance(one, ast.Assign)]
+        elif isinstance(node, ast.Assign) and isinstance(node.value, ast.IfExp):
+            done = [(node.targets[0], node.value.body), (node.targets[0], node.value.orelse)]
+        if done:
+            test = list(ast.walk(node.test if isinstance(node, ast.If) else node.value.test))
+            names = {ast.dump(part) for part in test if isinstance(part, (ast.Name, ast.Attribute))}
+            values = [value for name, value in done if ast.dump(name).replace("Store()", "Load()") in names]
+            value = next((value for value in values if whole(value) is not None), None)
+            asked = test if value is not None else []
+        for part in asked:
+            if whole(part) is not None:
+                yield slip(part.lineno, "reset-limit", "%d" % whole(part))
+        if value is not None:
+            yield slip(value.lineno, "reset-value", "%d" % whole(value))
+
+
+def whole(node):
+    """Return a whole number as it is written, without a sign."""
+    number = isinstance(node, ast.Constant) and type(node.value) is int and node.value < 1 << 31
+    return node.value if number else None
+
+
+def is_increment(node, target, value):
+    """Whether a name is given what it was before, and something more: `n += 1`, `n = (n + 1) % 128`."""
+    if isinstance(node, ast.AugAssign):
+        return isinstance(node.op, ast.Add) and isinstance(value, ast.Constant)
+    return any(dotted(part) == dotted(target) for part in ast.walk(value) if isinstance(part, type(target)))
+
+
+def counter_slips(tree):
+    """Counters that a loop sets in each of its turns, and those that it resets before it adds one."""
+    for loop in ast.walk(tree):
+        body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
+        inside = [n for one in body for n in ast.walk(one)]
+        sent = [i for i, one in enumerate(body) if any(is_call(n, "publish") for n in ast.walk(one))]
+        added = {dotted(t): n for n in inside for t in increments(n)} if sent else {}
+        for name, node in added.items():
+            set_at = [i for i, one in enumerate(body) if name in (dotted(t) for t in constants_in([one]))]
+            reset_at = [i for i, one in enumerate(body) if isinstance(one, ast.If) and name in reset_in(one)]
+            if set_at:
+                one = body[set_at[0]]
+                message = "this sets `%s` again each time around the loop" % name
+                fix = "move line %d above the loop of line %d" % (one.lineno, loop.lineno)
+                yield slip(one.lineno, "set-in-loop", message, fix=fix, name=name)
+            elif reset_at and node in body:
+                first = next((i for i in sent if name in names_in(body[i])), sent[0])
+                turn = [(i - first) % len(body) for i in (reset_at[0], body.index(node))]
+                if turn[0] < turn[1]:
+                    line = body[reset_at[0]].lineno
+                    message = "the counter is reset before line %d adds one, and that sum is published"
+                    fix = "move line %d above the `if` in line %d" % (node.lineno, line)
+                    yield slip(line, "reset-early", message % node.lineno, fix=fix, name=name)
+
+
+def increments(node):
+    targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+    value = getattr(node, "value", None)
+    return [t for t in targets if value is not None and t is not None and is_increment(node, t, value)]
+
+
+def constants_in(statements):
+    return [
+        n.targets[0] for n in statements if isinstance(n, ast.Assign) and isinstance(n.value, ast.Constant)
+    ]
+
+
+def reset_in(node):
+    """Return the names that an `if` asks for and gives a fixed value."""
+    return {dotted(t) for t in constants_in(node.body)} & names_in(node.test)
+
+
+def names_in(node):
+    return {dotted(n) for n in ast.walk(node) if isinstance(n, (ast.Name, ast.Attribute))}
 
 
 # ---- texts that are published and printed

@@ -13,11 +13,14 @@ sys.path.append(os.path.dirname(os.path.abspath(__file__)))
 from script_names import (
     TEXT_LIMIT,
     called_name,
+    counter_slips,
     dotted,
     graph_names,
     is_call,
+    is_increment,
     misspelt,
     object_slips,
+    resets,
     said_texts,
     slip,
 )
@@ -52,7 +55,16 @@ def slips(tree):
         if name:
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             found.append(slip(node.lineno, "input", message))
-    finders = (misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops)
+    finders = (
+        misspelt,
+        loop_rates,
+        resets,
+        never_run,
+        never_reached,
+        stopped_loops,
+        sleepless_loops,
+        sleeps_twice,
+    )
     for find in (
         *finders,
         callbacks,
@@ -62,6 +74,7 @@ def slips(tree):
         said_texts,
         deaf_loops,
         clock_values,
+        counter_slips,
         without_effect,
     ):
         found += find(tree)
@@ -165,7 +178,9 @@ def never_reached(tree):
                     what = "spin()" if spins else "loop"
                     message = "the %s in line %d never ends, so the %s(…) in line %d is never reached"
                     message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
-                    yield slip(loop.lineno, "never-reached", message)
+                    fix = "move line %d above line %d" % (behind[0].lineno, loop.lineno)
+                    fix = "" if word(behind[0]) == "publish" else fix
+                    yield slip(loop.lineno, "never-reached", message, fix=fix)
 
 
 def stopped_loops(tree):
@@ -209,6 +224,23 @@ def sleepless_loops(tree):
         message = "`%s()` is outside the loop of line %d" % (name, loop.lineno)
         fix = "move it into that loop, as the last line of it"
         yield slip(outside[0].lineno, "sleep-outside", message, fix=fix, name=name)
+
+
+def sleeps_twice(tree):
+    """Loops that wait twice in each of their turns, and publish once."""
+    for loop in ast.walk(tree):
+        body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
+        at = [i for i, n in enumerate(body) if isinstance(n, ast.Expr) and called_name(n.value) == "sleep"]
+        if len(at) != 2:
+            continue
+        between, around = body[at[0] + 1 : at[1]], body[: at[0]] + body[at[1] + 1 :]
+        publish = [
+            any(is_call(n, "publish") for one in part for n in ast.walk(one)) for part in (between, around)
+        ]
+        if sorted(publish) == [False, True]:
+            lines = (body[at[0]].lineno, body[at[1]].lineno)
+            message = "the loop sleeps in line %d and again in line %d" % lines
+            yield slip(lines[1], "sleep-twice", message, fix="delete line %d" % lines[1])
 
 
 def is_endless(loop):
@@ -309,39 +341,6 @@ def constant(node, given, depth=4):
         if left and right:
             return left / right if isinstance(node.op, ast.Div) else left * right
     return None
-
-
-def resets(tree):
-    """Where a counter goes back: the number that it is set to in an `if` that asks for it, and the number in that `if`,
-    or behind a `%`.
-    """
-    for node in ast.walk(tree):
-        value, done, asked = None, (), []
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
-            asked = [node.right]
-        elif isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Mod):
-            asked = [node.value]
-        elif isinstance(node, ast.If):
-            done = [(one.targets[0], one.value) for one in node.body if isinstance(one, ast.Assign)]
-        elif isinstance(node, ast.Assign) and isinstance(node.value, ast.IfExp):
-            done = [(node.targets[0], node.value.body), (node.targets[0], node.value.orelse)]
-        if done:
-            test = list(ast.walk(node.test if isinstance(node, ast.If) else node.value.test))
-            names = {ast.dump(part) for part in test if isinstance(part, (ast.Name, ast.Attribute))}
-            values = [value for name, value in done if ast.dump(name).replace("Store()", "Load()") in names]
-            value = next((value for value in values if whole(value) is not None), None)
-            asked = test if value is not None else []
-        for part in asked:
-            if whole(part) is not None:
-                yield slip(part.lineno, "reset-limit", "%d" % whole(part))
-        if value is not None:
-            yield slip(value.lineno, "reset-value", "%d" % whole(value))
-
-
-def whole(node):
-    """Return a whole number as it is written, without a sign."""
-    number = isinstance(node, ast.Constant) and type(node.value) is int and node.value < 1 << 31
-    return node.value if number else None
 
 
 def read_parameter(node):
@@ -483,13 +482,6 @@ def turns(tree):
             own = isinstance(child, (ast.FunctionDef, ast.Lambda))
             looped = again or isinstance(node, (ast.While, ast.For))
             left.append((child, child if own else function, looped and not own))
-
-
-def is_increment(node, target, value):
-    """Whether a name is given what it was before, and something more: `n += 1`, `n = (n + 1) % 128`."""
-    if isinstance(node, ast.AugAssign):
-        return isinstance(node.op, ast.Add) and isinstance(value, ast.Constant)
-    return any(dotted(part) == dotted(target) for part in ast.walk(value) if isinstance(part, type(target)))
 
 
 SWALLOWS = {"KeyboardInterrupt", "ROSInterruptException", "ROSException", "Exception", "BaseException"}

@@ -247,15 +247,17 @@ def judge_wraps(
     return verdict or _silent(count, run, package, params) or _too_few(count, good, run, params), last
 
 
-def cite_no_effect(
-    verdict: Verdict, count: Count, run: Run, package: PackageFacts, kind: SlipKind = "no-effect"
-) -> Verdict:
+def cite_slip(verdict: Verdict, count: Count, run: Run, package: PackageFacts, *kinds: SlipKind) -> Verdict:
     """Return the verdict; one that is lost with the line of the node's script that was to change the counter."""
-    slip = next(iter(slips_of(package, run, count.callerid, kind)), None)
+    slip = next(iter(slips_of(package, run, count.callerid, *kinds)), None)
     if slip is None or not verdict.status.is_lost:
         return verdict
     message = f"{verdict.message}; {slip.file}, line {slip.line}: {slip.message}"
-    hint = f"{slip.fix} in line {slip.line} of {slip.file}"
+    hint = (
+        f"in {slip.file}, {slip.fix}"
+        if "line" in slip.fix
+        else f"{slip.fix} in line {slip.line} of {slip.file}"
+    )
     cited = (slip.place, *verdict.citations)
     return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
 
@@ -322,8 +324,13 @@ def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], pa
     right = params.minimum if wrong_value else params.maximum
     hint = f"in line {slip.line}, write {right} instead of {slip.message}"
     if not wrong_value:
-        hint = f"let it count up to {right} there: `if counter > {right}`, or `% {right + 1}`, in line {slip.line}"
+        hint = _limit_hint(slip, params)
     return verdict.model_copy(update={"message": message, "hint": hint, "citations": (slip.place,)})
+
+
+def _limit_hint(slip: PythonSlip, params: WrapParams) -> str:
+    most = params.maximum
+    return f"let it count up to {most} there: `if counter > {most}`, or `% {most + 1}`, in line {slip.line}"
 
 
 def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Literal["program", "flood", "lost"]:
@@ -363,6 +370,11 @@ def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapPara
     last = count.values[-1]
     if last >= params.maximum - 1:
         message = f"the node dies at {significant(last + 1)}, where the counter should reset: {end.cause}"
+        limits = slips_of(package, run, count.callerid, "reset-limit")
+        high = next((one for one in limits if int(one.message) > params.maximum), None)
+        if high is not None and last == params.maximum:
+            hint = _limit_hint(high, params)
+            return failed(f"{message}; line {high.line} compares the counter with {high.message}", hint=hint)
         return failed(message, hint=params.reset_hint, citations=end.citations)
     came = f"after {plural(len(count.values), 'message')}, at {significant(last)}"
     message = f"the node ended {came}, before the counter could reset twice: {end.cause}"

@@ -9,6 +9,7 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from grader.checks.support.text import shown
+from grader.model.package import PackageFacts
 from grader.wording import plural
 
 Meaning = tuple[str, str]
@@ -447,3 +448,34 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
         "call another function there, or loop",
     ),
 }
+
+
+def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
+    """Return why a message does not take the value that is published: a text for a number, a number for a text, or the
+    publisher of another topic."""
+    wants_text = "must be of type bytes or an ascii string" in found.message
+    if not wants_text and "must be an integer type" not in found.message:
+        return None
+    frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
+    kind, other = ("string", "numbers") if wants_text else ("whole number", "strings")
+    sent = next(iter(_calls(frame.source, "publish")), None)
+    owner = ast.unparse(sent.func.value) if sent is not None and isinstance(sent.func, ast.Attribute) else ""
+    slips = [s for s in package.slips if frame.file.endswith(f"/{s.file}")]
+    types = {s.line: s.message for s in slips if s.kind == "publisher-type"}
+    made = {s.name: s for s in slips if s.kind == "publisher" and s.line in types}
+    texts = [n for n in _calls(frame.source, "str") if len(n.args) == 1]
+    if texts and not wants_text:
+        why = f"the message takes a {kind}, and `str(…)` makes a string of it"
+        return why, rewritten(frame.source, (texts[0], texts[0].args[0]))
+    here = made.get(owner)
+    others = [s for s in made.values() if (types[s.line] == "String") is not wants_text]
+    if here is not None and here not in others and len(others) == 1:
+        why = f"`{owner}` publishes {types[here.line]} on {here.message} (line {here.line})"
+        lines = sorted((here.line, others[0].line))
+        fix = (
+            f"swap `{owner}` and `{others[0].name}` in lines {lines[0]} and {lines[1]}, or where they publish"
+        )
+        return why, fix
+    call = "str(…)" if wants_text else "int(…)"
+    hint = f"publish a {kind} here, `{call}`; {other} go to the publisher of their own topic"
+    return f"the message takes a {kind} but gets something else", hint

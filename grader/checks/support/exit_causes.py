@@ -18,6 +18,7 @@ from grader.checks.support.exceptions import (
     is_text,
     rewritten,
     tracebacks,
+    unfit_value,
     unpack_traceback,
     wrong_class,
 )
@@ -100,10 +101,6 @@ SLIPS = {
      "one script is one node: call `rospy.init_node(…)` once"),
     "Inappropriate ioctl for device": ("it reads keys from its terminal, and a node that is started for you has none",
      "leave the keys out: publish in the loop by itself, or read keys in a node of their own"),
-    "must be of type bytes or an ascii string": ("the message takes a string but gets something else",
-     "publish a string here, `str(…)`; numbers go to the publisher of their own topic"),
-    "must be an integer type": ("the message takes a whole number but gets something else",
-     "publish a whole number here, `int(…)`; strings go to the publisher of their own topic"),
     "Invalid number of arguments, args should be": (
      "the message gets a different number of values than it has fields",
      'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not by a comma'),
@@ -345,7 +342,7 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     known = next((known for said, known in SLIPS.items() if said in found.message), None)
     meant = known or other_name(found, package)
     frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
-    meant = meant or _values_of_text(found.message, source)
+    meant = meant or unfit_value(found, package) or _values_of_text(found.message, source)
     return meant or explain_exception(found.kind, found.message, frame.source, frame.marked)
 
 
