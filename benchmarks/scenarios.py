@@ -31,10 +31,12 @@ class Fault(NamedTuple):
     wrong: str
 
 
-YORK, TF, SCAN = "york-ele00118m-lab7", "tf-broadcaster", "scan-to-cmd-vel"
+YORK, TF, SCAN, OWN = "york-ele00118m-lab7", "tf-broadcaster", "scan-to-cmd-vel", "service-own-type"
 SENDER, RECEIVER = "lab_exercises/scripts/sender.py", "lab_exercises/scripts/receiver.py"
 FRAMES, STOP = "robot_frames/scripts/frames.py", "scan_to_cmd_vel/scripts/stop.py"
 CLIENT, SERVER = "adder/scripts/add_client.py", "own_service/scripts/server.py"
+DRIVER, COUNT = "go_to_goal/scripts/go_to_goal.py", "counting/scripts/count.py"
+RECORD = "walk_log/launch/record.launch"
 TYPE = "import String\n"
 FAULTS = (
     Fault("an exception in a listener's callback", YORK, "receiver", RECEIVER, "data.data", "data.dat"),
@@ -46,11 +48,30 @@ FAULTS = (
     Fault("a client of another service", "service-client", "adds", CLIENT, "'/add'", "'/sum'"),
     Fault(
         "a service that never answers",
-        "service-own-type",
+        OWN,
         "server",
         SERVER,
         "    result =",
         f"{ENDLESS}    result =",
+    ),
+    Fault(
+        "a service that sleeps", OWN, "server", SERVER, "    result =", "    rospy.sleep(60)\n    result ="
+    ),
+    Fault("a server of another name", OWN, "client", SERVER, "Service('/clamp'", "Service('/clamps'"),
+    Fault("a listener that prints nothing", YORK, "receiver", RECEIVER, "rospy.loginfo(", "str("),
+    Fault(
+        "a callback that never ends",
+        YORK,
+        "receiver",
+        RECEIVER,
+        "    rospy.loginfo",
+        f"{ENDLESS}    rospy.loginfo",
+    ),
+    Fault("a node that dies", YORK, "sender", SENDER, "        rate.sleep()", "        raise KeyError"),
+    Fault("a topic of the goal's", "go-to-goal", "goals", DRIVER, "'/goal'", "'/target'"),
+    Fault("an action of another name", "action-server", "goals", COUNT, "'/count'", "'/counter'"),
+    Fault(
+        "a recording of nothing", "record-and-replay", "record", RECORD, "walk.bag /steps", "walk.bag /walk"
     ),
     Fault(
         "transforms that are never sent",

@@ -66,9 +66,10 @@ class RunState:
     each first sent a message, `owners` the processes of all nodes so far. `lost_s` is what others took of the run's
     time while they filled the machine: so much longer a node is waited for. Of that, `lost_before_s` was gone at
     `started_s`, `lost_before_last_s` at `last_start_s`.
-    `serves` are the services and actions that the grader offers to programs that wait for them without end, `sought`
-    the services that nodes looked for, `refused` topics of the grader's to which a node wanted to subscribe with
-    another type. Until `answers_s`, the grader works on what they asked for.
+    `serves` are the services and actions that the grader offers, `sought` the services that nodes looked for,
+    `missed` those for which they have asked; a program of the package `gives_up` where its wait for a service ends
+    without it. `refused` are topics of the grader's to
+    which a node wanted to subscribe with another type. Until `answers_s`, the grader works on what they asked for.
     `sent_s`: when the grader last sent a message, `last_sent_s` one that is to be printed; `raised_s`: when a callback
     of a process last ended with an exception. `waited_s`: how long steps had waited by `started_s` for what never came.
     `least_s` is how long nodes are watched, even where nothing more is to come. `naps`: the package's programs sleep
@@ -98,6 +99,8 @@ class RunState:
     listened: dict[str, set[str]] = field(default_factory=dict)
     raised_s: dict[str, float] = field(default_factory=dict)
     serves: frozenset[str] = frozenset()
+    gives_up: bool = False
+    missed: set[tuple[str, str]] = field(default_factory=set)
     sought: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     refused: set[str] = field(default_factory=set)
     answers_s: float = 0.0
@@ -194,6 +197,13 @@ class RunState:
     def subscribed(self) -> AbstractSet[str]:
         """The topics of the grader's to which a node has subscribed."""
         return self.subscribers.keys()
+
+    def note_lookup(self, node: str, service: str, *, is_there: bool) -> None:
+        """Take note that a node asked for a service. One that is not there is sought by a node that asks again: the
+        first time may be a call that it can do without."""
+        if is_there or (node, service) in self.missed:
+            self.sought[node].add(service)
+        self.missed.add((node, service))
 
     def note_connections(self, topics: Iterable[str], now_s: float) -> None:
         """Take note of the topics over which nodes are connected now, and since when."""
@@ -328,13 +338,22 @@ def computes(live: RunState, process: str) -> bool:
 
 
 def _waits_in_vain(live: RunState, process: str) -> bool:
-    """Return whether a process looks for a service or an action, and for none of those that the grader offers."""
+    """Return whether a process looks for a service or an action without end, and for none of those that are there."""
     nodes = {node for node in live.here if live.owners.get(node) == process}
     asked = {service for node in nodes & live.sought.keys() for service in live.sought[node]}
     goals = {t.removesuffix("/goal") for t in live.published if t.endswith("/goal")}
     goals = {action for action in goals if f"{action}/cancel" in live.published}
-    known = live.serves | live.services
-    return bool(live.serves) and bool(asked | goals) and known.isdisjoint(asked | goals)
+    served = {topic.removesuffix("/goal") for topic in live.listened if topic.endswith("/goal")}
+    known, rest = live.serves | live.services | served, live.at_rest.get(process)
+    if rest is None or live.gives_up or not asked | goals or known & (asked | goals):
+        return False
+    others = [live.at_rest.get(other) for other in live.running - {process}]
+    # One of the student's own programs may yet offer it, where it does more than wait for callbacks.
+    return bool(live.serves) or (
+        rest.programs == 1
+        and not live.naps
+        and all(other is not None and other.kind == "spins" for other in others)
+    )
 
 
 def _unused(live: RunState) -> set[str]:
@@ -354,8 +373,10 @@ def _patience_s(live: RunState) -> float:
     found = []
     for process in live.running:
         own_s = patience.get(live.at_rest[process].kind, LOOPING_S)
+        if own_s == SPINNING_S and _raised(live, [process]):
+            own_s = ANSWERING_S
         if _waits_in_vain(live, process):
-            own_s = SPINNING_S if live.naps else IN_VAIN_S
+            own_s = IN_VAIN_S if live.serves and not live.naps else SPINNING_S
         found.append(min(TALKING_S if process in talking else LOOPING_S, own_s))
     return max(found)
 
@@ -363,8 +384,15 @@ def _patience_s(live: RunState) -> float:
 def _answers_in_s(live: RunState) -> float:
     """Return how long after a message the programs, which are at rest, may yet do something for it."""
     waits = not live.naps and all(live.at_rest[process].kind == "spins" for process in live.running)
-    raised = any(raised_s >= max(live.sent_s, live.last_sent_s) for raised_s in live.raised_s.values())
-    return min(_patience_s(live), RAISED_S if raised else ANSWERING_S) if waits else _patience_s(live)
+    answering_s = RAISED_S if _raised(live, live.raised_s) else ANSWERING_S
+    return min(_patience_s(live), answering_s) if waits else _patience_s(live)
+
+
+def _raised(live: RunState, processes: Iterable[str]) -> bool:
+    """Return whether a callback of one of these processes ended in an exception since the grader last sent a
+    message."""
+    sent_s = max(live.sent_s, live.last_sent_s)
+    return any(live.raised_s.get(process, -math.inf) >= sent_s for process in processes)
 
 
 def _longer(live: RunState, patience_s: float) -> float:

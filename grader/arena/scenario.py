@@ -62,15 +62,17 @@ ALONE_S, ROSTEST_LOOK_S = 5.0, 0.5
 def expected_s(scenario: Scenario) -> float:
     """Return about how long a run takes when all is as it should be."""
     until = scenario.until
-    messages = (
-        max(until.messages.values(), default=0)
-        / EXPECTED_HZ
-        / (scenario.warp if scenario.clock == "warped" else 1)
-    )
+    warp = scenario.warp if scenario.clock == "warped" else 1
+    messages = max(until.messages.values(), default=0) / EXPECTED_HZ / warp
     probing = sum(shot.pause_s for shot in make_shots(scenario.probes))
-    probing += sum(step.lasts_s for step in scenario.steps)
     watched = max(until.window_s or 0, until.alive_s or 0, until.quiet_s or 0)
-    return STARTING_S + watched + messages + probing
+    return STARTING_S + watched + messages + probing + _steps_s(scenario)
+
+
+def _steps_s(scenario: Scenario) -> float:
+    """Return about how long the steps of a scenario take."""
+    warp = scenario.warp if scenario.clock == "warped" else 1
+    return sum(step.lasts_s for step in scenario.steps) / warp
 
 
 async def run_scenario(
@@ -131,8 +133,8 @@ def _tell_what_is_known(
     watched_s: float,
 ) -> None:
     """Set what the scenario and the package's sources say of how long anything may yet come."""
-    if not place.has_line(GIVES_UP):
-        session.live.serves = frozenset(one.service or one.action or "" for one in scenario.serves)
+    session.live.gives_up = place.has_line(GIVES_UP)
+    session.live.serves = frozenset(one.name for one in scenario.serves)
     session.live.naps = place.has_line(NAPS)
     scripts = {spec["name"]: spec["script"] for _, spec in starts if spec["script"] is not None}
     session.live.endless = frozenset(s["name"] for _, s in starts if place.has_line(IDLE, s["script"]))
@@ -141,7 +143,9 @@ def _tell_what_is_known(
         for name, path in scripts.items()
         if place.has_line(PUBLISHER, path) and not place.has_line(PUBLISHES, path, programs=PROGRAM)
     )
-    session.live.least_s = max(watched_s + WATCHED_MORE_S, expected_s(scenario) - STARTING_S)
+    # What steps wait for comes besides: a node that makes one of them wait in vain is watched for half of them first.
+    least_s = expected_s(scenario) - STARTING_S - _steps_s(scenario) / 2
+    session.live.least_s = max(watched_s + WATCHED_MORE_S, least_s)
 
 
 async def _run(

@@ -300,7 +300,7 @@ class ArenaSession:
             if record["detail"].startswith(STOPPED):
                 self._killed.limited(record["actor"])
         elif record["action"] == "lookup":
-            self.live.sought[record["actor"]].add(record["topic"])
+            self.live.note_lookup(record["actor"], record["topic"], is_there=not record["detail"])
         elif record["action"] == "note" and record.get("detail") == OTHER_TYPE:
             self.live.refused.add(record["topic"])
         elif record["action"] == "open":

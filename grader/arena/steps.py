@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from grader.evidence.run import Channel
 
 Tell = Callable[[str], None]
-ANSWER_S = 10.0
+ANSWER_S, AGAIN_S = 10.0, 2.0
+"""So long an answer is waited for, and by calls of a service that has left one unanswered."""
 SUBSCRIBE_S = 6.0
 REFUSED_S, UNANSWERED_S = 1.0, 0.5
 """So long a node that asks for a topic of the grader's by another type may yet do something else."""
@@ -455,10 +456,13 @@ class StepRunner:
         about = {"topic": call.service, "type": call.type, "value": shown}
         record = {"action": "call", "actor": "grader", **about}
         encoded = base64.b64encode(data).decode()
+        begun_s, limit_s = time.monotonic(), AGAIN_S if call.service in self._in_vain else ANSWER_S
         answer = await self._arena.call(
-            ANSWER_S, service=call.service, type=call.type, data=encoded, record=record
+            limit_s, service=call.service, type=call.type, data=encoded, record=record
         )
         if "data" not in answer:
+            if time.monotonic() > begun_s + AGAIN_S:
+                self._in_vain.add(call.service)
             self._answer(call, None, answer["error"])
             return
         value = types.response.decode(base64.b64decode(answer["data"]))

@@ -122,6 +122,26 @@ def test_who_works_in_the_same_memory_computes(program: str, kinds: set[str | No
             process.kill()
 
 
+WAITS = "import threading\nthreading.Thread(target=lambda: [sum([0]) or time.sleep(0.1) for _ in range(9000)]).start()"
+
+
+@pytest.mark.parametrize(("compiled", "kind"), [(True, "loops"), (False, None)])
+def test_a_compiled_program_rests_while_it_waits_for_its_threads(
+    compiled: bool, kind: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("process_tree._is_compiled", lambda _: compiled)
+    with subprocess.Popen([sys.executable, "-c", f"import time\n{WAITS}"]) as process:
+        try:
+            rest, begun_s = TreeRest(), time.monotonic()
+            found: list[str | None] = []
+            while time.monotonic() < begun_s + 60 and (len(found) < 20 or found[-5:] != [kind] * 5):
+                time.sleep(LOOK_S)
+                found.append(rest.look([process.pid], time.monotonic())[0])
+            assert found[-5:] == [kind] * 5, found
+        finally:
+            process.kill()
+
+
 NOT_WAITED_FOR = """
 import os, signal, sys, time
 if sys.argv[1] == "ignore":

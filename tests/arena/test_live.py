@@ -501,6 +501,50 @@ def test_who_looks_for_what_nobody_offers_is_not_waited_for(
     assert find_outcome(live, until, 2.3) == (("silent", "the graph has settled") if in_vain else None)
 
 
+def test_a_client_of_another_name_than_the_students_server_is_not_waited_for() -> None:
+    live, until = _resting(client=("loops", 1), server=("spins", 1)), Until(ended=("client",))
+    live.services, live.sought["/client"] = {"/clamps"}, {"/clamp"}
+    assert find_outcome(live, until, 3.4) is None
+    assert find_outcome(live, until, 3.6) == ("silent", "the graph has settled")
+    live.gives_up = True
+    assert find_outcome(live, until, 3.6) is None
+    live.gives_up, live.services = False, {"/clamp"}
+    assert find_outcome(live, until, 3.6) is None
+    live.services, live.published = set(), {"/count/goal": {"/client"}, "/count/cancel": {"/client"}}
+    assert find_outcome(live, until, 3.6) == ("silent", "the graph has settled")
+    live.sought.clear()
+    live.listened = {"/count/goal": {"/server"}}
+    assert find_outcome(live, until, 3.6) is None
+    live.sought["/client"], live.listened = {"/clamp"}, {}
+    live.note_rest("server", "loops", 1, 2.0)  # it may offer it in the end
+    assert find_outcome(live, until, 3.6) is None
+    live.note_rest("server", "spins", 1, 2.0)
+    assert find_outcome(live, until, 3.6) == ("silent", "the graph has settled")
+    live.note_rest("client", "loops", 2, 2.0)  # of two programs, one may offer what the other asks for
+    assert find_outcome(live, until, 3.6) is None
+
+
+def test_a_service_is_sought_by_who_asks_for_it_again() -> None:
+    live = RunState()
+    live.note_lookup("/node", "/there", is_there=True)
+    live.note_lookup("/node", "/log", is_there=False)
+    live.note_lookup("/other", "/log", is_there=False)
+    assert live.sought == {"/node": {"/there"}}
+    live.note_lookup("/node", "/log", is_there=False)
+    assert live.sought == {"/node": {"/there", "/log"}}
+
+
+def test_a_callback_that_ended_in_an_exception_does_nothing_more() -> None:
+    live = _resting(node=("spins", 1))
+    live.sent_s = 2.0
+    live.raised_s["node"] = 2.0
+    assert not is_settled(live, 2.9)
+    assert is_settled(live, 3.1)
+    live.sent_s = 2.1  # what came since may be heard
+    assert not is_settled(live, 3.4)
+    assert is_settled(live, 3.6)
+
+
 def test_nothing_is_settled_while_the_grader_works_on_an_answer() -> None:
     live = _resting(node=("spins", 1))
     live.answers_s = math.inf

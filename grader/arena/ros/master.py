@@ -58,7 +58,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._recorder = recorder
         self._own = own
         self._opened = 0
-        self._told = {"lookup": set(), "read": set()}
+        self._told = {"lookup": {}, "read": {}}
         self._pool = Pool()
         self._calling = threading.local()
         self._guard = guard
@@ -147,7 +147,8 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return self._note_arrival(answer)
 
     def lookupService(self, caller_id, service):
-        """What a client asks for is told once: `wait_for_service` asks again and again."""
+        """What a client asks for is told once, and of what is not there, once more: `wait_for_service` asks again and
+        again."""
         answer = super().lookupService(caller_id, service)
         self._note_lookup("lookup", caller_id, service, is_there=answer[0] == 1)
         return answer
@@ -171,10 +172,13 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return answer
 
     def _note_lookup(self, action, caller_id, name, is_there):
-        """Tell the first time that a node asks for a name."""
-        asked = self._told[action]
-        if self._caller is not None and (caller_id, str(name)) not in asked and len(asked) < TOLD_MAX:
-            asked.add((caller_id, str(name)))
+        """Tell the first time that a node asks for a name, and the second for a service that is not there."""
+        asked, key = self._told[action], (caller_id, str(name))
+        times = asked.get(key, 0)
+        if self._caller is None or times > (action == "lookup" and not is_there):
+            return
+        if times or len(asked) < TOLD_MAX:
+            asked[key] = times + 1
             record = {"action": action, "actor": caller_id, "topic": cut(name, ARGUMENT_CHARS)}
             self._wire.event("/grader/actor", dict(record, detail="" if is_there else "not there"))
 

@@ -103,6 +103,14 @@ def _wakes(pid, thread):
         return 0
 
 
+def _is_compiled(pid):
+    """Return whether it is no Python, of which some versions do not show that a thread sleeps."""
+    try:
+        return "python" not in os.path.basename(os.readlink("/proc/{}/exe".format(pid)))
+    except OSError:
+        return False
+
+
 def _late_s(pid, thread):
     """Return how long a thread has waited for a processor so far."""
     try:
@@ -152,7 +160,8 @@ GROWS = 25
 class Rest:
     """Whether a program has come to rest: it does little, and wakes again and again, as a loop or `spin()` does.
 
-    A long sleep is no rest, since no one knows what comes after it. `since_s` is when the rest began, or None. It
+    A long sleep is no rest, since no one knows what comes after it; a compiled program whose main thread waits for its
+    others (`MultiThreadedSpinner`, `rosbag record`) rests as a loop does. `since_s` is when the rest began, or None. It
     `spins` while its main thread wakes about twice a second (rospy), or waits for callbacks alone (roscpp).
     `computed_s` are the CPU seconds of its last stretch of work in the same memory, as `while True: pass` does.
     """
@@ -180,16 +189,17 @@ class Rest:
         waited_s = max((late_s[thread] - self._late_s.get(thread, 0.0) for thread in late_s), default=0.0)
         work_s = used_s - self._used_s + waited_s
         working = self._late_s == {} or work_s > WORKING * (now_s - self._looked_s)
-        if working or asleep or now_s - self._woke_s > ASLEEP_S:
+        sleeps, waits = now_s - self._woke_s > ASLEEP_S, "futex" in waits_in(self._pid, self._pid)
+        if working or asleep or (sleeps and not (waits and _is_compiled(self._pid))):
             self.since_s = None
         elif self.since_s is None:
             self.since_s, self._wakes_before = now_s, wakes
             self._only_callbacks, self._napping = True, False
         if self.since_s is not None:
-            self._only_callbacks = self._only_callbacks and "futex" in waits_in(self._pid, self._pid)
+            self._only_callbacks = self._only_callbacks and waits
             self._napping = self._napping or napping
             rarely = wakes - self._wakes_before <= SPIN_HZ * (now_s - self.since_s) + 1
-            self.spins = not self._napping and (rarely or self._only_callbacks)
+            self.spins = not (self._napping or sleeps) and (rarely or self._only_callbacks)
         grows = pages - self._pages > GROWS
         self.computed_s = self.computed_s + used_s - self._used_s if working and not grows else 0.0
         self._used_s, self._pages, self._late_s = used_s, pages, late_s
