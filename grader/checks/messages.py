@@ -366,6 +366,8 @@ class FieldEqualsParams(Record):
             raise ValueError("give one of value and values")
         if self.values and self.when != "every":
             raise ValueError("when is for value, not for values")
+        if self.tolerance and any(isinstance(one, str) for one in (self.value, *self.values)):
+            raise ValueError("tolerance is for numbers, and text has none: write a number without quotes")
         return self
 
     @property

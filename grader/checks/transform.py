@@ -67,6 +67,8 @@ class TransformParams(Record):
     def _one_value(self) -> TransformParams:
         if self.pose_of is not None and (self.translation or self.rotation_deg):
             raise ValueError("give pose_of, or translation and rotation_deg")
+        if self.parent == self.child:
+            raise ValueError(f"parent and child are both {self.child}")
         return self
 
     @property

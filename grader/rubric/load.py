@@ -15,7 +15,7 @@ from grader.model.message_rate import RateBounds
 from grader.model.record import Record
 from grader.model.result import RubricOrigin
 from grader.model.version import RUBRIC, UPDATE, Versioned
-from grader.rubric.consistency import cross_faults
+from grader.rubric.consistency import cross_faults, doubtful_names
 from grader.rubric.course import load_course, split_name
 from grader.rubric.fault_words import model_faults
 from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics_folder
@@ -184,6 +184,12 @@ def read_beside_rubric(rubric: LoadedRubric) -> dict[str, bytes]:
     """
     source = read_source(rubric.path, rubric.path.name)
     return read_instructor(source.data, rubric.path.parent).files
+
+
+def doubts_of(loaded: LoadedRubric, name: str) -> list[str]:
+    """Return what may be a slip in the rubric of that file, each as `name:line: key.path: why`."""
+    source = read_source(loaded.path, name)
+    return [source.fault(*doubt) for doubt in doubtful_names(source.data, loaded.path.parent)]
 
 
 def refuse_newer(source: Source, known: Versioned) -> None:

@@ -18,6 +18,7 @@ from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
 from grader.ros_packages import TypeKind, ros_packages
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Scenario, Step, Until
+from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import closest, did_you_mean, join_words
 
@@ -109,7 +110,9 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
     elif to == "program" and value.partition("/")[0] not in own:
         fault = ros_packages().program_fault(value)
     elif to == "dependency":
-        fault = "" if value in own else ros_packages().misspelt(value)
+        meant = "" if value in own else closest(value, own, cutoff=SURE)
+        fault = f'there is no package "{value}" (did you mean "{meant}"?)' if meant else ""
+        fault = fault or ("" if value in own else ros_packages().misspelt(value))
     elif to == "package" and value not in packages_in(rubric):
         fault = f'the lab has no package "{value}"{_instead(value, packages_in(rubric))}'
     elif to in TYPES and re.fullmatch(TYPE_PATTERN, value := value.partition("[")[0]):
@@ -285,16 +288,10 @@ def _unknown_topics(
             if topic.startswith("/") and topic not in known and (near or not open_):
                 meant = f' (did you mean "{near}"?)' if near else ""
                 yield ("scenarios", name, "until", *at), f"no criterion and no probe names {topic}{meant}"
+        steps = [step for _, step in as_maps(scenario.get("steps")) if "wait" not in step]
+        there = {*named, *_topics_in(steps)}
         for at, topic in _waits_in_steps(scenario):
-            near = (
-                _near(topic, named, cutoff=SURE)
-                if topic
-                not in {
-                    *named,
-                    *_topics_in([step for _, step in as_maps(scenario.get("steps")) if "wait" not in step]),
-                }
-                else ""
-            )
+            near = "" if topic in there else _near(topic, named, cutoff=SURE)
             if near:
                 yield ("scenarios", name, *at), f'no criterion names {topic} (did you mean "{near}"?)'
 
@@ -307,12 +304,8 @@ def _too_many(
     for _, criterion in as_maps(rubric.get("criteria")):
         given, check = as_map(criterion.get("with")), checks.get(str(criterion.get("check")))
         topic, rate_hz = given.get("topic"), given.get("rate_hz")
-        if (
-            check
-            and hasattr(check.params, "rate_bounds")
-            and isinstance(rate_hz, int | float)
-            and rate_hz > 0
-        ):
+        of_rate = check is not None and hasattr(check.params, "rate_bounds")
+        if of_rate and isinstance(rate_hz, int | float) and rate_hz > 0:
             rates[str(topic)] = float(rate_hz)
     for name, scenario in scenarios.items():
         until = as_map(scenario.get("until"))
@@ -354,8 +347,10 @@ def _unknown_fields(path: KeyPath, given: dict[str, Any], rubric: dict[str, Any]
     """Yield fields that the topic's type does not have, where the rubric says the type and it is one of ROS's."""
     topic, field = given.get("topic"), given.get("field")
     if isinstance(topic, str) and isinstance(field, str):
-        types = {kind for kind in _types_of(topic, rubric) if isinstance(kind, str)}
-        faults = [_no_such_field(kind, field) for kind in sorted(types)]
+        types = {kind for kind in types_of(topic, rubric) if isinstance(kind, str)}
+        value = given.get("value")
+        is_one = value is not None and not isinstance(value, list | dict)
+        faults = [_no_such_field(kind, field, is_one) for kind in sorted(types)]
         if faults and all(faults):
             yield (*path, "field"), faults[0]
     for key, inner in given.items():
@@ -363,8 +358,9 @@ def _unknown_fields(path: KeyPath, given: dict[str, Any], rubric: dict[str, Any]
             yield from _unknown_fields((*path, key), inner, rubric)
 
 
-def _types_of(topic: str, rubric: dict[str, Any]) -> Iterator[object]:
+def types_of(topic: str, rubric: dict[str, Any]) -> Iterator[object]:
     """Yield the types that the rubric gives a topic: those that it sends there, or asks for."""
+    yield from ("tf2_msgs/TFMessage",) if topic in {"/tf", "/tf_static"} else ()
     for _, criterion in as_maps(rubric.get("criteria")):
         given = as_map(criterion.get("with"))
         if criterion.get("check") == "topic-type" and given.get("topic") == topic:
@@ -463,6 +459,13 @@ def _other_goals_and_types(rubric: dict[str, Any], scenarios: dict[str, dict[str
         goals, goal = [a for a in steps if a.get("name") == given.get("action", "")], given.get("goal")
         if isinstance(goal, int) and 0 < len(goals) < goal:
             yield (*path, "goal"), f"{name} sends {len(goals)} goals to {given['action']}"
+        number, asked_on = given.get("number"), given.get("asked_on")
+        sent = [s for s in given_steps(scenario, "publish") if s.get("topic") == asked_on]
+        singly = bool(sent) and not any(
+            {"count", "duration_s", "values", "background"} & s.keys() for s in sent
+        )
+        if singly and isinstance(number, int) and number > len(sent) and not scenario.get("probes"):
+            yield (*path, "number"), f"{name} sends {len(sent)} messages on {asked_on}"
         service, kind = given.get("service", ""), given.get("type")
         called = {str(one.get("type")) for _, one in _services_in(scenario) if one.get("service") == service}
         if isinstance(kind, str) and called and not closest(kind, called, cutoff=SURE):
@@ -470,14 +473,17 @@ def _other_goals_and_types(rubric: dict[str, Any], scenarios: dict[str, dict[str
 
 
 @lru_cache(maxsize=256)
-def _no_such_field(type_: str, field: str) -> str:
-    """Return why a type has no such field; empty where it has, or where its definition is not known here."""
+def _no_such_field(type_: str, field: str, is_one: bool = False) -> str:
+    """Return why a type has no such field, or a list for one value; empty where it has, or where its definition is not
+    known here."""
     from grader.checks.support.fields import NoField, values_at  # noqa: PLC0415 - as below
     from grader.evidence.message_values import MessageType  # noqa: PLC0415 - slow to load, and few rubrics need it
 
     try:
         kind = MessageType(type_)
-        values_at(kind.decode(kind.encode({})), field.partition("[")[0])
+        found = values_at(kind.decode(kind.encode({})), field.partition("[")[0])
+        if is_one and "[" not in field and any(isinstance(one, list) for one in found):
+            return f"{type_}: {field} is a list: give all its values, or name {field}[0] or {field}[*]"
     except NoField as error:
         return f"{type_}: {error}"
     except ValueError:
@@ -492,6 +498,8 @@ def _misspelt_nodes(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]
         names = as_texts(as_map(criterion.get("with")).get("names"))
         asked.setdefault(str(criterion.get("scenario")), set()).update(n.strip("/") for _, n in names)
     for name, scenario in scenarios.items():
+        programs = _values_of(_starts(scenario), "program")
+        asked.setdefault(name, set()).update(program.rpartition("/")[2] for program in programs)
         given: list[tuple[KeyPath, dict[str, Any]]] = [
             (("params", n), one) for n, one in as_maps(scenario.get("params"))
         ]

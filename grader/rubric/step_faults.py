@@ -82,6 +82,10 @@ def _faults_of(at: KeyPath, kind: str, given: dict[str, Any], types: dict[str, s
         yield from slash((*at, key), given.get(key), what)
     if kind == "publish":
         yield from _publish(at, given, types)
+    elif kind == "call":
+        yield from of_type(at, given)
+    elif kind == "action":
+        yield from _action_name(at, given)
     elif kind == "wait":
         yield from _wait(at, given)
     elif kind == "set_param" and (given.get("value", "") is None or given.get("value") in NOT_FINITE):
@@ -91,6 +95,13 @@ def _faults_of(at: KeyPath, kind: str, given: dict[str, Any], types: dict[str, s
     elif kind == "play":
         for number, topic in as_texts(given.get("topics")):
             yield from slash((*at, "topics", number), topic, "a topic")
+
+
+def _action_name(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
+    kind = str(given.get("type"))
+    if kind.endswith("Action"):
+        short = kind.removesuffix("Action")
+        yield (*at, "type"), f"is named as its .action file, without Action: {short}"
 
 
 def _one_of(names: tuple[str, ...]) -> str:
@@ -237,7 +248,9 @@ def served_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
                 yield (*at, key), f"is not for {'a service' if kind == 'service' else 'an action'}"
         if kind == "service":
             yield from _answers(at, served)
-        yield from _misfits(at, served)
+        else:
+            yield from _action_name(at, served)
+        yield from of_type(at, served)
 
 
 def _answers(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:
@@ -247,8 +260,8 @@ def _answers(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:
         yield at, f"give one of answer, answers and fails: {found}"
 
 
-def _misfits(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:
-    """Yield what does not fit the type, where its text is known before a run."""
+def of_type(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:
+    """Yield what does not fit the type of a call, or of what is served, where its text is known before a run."""
     from grader.evidence.message_values import MessageType, ServiceTypes, action_texts  # noqa: PLC0415 - slow to load, and few rubrics need it
 
     kind, text = served.get("type"), served.get("definition")
@@ -261,7 +274,9 @@ def _misfits(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:
     values: list[tuple[MessageType, KeyPath, Any]] = []
     try:
         if "service" in served:
-            response = ServiceTypes(kind, text).response
+            types = ServiceTypes(kind, text)
+            request, response = types.request, types.response
+            values += [(request, (*at, "request"), as_map(served.get("request")))]
             values += [(response, (*at, "answer"), served["answer"])] if as_map(served.get("answer")) else []
             values += [(response, (*at, "answers", n), one) for n, one in as_maps(served.get("answers"))]
         else:

@@ -10,6 +10,7 @@ from grader.checks import CHECKS
 from grader.ros_env import RosInstallation
 from grader.ros_packages import RosPackages
 from grader.rubric import references
+from grader.rubric.consistency import doubtful_names
 from grader.rubric.load import load_rubric
 from tests.rubric.samples import faults, spoiled
 
@@ -441,6 +442,21 @@ criteria:
          '9: scenarios.asks.params[0].name: the node is called ask, and not asks (did you mean "/ask/times"?)'),
         ("int64 a", "int46 a",
          '10: scenarios.asks.serves[0].definition: there is no type "int46" (did you mean "int64"?)'),
+        ("type: std_srvs/SetBool", "type: std_srvs/SetBool, request: {date: true}",
+         '11: scenarios.asks.calls[0].request: std_srvs/SetBoolRequest has no field date (did you mean "data"?)'),
+        ("definition, with: {file: msg/Reading.msg, fields: {at: time}}}",
+         "transform, scenario: asks, with: {parent: odom, child: odom}}",
+         "16: criteria[1].with: parent and child are both odom"),
+        ("check: topic-type, with: {topic: /r, type: lab1/Reading}",
+         "check: field-equals, with: {topic: /r, field: a, value: '2', tolerance: 1}",
+         "18: criteria[3].with: tolerance is for numbers, and text has none: write a number without quotes"),
+        ("check: topic-type, with: {topic: /r, type: lab1/Reading}",
+         "check: field-equals, with: {topic: /tf, field: transforms, value: 2}",
+         ("18: criteria[3].with.field: tf2_msgs/TFMessage: transforms is a list: give all its values, "
+          "or name transforms[0] or transforms[*]")),
+        ("check: topic-type, with: {topic: /r, type: lab1/Reading}",
+         "check: manifest, with: {name: lab1, dependencies: [labb1]}",
+         '18: criteria[3].with.dependencies[0]: there is no package "labb1" (did you mean "lab1"?)'),
         ("at: time", "at: tme", '16: criteria[1].with: there is no type "tme" (did you mean "time"?)'),
         ("type: lab1/Reading", "type: lab1/Reading, definition: 'tme at'",
          '18: criteria[3].with.definition: there is no type "tme" (did you mean "time"?)'),
@@ -466,6 +482,31 @@ def test_what_a_map_of_a_checks_parameters_names_is_looked_at(tmp_path: Path) ->
         where = "lab.yaml:40: criteria[9].with.topics./chatter.type: "
         assert (faults(path) if fault else []) == [where + one for one in fault]
         assert fault or load_rubric(str(path)).rubric.scenarios["launch"].keeps == ("*.bag",)
+
+
+def test_a_name_that_one_line_alone_has_is_warned_of(tmp_path: Path) -> None:
+    (tmp_path / "test_it.py").touch()
+    names = {
+        "topic": "/stet",
+        "file": "walks.csv",
+        "child": "laser",
+        "parent": "/base",
+        "path": "test_it.py",
+        "text": "no name",
+        "log": "/rosout",
+    }
+    own = {"check": "topic-type", "with": {"topic": "/own", "type": "lab1/Own"}}
+    bounds = {"check": "field-bounds", "with": {"topic": "/own", "field": "a.hight[0]"}}
+    run = {"keeps": ["*.csv"], "start": [{"name": "talker", "script": "src/talker.py"}]}
+    data = {
+        "package": "lab1",
+        "handout": "The laser is 0.2 m ahead of `/base`.",
+        "scenarios": {"a": run},
+        "criteria": [{"with": names}, own, bounds],
+    }
+    found = {str(path[-1]): why for path, why in doubtful_names(data, tmp_path)}
+    assert sorted(found) == ["field", "file", "topic"]
+    assert found["topic"] == "nothing else in the rubric names /stet: is it spelt as in the handout?"
 
 
 def test_a_scenario_that_no_criterion_judges_is_refused(tmp_path: Path) -> None:

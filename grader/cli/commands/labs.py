@@ -108,10 +108,13 @@ def example(
 
 @command("rubric validate", group=INSTRUCTORS)
 def validate_rubrics(*, files: Annotated[Sequence[str], Argument("FILE", "rubric files")]) -> ExitCode:
-    """Check rubric files, and name every fault."""
+    """Check rubric files, and name every fault.
+
+    It warns of a name that one line alone has: it may be right, or misspelt.
+    """
     with loading():
         from grader.cli.output import say
-        from grader.rubric.load import load_rubric
+        from grader.rubric.load import doubts_of, load_rubric
         from grader.wording import number
     faults, hint = [], ""
     for file in files:
@@ -124,6 +127,8 @@ def validate_rubrics(*, files: Annotated[Sequence[str], Argument("FILE", "rubric
             rubric, points = loaded.rubric, number(loaded.rubric.max_points)
             say(f"{file}: ok, {rubric.id}, {len(rubric.criteria)} criteria, {points} points")
             say(f"  digest {loaded.digest}")
+            for doubt in doubts_of(loaded, file):
+                say(f"  warning: {doubt}")
     if faults:
         raise RubricError(faults, hint=hint)
     return ExitCode.PASSED
