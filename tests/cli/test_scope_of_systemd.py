@@ -72,7 +72,7 @@ def groups() -> Iterator[list[Path]]:
     for group in made:
         while any(path.read_text() for path in group.rglob("cgroup.procs")) and time.monotonic() < until:
             time.sleep(0.05)
-        for folder in (*sorted(group.rglob("*/"), reverse=True), group):
+        for folder in (*sorted(filter(Path.is_dir, group.rglob("*")), reverse=True), group):
             folder.rmdir()
 
 
