@@ -53,6 +53,7 @@ mount --bind . . && cd "$1"
 mount -t proc proc proc
 mount --rbind /dev dev
 mount --rbind /sys sys
+ip link set lo up
 mkdir -p .{HOST} && mount -t tmpfs none .{HOST}
 [ -z "$2" ] || {{ mkdir .{HOST}/locks && mount --bind "$2" .{HOST}/locks; }}
 mkdir -p mnt/outside && pivot_root . mnt/outside && umount -l /mnt/outside
@@ -68,7 +69,9 @@ def missing() -> str:
     if os.geteuid() != 0:
         return "fresh roots take root's rights"
     if without := [
-        name for name in ("mmdebstrap", "bwrap", "nsenter", "unshare", "mount") if not shutil.which(name)
+        name
+        for name in ("mmdebstrap", "bwrap", "nsenter", "unshare", "mount", "ip")
+        if not shutil.which(name)
     ]:
         return f"no {', '.join(without)} here"
     if _available_kib() < NEEDED_KIB:
@@ -116,7 +119,8 @@ class Root:
     ) -> subprocess.CompletedProcess[str]:
         """Run a command in the root as root, or as `user` (a name or a number), with what a container may do.
 
-        `privileged` is as on a machine of its own: with all rights and the kernel's control groups, but no network.
+        `privileged` is as on a machine of its own: with all rights and the kernel's control groups, but no network
+        beyond itself.
 
         With the folder of their `locks`, graders in the root and those of this machine take turns.
         Raises Failed where `check` is set and it ends with another code than 0.

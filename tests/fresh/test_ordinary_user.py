@@ -16,8 +16,8 @@ pytestmark = [pytest.mark.ros, pytest.mark.full, pytest.mark.slow, pytest.mark.t
 REPO = Path(__file__).resolve().parents[2]
 HOME, USER = "/home/someone", "someone"
 CLONE = f"{HOME}/ros-lab-grader"
-GRADE = [f"{CLONE}/.venv/bin/grader", "grade", "reference_solutions/leeds-comp3631-lab1"]
-GRADE += ["--rubric", "leeds-comp3631-lab1", "--out", f"{HOME}/out"]
+CHECK = [f"{CLONE}/.venv/bin/grader", "check", "reference_solutions/leeds-comp3631-lab1"]
+CHECK += ["--rubric", "leeds-comp3631-lab1", "--out", f"{HOME}/out"]
 WITHOUT_NAMESPACES = """
 set -e
 coproc unshare --user cat
@@ -86,13 +86,16 @@ def test_the_tests_of_gradings(run) -> None:
 
 
 def test_without_user_namespaces_no_sandbox_can_be_had(run) -> None:
-    done, root = run("bash", "-c", WITHOUT_NAMESPACES, "bash", *GRADE, "--sandbox", "require", user=None)
+    done, root = run("bash", "-c", WITHOUT_NAMESPACES, "bash", *CHECK, "--sandbox", "require", user=None)
     assert done.returncode == 3, done.stdout + done.stderr
     assert "no sandbox on this machine" in done.stderr
     assert _result(root, f"{HOME}/out/leeds-comp3631-lab1").status == "error"
 
 
 def test_without_user_namespaces_it_can_be_done_without(run) -> None:
-    done, root = run("bash", "-c", WITHOUT_NAMESPACES, "bash", *GRADE, "--sandbox", "none", user=None)
-    assert "The sandbox is switched off (--sandbox none)" in done.stderr, done.stderr
-    assert "bubblewrap" not in _result(root, f"{HOME}/out/leeds-comp3631-lab1").environment.sandbox
+    done, root = run("bash", "-c", WITHOUT_NAMESPACES, "bash", *CHECK, "--sandbox", "none", user=None)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "The sandbox is switched off (--sandbox none)" in done.stderr
+    result = _result(root, f"{HOME}/out/leeds-comp3631-lab1")
+    assert "bubblewrap" not in result.environment.sandbox
+    assert result.points == 100
