@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 SUITE = "bookworm"
@@ -17,9 +18,9 @@ def missing() -> str:
     return "" if KEYS.exists() or _sources() else "this machine has no keys of Debian's archive"
 
 
-def make(target: Path) -> None:
-    """Write the archive. Raises AssertionError with what mmdebstrap said."""
-    command = ["mmdebstrap", "--quiet", "--variant=minbase", "--format=tar", SUITE, str(target)]
+def make(target: Path, *, options: Sequence[str] = ("--variant=minbase",)) -> None:
+    """Write the archive, as mmdebstrap makes it with these options. Raises AssertionError with what that said."""
+    command = ["mmdebstrap", "--quiet", *options, "--format=tar", SUITE, str(target)]
     done = subprocess.run(
         [*command, *(map(str, _sources() or [MIRROR]))],
         stdin=subprocess.DEVNULL,
