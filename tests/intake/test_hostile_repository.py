@@ -210,7 +210,8 @@ def test_refs_that_begin_with_a_dash(name, tmp_path):
 def test_thousands_of_refs_and_a_long_history(tmp_path):
     repo = repository(tmp_path / "student", lab())
     head = git(repo, "rev-parse", "HEAD")
-    lines = "".join(f"{head} refs/heads/b{n}\n{head} refs/tags/t{n}\n" for n in range(5000))
+    names = sorted(f"refs/{kind}{n}" for n in range(5000) for kind in ("heads/b", "tags/t"))
+    lines = "".join(f"{head} {name}\n" for name in names)
     commits = [f"commit refs/heads/main\ncommitter a <a> {n} +0000\ndata 0\n" for n in range(2000)]
     commits[0] += f"from {head}\n"
     stream = "".join(commits)
