@@ -401,7 +401,7 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
     expected = f"{params.name} is {params.value}{others}" + (", and it is logged" if params.logged else "")
     verdict = (
         (None if _is_value(got, params.value) else _not_set(package, run, after, params, until_ns))
-        or _set_in_part(run, after, params)
+        or _set_in_part(package, run, after, params)
         or passed(f"sets {params.name} to {params.value}{' and logs it' if params.logged else ''}")
     )
     cited = cite(run, "/grader/param")
@@ -409,11 +409,13 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
     return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cited))
 
 
-def _set_in_part(run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verdict | None:
+def _set_in_part(
+    package: PackageFacts, run: Run, after: dict[str, Any], params: ParamsSetParams
+) -> Verdict | None:
     """Return what is wrong besides where the value is set, with the share of what is right."""
     asked: dict[str, Verdict | None] = {f"{params.name} is set": None}
     asked |= {"the others are as before": _judge_unchanged(run, after, params)} if params.unchanged else {}
-    asked |= {"the new value is printed": _not_logged(run, params)} if params.logged else {}
+    asked |= {"the new value is printed": _not_logged(package, run, params)} if params.logged else {}
     lost = joined([one for one in asked.values() if one])
     right = [what for what, one in asked.items() if one is None]
     return lost and lost.in_part(len(right) / len(asked), join_words(right))
@@ -484,10 +486,12 @@ def _taken_away(run: Run, name: str) -> str:
     return ""
 
 
-def _not_logged(run: Run, params: ParamsSetParams) -> Verdict | None:
+def _not_logged(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verdict | None:
     if not params.logged or is_printed(params.value, printed_lines(run)):
         return None
     message = f"{params.name} is set to {params.value}, but the new value is never printed"
+    if end := explain_failure(package, run):
+        return end.verdict(failed, f"{message}: the node ended with {end.cause}")
     return failed(message, hint=log_param(params.name))
 
 

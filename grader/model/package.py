@@ -107,8 +107,11 @@ ALIKE, SHORT = 0.88, 5
 
 def meant_command(name: str) -> str:
     """Return the command of CMake or catkin that a name, in small letters, is a slip of; empty where it is none."""
-    near = [] if name in CMAKE_COMMANDS else get_close_matches(name, CMAKE_COMMANDS, 1, ALIKE)
-    return near[0] if near and len(name) > SHORT else ""
+    if name in CMAKE_COMMANDS or len(name) <= SHORT:
+        return ""
+    turned = [known for known in CMAKE_COMMANDS if sorted(known.split("_")) == sorted(name.split("_"))]
+    near = turned or get_close_matches(name, CMAKE_COMMANDS, 1, ALIKE)
+    return near[0] if near else ""
 
 
 class CMakeCall(Record):

@@ -149,7 +149,7 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
         column=column if known else None,
         kind="XMLSyntaxError",
         message=message[:_MESSAGE_CHARS_MAX],
-        cause=cause,
+        cause=_opened_again(message, data, text, root) or cause,
         source=text.rstrip("\r") if known else "",
     )
 
@@ -162,6 +162,14 @@ def _unclosed_line(cause: str, log: list[str]) -> int | None:
         found = (re.search(r"end of Start Tag \S+ line (\d+)", message) for message in log)
         return next((int(one[1]) for one in found if one), None)
     return None
+
+
+def _opened_again(message: str, data: bytes, text: str, root: str) -> str:
+    """Return what is to be said where the root's tag stands a second time, in place of the one that closes it."""
+    twice = "end of data" in message and text.strip() == f"<{root}>" and f"</{root}>".encode() not in data
+    if not twice or len(re.findall(rf"<{re.escape(root)}[\s>]".encode(), data)) < 2:
+        return ""
+    return f"`<{root}>` opens the file a second time here, where it is to end: write `</{root}>` for it"
 
 
 def _line(data: bytes, number: int) -> str:
@@ -278,6 +286,9 @@ def _closed(lines: list[str], tag: str, line: int, root: str) -> Iterator[str]:
     """Yield the lines with an open tag closed: by `/` before its `>`, all that are left open so, or behind its text."""
     text = "\n".join(lines)
     if tag == root:
+        above, _, below = text.rpartition(f"<{root}>")
+        if f"<{root}" in above and not below.strip():
+            yield f"{above}</{root}>{below}"
         yield f"{text.rstrip()}\n</{root}>\n"
     elif tag == "group" and (end := text.rfind(f"</{root}>")) >= 0:
         yield f"{text[:end]}</{tag}>\n{text[end:]}"

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from grader.model.package import meant_command
 from grader.package.cmake import read_cmake, split_lists
 from grader.package.cmake_parse import parse_tree_of
 
@@ -261,3 +262,17 @@ def test_a_name_that_only_cmake_knows_may_be_any(tmp_path):
     (found,) = facts_of(tmp_path, text).executables
     assert found.is_called("my_talker_node")
     assert not found.is_called("talker")
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("catkin_python_install", "catkin_install_python"),
+        ("package_find", "find_package"),
+        ("catkinpackage", "catkin_package"),
+        ("catkin_install_python", ""),
+        ("my_macro", ""),
+    ],
+)
+def test_a_command_with_its_words_in_another_order_is_a_slip_of_it(name, meant):
+    assert meant_command(name) == meant

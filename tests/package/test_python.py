@@ -173,6 +173,9 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node(LOOP + "        p.publish(1)\n        rospy.spin()\n") + CALLED,
          [("spin-in-loop", 6, "stops at the spin()")]),
         (node(LOOP + "        p.publish(1)\n        break\n") + CALLED, [("loop-left", 6, "at the break in line 6")]),
+        (node("    if not rospy.is_shutdown():\n        p.publish(1)\n") + CALLED,
+         [("loop-left", 4, "write `while` for `if` in line 4")]),
+        (node("    while go:\n        if not rospy.is_shutdown():\n            p.publish(1)\n") + CALLED, []),
         (node(LOOP + "        p.publish(1)\n        if x:\n            return\n") + CALLED, []),
         (node(LOOP + "        p.publish(1)\n    rate.sleep()\n") + CALLED,
          [("sleep-outside", 6, "`rate.sleep()` is outside the loop of line 4")]),
@@ -193,7 +196,11 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         ("def f(*a):\n    pass\nrospy.Timer(d, f)\n", []),
         ("def f():\n    return lambda m: 0\nrospy.Subscriber('a', A, f())\n", []),
         ("class A:\n    def f(m):\n        pass\n    def g(self):\n        rospy.Service('a', T, self.f)\n",
-         [("callback-values", 2, "`f` takes 0 arguments, but ROS passes it the request")]),
+         [("callback-values", 2, "takes no `self`: write `def f(self, m):`")]),
+        ("class A:\n    def f():\n        pass\n    def g(self):\n        rospy.Service('a', T, self.f)\n",
+         [("callback-values", 2, "write `def f(self, msg):`")]),
+        ("def hear(m):\n    print(m)\ndef run():\n    rospy.Subscriber('a', A, run)\n    rospy.spin()\nrun()\n",
+         [("callback-values", 3, "is the function that makes this call, not its callback: in line 4, write hear")]),
     ],
 )  # fmt: skip
 def test_what_never_runs_is_known(tmp_path, text, found):

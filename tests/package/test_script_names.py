@@ -22,6 +22,8 @@ UNDEFINED = {
                  "`msg` has a value only in `a(…)`: keep it there"),
     "import-in-function": ("def a():\n    import time\ndef b():\n    time.sleep(1)\n",
                            "`time` has a value only in `a(…)`: move its import to the top of the file"),
+    "argument without its value": ("p = rospy.Publisher('a', Int32, queue_size)\n",
+                                   "`queue_size` stands here without its value: write `queue_size=10`"),
     "global": ("def a():\n    global total\n    total = 1\ndef b():\n    return total\n", ""),
     "enclosing": ("def a(x):\n    def b():\n        return x\n    return [b, lambda y: x + y, [z for z in x]]\n", ""),
     "class-level": ("class A:\n    n = 3\n    m = n + 1\n", ""),

@@ -22,6 +22,7 @@ EDITED = {
     "root left open": ("</launch>\n", ""),
     "root misspelt": ("</launch>", "</lauch>"),
     "root in capitals": ("</launch>", "</Launch>"),
+    "root opened twice": ("</launch>", "<launch>"),
     "no quotes": ('"talker.py"', "talker.py"),
     "no quotes in both": ('"lab"', "lab"),
     "no closing quote": ('"talker.py"', '"talker.py'),
@@ -80,3 +81,9 @@ def test_a_group_is_closed_behind_its_nodes() -> None:
 )
 def test_what_is_right_or_has_no_plain_edit_stays(text: str) -> None:
     assert well_formed(text, "a.launch", root="launch") == []
+
+
+def test_a_root_that_is_opened_where_it_is_to_end_is_told_so() -> None:
+    fault = parse_launch(RIGHT.replace("</launch>", "<launch>").encode(), "a.launch").fault
+    assert fault is not None
+    assert (fault.line, fault.fix) == (4, "line 4: write `</launch>` for it")

@@ -210,12 +210,19 @@ MODULES = {
 }  # fmt: skip
 
 
+GIVEN_BY_NAME = {"queue_size": "10", "anonymous": "True", "latch": "True"}
+"""Arguments of rospy's functions that are written with their name, and a value that most labs give them."""
+
+
 def undefined(node, tree):
     """Return why a name is not there that the file gives no value anywhere, and what to do."""
     name, line = node.id, node.lineno
     why = "nothing in the file gives `%s` a value" % name
     uses = [n for n in ast.walk(tree) if node in (getattr(n, "value", None), getattr(n, "func", None))]
     used = uses[0] if uses else None
+    calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and node in n.args]
+    if name in GIVEN_BY_NAME and calls:
+        return "`%s` stands here without its value" % name, "write `%s=%s`" % (name, GIVEN_BY_NAME[name])
     if name in ALIASES or (name in MODULES and isinstance(used, ast.Attribute)):
         return "`%s` is not imported" % name, "write `import %s` at the top" % ALIASES.get(name, name)
     if name[:1].isupper():

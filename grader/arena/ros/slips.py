@@ -56,27 +56,10 @@ def slips(tree):
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             found.append(slip(node.lineno, "input", message))
     finders = (
-        misspelt,
-        loop_rates,
-        resets,
-        never_run,
-        never_reached,
-        stopped_loops,
-        sleepless_loops,
-        sleeps_twice,
-    )
-    for find in (
-        *finders,
-        callbacks,
-        queue_sizes,
-        graph_names,
-        object_slips,
-        said_texts,
-        deaf_loops,
-        clock_values,
-        counter_slips,
-        without_effect,
-    ):
+        misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice, callbacks,
+        queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips, without_effect,
+    )  # fmt: skip
+    for find in finders:
         found += find(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
     if published is not None and counts(tree):
@@ -184,8 +167,16 @@ def never_reached(tree):
 
 
 def stopped_loops(tree):
-    """`spin()` in a loop that publishes: the loop does not come round. And `break` or `return` in each of its turns."""
+    """`spin()` in a loop that publishes: the loop does not come round. `break` or `return` in each of its turns. And
+    `if` in place of `while`.
+    """
+    turned = dict(turns(tree))
     for loop in ast.walk(tree):
+        once = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
+        if once and not turned[loop][1] and any(is_call(n, "publish") for n in ast.walk(loop)):
+            message = "the `if` in line %d runs what follows it once" % loop.lineno
+            fix = "write `while` for `if` in line %d" % loop.lineno
+            yield slip(loop.lineno, "loop-left", message, fix=fix)
         inside = list(ast.walk(loop)) if isinstance(loop, (ast.While, ast.For)) else []
         if not any(is_call(n, "publish") for n in inside):
             continue
@@ -299,9 +290,23 @@ def callbacks(tree):
                     "on_shutdown": "nothing",
                     "signal": "the signal's number and a frame",
                 }.get(name, "the message")
-                message = "`%s` takes %d arguments, but ROS passes it %s" % (own.name, least, what)
-                fix = "write `def {0}(msg):`, or `def {0}(self, msg):` in a class".format(own.name)
+                message, fix = wrong_callback(own, node, functions, isinstance(meant, ast.Attribute), values)
+                message = message or "`%s` takes %d arguments, but ROS passes it %s" % (own.name, least, what)
                 yield slip(own.lineno, "callback-values", message, fix=fix, name=own.name)
+
+
+def wrong_callback(own, call, functions, bound, values):
+    """Return why a function does not fit as a callback, "" where only its arguments do not, and what to write."""
+    given = [one.arg for one in own.args.args]
+    if any(inner is call for inner in ast.walk(own)):
+        others = [f for f in functions.values() if f is not own and takes(f, bound)[0] == values]
+        message = "`%s` is the function that makes this call, not its callback" % own.name
+        meant = others[0].name if len(others) == 1 else "the name of the function that prints the message"
+        return message, "in line %d, write %s for %s" % (call.lineno, meant, own.name)
+    if bound and len(given) == values and "self" not in given:
+        message = "`%s` is called on an object, and takes no `self`" % own.name
+        return message, "write `def %s(%s):`" % (own.name, ", ".join(["self", *given]))
+    return "", "write `def {0}({1}msg):`".format(own.name, "self, " if bound else "")
 
 
 def gives_value(function):

@@ -52,6 +52,9 @@ _WHOLE = re.compile(
 )
 """What Python says of a whole message where one of its values is meant."""
 _WANTS_NUMBER = re.compile(r"(?:real number|a number) is required, not (\w+)|must be real number, not (\w+)")
+_IN_ITSELF = re.compile(
+    r"(?:'(?:builtin_function_or_method|function)' object|type object '[\w.]+') has no attribute '(\w+)'$"
+)
 HEADING = "Traceback (most recent call last):"
 _FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
 _CARETS = re.compile(r"    \s*([~^]*\^[~^]*)")
@@ -393,7 +396,14 @@ def _local(message: str, _source: str, _marked: tuple[int, int] | None) -> Meani
     return cause, f"write `global {name[1]}` as the first line of the function"
 
 
-def _attribute(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    if message == "'Duration' object has no attribute 'sleep'":
+        hint = "make it with `rospy.Rate(…)`, which takes how often the loop goes round in a second"
+        return "a Duration is a length of time, and only a Rate sleeps", hint
+    if (twice := _IN_ITSELF.search(message)) and re.search(rf"\b{twice[1]}\.{twice[1]}\b", source):
+        name = twice[1]
+        cause = f"`from {name} import {name}` makes `{name}` what is in the module, and not the module"
+        return cause, f"write `{name}` for `{name}.{name}`"
     if found := re.match(r"'(tuple|list|dict)' object has no attribute 'encode'", message):
         hint = 'put the values into the text with `%`: `"… %s" % value`, not behind a comma'
         return f"a text is published here, and this is a {found[1]}", hint

@@ -398,20 +398,22 @@ def _callback(found: Traceback, place: FileCitation | None, package: PackageFact
 
 
 def _operand(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
-    """A text and something else are added: which of both is not a string, where Python marks the place."""
+    """A text or a message and something else are added: which of both does not fit, where Python marks the place."""
     if not (match := _ADDED.search(found.message)):
         return None
-    kind, is_right = (
-        (match[1], True) if match[1] else (match[2], False) if match[3] == "str" else (match[3], True)
-    )
+    of_text = bool(match[1]) or "str" in match.groups()
+    left = match[3] == "str" or (not of_text and bool(fields_of(package, match[2])))
+    kind, is_right = (match[1], True) if match[1] else (match[2], False) if left else (match[3], True)
     other = _other_side(found.own_frames[-1], is_right=is_right)
     if fields := fields_of(package, kind):
         value = f"{other or 'msg'}.{fields[0]}"
-        value = value if kind == "String" else f"str({value})"
+        value = value if kind == "String" or not of_text else f"str({value})"
         return (
             f"{other or 'one side'} is the whole message ({kind})",
             f"write `{value}` for `{other or 'msg'}`",
         )
+    if not of_text:
+        return None
     if other:
         return f"{other} is not a string", f"write `str({other})` for `{other}`"
     return (
@@ -428,6 +430,9 @@ def _other_side(frame: Frame, *, is_right: bool) -> str:
         sums = [n for n in nodes if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)]
         if sums and (frame.marked or len(sums) == 1):
             return shown(ast.unparse(sums[0].right if is_right else sums[0].left))
+        more = next((n for n in nodes if isinstance(n, ast.AugAssign)), None)
+        if more is not None:
+            return shown(ast.unparse(more.value if is_right else more.target))
     return ""
 
 

@@ -232,10 +232,14 @@ def explain_failure(package: PackageFacts, run: Run) -> Ending | None:
     key = re.match(r"KeyError: ['\"]?([^'\" (]+)", end.cause)
     if key is None:
         return end
-    parts = {
-        part for name in without_system_params(params_on_server(run)) for part in name.split("/") if part
-    }
+    names = list(without_system_params(params_on_server(run)))
+    parts = {part for name in names for part in name.split("/") if part}
     last = PurePosixPath(key[1]).name
+    deeper = [name for name in names if name.endswith(f"/{last}")]
+    if len(deeper) == 1:
+        levels = "".join(f"['{part}']" for part in deeper[0].split("/") if part)
+        hint = f"write {get_param(deeper[0])}, or a key for each level: {levels}"
+        return end._replace(cause=f"{end.cause}: {last} is not there but in {deeper[0]}", hint=hint)
     near = near_names(last, parts - {last})
     seen = f"; there is {join_words(near)}" if near else ""
     hint = "write the name as rosparam list shows it, one key for each level: get_param('details')['name']['first']"
