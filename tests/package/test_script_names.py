@@ -144,6 +144,11 @@ COUNTERS = {
                     ("reset-early", 3, "move line 5 above the `if` in line 3")),
     "of-self": (f"{LOOP}    p.publish(self.c)\n    if self.c == 127:\n        self.c = 0\n    self.c += 1\n",
                 ("reset-early", 4, "move line 6 above the `if` in line 4")),
+    "plus behind": ("c = 0\nwhile True:\n    p.publish(c)\n    c =+ 1\n", ("no-effect", 4, "write `c += …`")),
+    "below": (f"{LOOP}    p.publish(c)\nc += 1\nif c > 9:\n    c = 0\n",
+              ("no-effect", 4, "indent lines 4 to 6 like the lines of that loop")),
+    "below-alone": (f"{LOOP}    p.publish(c)\nc += 1\n", ("no-effect", 4, "indent line 4 like the lines of that loop")),
+    "below-another": (f"{LOOP}    p.publish(1)\nc += 1\n", None),
     "two-sleeps": (f"{LOOP}    p.publish(c)\n    r.sleep()\n    rospy.sleep(1)\n", ("sleep-twice", 5, "delete line 5")),
     "sleeps-apart": (f"{LOOP}    r.sleep()\n    p.publish(c)\n    r.sleep()\n", ("sleep-twice", 5, "delete line 5")),
     "two-messages": (f"{LOOP}    p.publish(c)\n    r.sleep()\n    p.publish(c)\n    r.sleep()\n", None),
@@ -154,6 +159,6 @@ COUNTERS = {
 def test_what_a_loop_does_to_its_counter_and_its_rate(tmp_path, case):
     code, found = COUNTERS[case]
     (tmp_path / "a.py").write_text(code)
-    kinds = ("set-in-loop", "reset-early", "sleep-twice")
+    kinds = ("set-in-loop", "reset-early", "sleep-twice", "no-effect")
     slips = [(s.kind, s.line, s.fix) for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in kinds]
     assert slips == ([found] if found else [])

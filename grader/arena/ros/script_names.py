@@ -421,7 +421,10 @@ def is_increment(node, target, value):
 
 
 def counter_slips(tree):
-    """Counters that a loop sets in each of its turns, and those that it resets before it adds one."""
+    """Counters that a loop sets in each of its turns, those that it resets before it adds one, and those that it does
+    not count: `n =+ 1`, or the line below the loop.
+    """
+    yield from uncounted(tree)
     for loop in ast.walk(tree):
         body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
         inside = [n for one in body for n in ast.walk(one)]
@@ -443,6 +446,30 @@ def counter_slips(tree):
                     message = "the counter is reset before line %d adds one, and that sum is published"
                     fix = "move line %d above the `if` in line %d" % (node.lineno, line)
                     yield slip(line, "reset-early", message % node.lineno, fix=fix, name=name)
+
+
+def uncounted(tree):
+    for node in ast.walk(tree):
+        value = node.value if isinstance(node, ast.Assign) else None
+        if isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.UAdd):
+            name = dotted(node.targets[0])
+            message, fix = "`%s =+ …` sets it, and adds nothing" % name, "write `%s += …`" % name
+            yield slip(node.lineno, "no-effect", message, fix=fix, name=name)
+        body = getattr(node, "body", None)
+        for at, loop in enumerate(body[:-1] if isinstance(body, list) else ()):
+            after = body[at + 1]
+            ends = not isinstance(loop, ast.While) or any(isinstance(n, ast.Break) for n in ast.walk(loop))
+            sent = [names_in(n) for n in ast.walk(loop) if is_call(n, "publish")]
+            for name in () if ends else (dotted(t) for t in increments(after)):
+                if any(name in names for names in sent):
+                    message = "`%s` is counted below the loop of line %d, which does not end before the node"
+                    last = after
+                    for one in body[at + 2 :]:
+                        last = one if name in names_in(one) else last
+                    lines = "line %d" % after.lineno if last is after else "lines %d to %d"
+                    lines = lines if last is after else lines % (after.lineno, last.end_lineno)
+                    fix = "indent %s like the lines of that loop" % lines
+                    yield slip(after.lineno, "no-effect", message % (name, loop.lineno), fix=fix, name=name)
 
 
 def increments(node):
