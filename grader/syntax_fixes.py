@@ -15,11 +15,16 @@ from typing import NamedTuple
 
 LINE_CHARS_MAX = 300
 BLOCK = r"(?:if|elif|else|while|for|def|class|try|except|finally|with)\b"
+COMMENTED_OUT = "block commented out"
+"""What the grader says of a comment that is the first line of the block below it."""
 MERGE_MARKER = re.compile(r"(<{7}|={7}|>{7})(\s|$)")
 _BLOCK = re.compile(rf"\s*{BLOCK}")
 _BRACE = rf"(?:\}}\s*)?{BLOCK}(?:.*[\w\])\"])?\s*\{{$"
 _TEXT = re.compile(r"""("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|#.*""")
 _UNITS = r"[kM]?[hH][zZ]|msec|ms|secs?|seconds?|s|min|cm|mm|km|m|rad|deg|degrees"
+_SHELL = (
+    r"\$|(?:sudo|rosrun|roslaunch|rostopic|cd|chmod|source|python3?|catkin_make)\s+[-+~./\w]+|catkin_make$"
+)
 _NUMBERS = r"int|float|double|long|short|char|bool|byte|unsigned|size_t"
 _FOR = (
     r"^(\s*)for\s*\(\s*(?:\w+\s+)?(\w+)\s*=\s*(\w+)\s*;\s*\2\s*<\s*([\w.()]+)\s*;"
@@ -74,8 +79,10 @@ class _Habit(NamedTuple):
 
 _HABITS = (
     _Habit(MERGE_MARKER.pattern, "git's merge markers (`<<<<<<<`) are still in the file: keep one version"),
-    _Habit(r"^\s*(\$|sudo |rosrun |roslaunch |cd |chmod )",
+    _Habit(rf"^\s*(?:{_SHELL})",
            "this is a command for the terminal, not Python: delete this line"),
+    _Habit(rf"\)\s*(?:{_SHELL}).*$", "a command for the terminal stands behind the code: delete it",
+           ((rf"\)\s*(?:{_SHELL}).*$", ")"),)),
     _Habit(r"^\s*(using\s+namespace\b|#\s*include\b)", "this is C++, not Python: delete this line"),
     _Habit(r"(?<![\w.])(r[^\w\s]spy|ro[^\w\s]py|ros[^\w\s]y|rosp[^\w\s.])\.", "`rospy` is misspelt as `{0}`",
            ((r"(?<![\w.])(?:r[^\w\s]spy|ro[^\w\s]py|ros[^\w\s]y|rosp[^\w\s.])(?=\.)", "rospy"),)),
@@ -188,13 +195,17 @@ def corrected(line: str, message: str = "", column: int | None = None) -> str:
 
     `message` is what Python says of the line, and `column` the place, from 1.
     """
-    return next((one for one in corrections(line, message, column) if one != line and _parses(one)), "")
+    return next((one for one in corrections(line, message, column) if one != line and _parses(one)), "") or (
+        _without_unmatched(line, message, column) if _ends_earlier_lines(line) else ""
+    )
 
 
 def corrections(line: str, message: str = "", column: int | None = None) -> Iterator[str]:
     """Yield the line with one mistake after the other put right, then with the token that Python asks for."""
     if len(line) > LINE_CHARS_MAX or not line.strip():
         return
+    if message.startswith(COMMENTED_OUT):
+        yield without_comment_sign(line)
     yield line.translate(PLAIN)
     code, comment, texts = _taken_apart(line.translate(PLAIN))
     code = re.sub("[\u2010-\u2015\u2212]", "-", code)
@@ -215,6 +226,12 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
     yield from (_together(one, comment, texts) for one in _with_separator(plain, texts))
     yield from _with_bracket(line, message, column)
     yield from _with_quote(line, message, column)
+
+
+def without_comment_sign(line: str) -> str:
+    """Return the first line of a block that is commented out, without its `#`; "" for any other line."""
+    found = re.fullmatch(r"(\s*)#[#\s]*((?:if|while|for|def|class|try|with)\b.*:)\s*", line[:LINE_CHARS_MAX])
+    return found[1] + found[2] if found and _parses(found[2]) else ""
 
 
 def _taken_apart(line: str) -> tuple[str, str, list[str]]:
@@ -259,8 +276,12 @@ def _with_separator(code: str, texts: list[str]) -> Iterator[str]:
 def _with_bracket(line: str, message: str, column: int | None) -> Iterator[str]:
     """Yield the line without the bracket that closes nothing, with the right one, or with the one that is missing."""
     at = (column or 0) - 1
-    if (extra := re.search(r"unmatched '(.)'", message)) and line[at : at + 1] == extra[1]:
-        yield line[:at] + line[at + 1 :]
+    if shorter := _without_unmatched(line, message, column):
+        code, comment, texts = _taken_apart(line)
+        called = re.sub(r"^(\s*(?:\w+\.)+\w+)\)$", r"\1()", code)
+        opened = _OPENED.sub(lambda found: f"{_log_call(found[1])}(", code, count=1)
+        yield from (_together(one, comment, texts) for one in (called, opened) if one != code)
+        yield shorter
     if (wrong := re.search(r"'(.)' does not match opening parenthesis '(.)'", message)) and line[
         at : at + 1
     ] == wrong[1]:
@@ -278,6 +299,32 @@ def _with_bracket(line: str, message: str, column: int | None) -> Iterator[str]:
     if closing and _CLOSED_ENOUGH.search(code):
         colon = ":" if code.endswith(":") else ""
         yield _together(code.removesuffix(":") + closing + colon, comment, texts)
+
+
+_OPENED = re.compile(
+    r"((?:\w+\.)+?\w+?|\bprint)(?:\s*\)(?=[\w\"])|(?=\"\")|(?<=\w)(?=rospy\.)|\s+(?=[\w\"]+\s*\)$))"
+)
+"""A call whose `(` is missing: `pub.publish)x)`, `pub.publish"x")`, `pub.publish x)`, `rospy.loginforospy.…)`."""
+_LOG_CALLS = ("logdebug", "loginfo", "logwarn", "logerr", "logfatal")
+
+
+def _log_call(name: str) -> str:
+    """Return the name of a call as rospy has it, where it is a misspelt one that logs."""
+    owner, _, last = name.rpartition(".")
+    near = get_close_matches(last, _LOG_CALLS, n=1, cutoff=0.8) if owner == "rospy" else []
+    return f"{owner}.{near[0]}" if near else name
+
+
+def _without_unmatched(line: str, message: str, column: int | None) -> str:
+    """Return the line without the bracket that closes nothing; "" where it is not there."""
+    at, extra = (column or 0) - 1, re.search(r"unmatched '(.)'", message)
+    return line[:at] + line[at + 1 :] if extra and line[at : at + 1] == extra[1] else ""
+
+
+def _ends_earlier_lines(line: str) -> bool:
+    """Return whether the line has two closing brackets more than it opens: it goes on with a call of lines above."""
+    code, _, _ = _taken_apart(line)
+    return sum(map(code.count, ")]}")) - sum(map(code.count, "([{")) > 1
 
 
 def _with_quote(line: str, message: str, column: int | None) -> Iterator[str]:

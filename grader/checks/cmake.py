@@ -297,7 +297,10 @@ def _why_unnamed(
         return Lack(why, f"write {path} in place of {shown(one.path)}", _line(one))
     why = "catkin_install_python(…) does not name {}"
     if any(one.kind == "PROGRAMS" and is_bin(one.destination or "", package) for one in of_python):
-        return Lack(why, "write {} into it, after PROGRAMS", None, path)
+        absent = next((shown(one.path) for one in names.values() if one.known), "")
+        fix = "write {} " + (f"in place of `{absent}`" if absent else "into it, after PROGRAMS")
+        why += f", and names `{absent}`, which does not exist" if absent else ""
+        return Lack(why, fix, None, path)
     fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN}){_below(of_python[-1].call)}"
     return Lack(why, fix, None, path)
 

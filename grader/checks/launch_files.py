@@ -184,6 +184,13 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
         kind = "" if (name, line) in file.commented else f', and write type="{name}" in it'
         hint = f"take the <node> of line {line} out of the comment: remove `<!--` before it and `-->` after it{kind}"
         return failed(message, hint=hint, citations=cited)
+    if off := next(
+        (one for one in file.switched_off if PurePosixPath(one[0]).stem == PurePosixPath(name).stem), None
+    ):
+        cited = (FileCitation(file=file.path, line=off[1]),)
+        message = f"{message}: {off[2]} in line {off[1]} leaves the one that is there out"
+        hint = f"remove {off[2]} from line {off[1]}, or give its <arg> the other default"
+        return failed(message, hint=hint if "$(arg" in off[2] else hint.partition(",")[0], citations=cited)
     unknown = (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node")
     for tag, line in unknown:
         cited = (FileCitation(file=file.path, line=line),)

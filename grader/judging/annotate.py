@@ -27,17 +27,22 @@ from grader.checks.support.launch_names import find_renaming
 from grader.checks.support.scripts import (
     BACKUPS,
     PYTHON,
+    SourceLine,
     commented_call,
     commented_calls,
     find_script,
     installed,
     is_product,
     lines_text,
+    lines_that_publish,
+    lines_that_say,
+    lines_that_set,
     names_script,
     programs,
 )
 from grader.checks.support.text import (
     SAID_DATA,
+    SAID_VALUE,
     SECONDS,
     VALUE,
     Language,
@@ -52,7 +57,7 @@ from grader.checks.support.text import (
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO
-from grader.judging.facts import Facts
+from grader.judging.facts import SOURCES, Facts, scripts_of, sources_of
 from grader.model.package import LaunchFile, PackageFacts, PythonSlip
 from grader.model.result import CriterionResult
 from grader.model.verdict import Citation, FileCitation, Status, Verdict
@@ -208,9 +213,9 @@ class Later:
         self._build = facts.runs.get(PACKAGE_RUN)
         self._wanted = criterion.parameters
         self._topic = str(self._wanted.get("topic", ""))
-        scripts = _scripts(criterion, facts.rubric, package)
+        scripts = scripts_of(criterion, facts.rubric, package)
         self._slips = [slip for slip in package.slips if slip.file in scripts]
-        self._paths = scripts | _sources(criterion, facts.rubric, package)
+        self._paths = scripts | sources_of(criterion, facts.rubric, package)
         self._slips += self._texts_of_cpp()
         self._ran = not verdict.cause
         """Names are told already then, and only what is behind them is not."""
@@ -267,7 +272,7 @@ class Later:
         if len(published) > 1 and not lines:
             names = join_words(f"{one.message} (line {one.line})" for one in published[:NAMES_SHOWN])
             yield f"publish {kind} on {self._topic}: {published[0].file} publishes on {names}"
-        types = [one for one in self._of("publisher-type") if one.line in lines or len(published) == 1]
+        types = [one for one in self._of("publisher-type") if one.line in lines or len(published) <= 1]
         types = types if not (self._ran and lines) else []
         if len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
             yield f"publish {kind} in {_line(types[0])}, not {types[0].message}"
@@ -277,10 +282,12 @@ class Later:
         probes = scenario.probes if scenario is not None else ()
         sent = [probe.type for probe in probes if probe.topic == self._topic]
         heard, types = self._of("subscriber"), self._of("subscriber-type")
+        own = sent[0].rpartition("/")[2] if sent else ""
         elsewhere = len(heard) == 1 and f"/{heard[0].message.lstrip('/')}" != self._topic
         if elsewhere and not self._ran:
             yield f"subscribe to {self._topic} in {_line(heard[0])}, not to {heard[0].message}"
-        if sent and len(types) == 1 and elsewhere and types[0].message != sent[0].rpartition("/")[2]:
+        other = sent and len(types) == 1 and types[0].message != own
+        if other and (elsewhere or (not heard and f"/{types[0].message}" not in self._verdict.message)):
             yield f"subscribe with {sent[0]} in {_line(types[0])}, not {types[0].message}"
         template, said = str(self._wanted.get("template", VALUE)), self._of("prints")
         said = [one for one in said if SAID_DATA in one.message]
@@ -291,6 +298,8 @@ class Later:
             yield f"print '{in_words(template)}' in {_line(said[0])}, not '{in_source(said[0].message)}'"
         elif self._lacks_words(template.partition(VALUE)[0]):
             yield f"print '{in_words(template)}'"
+        elif other and not said and len(self._of("prints")) == 1:  # a field that the right type does not have
+            yield f"print the `data` of the message in {_line(self._of('prints')[0])}"
 
     def _lacks_words(self, words: str) -> bool:
         """Return whether the words stand in no line of the sources, which are known."""
@@ -311,6 +320,8 @@ class Later:
                 yield f"publish `{code}`"
             return
         text = said[0].message
+        if text in {SAID_VALUE, SAID_DATA} and self._lacks_words(template.partition(SECONDS)[0]):
+            yield f"publish `{code}` in {_line(said[0])}"
         sample = template.replace(SECONDS, "1234567890.25")
         if not could_say(text, sample):
             words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code
@@ -343,30 +354,6 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
 
 def _line(slip: PythonSlip) -> str:
     return f"line {slip.line} of {slip.file}"
-
-
-def _scripts(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set[str]:
-    """Return the paths of the scripts that the criterion's scenario starts."""
-    scenario = rubric.scenarios.get(criterion.scenario or "")
-    named = [start.script for start in scenario.start if start.script] if scenario is not None else []
-    return {file.path for path in named if (file := find_script(package, path)) is not None}
-
-
-SOURCES = {".c", ".cc", ".cpp", ".cxx"}
-
-
-def _sources(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set[str]:
-    """Return the paths of the C++ sources of the programs that the criterion's scenario starts."""
-    scenario = rubric.scenarios.get(criterion.scenario or "")
-    started = scenario.start if scenario is not None else ()
-    names = {PurePosixPath(one.script).name for one in started if one.script}
-    every = any(one.built for one in started)
-    made = [
-        one for one in programs(package) if every or one.target in names or any(map(one.is_called, names))
-    ]
-    words = {word.rpartition("/")[2] for one in made for word in one.call.args}
-    paths = [PurePosixPath(file.path) for file in package.files]
-    return {str(path) for path in paths if path.suffix in SOURCES and path.name in words}
 
 
 def choose_hint_language(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
@@ -450,48 +437,41 @@ def fill_input_hint(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> V
 SAYS = {
     "hears": r"\b(?:printf?|log\w+|write|ROS_\w+)\s*\(|\bc(?:out|err)\s*<<",
     "logs": r"\b(?:log\w+|ROS_\w+)\s*\(",
-    "message": r"\bpublish\s*\(",
 }
-"""The checks of a node's words, and what a line of Python or C++ calls that says them."""
-_LITERAL = re.compile(r"""(["'])([^"'\\]+)\1""")
-_FILLED_IN = re.compile(r"%[-+ 0-9.]*[a-z]|\{[^{}]*\}")
-_WORD = re.compile(r"\w+")
+"""The checks of what a node says, and what a line of Python or C++ calls that says them."""
 _LINES_READ = 2_000
 
 
 def cite_words(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
-    """Return the verdict; one on other words than the lab's with the line of the script that makes them, if it is plain
-    which one does."""
+    """Return the verdict; one on other words or values than the lab's with the line of the script that makes, or that
+    publishes them, if it is plain which one does."""
     package = facts.package_of(criterion)
     placed = any(isinstance(one, FileCitation) for one in verdict.citations)
     lost = verdict.status in {Status.PARTIAL, Status.FAIL} and not verdict.unjudged
-    if criterion.check not in SAYS or placed or not lost or package is None or package is not facts.package:
+    field = criterion.parameters.get("field")
+    if not (field or criterion.check in {*SAYS, "message"}) or placed or not lost or package is None:
         return verdict
-    said = f"{verdict.measured} {verdict.message.partition(', not ')[0]} {verdict.message.partition(' it prints ')[2]}"
+    if package is not facts.package:
+        return verdict
+    paths = scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
     lines = [
-        (path, number, text)
-        for path in sorted(
-            _scripts(criterion, facts.rubric, package) | _sources(criterion, facts.rubric, package)
-        )
+        SourceLine(path, number, text)
+        for path in sorted(paths)
         for number, text in enumerate(build.file_lines(path)[:_LINES_READ], 1)
         if len(text) <= LINE_CHARS and not text.lstrip().startswith(("#", "//"))
     ]
-    alike = [(_words_of(text, said), path, number) for path, number, text in lines]
-    most = max((words for words, _, _ in alike), default=0)
-    found = [(path, number) for words, path, number in alike if words == most > 0]
-    if not found and verdict.status is Status.PARTIAL:
-        found = [(path, number) for path, number, text in lines if re.search(SAYS[criterion.check], text)]
+    said = f"{verdict.measured} {verdict.message.partition(', not ')[0]} {verdict.message.partition(' it prints ')[2]}"
+    found = lines_that_set(lines, str(field)) if field else lines_that_say(lines, said)
+    if field or criterion.check == "message":
+        published = lines_that_publish(lines, str(criterion.parameters.get("topic", "")))
+        # of several, the one that is published; of none, what is published has nothing of it
+        found = found if len(found) == 1 else [one for one in published if one in found] or published
+    elif not found and verdict.status is Status.PARTIAL:
+        found = [one for one in lines if re.search(SAYS[criterion.check], one.text)]
     if len(found) != 1:
         return verdict
-    place = FileCitation(file=found[0][0], line=found[0][1])
+    place = FileCitation(file=found[0].file, line=found[0].number)
     return verdict.model_copy(update={"citations": (place, *verdict.citations)})
-
-
-def _words_of(line: str, said: str) -> int:
-    """Return how many letters of a string in the line are in what was said; 0 unless all its words are."""
-    strings = [_WORD.findall(_FILLED_IN.sub(" ", found[2])) for found in _LITERAL.finditer(line)]
-    spoken = set(_WORD.findall(said))
-    return max((sum(map(len, words)) for words in strings if spoken.issuperset(words)), default=0)
 
 
 def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: Run) -> Verdict:
@@ -535,8 +515,26 @@ def _cite_install(verdict: Verdict, lines: Sequence[str], below: int | None) -> 
 
 
 _BELOW = re.compile(r" below (?:the )?\w+\(…?\)(?: of line (\d+))?$")
+_NO_PACKAGE = re.compile(r"roslaunch starts nothing: there is no package (\w+)")
 _UNDECLARED = re.compile(r" does not declare (\w+) as a run-time dependency")
 _LACKED = re.compile(r": it needs the package (\w+), which this grading machine lacks")
+
+
+def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | None, build: Run) -> Verdict:
+    """Return the verdict; one on a package that roslaunch does not find cites the lines of the launch file that name
+    it."""
+    absent = _NO_PACKAGE.search(verdict.message)
+    file = find_launch(package, str(criterion.parameters.get("launch", ""))) if package and absent else None
+    if file is None or absent is None or not verdict.status.is_lost:
+        return verdict
+    name = re.compile(rf"""\$\(find\s+{absent[1]}\)|pkg\s*=\s*["']{absent[1]}["']""")
+    lines = [n for n, text in enumerate(build.file_lines(file.path)[:_LINES_READ], 1) if name.search(text)]
+    if not lines:
+        return verdict
+    where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))}"
+    hint = f"write the package's exact name in {where}, push {absent[1]} if it is your own, or leave that out"
+    cited = tuple(FileCitation(file=file.path, line=n) for n in lines)
+    return verdict.model_copy(update={"hint": hint, "citations": cited})
 
 
 def cite_name(verdict: Verdict, build: Run) -> Verdict:

@@ -14,7 +14,7 @@ from grader.checks.registry import Check, Evidence
 from grader.checks.support.exit_causes import SYNTAX, syntax_hint
 from grader.checks.support.launch import own_script, read_launch
 from grader.checks.support.processes import failed_program
-from grader.checks.support.scripts import find_script
+from grader.checks.support.scripts import find_script, programs
 from grader.evidence.events import PACKAGE_RUN, RECORDING_MISSING, RECORDING_PROBLEM
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, PackageFacts
@@ -248,3 +248,27 @@ def unread_recording(run: Run) -> Verdict | None:
             run.metadata[RECORDING_PROBLEM], hint="hand in one recording that `rosbag info` can read"
         )
     return None
+
+
+def scripts_of(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set[str]:
+    """Return the paths of the scripts that the criterion's scenario starts."""
+    scenario = rubric.scenarios.get(criterion.scenario or "")
+    named = [start.script for start in scenario.start if start.script] if scenario is not None else []
+    return {file.path for path in named if (file := find_script(package, path)) is not None}
+
+
+SOURCES = {".c", ".cc", ".cpp", ".cxx"}
+
+
+def sources_of(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set[str]:
+    """Return the paths of the C++ sources of the programs that the criterion's scenario starts."""
+    scenario = rubric.scenarios.get(criterion.scenario or "")
+    started = scenario.start if scenario is not None else ()
+    names = {PurePosixPath(one.script).name for one in started if one.script}
+    every = any(one.built for one in started)
+    made = [
+        one for one in programs(package) if every or one.target in names or any(map(one.is_called, names))
+    ]
+    words = {word.rpartition("/")[2] for one in made for word in one.call.args}
+    paths = [PurePosixPath(file.path) for file in package.files]
+    return {str(path) for path in paths if path.suffix in SOURCES and path.name in words}

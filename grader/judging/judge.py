@@ -30,6 +30,7 @@ from grader.judging.annotate import (
     add_later_faults,
     choose_hint_language,
     cite_commented_call,
+    cite_find,
     cite_name,
     cite_words,
     fill_input_hint,
@@ -112,6 +113,7 @@ def judge_all_runs(
         for criterion in rubric.criteria:
             placed = cite_words(verdicts[criterion.id], criterion, facts, build)
             placed = cite_commented_call(placed, facts.package_of(criterion), build)
+            placed = cite_find(placed, criterion, facts.package_of(criterion), build)
             shown[criterion.id] = show_lines(cite_name(placed, build), build)
     results = tuple(
         result_of(c, shown[c.id], rubric.digits, uses.get(c.id), values_of(rubric, c))

@@ -20,7 +20,7 @@ from grader.checks.support.text import texts_in
 from grader.evidence.events import CATKIN_MAKE, PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
-from grader.model.repair import Repair, advice_of, place_of
+from grader.model.repair import Repair, advice_on, place_of
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import FileCitation, Status, Verdict, failed, share_text
 from grader.rubric.model import Criterion, Rubric
@@ -167,7 +167,7 @@ def concerns(
         return True
     if found[criterion.id].blocked_by:
         return any(_asks_for(found[name], repair) for name in criterion.requires)
-    return repair.kind not in OF_BUILDS | SEEN_IN_RUNS and _cites(found[criterion.id], repair)
+    return repair.kind not in OF_BUILDS and _asks_for(found[criterion.id], repair)
 
 
 def launched_in(package: PackageFacts | None) -> frozenset[str]:
@@ -267,9 +267,13 @@ def _cites(found: Verdict | CriterionResult, repair: Repair) -> bool:
 
 
 def _asks_for(found: Verdict | CriterionResult, repair: Repair) -> bool:
-    """Return whether a criterion of the files is lost by what was repaired."""
+    """Return whether a criterion of the files is lost by what was repaired. What is otherwise seen in runs, such as a
+    node's name, one of a launch file can refuse at its very line."""
     lost = found.status.is_lost and found.status is not Status.BLOCKED
-    return lost and repair.kind not in SEEN_IN_RUNS and _cites(found, repair)
+    if repair.kind in SEEN_IN_RUNS:
+        lines = {(getattr(c, "file", None), getattr(c, "line", None)) for c in found.citations}
+        return lost and (repair.file, repair.line) in lines
+    return lost and _cites(found, repair)
 
 
 def _names(criterion: Criterion, repair: Repair) -> bool:
@@ -284,25 +288,27 @@ def _words(text: str) -> set[str]:
 
 
 def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdict:
-    """Return the loss, with the repairs that were seen to help as its hint."""
-    if verdict.status is Status.BLOCKED:
+    """Return the loss, with the repairs that were seen to help as its hint, and what the copy loses it by."""
+    blocked = verdict.status is Status.BLOCKED
+    is_next = _is_next(verdict, copy, repairs) or (blocked and copy.status.is_lost and not copy.unjudged)
+    if blocked:
         message = "; ".join(one.message for one in repairs)
         verdict = failed(
             message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
         )
-    if copy.status.is_lost and not _is_next(verdict, copy, repairs) and verdict.hint:
+    if copy.status.is_lost and not is_next and verdict.hint:
         return verdict  # the repair brings up what its own advice is about
     told = [one for one in repairs if _is_told(one, verdict.hint)]
     clauses = verdict.hint.split("; ") if told else []
     if any(one not in told for one in repairs):
         clauses = [clause for clause in clauses if any(_is_told(one, clause) for one in told)]
-    hints = clauses + [advice_of(one) for one in repairs if one not in told]
+    hints = clauses + advice_on(one for one in repairs if one not in told)
     said = verdict.message
     words = [said, *(one.message for one in repairs if one.file not in said and one.message not in said)]
-    if _is_next(verdict, copy, repairs):
+    if is_next:
         untold = [clause for clause in copy.message.split("; ") if clause not in said]
         words += [f"with that repaired, {'; '.join(untold)}"] if untold else []
-        hints += [f"then {copy.hint}"] if copy.hint else []
+        hints += [f"then {_at_its_line(copy)}"] if copy.hint else []
     cited = {(c.file, c.line) for c in verdict.citations if isinstance(c, FileCitation)}
     lines = [
         FileCitation(file=one.file, line=one.line)
@@ -317,6 +323,14 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         "citations": (*lines, *verdict.citations),
     }
     return verdict.model_copy(update=update)
+
+
+def _at_its_line(copy: Verdict) -> str:
+    """Return the hint of a verdict on the copy; what is to be written with its line, where that is plain."""
+    lines = [c for c in copy.citations if isinstance(c, FileCitation) and c.line is not None]
+    if len(lines) != 1 or not copy.hint.startswith("write ") or " line " in copy.hint:
+        return copy.hint
+    return f"in line {lines[0].line} of {lines[0].file}, {copy.hint}"
 
 
 def _is_told(repair: Repair, hint: str) -> bool:

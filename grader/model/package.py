@@ -407,7 +407,8 @@ class LaunchFile(Record):
     `$(dirname)` and namespaces resolved: `brings` (nodes), `tests` (`<test>`, which only rostest runs), `params`,
     `loads`, `include_faults` (own files that cannot be included), `unset_args`. A path below the package reads
     `$(find <package>)/…`. `unknown_tags` are tags, with their lines, that roslaunch skips, `commented` the `type`s of
-    nodes that stand in a comment. `readable` are the nodes that can be read of a file that is not well-formed.
+    nodes that stand in a comment, `switched_off` those of nodes that an `if` or `unless` leaves out, with its line and
+    what it says. `readable` are the nodes that can be read of a file that is not well-formed.
     """
 
     path: str
@@ -422,6 +423,7 @@ class LaunchFile(Record):
     include_faults: tuple[Fault, ...] = ()
     unknown_tags: tuple[tuple[str, int], ...] = ()
     commented: tuple[tuple[str, int], ...] = ()
+    switched_off: tuple[tuple[str, int, str], ...] = ()
     unset_args: tuple[LaunchArg, ...] = ()
     readable: tuple[LaunchNode, ...] = ()
 

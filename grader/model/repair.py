@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable
+from itertools import groupby
 from typing import Literal, get_args
 
 from grader.model.record import Record
 from grader.model.submission import chmod_hint
-from grader.wording import join_words
+from grader.wording import join_words, plural
 
 RepairKind = Literal[
     "executable-bit",
@@ -118,10 +120,31 @@ def advice_of(repair: Repair) -> str:
     new, added = repair.after.split("\n"), _added(repair.before, repair.after)
     if repair.fix != "; ".join(added):
         below = len(new) > 1 and new[0] == repair.before and repair.line is not None
-        where = f"{repair.file}: below line {repair.line}," if below else f"{place_of(repair)}:"
+        named = re.match(r"(delete|start|indent) lines? \d", repair.fix)
+        place = repair.file if named else place_of(repair)
+        where = f"{repair.file}: below line {repair.line}," if below and not named else f"{place}:"
         return f"{where} {repair.fix}"
     code = join_words([line if "`" in line else f"`{line}`" for line in added])
     if repair.before not in (new[0], new[-1]):
         return f"{place_of(repair)}: write {code}"
     where = "below" if repair.before == new[0] else "above"
-    return f"{repair.file}: {where} line {repair.line} add {code}"
+    beside = new[1] if where == "below" else new[0]
+    depth = _indentation(beside) if repair.file.endswith(".py") else ""
+    return f"{repair.file}: {where} line {repair.line} add {code}{depth}"
+
+
+def advice_on(repairs: Iterable[Repair]) -> list[str]:
+    """Return the advice for each of the repairs, as one for those that follow each other in one line."""
+    split = [advice_of(one).partition(": ") for one in repairs]
+    return [
+        f"{place}{colon}{', and '.join(fix for _, _, fix in found)}"
+        for (place, colon), found in groupby(split, key=lambda one: one[:2])
+    ]
+
+
+def _indentation(line: str) -> str:
+    """Return how an indented line begins, as it has to be typed: with the tabs or the spaces of the lines beside it."""
+    blanks = line[: len(line) - len(line.lstrip())]
+    counts = ((blanks.count("\t"), "tab"), (blanks.count(" "), "space"))
+    words = join_words(plural(count, kind) for count, kind in counts if count)
+    return f", with {words} before it" if words else ""

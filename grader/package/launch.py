@@ -140,6 +140,7 @@ def _record(path: str, parsed: _Parsed, own: tuple[str, ...], find: Find) -> Lau
         loads=tuple(loaded.loads),
         include_faults=tuple(loaded.faults),
         unknown_tags=tuple(_unknown(parsed.element)),
+        switched_off=tuple(loaded.switched_off),
         unset_args=tuple(loaded.unset_args.values()),
         commented=tuple(islice(_commented(parsed.element), _COMMENTED_MAX)),
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import PurePosixPath
 from typing import Protocol
 
@@ -27,6 +28,7 @@ _FOUND = re.compile(r"\$\(find\s+([^()\s]+)\s*\)/+(.+)")
 _SUBSTITUTION = re.compile(r"\$\(([^()]*)\)")
 _ARGUMENT = re.compile(r"\$\(arg\s+([^()\s]+)\s*\)")
 _UNSET_MAX = 20
+_OFF_MAX = 20
 _SLASHES = re.compile(r"//+")
 # Of one value: arguments that name each other can double at every step.
 _VALUE_CHARS_MAX = 4_000
@@ -68,6 +70,7 @@ class Loaded:
     loads: list[LaunchLoad] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
     unset_args: dict[tuple[str, str], LaunchArg] = field(default_factory=dict)
+    switched_off: list[tuple[str, int, str]] = field(default_factory=list)
     included: int = 0
     work: int = 0
 
@@ -119,7 +122,10 @@ class _Loader:
     def walk(self, parent: etree._Element, scope: Scope, depth: int) -> None:
         """Read tag by tag: each changes the scope for those that follow it."""
         for child in parent:
-            if not isinstance(child.tag, str) or not wanted(child, scope):
+            if not isinstance(child.tag, str):
+                continue
+            if not wanted(child, scope):
+                self._note_off(child)
                 continue
             if self.loaded.full(len(scope.args) // 10 + len(scope.renaming) // 10 + len(scope.private)):
                 self._stop(child, scope)
@@ -133,6 +139,12 @@ class _Loader:
                 scope = self._change_scope(child, scope)
             else:
                 self._add(child, scope.of(child))
+
+    def _note_off(self, element: etree._Element) -> None:
+        """Note the nodes that are left out, by the `if` or `unless` of the tag that leaves them out."""
+        said = " ".join(f'{key}="{element.get(key)}"' for key in ("if", "unless") if element.get(key))
+        off = ((node.get("type") or "", line_of(element) or 0, said) for node in element.iter("node"))
+        self.loaded.switched_off += islice(off, max(0, _OFF_MAX - len(self.loaded.switched_off)))
 
     def _stop(self, child: etree._Element, scope: Scope) -> None:
         if not any(fault.message == _TOO_MUCH for fault in self.loaded.faults):

@@ -17,7 +17,7 @@ from grader.limited_child import ChildLimits, run_limited
 from grader.model.package import Fault, PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.package.reading import printable
-from grader.syntax_fixes import BLOCK, MERGE_MARKER, cause_of_line
+from grader.syntax_fixes import BLOCK, COMMENTED_OUT, MERGE_MARKER, cause_of_line
 
 CHECK = "grader.arena.ros.syntax:check_all"
 MEMORY_BYTES, CPU_S = 1 << 30, 20
@@ -52,7 +52,8 @@ _MESSAGES = (
     (r"leading zeros in decimal", "a number may not begin with 0: write 777, or 0o777 for an octal one"),
     (r"expected ':'", "a colon `:` is missing at the end of the line"),
     (r"'(.)' was never closed", "the bracket `{0}` is opened in this line and never closed"),
-    (r"unmatched '(.)'", "there is one `{0}` too many, or its opening bracket is missing: count both in this line"),
+    (r"unmatched '(.)'",
+     "there is one `{0}` too many, or its opening bracket is missing: delete it, or write what it closes"),
     (r"closing parenthesis '(.)' does not match opening parenthesis '(.)'",
      "a `{1}` is closed by `{0}`: the two must match"),
     (r"triple-quoted", "a triple-quoted string is opened and never closed: write the three quotes where it ends"),
@@ -79,6 +80,7 @@ _MESSAGES = (
     (r"null bytes", "the file holds null bytes: it is not text, or was saved as UTF-16; save it as UTF-8"),
     (r"after line continuation", r"nothing may follow a backslash `\` at the end of a line"),
     (r"duplicate argument '(\w+)'", "two parameters are both called `{0}`"),
+    (COMMENTED_OUT, "this line begins the block below it, and is commented out: delete its `#`"),
     (r"unexpected EOF",
      "the file ends in the middle of something (a bracket, or a block without a body): complete its last lines"),
     (r"too many nested|overflow|too complex|recursion|^$", "the file is nested too deep for Python"),

@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from grader.syntax_fixes import PLAIN, cause_of_line, corrections, without_brace
+from grader.syntax_fixes import PLAIN, cause_of_line, corrections, without_brace, without_comment_sign
 
 STEPS_MAX = 60
 STATEMENT_LINES_MAX = 12
@@ -62,7 +62,7 @@ def _one_step(text: str, error: Error) -> Step | None:
         further = left is not None and (left["line"] > error["line"] or _is_next(error, left))
         if left is None or further:
             word = re.match(r"name '(\w+)'", error["message"])
-            line = _first_changed(text, candidate) if cause == "braces" else error["line"]
+            line = _first_changed(text, candidate) if cause in ("braces", "commented") else error["line"]
             found = {"cause": cause, "line": line, "error": error, "text": candidate}
             return {**found, "word": word[1] if word else ""}
     return None
@@ -107,6 +107,7 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     if "global declaration" in error["message"]:
         yield from _with_global_first(text, error["line"])
     if error["message"].startswith(("unexpected indent", "unindent does not match")):
+        yield from (("commented", candidate) for candidate in _with_head_uncommented(lines, at))
         yield from (("level", candidate) for candidate in _with_block_moved(lines, at))
     if error["message"].startswith("expected an indented block"):
         yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
@@ -145,6 +146,16 @@ def _with_body_indented(lines: list[str], at: int) -> Iterator[str]:
     ends = len(_indentation(after)) < len(own) or not after or CONTINUES.match(after.strip())
     if lines[at].strip() and own == _indentation(head) and ends:
         yield with_line(lines, at, "    " + lines[at])
+
+
+def _with_head_uncommented(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with the comment right above the line that is the first line of its block."""
+    for number in range(at - 1, -1, -1):
+        if head := without_comment_sign(lines[number]):
+            before = next((line for line in reversed(lines[:number]) if _code(line).strip()), "")
+            yield with_line(lines, number, _indentation(before) + head.lstrip())
+        if _code(lines[number]).strip():
+            return
 
 
 def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:

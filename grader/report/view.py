@@ -271,10 +271,9 @@ def hint_beside(criterion: CriterionResult, place: str) -> str:
     file, _, number = place.rpartition(":")
     if file:
         hint = re.sub(
-            rf"(?:(?<=; )|^){re.escape(file)},? line (\d+): (?!.*\bline \1\b)",
+            rf"(?:(?<=; )|^){re.escape(file)},? line (\d+): (?![^;]*\bline \1\b)",
             r"in line \1, ",
             hint,
-            flags=re.DOTALL,
         )
     told = without_place(hint, place)
     whole = len(file_places(criterion)) == 1 and "line" not in told and WHOLE_LINE.match(told)

@@ -19,6 +19,7 @@ from grader.judging.annotate import (
     add_advice,
     choose_hint_language,
     cite_commented_call,
+    cite_find,
     cite_name,
     cite_words,
     fill_input_hint,
@@ -30,6 +31,7 @@ from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status, failed, partial, passed
 from grader.package import read_package
+from grader.package.launch import parse_launch_files
 from grader.rubric.load import load_rubric, read_beside_rubric
 from tests.judging.rubrics import ALL, CHATTER, EXECUTABLE, GOOD_RUN, RATE, SCRIPT, rubric
 from tests.judging.rubrics import NODE as LIVES
@@ -127,6 +129,70 @@ def test_other_words_are_shown_where_the_script_makes_them(line: str, said: str,
     place = FileCitation(file=SCRIPT["path"], line=4)
     assert found.citations == ((place,) if cited else ())
     assert cite_words(passed("right"), lab.criteria[0], facts_, runs["package"]) == passed("right")
+
+
+SENT = {"check": "message", "with": {"topic": "/chatter", "template": "hello world {seconds}"}}
+FIELD = {"check": "field-equals", "with": {"topic": "/cmd_vel", "field": "linear.x", "value": 1}}
+
+
+@pytest.mark.parametrize(
+    ("asked", "source", "line"),
+    [
+        (SENT, "text = 'bye'\npub.publish()", 2),
+        (SENT, "text = 'hello world'\npub.publish('hello world')", 2),
+        (SENT, "pub.publish(text)\nif x:\n    pub.publish()", None),
+        (
+            SENT,
+            "a = rospy.Publisher('/chatter', String)\nb = rospy.Publisher('other', String)\nb.publish(1)\na.publish(2)",
+            4,
+        ),
+        (
+            SENT,
+            'ros::Publisher p = n.advertise<std_msgs::String>("chatter", 1);\nq.publish(m);\np.publish(m);',
+            3,
+        ),
+        (FIELD, "msg.linear.x = 2\nmsg.linear.y = 1\npub.publish(msg)", 1),
+        (FIELD, "msg = Twist()\nmsg.linear.y = 1\npub.publish(msg)", 3),
+        (FIELD, "if msg.linear.x == 2:\n    pub.publish(msg)", 2),
+        (FIELD, "msg.linear.x = 2\nmsg.linear.x += 1\npub.publish(msg)", 3),
+    ],
+)
+def test_what_is_wrong_in_a_message_is_shown_where_it_is_set_or_published(
+    asked: dict[str, Any], source: str, line: int | None
+) -> None:
+    lab = rubric({"id": "sent", "scenario": "talker", **asked})
+    package = {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: f"#!\n{source}\n"}}
+    runs = build_runs({"runs": {"package": package}})
+    verdict = failed("a message reads 'hello world', not 'hello world <seconds>'")
+    found = cite_words(verdict, lab.criteria[0], try_facts(lab, runs), runs["package"])
+    assert found.citations == ((FileCitation(file=SCRIPT["path"], line=line + 1),) if line else ())
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ('<node pkg="lab1" type="a.py" name="a"/>\n<include file="$(find elsewhere)/x.launch"/>', 3),
+        ("<node pkg='elsewhere' type='b' name='b'/>", 2),
+        ('<param name="elsewhere" value="1"/>', None),
+    ],
+)
+def test_a_package_that_roslaunch_does_not_find_is_shown_where_it_is_named(
+    text: str, line: int | None
+) -> None:
+    text = f"<launch>\n{text}\n</launch>"
+    launch = parse_launch_files({"launch/a.launch": text.encode()}, ["lab1"])
+    package = {"files": [SCRIPT], "launch_files": [one.model_dump() for one in launch]}
+    lab = rubric({"id": "x", "check": "launch-runs", "with": {"launch": "a.launch", "scripts": ["a.py"]}})
+    runs = build_runs({"runs": {"package": {"package": package, "attachments": {"launch/a.launch": text}}}})
+    said = failed(
+        "it did not come up: roslaunch starts nothing: there is no package elsewhere", hint="as it was"
+    )
+    found = cite_find(said, lab.criteria[0], try_facts(lab, runs).package, runs["package"])
+    if line is None:
+        assert found == said
+    else:
+        assert found.citations == (FileCitation(file="launch/a.launch", line=line),)
+        assert found.hint.startswith(f"write the package's exact name in line {line}, push elsewhere if")
 
 
 @pytest.mark.parametrize(

@@ -92,6 +92,13 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
     "text behind an undefined name": (
         "node", DIES, TALKER, [slip("publishes", "my words {}")],
         f'; then publish `"hello world %s" % rospy.get_time()` in line 5 of {FILE}, not \'my words <value>\''),
+    "the type of a topic whose name is in a variable": (
+        "node", DIES, TALKER, [slip("publisher-type", "Num")],
+        f"; then publish std_msgs/String in line 5 of {FILE}, not Num"),
+    "the type that is subscribed to, and a field that the right one lacks": (
+        "node", DIES, [NODE | ROOT, HEARS | {"requires": ["node"]}],
+        [slip("subscriber", "vel"), slip("subscriber-type", "Twist"), slip("prints", "{}I heard {}", 7)],
+        f"not Twist and print the `data` of the message in line 7 of {FILE}"),
     "a second undefined name": (
         "node", DIES, TALKER, [slip("undefined", "", name="math", fix="write `import math` at the top")],
         "; then write `import math` at the top"),
@@ -161,6 +168,10 @@ LACKS = "#!/usr/bin/env python3\n# I heard, hello world\nx = 1\n"
 def test_words_that_stand_nowhere_in_the_source_are_named() -> None:
     heard = [NODE | ROOT, HEARS | {"requires": ["node"]}]
     assert hint_of("node", DIES, heard, source=LACKS).endswith("; then print 'I heard <message>'")
+    other = slip("publishes", "{}", 6)
+    assert hint_of("node", DIES, TALKER, other, source=LACKS).endswith(
+        f'; then publish `"hello world %s" % rospy.get_time()` in line 6 of {FILE}'
+    )
     assert hint_of("node", DIES, TALKER, source=LACKS).endswith(
         '; then publish `"hello world %s" % rospy.get_time()`'
     )

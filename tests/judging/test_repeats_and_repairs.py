@@ -14,7 +14,8 @@ from grader.judging.judge import judge_all_runs
 from grader.judging.repeats_and_repairs import is_used_by
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
-from tests.judging.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, SCENARIO, rubric
+from grader.package.launch import parse_launch_files
+from tests.judging.rubrics import ALL, EXECUTABLE, GOOD_RUN, NODE, PACKAGE, RATE, SCENARIO, SCRIPT, rubric
 from tests.support.timeline import build_runs
 
 DIED = {"processes": [{"name": "talker", "exit_s": 0.3, "exit_code": 1}], "outcome": "ended"}
@@ -75,6 +76,78 @@ def test_a_name_is_charged_where_the_rubric_asks_for_it() -> None:
         "executable": ("pass", 10),
     }
     assert "/chatter" in found["chatter"].hint
+
+
+def test_a_name_that_a_launch_file_refuses_is_charged_there_alone() -> None:
+    text = '<launch>\n<node pkg="lab1" type="numeric_talker.py" name="/talker"/>\n</launch>'
+    wrong, right = (
+        {
+            **PACKAGE,
+            "name": "lab1",
+            "launch_files": [
+                f.model_dump() for f in parse_launch_files({"launch/x.launch": one.encode()}, ["lab1"])
+            ],
+        }
+        for one in (text, text.replace("/talker", "talker"))
+    )
+    slash = Repair(
+        kind="node-name",
+        file="launch/x.launch",
+        line=2,
+        before='name="/talker"',
+        after='name="talker"',
+        message="m",
+        fix="f",
+    )
+    with_launch = {"launch": "x.launch", "scripts": ["src/numeric_talker.py"]}
+    lab = rubric(
+        {"id": "launch-xml", "check": "launch-xml", "with": with_launch},
+        RATE | {"requires": []},
+        scenarios={"talker": {**SCENARIO, "start": [{"name": "roslaunch", "launch": "x.launch"}]}},
+    )
+    runs = build_runs({"runs": {"talker": {"outcome": "ended"}}, "package": wrong})
+    for name, run in build_runs({"runs": {"talker": GOOD_RUN}, "package": right}).items():
+        about = {"repairs": json.dumps([slash.model_dump()])}
+        runs[f"repaired-1/{name}"] = replace(run, metadata={**run.metadata, **about})
+    found = {c.id: c for c in judge(lab, runs)}
+    assert {name: (c.status.value, c.points) for name, c in found.items()} == {
+        "launch-xml": ("fail", 0),
+        "rate": ("pass", 10),
+    }
+
+
+def test_what_a_blocked_criterion_is_lost_by_next_is_named_with_its_line() -> None:
+    name = NODE | {"id": "name", "check": "node-name", "with": {"process": "talker", "names": ["talker"]}}
+    fault = {"file": SCRIPT["path"], "line": 7, "kind": "TabError", "message": "inconsistent use of tabs"}
+    broken = {"files": [{**SCRIPT, "python": True, "python_fault": fault}]}
+    lines = [f'  File "/ws/src/lab1/{SCRIPT["path"]}", line 7', "TabError: inconsistent use of tabs"]
+    died = {**DIED, "console": [{"process": "talker", "stream": "stderr", "every_s": 0.001, "lines": lines}]}
+    runs = build_runs({"runs": {"talker": died}, "package": broken})
+    value = TABS.model_copy(
+        update={
+            "kind": "missing-call",
+            "line": 8,
+            "before": "r = rospy.Rate = 1",
+            "after": "r = rospy.Rate(1)",
+            "message": "a value",
+            "fix": "r = rospy.Rate(1)",
+        }
+    )
+    slips = [{"file": SCRIPT["path"], "line": 4, "kind": "node-name", "message": "listener"}]
+    listener = {
+        **GOOD_RUN,
+        "processes": [{**GOOD_RUN["processes"][0], "script": SCRIPT["path"], "nodes": ["/listener"]}],
+    }
+    about = {"repairs": json.dumps([TABS.model_dump(), value.model_dump()])}
+    copy = build_runs({"runs": {"talker": listener}, "package": {**PACKAGE, "slips": slips}})
+    for key, run in copy.items():
+        runs[f"repaired-1/{key}"] = replace(run, metadata={**run.metadata, **about})
+    found = {c.id: c for c in judge(rubric(EXECUTABLE, name), runs)}["name"]
+    assert found.message == "a value; with that repaired, the node is named /listener, not /talker"
+    assert found.hint == (
+        "src/numeric_talker.py line 8: write `r = rospy.Rate(1)`; "
+        "then in line 4 of src/numeric_talker.py, write rospy.init_node('talker')"
+    )
 
 
 def test_two_faults_are_two_losses() -> None:
@@ -207,6 +280,17 @@ def test_a_line_that_is_missing_is_added_below_its_neighbour() -> None:
         update={"before": "import rospy", "after": "import rospy\nimport sys", "fix": "import sys"}
     )
     assert judged(DIED, GOOD_RUN, spin)["node"].hint == "src/numeric_talker.py: below line 7 add `import sys`"
+
+
+@pytest.mark.parametrize(
+    ("blanks", "words"), [("\t\t", "2 tabs"), (" " * 8, "8 spaces"), ("\t ", "1 tab and 1 space")]
+)
+def test_a_line_that_is_added_begins_as_its_neighbour_does(blanks: str, words: str) -> None:
+    sleep = TABS.model_copy(
+        update={"before": f"{blanks}x", "after": f"{blanks}x\n{blanks}rate.sleep()", "fix": "rate.sleep()"}
+    )
+    told = f"src/numeric_talker.py: below line 7 add `rate.sleep()`, with {words} before it"
+    assert judged(DIED, GOOD_RUN, sleep)["node"].hint == told
 
 
 def test_a_criterion_that_passes_on_the_copy_needs_no_hint() -> None:

@@ -239,6 +239,7 @@ def test_where_names_of_the_graph_are_written_is_known(tmp_path):
         ("publisher-type", 3, "String"),
         ("subscriber", 5, "~scan"),
         ("subscriber-type", 5, "LaserScan"),
+        ("publisher-type", 6, "String"),
     ]
 
 
@@ -493,6 +494,16 @@ def test_the_hint_names_the_repair_where_the_cause_is_known(tmp_path, source, hi
 # A line as C++, the shell or Python 2 has it, and the line that the hint names; "" where it only says what to do.
 HABITS = {
     "while not rospy.is_shutdown();": "while not rospy.is_shutdown():",
+    "pub.publish(text))": "pub.publish(text)",
+    "pub.publish)text)": "pub.publish(text)",
+    'rospy.loginfo"hi")': 'rospy.loginfo("hi")',
+    "rospy.loginfo text)": "rospy.loginfo(text)",
+    'rospy.logwinforospy.get_time() + "I heard %s", text)': 'rospy.loginfo(rospy.get_time() + "I heard %s", text)',
+    "rate.sleep)": "rate.sleep()",
+    "text = float(3))*2": "text = float(3)*2",
+    "rospy.spin()chmod +x talker.py": "rospy.spin()",
+    "rospy.spin() rosrun lab1 talker.py": "rospy.spin()",
+    "print('x')catkin_make": "print('x')",
     "while !rospy.is_shutdown():": "while not rospy.is_shutdown():",
     "while (!done && n < 3):": "while (not done and n < 3):",
     "if a || b:": "if a or b:",
@@ -556,6 +567,27 @@ def test_habits_of_other_languages_are_named_with_the_line_that_is_right(tmp_pat
     assert fault.cause
     assert fault.line == 2
     assert f"line 2: write `{right}`" in hint if right else "write `text" not in hint
+
+
+def test_a_bracket_too_many_at_the_end_of_a_call_over_two_lines(tmp_path):
+    (tmp_path / "a.py").write_text("print('a',\n      'b'))\n")
+    assert syntax_hint(check_syntax(tmp_path, ["a.py"]).faults["a.py"]) == "line 2: write `'b')`"
+
+
+@pytest.mark.parametrize(
+    ("comment", "hint"),
+    [
+        ("    # while x < 3:", "line 3: write `while x < 3:`"),
+        ("##if x:\n    # more", "line 3: write `if x:`, and begin it with 4 spaces"),
+        ("\t#for i in (1, 2):", "line 3: write `for i in (1, 2):`, and begin it with 4 spaces"),
+        ("    # try:", "line 3: write `try:`"),
+        ("    # for example:", "line 4: start it exactly below that one"),
+        ("    # else:", "line 4: start it exactly below that one"),
+    ],
+)
+def test_the_first_line_of_a_block_that_is_commented_out(tmp_path, comment, hint):
+    (tmp_path / "a.py").write_text(f"def f():\n    x = 1\n{comment}\n        x += 1\n")
+    assert syntax_hint(check_syntax(tmp_path, ["a.py"]).faults["a.py"]) == hint
 
 
 def test_a_right_line_is_never_corrected():

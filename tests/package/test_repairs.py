@@ -104,6 +104,18 @@ CASES = {
         "this line is indented further than the one above",
         after={TALKER: "    count = 0\n    rate = rospy"},
     ),
+    "head-commented-out": Case(
+        swapped(TALKER, ("    while not", "   ## while not")),
+        ["python-syntax"],
+        "line 9 of src/talker.py: this line begins the block below it, and is commented out",
+        after={TALKER: "    while not rospy"},
+    ),
+    "bracket-not-opened": Case(
+        swapped(TALKER, ("publish(1)", "publish)1)")),
+        ["python-syntax"],
+        "line 10 of src/talker.py: there is one `)` too many",
+        after={TALKER: "publisher.publish(1)"},
+    ),
     "further-out": Case(
         swapped(TALKER, ("        rate.sleep()", "       rate.sleep()")),
         ["python-syntax"],
@@ -200,6 +212,10 @@ CASES = {
         {CMAKELISTS: CMAKE + INSTALL, **INSTALLED}, ["build-line"],
         "CMakeLists.txt line 7: write src/listener.py src/talker.py after PROGRAMS", INSTALLS,
         {CMAKELISTS: "scripts/other.py"},
+    ),
+    "installed-in-place-of-what-is-not-there": Case(
+        {CMAKELISTS: CMAKE + INSTALL.replace("scripts/other.py", "bin/hello"), **INSTALLED}, ["build-line"],
+        "CMakeLists.txt line 8: write src/listener.py src/talker.py in place of bin/hello", INSTALLS,
     ),
     "installed-in-another-place": Case(
         {CMAKELISTS: CMAKE + INSTALL.replace("_BIN_", "_SHARE_"), **INSTALLED}, ["build-line"],

@@ -59,11 +59,11 @@ def graph_names(tree):
             continue
         owner = owners.get(id(node), "")
         names = node.args[:1] or [k.value for k in node.keywords if k.arg == "name"]
+        name = published_type(node)
         if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
             yield slip(names[0].lineno, kind, names[0].value, name=owner)
-            name = published_type(node)
-            if name.isidentifier() and kind != "node-name":
-                yield slip(names[0].lineno, kind + "-type", name)
+        if names and name.isidentifier() and kind != "node-name":
+            yield slip(names[0].lineno, kind + "-type", name)
 
 
 def published_type(call):

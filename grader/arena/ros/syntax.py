@@ -38,6 +38,8 @@ BRACE = re.compile(
     r"\s*(\}\s*)?(if|elif|else|while|for|def|class|try|except|finally|with)\b(.*[\w\])\"])?\s*\{\s*(#.*)?$"
 )
 """A block that begins as in C++: what Python says of it is said of a line below."""
+COMMENTED = re.compile(r"\s*#[#\s]*((?:if|while|for|def|class|try|with)\b.*:)\s*$")
+"""The first line of a block, commented out: Python speaks of the line below, which stands too far in."""
 ENCODINGS = (SyntaxError, LookupError, UnicodeDecodeError)
 
 
@@ -164,6 +166,10 @@ def syntax_fault(error, data):
     if known and braced is not None:
         at = lines[braced].index("{") + 1
         return fault("SyntaxError", braced + 1, at, "invalid syntax", text=lines[braced])
+    head = commented_head(lines, line) if known and "unexpected indent" in str(error) else None
+    if head is not None:
+        at, text = lines[head].index("#") + 1, lines[head]
+        return fault("IndentationError", head + 1, at, "block commented out" + moved(lines, head), text=text)
     begins = {text[0] for text in lines if text[:1] in ("\t", " ") and text.strip()}
     return fault(
         type(error).__name__,
@@ -174,6 +180,32 @@ def syntax_fault(error, data):
         opened=never_closed(data, line) if known else None,
         mixed=len(begins) > 1,
     )
+
+
+def commented_head(lines, line):
+    """Return the index of the comment above that line which is the first line of a block; None where none is."""
+    above = range(line - 2, -1, -1)
+    for number in above:
+        text = lines[number][:TEXT_LIMIT]
+        found = COMMENTED.match(text)
+        if found:
+            with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+                ast.parse(
+                    found.group(1) + " pass" + ("\nfinally: pass" if found.group(1).startswith("try") else "")
+                )
+                return number
+        if text.strip() and not text.lstrip().startswith("#"):
+            return None
+    return None
+
+
+def moved(lines, head):
+    """Return with what the line has to begin, as the code above does; "" where it begins so."""
+    above = (text for text in reversed(lines[:head]) if text.strip() and not text.lstrip().startswith("#"))
+    blanks, own = (text[: len(text) - len(text.lstrip())] for text in (next(above, ""), lines[head]))
+    counts = [(blanks.count("\t"), "tab"), (blanks.count(" "), "space")]
+    words = ["%d %s%s" % (count, kind, "s" * (count > 1)) for count, kind in counts if count]
+    return "" if blanks == own else ": begin it with %s" % (" and ".join(words) or "no spaces")
 
 
 def never_closed(data, line):

@@ -36,6 +36,7 @@ SYSTEM = ("/usr/", "/opt/")
 _QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
 """As compilers and linkers write them."""
 OF_GENERATION = ("add_message_files", "add_service_files", "add_action_files", "generate_messages")
+CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
 OF_CATKIN = ("catkin_package", "catkin_install_python", "catkin_python_setup")
 """Commands that `find_package(catkin …)` defines."""
 LIBRARIES = {
@@ -241,6 +242,12 @@ def _missing_launch(found: re.Match[str], package: PackageFacts, _lines: Sequenc
 
 
 def _missing_source(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    made = [*cmake_calls(package, "add_executable"), *cmake_calls(package, "add_library")]
+    named = [word for call in made for word in call.args if posixpath.splitext(word)[1] in CPP_SUFFIXES]
+    absent = [word for word in dict.fromkeys(named) if package.file(word) is None]
+    if len(absent) > 1 and found[1] in absent:
+        words = f"targets are made of {join_words(absent)}, which are not in the package"
+        return Explained(words, "add these files and push them, or remove the calls that name them")
     return _missing_file(found[1], package, f"a target is made of {found[1]}")
 
 
@@ -355,6 +362,12 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
     if found[1] != package.name or not made & {f.path for f in package.files}:
         if found[1] in known_packages():
             return _missing_package(found, package, lines)
+        if any(found[1] in call.args for call in cmake_calls(package, "find_package")):
+            # found, and so built beside this package: its messages come too late
+            why = f"{text}: nothing makes it wait for the messages of {found[1]}, so with -j it fails in some runs"
+            return Explained(
+                why, "add_dependencies(<program> ${catkin_EXPORTED_TARGETS}) below add_executable(…)"
+            )
         return Explained(f"{text}: there is no such header", "check the #include and find_package(…)")
     why = f"{text}: nothing makes it wait for its message, so with -j it fails in some runs and not in others"
     return Explained(

@@ -40,7 +40,7 @@ from grader.evidence.run import Run
 from grader.installable import ON_THE_MACHINE, exists_somewhere, install_hint, known_packages, noetic_messages
 from grader.model.package import Fault, PackageFacts, PythonSlip
 from grader.model.verdict import Citations, FileCitation, Verdict, machine_lacks
-from grader.syntax_fixes import corrected, without_brace
+from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
 from grader.wording import join_words, seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
@@ -134,7 +134,8 @@ def syntax_hint(fault: Fault) -> str:
         )
     if right:
         braces = ", and delete the `}` that closes the block" if without_brace(fault.source) else ""
-        return f"{where}write `{shown(right.strip())}`{braces}"
+        begin = fault.message.partition(f"{COMMENTED_OUT}: ")[2]
+        return f"{where}write `{shown(right.strip())}`{braces}" + (f", and {begin}" if begin else "")
     return fault.fix or CAUSES.get(fault.kind, ("", "save the file as plain UTF-8 text"))[1]
 
 

@@ -219,6 +219,51 @@ def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
         yield Obstacle(f"is Python, and its first line names {file.shebang.interpreter}", fix)
 
 
+class SourceLine(NamedTuple):
+    """A line of a script or of C++, with its file and its number from 1."""
+
+    file: str
+    number: int
+    text: str
+
+
+_LITERAL = re.compile(r"""(["'])([^"'\\]+)\1""")
+_FILLED_IN = re.compile(r"%[-+ 0-9.]*[a-z]|\{[^{}]*\}")
+_WORD = re.compile(r"\w+")
+
+
+def lines_that_say(lines: Sequence[SourceLine], said: str) -> list[SourceLine]:
+    """Return the lines with a string of which most is in what was said; none where no string has its words alone."""
+    spoken = set(_WORD.findall(said))
+
+    def alike(line: SourceLine) -> int:
+        strings = [_WORD.findall(_FILLED_IN.sub(" ", found[2])) for found in _LITERAL.finditer(line.text)]
+        return max((sum(map(len, words)) for words in strings if spoken.issuperset(words)), default=0)
+
+    most = max(map(alike, lines), default=0)
+    return [line for line in lines if alike(line) == most > 0]
+
+
+def lines_that_publish(lines: Sequence[SourceLine], topic: str) -> list[SourceLine]:
+    """Return the lines that publish on the topic, by the variable that its publisher is given to; all that publish
+    where there is no such line."""
+    name = re.escape(topic.lstrip("/"))
+    made = re.compile(rf"""(\w+)\s*=[^=].*\b(?:Publisher|advertise)\b.*["']/?{name}["']""")
+    own = {found[1] for line in lines if (found := made.search(line.text))}
+    publishing = [(line, found[1]) for line in lines if (found := _PUBLISHES.search(line.text))]
+    return [line for line, name in publishing if name in own] or [line for line, _ in publishing]
+
+
+_PUBLISHES = re.compile(r"(\w*)(?:\.|->)publish\s*\(")
+
+
+def lines_that_set(lines: Sequence[SourceLine], field: str) -> list[SourceLine]:
+    """Return the lines that give a field of a message its value: `linear.x` of `msg.linear.x = 1`."""
+    path = re.escape(re.sub(r"\[[^]]*\]", "", field)).replace(r"\.", r"\s*\.\s*")
+    sets = re.compile(rf"[.>]\s*{path}\s*(?:\[[^]]*\]\s*)?[-+*/]?=(?!=)|[(,]\s*{path}\s*=(?!=)")
+    return [line for line in lines if sets.search(line.text)]
+
+
 CALLS = ("project", "find_package", "catkin_package", "add_message_files", "add_service_files", "add_action_files",
          "generate_messages")  # fmt: skip
 """Of CMake, what a hint may tell to call, beside the call that installs scripts."""

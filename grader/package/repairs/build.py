@@ -301,10 +301,15 @@ def _name_scripts(files: Files, own: Sequence[str], paths: Sequence[str]) -> Non
         message = f"{CMAKE} does not install {join_words(unnamed)} where rosrun looks"
         files.change("build-line", CMAKE, f"{text.rstrip()}\n\n{line}\n", message, f"write {line}")
         return
-    programs = next(t for t in _words(call) if t.value == "PROGRAMS")
+    words = _words(call)
+    programs = next(t for t in words if t.value == "PROGRAMS")
     message = f"line {call.line} of {CMAKE}: {INSTALL}(…) does not name {join_words(unnamed)}"
-    fix = f"write {listed} after PROGRAMS"
-    files.change("build-line", CMAKE, _replace_token(text, programs, f"PROGRAMS {listed}"), message, fix)
+    behind = words[words.index(programs) + 1 :][:1]
+    known = {"DESTINATION", *own}
+    stray = next((t for t in behind if "$" not in t.value and _plain(t.value) not in known), None)
+    fix = f"write {listed} in place of {stray.value}" if stray else f"write {listed} after PROGRAMS"
+    changed = _replace_token(text, stray or programs, listed if stray else f"PROGRAMS {listed}")
+    files.change("build-line", CMAKE, changed, message, fix)
 
 
 def _replace_stray(files: Files, own: Sequence[str], path: str) -> bool:

@@ -17,6 +17,7 @@ from grader.model.record import Record
 from grader.model.repair import RepairKind
 from grader.package.python import cause_of
 from grader.package.repairs.editing import Files
+from grader.syntax_fixes import COMMENTED_OUT
 from grader.wording import join_words, plural
 
 EXAMINE = "grader.package.source_repair:examine"
@@ -32,6 +33,7 @@ Cause = Literal[
     "level",
     "indent",
     "braces",
+    "commented",
     "python2",
     "characters",
     "token",
@@ -208,12 +210,13 @@ def _words_by_cause(file: str, steps: list[_Step], before: str) -> dict[Cause, t
         ),
         "level": (
             f"{place}: {cause_of(first.error.message) if first.error else ''}",
-            _required_indentation(before, steps[-1].text, ""),
+            _required_indentation(before, steps[-1].text, "change the indentation: "),
         ),
         "indent": (
             f"{place}: the line after a `:` must be indented",
             f"indent line {first.line} by four more spaces",
         ),
+        "commented": (f"{place}: {cause_of(COMMENTED_OUT)}", ""),
         "braces": (
             f"{place}: Python has no `{{` and `}}` around a block",
             "end the first line of each block with `:` in place of `{`, and delete each `}` that ends a block",
