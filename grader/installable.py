@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from collections.abc import Collection, Iterable
@@ -13,6 +14,9 @@ from grader.wording import is_one_edit
 SLIP_CHARS_MIN = 4
 """Shorter names differ by one letter because they are different names."""
 _TABLE = Path(__file__).with_name("installable.txt")
+DEFINITIONS = Path(__file__).with_name("noetic_messages.json")
+NOT_WHOLE = {"tf2_msgs"}
+"""Packages of which not all types are known."""
 PIP = "pip:"
 ROS_2 = {
     "rclpy",
@@ -41,14 +45,25 @@ def known_packages() -> dict[str, tuple[str, ...]]:
 
 
 @cache
+def noetic_definitions() -> dict[str, tuple[str, str]]:
+    """Return the full definition and the MD5 sum of ROS Noetic's own message types, by name (`sensor_msgs/JointState`).
+
+    `make reference` takes them from rosbags, whose own module of them is slow to import.
+    """
+    found = json.loads(DEFINITIONS.read_bytes())
+    return {name: (text, md5sum) for name, (text, md5sum) in found.items()}
+
+
+@cache
 def noetic_messages() -> dict[str, dict[str, tuple[str, ...]]]:
     """Return the fields of ROS Noetic's own message types by package and name (`sensor_msgs`: {`JointState`: …})."""
-    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - slow to load, and few need it
-
     found: dict[str, dict[str, tuple[str, ...]]] = {}
-    for full, (_, fields) in sorted(get_typestore(Stores.ROS1_NOETIC).fielddefs.items()):
-        package, _, name = full.partition("/msg/")
-        found.setdefault(package, {})[name] = tuple(field for field, _ in fields)
+    for full, (text, _) in noetic_definitions().items():
+        package, _, name = full.partition("/")
+        if package not in NOT_WHOLE:
+            own = text.partition("\n===")[0].splitlines()  # before the types that it needs
+            fields = (line.split()[1] for line in own if line and "=" not in line)
+            found.setdefault(package, {})[name] = tuple(fields)
     return found
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -41,7 +40,6 @@ if TYPE_CHECKING:
 LATER = ("grader.evidence.decode", "grader.evidence.reader")
 """Slow to import, and needed by no verdict that the files alone decide: imported while the build runs. The arena is
 imported when it begins, and what judges or reports recordings when it is called."""
-ROS_TYPES = "rosbags.typesys.stores.ros1_noetic"
 
 Judged: TypeAlias = tuple[dict[str, Run], Judgement]
 """The runs by scenario, and what was judged by them."""
@@ -129,18 +127,15 @@ def refuse_missing(rubric: Rubric) -> None:
 
 def record_all(job: Job, recorder: Recorder | StaticRecorder) -> None:
     """Record every scenario, and copy the recordings that scenarios name in the submission."""
-    recorder.record_all(partial(import_later, job.rubric))
+    recorder.record_all(import_later)
     from grader.submitted_recordings import copy_recordings  # noqa: PLC0415 - see LATER
 
     copy_recordings(job.rubric.rubric, job.submission, job.evidence, job.progress)
 
 
-def import_later(rubric: LoadedRubric | None = None) -> None:
-    """Import modules before they are needed, by this rubric or by any. Only what the grader sends needs ROS's own
-    message types, hundreds."""
-    scenarios = rubric.rubric.scenarios.values() if rubric else ()
-    sends = rubric is None or any(s.probes or s.steps or s.serves for s in scenarios)
-    for name in (*LATER, *([ROS_TYPES] if sends else [])):
+def import_later() -> None:
+    """Import modules before they are needed."""
+    for name in LATER:
         import_module(name)
 
 

@@ -30,6 +30,7 @@ from grader.evidence.definitions import (
     parse,
 )
 from grader.evidence.run import DECODED_BYTES_MAX
+from grader.installable import noetic_definitions
 from grader.model.message_definitions import RULE
 
 Value: TypeAlias = Any
@@ -42,7 +43,6 @@ _LETTERS = {
     "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
 """What `struct` calls ROS's numbers."""
-_CLOCK_FIELDS = {"sec": "secs", "nanosec": "nsecs"}
 
 
 class Decoder:
@@ -199,48 +199,27 @@ def encode(type: str, value: Mapping[str, Any]) -> bytes:  # noqa: A002 - ROS's 
 
     Raises ValueError for a type or field that does not exist and for a value that does not fit.
     """
-    store, name = _noetic(), _ros2_name(type)
-    try:
-        return bytes(store.serialize_ros1(_message(store, name, value), name))
-    except (struct.error, OverflowError, SerdeError, AttributeError, TypeError) as error:
-        raise ValueError(f"{type} cannot hold {value!r}: {error}") from error
+    return Encoder(type, definition(type)).encode(value)
 
 
 def definition(type: str) -> str:  # noqa: A002 - ROS's own word
     """Return the full definition of one of ROS Noetic's own types. Raises ValueError for any other."""
-    return _definition_of(type)[0]
+    return _of_noetic(type)[0]
 
 
 def md5sum(type: str) -> str:  # noqa: A002 - ROS's own word
     """Return the type's MD5 sum as ROS computes it. Raises ValueError for a type that is not ROS Noetic's own."""
-    return _definition_of(type)[1]
+    return _of_noetic(type)[1]
 
 
-@lru_cache(maxsize=1)
-def _noetic() -> Typestore:
-    store = get_typestore(Stores.ROS1_NOETIC)
-    store.register(
-        get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", "tf2_msgs/msg/TFMessage")
-    )
-    return store
-
-
-@lru_cache(maxsize=256)
-def _definition_of(type_: str) -> tuple[str, str]:
-    return _noetic().generate_msgdef(_ros2_name(type_), ros_version=1)
-
-
-def _ros2_name(type_: str) -> str:
-    package, _, name = type_.partition("/")
-    full = f"{package}/msg/{name}"
-    if full not in _noetic().fielddefs:
+def _of_noetic(type_: str) -> tuple[str, str]:
+    if type_ not in noetic_definitions():
         raise ValueError(f"ROS Noetic has no message type {type_}")
-    return full
+    return noetic_definitions()[type_]
 
 
 def _message(store: Typestore, name: str, value: Mapping[str, Any]) -> object:
-    clock = name.startswith("builtin_interfaces/")
-    fields = [(_CLOCK_FIELDS[n] if clock else n, desc) for n, desc in store.fielddefs[name][1]]
+    fields = store.fielddefs[name][1]
     if unknown := value.keys() - {n for n, _ in fields}:
         raise ValueError(f"{name} has no field {', '.join(sorted(unknown))}")
     kept = [(n, desc) for n, desc in fields if n != "structure_needs_at_least_one_member"]

@@ -29,7 +29,7 @@ from tests.rubric.samples import faults, spoiled
         ("{topic: /x, type: std_msgs/String, text: 1, times: 2}", ".times: is for values"),
         (
             "{topic: /x, type: geometry_msgs/Twist, values: [{linear: {x: 1}}, {linear: {w: 1}}]}",
-            ".values[1]: geometry_msgs/msg/Vector3 has no field w",
+            ".values[1]: geometry_msgs/Vector3 has no field w",
         ),
         ("{topic: /x, type: std_msgs/Int8, values: [200]}", ".values[0]: 200 is out of range for int8"),
         ("{topic: /x, type: geometry_msgs/Twist, integers: 2}", ".integers: is not for geometry_msgs/Twist"),
