@@ -77,7 +77,12 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
     file = read_launch(package, params.launch, wanted)
     if isinstance(file, Verdict):
         return _with_next(file, package, params).about(expected=expected)
-    verdict = _lacking(package, file, params) or passed(
+    lacking = _lacking(package, file, params)
+    illegal = next(filter(None, map(illegal_name, file.brings)), None)
+    if lacking is not None and illegal is not None:
+        advice = f"{lacking.message}; besides, line {illegal.line}: {illegal.why}: {illegal.fix}"
+        lacking = lacking.model_copy(update={"message": advice})
+    verdict = lacking or passed(
         f"{file.path} has a <node> for {join_words(wanted)}", hint=_advice(package, file)
     )
     seen = f"{plural(len(file.brings), 'node')}: {join_words(map(_node_text, file.brings))}"
@@ -277,7 +282,7 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
     verdict = (
         not_run(run)
         or _script(package, build, file, params)
-        or _page(package, file, run, params)
+        or _page(package, build, file, run, params)
         or missing_node(package, file, params.script)
         or _beside(package, file, run, params)
         or passed(
@@ -285,7 +290,7 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
             f"{_url(pages, params)} in {params.program}"
         )
     )
-    opened = (_script(package, build, file, params) or _page(package, file, run, params)) is None
+    opened = (_script(package, build, file, params) or _page(package, build, file, run, params)) is None
     alone = missing_node(package, file, params.script) or _beside(package, file, run, params)
     right = "the page" if opened else "the node beside it"
     verdict = verdict.in_part(0.5 if opened or alone is None else 0.0, right)
@@ -342,7 +347,9 @@ def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> V
     return failed(f"{file.path} has no <node> that is a shell script{seen}", hint=hint)
 
 
-def _page(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams) -> Verdict | None:
+def _page(
+    package: PackageFacts, build: Run, file: LaunchFile, run: Run, params: OpensParams
+) -> Verdict | None:
     """The page was opened, in the program that was asked for."""
     pages = _pages(run)
     mine = [p for p in pages if _is_program(p.program, params)]
@@ -363,12 +370,55 @@ def _page(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams
                 f": in {where}, the shell takes {blank['name']} for a command, because a space follows it"
             )
             hint = f"write {blank['name']}=… in {where}, without spaces around the `=`"
+        elif slip := _unread_variable(package, build, file, params):
+            message, hint = f"{message}: {slip.why} ({slip.file}, line {slip.line})", slip.fix
         return failed(message, hint=hint, citations=cited)
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
     if absence := refusal(run, package):
         return failed(absence.why, hint=absence.hint, citations=absence.citations)
+    slip = _unread_variable(package, build, file, params)
+    hint = f"{slip.file}: {slip.fix}" if slip else hint
     return failed(f"the script opens nothing in {params.program}{_words(package, file, run)}", hint=hint)
+
+
+def _unread_variable(package: PackageFacts, build: Run, file: LaunchFile, params: OpensParams) -> Slip | None:
+    """Return the line of a shell script that has the address in a variable, and does not give the program its value."""
+    scripts = [
+        source.path for node in _shells(package, file) if (source := find_script(package, node.type or ""))
+    ]
+    for path in scripts:
+        lines = build.file_lines(path)
+        assigned = [
+            m[1]
+            for line in lines
+            if (m := _ASSIGNMENT.match(line)) and _plain(m[2]) in map(_plain, params.urls)
+        ]
+        for number, line in enumerate(lines, start=1):
+            if assigned and re.match(rf"\s*{re.escape(params.program)}\b", line):
+                right = value_given(line.strip(), assigned[-1])
+                why = f"it is not given the value of {assigned[-1]}"
+                return Slip(path, number, why, f"in line {number}, write `{right}`") if right else None
+    return None
+
+
+_ASSIGNMENT = re.compile(r"\s*(?:export\s+)?([A-Za-z_]\w*)=[\"']?([^\"'\s]+)")
+
+
+def value_given(line: str, name: str) -> str:
+    """Return the line of a shell with `$NAME` in place of what is not quite that; "" where nothing is."""
+    slips = (
+        rf"'\$\{{?{name}\}}?'",
+        rf"\$\{{{name}(?!\}})",
+        rf"(?<![\w$/{{-]){name}\b",
+        rf"\$\{{?(?!{name}\b)[A-Za-z_]\w*\}}?",
+    )
+    values = (f'"${name}"', f"${{{name}}}", f"${name}", f"${name}")
+    changed = (
+        re.sub(slip, value.replace("\\", "\\\\"), line, count=1)
+        for slip, value in zip(slips, values, strict=True)
+    )
+    return next((one for one in changed if one != line), "")
 
 
 def _blanks(run: Run, pages: list[Page]) -> re.Match[str] | None:

@@ -59,7 +59,7 @@ class LaunchLoadsParams(Record):
 
 
 @check("launch-loads", params=LaunchLoadsParams)
-def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> Verdict:
+def launch_loads(package: PackageFacts, build: Run, run: Run, params: LaunchLoadsParams) -> Verdict:
     """The launch file loads the parameters before the node reads them.
 
     What it checks
@@ -87,6 +87,7 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
     verdict = (
         not_run(run)
         or missing_node(package, file, params.script)
+        or _other_tag(package, build, file, params)
         or _judge_loaded(package, file, run, params)
         or passed(f"roslaunch loads {params.file}, then runs {PurePosixPath(params.script).name}")
     )
@@ -143,6 +144,22 @@ def _read_by_other_names(run: Run, params: LaunchLoadsParams, before: Mapping[st
     names = [absolute_name(name) for name in params.names]
     there = [name if name in before else name_in_its_place(name, before, names) for name in names]
     return all(name is not None and is_printed(before[name], lines) for name in there)
+
+
+def _other_tag(
+    package: PackageFacts, build: Run, file: LaunchFile, params: LaunchLoadsParams
+) -> Verdict | None:
+    """Return the loss by a tag that names the file and loads no parameters, where none does: `<param file=…>`."""
+    if any(_is_of(load, params) for load in file.loads) or _by_node(file, params):
+        return None
+    name = PurePosixPath(params.file).name
+    for number, line in enumerate(build.file_lines(file.path), start=1):
+        tag = re.search(r"<(param|include|rosparam)\b", line)
+        if tag is not None and name in line:
+            why = f"<{tag[1]}> does not load {params.file}"
+            right = f'<rosparam file="$(find {package.name})/{params.file}" command="load"/>'
+            return Slip(file.path, number, why, f"in line {number}, write `{right}`").verdict()
+    return None
 
 
 def _names_in_namespace(load: LaunchLoad, params: LaunchLoadsParams) -> list[str]:

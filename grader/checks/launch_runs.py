@@ -343,10 +343,25 @@ def _find_unnamed(
     for program in params.programs:
         if not nodes_of_program(file, program):
             pkg, _, name = program.partition("/")
+            meant = [n for n in file.brings if n.pkg == pkg and n.type and (n.type in name or name in n.type)]
+            meant = [n for n in meant if f"{n.pkg}/{n.type}" not in params.programs]
+            if len(meant) == 1:
+                return _other_type(file, meant[0], name, params)
             hint = f'add <node pkg="{pkg}" type="{name}" name="…"/>'
             seen = f"; it has {join_words(f'{n.pkg}/{n.type}' for n in file.brings)}" if file.brings else ""
             return failed(f"{file.path} has no <node> for {program}{seen}", hint=hint)
     return None
+
+
+def _other_type(file: LaunchFile, node: LaunchNode, name: str, params: LaunchRunsParams) -> Verdict:
+    """Return the loss by a `type` that is not quite that of the program, with wrong values of parameters behind it."""
+    lines = (
+        f'in line {one.line} write value="{params.params[key]}" for {key}'
+        for one in file.params
+        if (key := one.name.rpartition("/")[2]) in params.params and one.value != str(params.params[key])
+    )
+    fix = "; then ".join([f'in line {node.line} write type="{name}"', *lines])
+    return Slip(node.file, node.line, f'{node.pkg} has no program "{node.type}"', fix).verdict()
 
 
 def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:

@@ -223,13 +223,9 @@ class Later:
     def faults(self) -> Iterator[str]:
         """Yield how each is repaired."""
         by_check = {
-            "rate": self._rate,
-            "node-name": self._node_name,
-            "hears": self._heard,
-            "topic-type": self._published,
-            "message": self._message,
-            "logs": self._logged,
-        }
+            "rate": self._rate, "node-name": self._node_name, "hears": self._heard, "topic-type": self._published,
+            "message": self._message, "logs": self._logged, "copies": self._copied,
+        }  # fmt: skip
         if not self._ran:
             yield from self._names()
         yield from by_check[self._criterion.check]() if self._criterion.check in by_check else ()
@@ -263,6 +259,13 @@ class Later:
         own, names = self._of("node-name"), list(texts_in(self._wanted.get("names")))
         if not self._ran and len(own) == 1 and names and own[0].message.lstrip("/") not in names:
             yield f"name the node {names[0]} in {_line(own[0])}, not {own[0].message}"
+
+    def _copied(self) -> Iterator[str]:
+        started = [one.script for one in self._rubric.scenarios[self._criterion.scenario or ""].start]
+        twice = {PurePosixPath(one).name for one in started if one and started.count(one) > 1}
+        for slip in self._of("node-name"):
+            if PurePosixPath(slip.file).name in twice and not slip.name:
+                yield f"write anonymous=True in {_line(slip)}, for two of it at once"
 
     def _published(self) -> Iterator[str]:
         published, kind = self._of("publisher"), str(self._wanted.get("type", ""))

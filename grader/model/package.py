@@ -309,8 +309,8 @@ class PythonSlip(Record):
     value where it is read. `no-effect` and `compared`: a statement such as `++i`, or `i == 0`. `publishes` and
     `prints`: no slips, but a text that is published or printed, `{}` for a value in it and `{data}` for that of a
     message. `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a topic;
-    `name` is the variable that is given the publisher. `publisher-type` and `subscriber-type`: the message type in
-    that line.
+    `name` is the variable that is given the publisher, or `anonymous`. `publisher-type` and `subscriber-type`: the
+    message type in that line.
     """
 
     file: str

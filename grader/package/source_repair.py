@@ -35,6 +35,13 @@ MESSAGES = {
     "nav_msgs": "OccupancyGrid Odometry",
     "sensor_msgs": "CompressedImage Image Imu JointState Joy LaserScan NavSatFix PointCloud2 Range",
 }
+OF_OTHER_LANGUAGES = {
+    **dict.fromkeys(("true", "TRUE"), "True"),
+    **dict.fromkeys(("false", "FALSE"), "False"),
+    **dict.fromkeys(("null", "NULL", "none", "nil", "nullptr"), "None"),
+}
+NAME_CHARS_MIN = 4
+"""Shorter names differ by one letter because they are different names."""
 SLIP_CHARS = 3
 OF_ROS = {
     "rosbag",
@@ -103,6 +110,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             _without_old_print,
             lambda t: _with_modules(t, types),
             lambda t: _with_imports(t, types),
+            _with_names,
             _with_attributes,
             _with_values_called,
             _with_calls,
@@ -282,6 +290,47 @@ def _add_import(text: str, statement: str, module: str, name: str) -> str:
 
 def _last(node: ast.AST | None) -> str:
     return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+
+
+def _with_names(text: str) -> Iterator[Step]:
+    """`true`, `rospu` and `Sting`: a name that nothing in the file has, and one alone is nearly the same."""
+    tree, lines = ast.parse(text), text.split("\n")
+    bound = _bound(tree)
+    if "*" in bound or any(isinstance(n, ast.Try) and _catches_names(n) for n in ast.walk(tree)):
+        return
+    shared = {name for one in tree.body for name in _bound_by(one)}
+    known = bound | set(dir(builtins)) | {"__file__"}
+    for block in (n for n in tree.body if not isinstance(n, ast.Import | ast.ImportFrom)):
+        own = shared | (_bound(ast.Module([block], [])) if isinstance(block, ast.FunctionDef) else set())
+        missing = [n for n in ast.walk(block) if isinstance(n, ast.Name) and n.id not in known]
+        for name in dict.fromkeys(n.id for n in missing):
+            meant = OF_OTHER_LANGUAGES.get(name) or _meant_by(name, own)
+            spans = [span for n in missing if n.id == name and (span := _span(lines, n))]
+            if meant and spans:
+                after = _edit(text, [(*span, meant) for span in spans])
+                for step in _step("name", spans[0][0] + 1, text, after, name):
+                    text, lines = step["text"], step["text"].split("\n")
+                    yield step
+                    yield from _with_names(text)
+                    return
+
+
+def _meant_by(name: str, own: set[str]) -> str:
+    longer = [one for one in own if len(one) >= NAME_CHARS_MIN]
+    near = get_close_matches(name, longer, 2, 0.8) if len(name) >= NAME_CHARS_MIN else []
+    return near[0] if len(near) == 1 else ""
+
+
+def _bound_by(statement: ast.stmt) -> set[str]:
+    """Return the names that a statement of the script gives a value to, none of those within functions and classes."""
+    if isinstance(statement, ast.FunctionDef | ast.ClassDef):
+        return {statement.name}
+    return _bound(ast.Module([statement], []))
+
+
+def _catches_names(block: ast.Try) -> bool:
+    kinds = [ast.unparse(handler.type) if handler.type else "" for handler in block.handlers]
+    return any("NameError" in kind for kind in kinds)
 
 
 def _with_attributes(text: str) -> Iterator[Step]:

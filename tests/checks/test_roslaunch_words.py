@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from grader.checks.launch_files import value_given
 from grader.checks.support.launch import died, finished, is_exact, name_pattern, refusal
 from grader.checks.support.parameters import explain_yaml, explain_yaml_line
 from grader.evidence.run import Run
@@ -132,3 +133,19 @@ def test_yaml_words_name_the_last_line() -> None:
 def test_the_line_of_a_yaml_file_that_lacks_something(text: str, told: str) -> None:
     found = explain_yaml_line(text, until=2)
     assert (f"{found.why}; {found.hint}" if found else "") == told
+
+
+@pytest.mark.parametrize(
+    ("line", "right"),
+    [
+        ("firefox -new-window URL", "firefox -new-window $URL"),
+        ("firefox '$URL'", 'firefox "$URL"'),
+        ("firefox ${URL", "firefox ${URL}"),
+        ("firefox $ULR", "firefox $URL"),
+        ('firefox "${url}"', 'firefox "$URL"'),
+        ("firefox $URL", ""),
+        ("firefox", ""),
+    ],
+)
+def test_a_line_of_a_shell_that_is_not_given_the_variable(line: str, right: str) -> None:
+    assert value_given(line, "URL") == right

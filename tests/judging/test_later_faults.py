@@ -77,14 +77,27 @@ def judgement_of(
 ) -> Judgement:
     package = {**PACKAGE, "slips": list(slips)}
     runs = {"talker": run, "package": {"attachments": {FILE: source}}}
+    twice = any(criterion["check"] == "copies" for criterion in criteria)
+    started = [*SCENARIO["start"], *([{"name": "other", "script": FILE}] if twice else [])]
     scenarios = {
-        "talker": {**SCENARIO, "probes": [{"topic": "/chatter", "type": "std_msgs/String", "text": 2}]}
+        "talker": {
+            **SCENARIO,
+            "start": started,
+            "probes": [{"topic": "/chatter", "type": "std_msgs/String", "text": 2}],
+        }
     }
     recorded = build_runs({"runs": runs, "package": package})
     return judge_all_runs(rubric(*criteria, scenarios=scenarios), recorded)
 
 
 TALKER = [NODE | ROOT, CHATTER, RATE, MESSAGE]
+COPIES = {
+    "id": "copies",
+    "check": "copies",
+    "with": {"first": "talker", "second": "other", "listener": "talker", "topic": "/chatter"},
+    "scenario": "talker",
+    "requires": ["node"],
+}
 CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str, Any]], str]] = {
     "rate behind an undefined name": (
         "node", DIES, TALKER, [slip("undefined", "", 3, **UNDEFINED), slip("rate-number", "2", 4)],
@@ -131,6 +144,9 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
     "listener's words behind another topic": (
         "hears", DEAF, [NODE | ROOT, HEARS], [slip("subscriber", "hello"), slip("prints", "{}got {data}", 7)],
         f"; then print 'I heard <message>' in line 7 of {FILE}, not '<value>got <message>'"),
+    "two copies of one name behind an error": (
+        "node", DIES, [NODE | ROOT, COPIES], [slip("node-name", "talker", 11)],
+        f"write anonymous=True in line 11 of {FILE}, for two of it at once"),
     "other words that are logged, behind an error": (
         "node", DIES, [NODE | ROOT, LOGS], [slip("prints", "Hello ROS")],
         f"; then log 'Hello World!' in line 5 of {FILE}, not 'Hello ROS'"),

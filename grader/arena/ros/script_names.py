@@ -57,7 +57,8 @@ def graph_names(tree):
         kind = NAMED.get(called_name(node))
         if not kind:
             continue
-        owner = owners.get(id(node), "")
+        anonymous = [k for k in node.keywords if k.arg == "anonymous" and getattr(k.value, "value", True)]
+        owner = owners.get(id(node), "") or ("anonymous" if anonymous else "")
         names = node.args[:1] or [k.value for k in node.keywords if k.arg == "name"]
         name = published_type(node)
         if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):

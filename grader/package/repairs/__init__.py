@@ -33,6 +33,7 @@ from grader.package.repairs.names import (
     is_near,
     repair_launch_files,
     repair_launch_names,
+    repair_script_keys,
     repair_script_names,
     repair_yaml_names,
     wanted_of,
@@ -76,6 +77,8 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     for script in names:
         repair_script_names(files, script, names[script], wanted)
     repair_yaml_names(files, package, names, wanted)
+    for script in names:
+        repair_script_keys(files, script, names[script], wanted)
     return tuple(sorted(files.repairs, key=lambda repair: KINDS.index(repair.kind)))
 
 

@@ -173,6 +173,17 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
                 node = literal if role == "node" else node
 
 
+def repair_script_keys(files: Files, file: str, names: Sequence[Name], wanted: Wanted) -> None:
+    """Find the keys in `details['name']['First']` that differ from a part of the lab's parameters by capitals or a
+    letter, where the script has no other key for that part."""
+    parts = dict.fromkeys(part for branch in _branches(wanted) for part in branch)
+    used = {name.value for name in names}
+    for name in dict.fromkeys(one for one in names if one.role == "key" and one.value not in parts):
+        near = [part for part in parts if part not in used and is_near(name.value, part)]
+        if len(near) == 1:
+            _replace_literal(files, file, name, near[0], near[0])
+
+
 def _bare(name: str, role: str) -> str:
     return name.strip("/") if role == "node" else f"/{name.lstrip('/')}"
 
@@ -331,6 +342,8 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
         pkg, kind = node.pkg or "", node.type or ""
         if pkg != own and (is_near(pkg, own) or (pkg in ours and {kind, f"{kind}.py"} & scripts)):
             _set_attribute(files, launch.path, node.line, ("pkg", pkg, own), kind="package-name")
+    for launch in package.launch_files:
+        _repair_find(files, launch.path, own)
     for launch, node in nodes:
         kind = node.type or ""
         if kind and kind not in programs and (node.pkg in ours or is_near(node.pkg or "", own)):
@@ -345,6 +358,18 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
         _repair_node(files, launch, node, wanted)
     for launch in package.launch_files:
         _repair_params(files, launch, wanted)
+
+
+def _repair_find(files: Files, file: str, own: str) -> None:
+    """Replace what is nearly the package's name in each `$(find …)` of a launch file."""
+    text = files.text(file) or ""
+    for found in re.findall(r"\$\(find +([\w-]+) *\)", text):
+        if is_near(found, own):
+            after = re.sub(rf"(\$\(find +){re.escape(found)}(?= *\))", rf"\g<1>{own}", files.text(file) or "")
+            line = text[: text.index(found)].count("\n") + 1
+            files.change(
+                "package-name", file, after, f"line {line} of {file}: $(find {found}) should be $(find {own})"
+            )
 
 
 def _own_name(files: Files, given: str) -> str:

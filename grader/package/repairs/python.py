@@ -42,6 +42,7 @@ Cause = Literal[
     "old-name",
     "module",
     "import",
+    "name",
     "attribute",
     "value",
     "call",
@@ -50,7 +51,7 @@ Cause = Literal[
     "main",
     "spin",
 ]
-CALLS = ("attribute", "value", "call", "callback", "guard", "main", "spin")
+CALLS = ("name", "attribute", "value", "call", "callback", "guard", "main", "spin")
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "import"), "missing-import"),
     **dict.fromkeys(CALLS, "missing-call"),
@@ -137,7 +138,7 @@ def _join_steps(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
         if (
             groups
             and groups[-1][0] == step.cause
-            and step.cause not in ("token", "indent", "module", "import", "attribute")
+            and step.cause not in ("token", "indent", "module", "import", "name", "attribute")
         ):
             groups[-1][1].append(step)
         else:
@@ -234,6 +235,7 @@ def _words_by_cause(file: str, steps: list[_Step], before: str) -> dict[Cause, t
         ),
         "import": (f"{place} uses {word}, which is not imported", ""),
         "module": (f"{place}: messages are not imported from {word}", ""),
+        "name": (f"{place}: {word} is not defined", ""),
         "attribute": (f"{place}: there is no {word}", ""),
         "value": (f"{place}: {word} is given a value with `=`, and has to be called", ""),
         "call": (f"{place}: {word} is named but not called", f"write {calls}"),
