@@ -28,7 +28,7 @@ from grader.evidence.run import Run, console_log
 from grader.faults import GradingContext, classify_errors
 from grader.files import temporary_folder
 from grader.intake import open_recorded, open_recording, open_submission
-from grader.intake.choose import Wanted
+from grader.intake.choose import WantedPackage
 from grader.intake.source import Source, local_path
 from grader.judging.judge import judge_files
 from grader.judging.summary import assemble_result, environment_info
@@ -41,8 +41,8 @@ from grader.model.submission import RecordedSubmission, Submission
 from grader.package import read_packages
 from grader.portable import wait_for_children
 from grader.recording import (
-    Job,
     Judged,
+    RecordingJob,
     RecordingOptions,
     import_later,
     judge_folder,
@@ -173,7 +173,7 @@ def warm_up() -> None:
     from grader import repaired_copy, submitted_recordings  # noqa: F401, PLC0415 - see recording.LATER
     from grader.arena import recorder  # noqa: F401, PLC0415
     from grader.arena.arena_process import template_of  # noqa: PLC0415
-    from grader.arena.sandbox import choose  # noqa: PLC0415
+    from grader.arena.sandbox import choose_sandbox  # noqa: PLC0415
     from grader.arena.session import arena_command  # noqa: PLC0415
     from grader.evidence import message_values  # noqa: F401, PLC0415
     from grader.package import launch, launch_loader  # noqa: F401, PLC0415
@@ -186,7 +186,7 @@ def warm_up() -> None:
     ros = find_ros()
     if ros is not None:
         template_of(*arena_command(ros))
-        choose("auto")
+        choose_sandbox("auto")
 
 
 # --- Open -------------------------------------------------------------------------------------------------------------
@@ -211,9 +211,9 @@ def open_source(
         yield submission
 
 
-def wanted_package(rubric: Rubric, asked: str) -> Wanted:
+def wanted_package(rubric: Rubric, asked: str) -> WantedPackage:
     """Return what the intake has to look for: the lab's packages, in place of the main one what was `asked` for."""
-    main, *others = (Wanted(name=name, files=files_of(rubric, name)) for name in rubric.package_names)
+    main, *others = (WantedPackage(name=name, files=files_of(rubric, name)) for name in rubric.package_names)
     return replace(main, asked=asked, others=tuple(others))
 
 
@@ -233,12 +233,12 @@ def submission_info(submission: Submission | RecordedSubmission) -> SubmissionIn
 
 def recording_job(
     submission: Submission, rubric: LoadedRubric, evidence: Path, options: GradeOptions, progress: Progress
-) -> Job:
+) -> RecordingJob:
     """Return what is to be recorded into the folder `evidence`, with what the files say; none of them is executed."""
     progress.step("package", "running", "reading its files")
     facts = read_packages(submission)
     progress.step("package", "done")
-    return Job(
+    return RecordingJob(
         submission=submission,
         facts=facts,
         rubric=rubric,
@@ -248,7 +248,7 @@ def recording_job(
     )
 
 
-def record_and_judge(job: Job, *, keep_hidden: bool) -> tuple[Recording, Judged]:
+def record_and_judge(job: RecordingJob, *, keep_hidden: bool) -> tuple[Recording, Judged]:
     """Record every scenario, and judge it; then what a lost mark needs besides."""
     job.progress.early(lambda: judge_early(job.facts, job.rubric, keep_hidden=keep_hidden))
     with make_recorder(job) as recorder:

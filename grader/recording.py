@@ -1,9 +1,9 @@
 """Records what a rubric needs of one submission: by which recorder, what is recorded again, and what besides.
 
-A `Job` comes in: the submission, its facts, the rubric and a folder. Evidence goes out, in that folder. `make_recorder`
-chooses the arena, the files alone or recordings that were handed in; `record_all` records each scenario.
-`judge_recorded` judges them and records again what the machine was too late for; `record_other_runs` adds repeats of
-losses and the runs of a repaired copy. How a run is recorded is the business of `arena`.
+A `RecordingJob` comes in: the submission, its facts, the rubric and a folder. Evidence goes out, in that folder.
+`make_recorder` chooses the arena, the files alone or recordings that were handed in; `record_all` records each
+scenario. `judge_recorded` judges them and records again what the machine was too late for; `record_other_runs` adds
+repeats of losses and the runs of a repaired copy. How a run is recorded is the business of `arena`.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class RecordingOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Job:
+class RecordingJob:
     """A submission to record into the folder `evidence`."""
 
     submission: Submission
@@ -72,7 +72,7 @@ class Job:
 
 
 def make_recorder(
-    job: Job, *, only: Collection[str] | None = None, about: Mapping[str, str] | None = None
+    job: RecordingJob, *, only: Collection[str] | None = None, about: Mapping[str, str] | None = None
 ) -> Recorder | StaticRecorder:
     """Return what records the rubric's scenarios (`only` these), to be used as a context: the arena, or a recorder of
     files alone where nothing is to be run, or can be. `about` goes into the metadata."""
@@ -125,7 +125,7 @@ def refuse_missing(rubric: Rubric) -> None:
         )
 
 
-def record_all(job: Job, recorder: Recorder | StaticRecorder) -> None:
+def record_all(job: RecordingJob, recorder: Recorder | StaticRecorder) -> None:
     """Record every scenario, and copy the recordings that scenarios name in the submission."""
     recorder.record_all(import_later)
     from grader.submitted_recordings import copy_recordings  # noqa: PLC0415 - see LATER
@@ -162,7 +162,7 @@ def judge_recorded(recorder: Recorder | StaticRecorder, evidence: Path, rubric: 
     return runs, judged
 
 
-def record_other_runs(job: Job, recorder: Recorder | StaticRecorder, judged: Judged) -> bool:
+def record_other_runs(job: RecordingJob, recorder: Recorder | StaticRecorder, judged: Judged) -> bool:
     """Record what a lost mark needs besides the first runs, which were `judged`, and return whether there was anything.
 
     A run whose timing could have cost the mark is repeated. Where a mechanical repair could be the reason for the loss,

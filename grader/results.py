@@ -31,7 +31,7 @@ NEW, READY = ".grader-new", ".grader-ready"
 NAMES, REPLACED = "names.json", "replaced"
 EVIDENCE, RESULT = "evidence", "result.json"
 SUMS, SIGNATURE = "SHA256SUMS", "SHA256SUMS.sig"
-PARTS = (RESULT, EVIDENCE, "report.md", "report.html", "junit.xml", "console.log", SUMS, SIGNATURE)
+RESULT_FILES = (RESULT, EVIDENCE, "report.md", "report.html", "junit.xml", "console.log", SUMS, SIGNATURE)
 COMPLETE = ("graded", "inconclusive")
 ATTEMPTS = 10
 
@@ -200,7 +200,7 @@ def _roll_forward(folder: Path) -> None:
 def _clear(folder: Path, coming: list[str]) -> None:
     """Remove what is replaced, the old result first. What is in place already is no longer in `ready`, and stays."""
     ready = folder / READY
-    for name in dict.fromkeys((*PARTS, *coming)):
+    for name in dict.fromkeys((*RESULT_FILES, *coming)):
         old = folder / name
         if os.path.lexists(old) and ((ready / name).exists() or name not in coming):
             if name == EVIDENCE:

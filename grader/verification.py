@@ -169,7 +169,7 @@ About = Literal["rubric", "result", "evidence", "signature", "code", "grader"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class PartFinding:
     """What was found about a part. With `wrong`, the result is not to be trusted for it."""
 
     about: About
@@ -211,7 +211,7 @@ def read_whole(folder: Path) -> GradingResult:
 
 def verify(
     folder: Path, rubric: LoadedRubric, allowed: Path | None, *, of_class: bool = False
-) -> list[Finding]:
+) -> list[PartFinding]:
     """Judge the evidence in a result's folder again, and return what was found about result, rubric, evidence and
     signature. `of_class`: the folder is one of a class, where it has its submission's name.
 
@@ -227,38 +227,38 @@ def verify(
     try:
         runs = load_evidence([folder / EVIDENCE])
     except EvidenceError as error:
-        return [*found, Finding(about="evidence", text=error.message)]
+        return [*found, PartFinding(about="evidence", text=error.message)]
     return [*found, *_evidence_findings(result, runs), *_result_findings(result, runs, rubric)]
 
 
-def _owner_findings(folder: Path, result: GradingResult, *, of_class: bool) -> Iterator[Finding]:
+def _owner_findings(folder: Path, result: GradingResult, *, of_class: bool) -> Iterator[PartFinding]:
     """The whole of another student's folder, signature and all, fits in itself."""
     owner, name = result.submission.id, folder.resolve().name
     if name != safe_name(owner):
-        yield Finding(
+        yield PartFinding(
             about="result", text=f"it is the result of {owner}, in the folder {name}", wrong=of_class
         )
 
 
-def _rubric_findings(result: GradingResult, rubric: LoadedRubric) -> Iterator[Finding]:
+def _rubric_findings(result: GradingResult, rubric: LoadedRubric) -> Iterator[PartFinding]:
     used, lab = result.rubric, rubric.rubric
     if (used.id, used.digest) == (lab.id, rubric.digest):
         words = f"{lab.id}, digest {rubric.digest[:12]}"
-        yield Finding(about="rubric", text=f"{words} ({RUBRIC_FROM[rubric.origin]})", wrong=False)
+        yield PartFinding(about="rubric", text=f"{words} ({RUBRIC_FROM[rubric.origin]})", wrong=False)
         return
     origin = RUBRIC_FROM[result.rubric_origin]
     words = f"it was judged by {used.id} with digest sha256:{used.digest}{f' ({origin})' if origin else ''}"
     other = (
         f"{lab.id} with digest sha256:{rubric.digest}; give the course's own with --rubric, if it is another"
     )
-    yield Finding(about="rubric", text=f"{words}, not by {other}")
+    yield PartFinding(about="rubric", text=f"{words}, not by {other}")
 
 
-def _signature_findings(folder: Path, allowed: Path | None) -> Iterator[Finding]:
+def _signature_findings(folder: Path, allowed: Path | None) -> Iterator[PartFinding]:
     """Yield what is found about the signature. None, or one without a name, is wrong only where signers are
     asked for."""
     signature = read_signature(folder, allowed)
-    yield Finding(
+    yield PartFinding(
         about="signature",
         text=_signature_words(signature, asked=allowed is not None),
         wrong=signature.state == "bad" or (allowed is not None and signature.state != "good"),
@@ -271,7 +271,7 @@ def _signature_findings(folder: Path, allowed: Path | None) -> Iterator[Finding]
             if what != "missing"
             else f"{name} was signed, and is gone"
         )
-        yield Finding(about="result" if name == RESULT else "evidence", text=text)
+        yield PartFinding(about="result" if name == RESULT else "evidence", text=text)
 
 
 def _signature_words(signature: Signature, *, asked: bool) -> str:
@@ -285,7 +285,7 @@ def _signature_words(signature: Signature, *, asked: bool) -> str:
     return f"signed with the {signature.by}{who}"
 
 
-def _evidence_findings(result: GradingResult, runs: Mapping[str, Run]) -> Iterator[Finding]:
+def _evidence_findings(result: GradingResult, runs: Mapping[str, Run]) -> Iterator[PartFinding]:
     """Evidence says whose it is, and of which files."""
     for key, said in (("commit", result.submission.commit or ""), ("digest", result.submission.digest)):
         other = {
@@ -295,12 +295,12 @@ def _evidence_findings(result: GradingResult, runs: Mapping[str, Run]) -> Iterat
             text = (
                 f"it is of a submission with the {key} {min(other)[:40] or 'none'}, not {said[:40] or 'none'}"
             )
-            yield Finding(about="evidence", text=text)
+            yield PartFinding(about="evidence", text=text)
 
 
 def _result_findings(
     result: GradingResult, runs: Mapping[str, Run], rubric: LoadedRubric
-) -> Iterator[Finding]:
+) -> Iterator[PartFinding]:
     again = _judge_again(result, runs, rubric)
     before, after = ({c.id: c for c in one.criteria} for one in (result, again))
     differing = []
@@ -320,13 +320,13 @@ def _result_findings(
         cost = f"{number(late.points_before)} points before, {number(result.points)} after"
         words = f"{late.text} ({cost}), by a deadline that this rubric does not have: course.yaml#LAB has it"
         fits = late.points == result.points <= late.points_before
-        yield Finding(about="rubric", text=words, wrong=not fits)
-    yield from (Finding(about="result", text=text) for text in differing)
+        yield PartFinding(about="rubric", text=words, wrong=not fits)
+    yield from (PartFinding(about="result", text=text) for text in differing)
     yield from _remarks(result, again)
     if not differing:
         judged = plural(len(before), "criterion", "criteria")
         text = f"{judged} and {number(result.points)} points, as the evidence gives"
-        yield Finding(about="result", text=text, wrong=False)
+        yield PartFinding(about="result", text=text, wrong=False)
 
 
 def _unknown_terms(result: GradingResult, rubric: LoadedRubric) -> Lateness | None:
@@ -334,21 +334,21 @@ def _unknown_terms(result: GradingResult, rubric: LoadedRubric) -> Lateness | No
     return None if rubric.rubric.deadline or rubric.rubric.late else result.late
 
 
-def _remarks(result: GradingResult, again: GradingResult) -> Iterator[Finding]:
+def _remarks(result: GradingResult, again: GradingResult) -> Iterator[PartFinding]:
     """Yield what changes no points. Words differ from one build of the grader to the next."""
     texts = {c["id"]: c for c in json.loads(result_text(again))["criteria"]}
     said = {c["id"]: c for c in json.loads(result_text(result))["criteria"]}
     other = [name for name in said if name in texts and said[name] != texts[name]]
     if other:
         text = f"worded otherwise, by another build of the grader or by hand: {', '.join(other)}"
-        yield Finding(about="result", text=text, wrong=False)
+        yield PartFinding(about="result", text=text, wrong=False)
     if result.environment.grader != __version__:
         text = f"graded by {result.environment.grader}, judged again by {__version__}"
-        yield Finding(about="grader", text=text, wrong=False)
+        yield PartFinding(about="grader", text=text, wrong=False)
     if decided := awarded(result.overrides):
         who = ", ".join(sorted({o.author or "someone unnamed" for o in decided.values()}))
         text = f"people decided {plural(len(decided), 'criterion', 'criteria')}: {who}"
-        yield Finding(about="result", text=text, wrong=False)
+        yield PartFinding(about="result", text=text, wrong=False)
 
 
 def _judge_again(result: GradingResult, runs: Mapping[str, Run], rubric: LoadedRubric) -> GradingResult:
@@ -389,20 +389,20 @@ def _verdict(of: CriterionResult | Automatic) -> str:
     return f"{of.status.value}, {number(of.points)}"
 
 
-def compare(own: GradingResult, official: GradingResult) -> list[Finding]:
+def compare(own: GradingResult, official: GradingResult) -> list[PartFinding]:
     """Return what differs between a student's own result and the official one: code, rubric, grader, and criteria."""
     return [*_compare_causes(own, official), *_compare_criteria(own, official)]
 
 
-def _compare_causes(own: GradingResult, official: GradingResult) -> Iterator[Finding]:
+def _compare_causes(own: GradingResult, official: GradingResult) -> Iterator[PartFinding]:
     same = own.submission.digest == official.submission.digest
     commits = " and ".join((one.submission.commit or "no commit")[:12] for one in (own, official))
     words = "the same files were graded" if same else f"other files were graded ({commits})"
-    yield Finding(about="code", text=words, wrong=not same)
+    yield PartFinding(about="code", text=words, wrong=not same)
     if (own.rubric.id, own.rubric.digest) != (official.rubric.id, official.rubric.digest):
         used = [f"{one.rubric.id} {one.rubric.digest[:12]}" for one in (own, official)]
         origin = f" ({RUBRIC_FROM[own.rubric_origin]})" if own.rubric_origin else ""
-        yield Finding(about="rubric", text=f"own run by {used[0]}{origin}, official by {used[1]}")
+        yield PartFinding(about="rubric", text=f"own run by {used[0]}{origin}, official by {used[1]}")
     for name, one, other in zip(
         ("grader", "ROS", "sandbox"),
         (own.environment.grader, own.environment.ros, own.environment.sandbox),
@@ -410,23 +410,23 @@ def _compare_causes(own: GradingResult, official: GradingResult) -> Iterator[Fin
         strict=True,
     ):
         if one != other:
-            yield Finding(
+            yield PartFinding(
                 about="grader", text=f"{name}: {one or 'none'}, official: {other or 'none'}", wrong=False
             )
 
 
-def _compare_criteria(own: GradingResult, official: GradingResult) -> Iterator[Finding]:
+def _compare_criteria(own: GradingResult, official: GradingResult) -> Iterator[PartFinding]:
     mine = {criterion.id: criterion for criterion in own.criteria}
     for theirs in official.criteria:
         ours = mine.get(theirs.id)
         if ours is None:
-            yield Finding(about="result", text=f"{theirs.id}: only in the official result", wrong=False)
+            yield PartFinding(about="result", text=f"{theirs.id}: only in the official result", wrong=False)
         elif (ours.status, ours.points) != (theirs.status, theirs.points):
             old, new = (f"{_verdict(c)} of {number(c.max_points)}" for c in (ours, theirs))
-            yield Finding(
+            yield PartFinding(
                 about="result", text=f"{theirs.id}: own run {old}; official {new}: {theirs.message}"
             )
     for name in mine.keys() - {criterion.id for criterion in official.criteria}:
-        yield Finding(about="result", text=f"{name}: only in the own run", wrong=False)
+        yield PartFinding(about="result", text=f"{name}: only in the own run", wrong=False)
     points = [f"{number(one.points)} of {number(one.max_points)}" for one in (own, official)]
-    yield Finding(about="result", text=f"own run {points[0]} points, official {points[1]}", wrong=False)
+    yield PartFinding(about="result", text=f"own run {points[0]} points, official {points[1]}", wrong=False)

@@ -156,10 +156,10 @@ def test_a_control_group_without_room_is_named(tmp_path: Path, monkeypatch) -> N
     assert found[0].command == f"echo {60 + 768} > {inner.parent}/pids.max"
     monkeypatch.setattr(inherited_limits, "limits", lambda _: iter(()))
     with pytest.raises(HostError, match=r"pids\.max .* is 200, with 60 in use"):
-        sandbox.choose("none")
+        sandbox.choose_sandbox("none")
     make_room(begin=True)
     (inner.parent / "pids.max").write_text("100000\n")
-    sandbox.choose("none")
+    sandbox.choose_sandbox("none")
 
 
 @pytest.fixture

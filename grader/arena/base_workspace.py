@@ -29,7 +29,7 @@ from grader import __version__
 from grader.arena.interruption import run_until_signal
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import BASE, ProcessEnvironment
-from grader.arena.sandbox import Word, choose, copy_of, scratch, temporary_base
+from grader.arena.sandbox import Word, choose_sandbox, copy_of, scratch, temporary_base
 from grader.arena.sandbox_files import ANSWERS, COURSE, INSIDE_WORKSPACE, QUESTIONS, SOURCES, prepare
 from grader.arena.session import ArenaSession
 from grader.arena.workspace import Workspace, give_to, read_member
@@ -83,7 +83,7 @@ def provide_base(mode: SandboxMode) -> None:
     Raises GraderError where this machine lets nothing be run in this `mode`.
     """
     ros = find_ros()
-    sandbox = choose(mode) if ros else None
+    sandbox = choose_sandbox(mode) if ros else None
     if ros is None or sandbox is None or not sandbox.bubblewrap:
         return
     with temporary_folder("run", temporary_base(sandbox)) as folder:

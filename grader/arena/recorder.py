@@ -24,7 +24,7 @@ from grader.arena.build import BUILD_EXPECTED_S, CMakeTrace, build
 from grader.arena.interruption import Stop, run_together, run_until_signal
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.sandbox import choose, temporary_base
+from grader.arena.sandbox import choose_sandbox, temporary_base
 from grader.arena.sandbox_files import prepare
 from grader.arena.scenario import expected_s, run_scenario
 from grader.arena.static_recorder import (
@@ -94,7 +94,7 @@ class Recorder:
         ros = find_ros()
         if ros is None:
             raise RosMissing(NO_ROS, hint=INSTALL_HINT)
-        self._ros, self._sandbox, self._not_run = ros, choose(mode), ""
+        self._ros, self._sandbox, self._not_run = ros, choose_sandbox(mode), ""
         self.recording = Recording(folder=folder, facts=facts, ros=ros, sandbox=self._sandbox)
         self._place: ProcessEnvironment | None = None
         self._stack = ExitStack()

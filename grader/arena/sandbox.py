@@ -3,9 +3,9 @@
 How much a process tree may use is in `limits.py`.
 
 Of a wall, only arguments are made; the arena starts the programs (`ros/launching.py`) in namespaces of its own
-(`ros/namespaces.py`). Going without (`choose`) is for machines that lack a program or whose kernel forbids it. A probe
-that says nothing, or something that is not known, stops the grading: what keeps it from working now may be gone with
-the next run, and until then students' code would have run without a wall.
+(`ros/namespaces.py`). Going without (`choose_sandbox`) is for machines that lack a program or whose kernel forbids it.
+A probe that says nothing, or something that is not known, stops the grading: what keeps it from working now may be gone
+with the next run, and until then students' code would have run without a wall.
 """
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ class Sandbox(Record):
 
 
 def _program(name: str) -> str:
-    """Return where the machine has the program; `choose` has seen that it does."""
+    """Return where the machine has the program; `choose_sandbox` has seen that it does."""
     return find_host_program(name) or f"/usr/bin/{name}"
 
 
@@ -258,7 +258,7 @@ UNKNOWN_HINT = (
 )
 
 
-def choose(mode: SandboxMode) -> Sandbox:
+def choose_sandbox(mode: SandboxMode) -> Sandbox:
     """Return the sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so.
 
     Raises SandboxMissing where it cannot be known whether there is one, and HostError where the limits that were

@@ -18,7 +18,7 @@ from grader.arena.sandbox_files import FUNCTIONS, ROSTESTS
 from grader.arena.scenario_inputs import OVER, make_shots, settings
 from grader.arena.session import ArenaSession
 from grader.arena.static_recorder import RunCost
-from grader.arena.steps import CTRL_C_S, LAUNCH_CTRL_C_S, TERM_S, Spec, StepRunner, Tell
+from grader.arena.steps import CTRL_C_S, LAUNCH_CTRL_C_S, TERM_S, ProcessSpec, StepRunner, Tell
 from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
@@ -129,7 +129,7 @@ def _tell_what_is_known(
     session: ArenaSession,
     scenario: Scenario,
     place: ProcessEnvironment,
-    starts: list[tuple[Start, Spec]],
+    starts: list[tuple[Start, ProcessSpec]],
     watched_s: float,
 ) -> None:
     """Set what the scenario and the package's sources say of how long anything may yet come."""
@@ -149,7 +149,11 @@ def _tell_what_is_known(
 
 
 async def _run(
-    scenario: Scenario, starts: list[tuple[Start, Spec]], arena: ArenaSession, tell: Tell, beside: Path | None
+    scenario: Scenario,
+    starts: list[tuple[Start, ProcessSpec]],
+    arena: ArenaSession,
+    tell: Tell,
+    beside: Path | None,
 ) -> tuple[str, str]:
     tell("starting the managed roscore")
     if scenario.clock == "warped":
@@ -244,7 +248,7 @@ async def _look_at_connections(arena: ArenaSession) -> None:
     await arena.wait(lambda: not arena.live.running, GRAPH_EVERY_S)
 
 
-def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int]) -> Iterator[Spec]:
+def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int]) -> Iterator[ProcessSpec]:
     """Return how `rosrun`, `roslaunch` or `rosparam` would start it; nothing for a file that is not in its package.
 
     `numbers` are those of the run's processes.
@@ -277,7 +281,7 @@ def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int
         yield from _script(start, place, numbers)
 
 
-def _script(start: Start, place: ProcessEnvironment, numbers: Iterator[int]) -> Iterator[Spec]:
+def _script(start: Start, place: ProcessEnvironment, numbers: Iterator[int]) -> Iterator[ProcessSpec]:
     found = place.find_program(start.script or "")
     if found is not None:
         program, path = found

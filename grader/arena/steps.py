@@ -50,7 +50,7 @@ NOT_PLAYED = frozenset({"/clock", "/rosout", "/rosout_agg"})
 """Where none is named: they are the run's own."""
 GOAL_ID = "actionlib_msgs/GoalID"
 
-Spec: TypeAlias = dict[str, Any]
+ProcessSpec: TypeAlias = dict[str, Any]
 """What the arena needs to start a process (`ProcessEnvironment.spec`)."""
 
 
@@ -60,7 +60,7 @@ class StepRunner:
     def __init__(
         self,
         scenario: Scenario,
-        starts: list[tuple[Start, Spec]],
+        starts: list[tuple[Start, ProcessSpec]],
         arena: ArenaSession,
         tell: Tell,
         *,
@@ -420,7 +420,7 @@ class StepRunner:
             record = {"action": "type", "actor": "grader", "detail": process, "value": typed.line}
             self._arena.send(do="type", name=process, data=data, record=record)
 
-    def _specs(self, name: str) -> list[Spec]:
+    def _specs(self, name: str) -> list[ProcessSpec]:
         return [spec for start, spec in self._starts if start.name == name]
 
     # --- Services ----------------------------------------------------------------------------------------------------

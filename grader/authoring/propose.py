@@ -12,9 +12,9 @@ from grader.authoring.rubric_draft import (
     INTEGER_PROBES,
     STRING,
     TEXT_PROBES,
-    Entry,
+    DraftSheet,
     Parts,
-    Sheet,
+    RubricEntry,
     assign_points,
     drop_empty,
     dump_flow,
@@ -43,7 +43,7 @@ WRAPS = 2
 LIVES_S = 5
 
 
-class Proposal(Sheet):
+class Proposal(DraftSheet):
     """The rubric that asks for what a correct package was seen to do."""
 
     def __init__(
@@ -76,7 +76,7 @@ class Proposal(Sheet):
         )
         installed = self._installed_scripts()
         if installed:
-            parameters: Entry = {"scripts": installed}
+            parameters: RubricEntry = {"scripts": installed}
             self.add(
                 "cmake-install", "CMake installs the scripts", "cmake-install", parameters, requires=["cmake"]
             )
@@ -128,21 +128,23 @@ class Proposal(Sheet):
 
     def _words(self, name: str, file: str, seen: Observed, node: str) -> None:
         """What it logs and which parameters it shows."""
-        needs: Entry = {"scenario": name, "requires": [node]}
+        needs: RubricEntry = {"scenario": name, "requires": [node]}
         for text in seen.logged[:1] if not seen.topics else ():
             self.add(f"{name}-logs", f"{file} logs {text!r}", "logs", {"text": text}, **needs)
         if seen.read:
             names = {"names": list(seen.read)}
             self.add(f"{name}-reads", f"{file} shows the parameters", "params-read", names, **needs)
 
-    def _with_params(self, scenario: Entry) -> Entry:
+    def _with_params(self, scenario: RubricEntry) -> RubricEntry:
         """Return the scenario, with the package's own parameters set before it starts."""
         params = {"params": [{"file": path} for path in self._parts.configs]} if self._parts.configs else {}
         return {"title": scenario["title"], **params, **scenario}
 
     def _scenario(self, name: str, script: str, seen: Observed) -> None:
         periodic = [t.name for t in seen.topics if t.rate_hz]
-        until: Entry = {"window_s": WINDOW_S, "topics": periodic} if periodic else {"alive_s": LIVES_S + 1}
+        until: RubricEntry = (
+            {"window_s": WINDOW_S, "topics": periodic} if periodic else {"alive_s": LIVES_S + 1}
+        )
         if seen.ended:
             until = {"quiet_s": 2}
         title = f"{PurePosixPath(script).name} in real time"
@@ -151,7 +153,7 @@ class Proposal(Sheet):
 
     def _life(self, name: str, script: str, seen: Observed, requires: list[str]) -> str:
         anonymous = "required" if seen.anonymous else "allowed"
-        named: Entry = {"names": list(seen.nodes[:1]), "anonymous": anonymous}
+        named: RubricEntry = {"names": list(seen.nodes[:1]), "anonymous": anonymous}
         run = f"rosrun {self._facts.name} {PurePosixPath(script).name}"
         if seen.ended:
             title = f"The node is /{seen.nodes[0]}"
@@ -181,9 +183,9 @@ class Proposal(Sheet):
             requires=[node],
             reproduce=f"rostopic info {topic.name}",
         )
-        needs: Entry = {"scenario": name, "requires": [kind, node]}
+        needs: RubricEntry = {"scenario": name, "requires": [kind, node]}
         if topic.rate_hz:
-            parameters: Entry = {"topic": topic.name, "rate_hz": format_number(topic.rate_hz)}
+            parameters: RubricEntry = {"topic": topic.name, "rate_hz": format_number(topic.rate_hz)}
             hz = f"{topic.name} runs at {topic.rate_hz:g} Hz"
             self.add(f"{label}-rate", hz, "rate", parameters, **needs, reproduce=f"rostopic hz {topic.name}")
         if topic.latched:
@@ -210,8 +212,8 @@ class Proposal(Sheet):
     def _counter(self, name: str, topic: Topic, requires: list[str], fast: Run | None) -> None:
         label, about = self._label(name, topic), {"topic": topic.name}
         wrap = wraps_of(fast, topic.name) if fast else None
-        rate: Entry = {"rate_hz": format_number(topic.rate_hz)} if topic.rate_hz else {}
-        needs: Entry = {"scenario": name, "requires": requires}
+        rate: RubricEntry = {"rate_hz": format_number(topic.rate_hz)} if topic.rate_hz else {}
+        needs: RubricEntry = {"scenario": name, "requires": requires}
         if wrap:
             last, first = wrap
             script = self._parts.nodes[name]
@@ -309,7 +311,7 @@ class Proposal(Sheet):
         file = next(f for f in self._facts.launch_files if PurePosixPath(f.path).name == launch)
         own = {n.type for n in file.nodes if n.pkg == self._facts.name}
         others = [n for n in file.nodes if n.pkg != self._facts.name and n.pkg and n.type and n.name]
-        wanted: Entry = {"launch": launch}
+        wanted: RubricEntry = {"launch": launch}
         wanted |= drop_empty(scripts=[s for s in self._parts.nodes.values() if PurePosixPath(s).name in own])
         programs = drop_empty(programs=[f"{n.pkg}/{n.type}" for n in others])
         if not seen.nodes:
@@ -320,7 +322,7 @@ class Proposal(Sheet):
         xml = self.add(
             f"{name}-xml", f"{launch} is well-formed and names its nodes", "launch-xml", wanted | programs
         )
-        until: Entry = {"nodes": len(seen.nodes), "alive_s": 1}
+        until: RubricEntry = {"nodes": len(seen.nodes), "alive_s": 1}
         self.scenarios[name] = {
             "title": f"roslaunch {launch}",
             "start": [{"name": name, "launch": launch}],
@@ -334,7 +336,7 @@ class Proposal(Sheet):
         )  # fmt: skip
 
 
-def _probe(topic: str, kind: str) -> Entry:
+def _probe(topic: str, kind: str) -> RubricEntry:
     made_up = {"text": TEXT_PROBES} if kind == STRING else {"integers": INTEGER_PROBES, "among": [0]}
     return {"topic": topic, "type": kind, **made_up}
 

@@ -2,7 +2,7 @@
 
 A package's folder and facts come in, and `find_parts` gives what can be started. `first_look` and `second_look` give
 rubrics that only run it and judge nothing (`only_runs`). What was observed there becomes scenarios, criteria and points
-(`assign_points`) on a `Sheet`, and `rubric_text` gives the YAML that people go on to edit.
+(`assign_points`) on a `DraftSheet`, and `rubric_text` gives the YAML that people go on to edit.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ WEIGHTS = {
     "cmake-install": 2, "launch-xml": 2, "launch-runs": 2, "reacts": 2,
 }  # fmt: skip
 
-Entry = dict[str, Any]
+RubricEntry = dict[str, Any]
 
 
-class Sheet:
+class DraftSheet:
     """Collects the parts of a rubric. `notes` are for the author: what was seen and is not covered."""
 
     def __init__(self) -> None:
         self.notes: list[str] = []
-        self.scenarios: dict[str, Entry] = {}
-        self.criteria: list[Entry] = []
+        self.scenarios: dict[str, RubricEntry] = {}
+        self.criteria: list[RubricEntry] = []
 
-    def add(self, id_: str, title: str, check: str, parameters: Entry, **more: object) -> str:
+    def add(self, id_: str, title: str, check: str, parameters: RubricEntry, **more: object) -> str:
         """Add a criterion without points and return its id, numbered where it is taken."""
         taken = {c["id"] for c in self.criteria}
         name = next(n for n in (id_, *(f"{id_}-{i}" for i in range(2, 100))) if n not in taken)
@@ -53,12 +53,12 @@ class Sheet:
         return name
 
 
-def drop_empty(**lists: list[str]) -> Entry:
+def drop_empty(**lists: list[str]) -> RubricEntry:
     """Return the lists that are not empty."""
     return {name: items for name, items in lists.items() if items}
 
 
-def assign_points(criteria: list[Entry]) -> None:
+def assign_points(criteria: list[RubricEntry]) -> None:
     """Set each criterion's points by its check's weight: whole numbers, together 100."""
     weights = [WEIGHTS.get(c["check"], 1) for c in criteria]
     exact = [TOTAL_POINTS * w / sum(weights) for w in weights]
@@ -267,10 +267,10 @@ def probe_for(topic: str, kind: str) -> Probe | None:
     return None
 
 
-def step_for(topic: str, kind: str) -> Entry:
+def step_for(topic: str, kind: str) -> RubricEntry:
     """Return a step that sends some messages of that type: numbers, or zeros where it has other fields than `data`."""
     values = SAMPLES.get(kind)
-    sent: Entry = {"values": list(values)} if values else {"value": {}, "count": MESSAGES}
+    sent: RubricEntry = {"values": list(values)} if values else {"value": {}, "count": MESSAGES}
     return {"publish": {"topic": topic, "type": kind, **sent, "rate_hz": 1 / ANSWERS_S}}
 
 

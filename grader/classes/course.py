@@ -24,7 +24,7 @@ from grader.classes.batch.renew_results import Settler, rewrite
 from grader.classes.batch.run import hold_folder, ids_of, write_books
 from grader.classes.feedback.publish import plan, published_rows, read_published
 from grader.classes.feedback.send import SentLog
-from grader.classes.gradebook import Book, Row
+from grader.classes.gradebook import Book, GradebookRow
 from grader.classes.gradebook.table import BookCriterion
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import folder_key, read_overrides
@@ -163,18 +163,18 @@ LATE_DAYS = "late days"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Marks:
+class LabMarks:
     """One lab's rows by `folder_key` of the student's id; `drafts` where nothing of it is published."""
 
     name: str
     title: str
     max_points: float
     weight: float
-    rows: Mapping[str, Row]
+    rows: Mapping[str, GradebookRow]
     drafts: bool
 
 
-def marks_of(course: CourseFile, *, drafts: bool = False) -> tuple[Marks, ...]:
+def marks_of(course: CourseFile, *, drafts: bool = False) -> tuple[LabMarks, ...]:
     """Return the marks of each lab of which there are any: what is published, or with `drafts` what is there now."""
     found = []
     for name, lab in course.course.labs.items():
@@ -186,7 +186,7 @@ def marks_of(course: CourseFile, *, drafts: bool = False) -> tuple[Marks, ...]:
         rows = batch.rows() if by_drafts else published_rows(batch, published)
         rubric = load_rubric(course.rubric(name)).rubric
         found.append(
-            Marks(
+            LabMarks(
                 name=name,
                 title=rubric.title,
                 max_points=rubric.max_points,
@@ -198,7 +198,7 @@ def marks_of(course: CourseFile, *, drafts: bool = False) -> tuple[Marks, ...]:
     return tuple(found)
 
 
-def students_of(course: CourseFile, marks: tuple[Marks, ...]) -> dict[str, Entry]:
+def students_of(course: CourseFile, marks: tuple[LabMarks, ...]) -> dict[str, Entry]:
     """Return all students by `folder_key`: those of the course's roster, or else all who are in a lab.
 
     Raises UsageError where the roster cannot be read.
@@ -222,7 +222,7 @@ def students_of(course: CourseFile, marks: tuple[Marks, ...]) -> dict[str, Entry
     return found
 
 
-def book_of(course: CourseFile, marks: tuple[Marks, ...]) -> Book:
+def book_of(course: CourseFile, marks: tuple[LabMarks, ...]) -> Book:
     """Return what the gradebook is about."""
     return Book(
         title=course.course.title,
@@ -233,7 +233,7 @@ def book_of(course: CourseFile, marks: tuple[Marks, ...]) -> Book:
     )
 
 
-def rows_of(course: CourseFile, marks: tuple[Marks, ...]) -> Iterator[Row]:
+def rows_of(course: CourseFile, marks: tuple[LabMarks, ...]) -> Iterator[GradebookRow]:
     """Yield a row for each student: each lab's points, and of all labs together 0 to 100, by their weights."""
     whole = sum(one.weight for one in marks)
     for key, entry in students_of(course, marks).items():
@@ -246,13 +246,13 @@ def rows_of(course: CourseFile, marks: tuple[Marks, ...]) -> Iterator[Row]:
         used = sum(result.late.late_days_used for result in results if result.late)
         points = round_half_up(MAX_POINTS * sum(shares) / whole, DIGITS) if whole else 0.0
         settled = all(not lab.status.is_open for lab in labs)
-        yield Row(
+        yield GradebookRow(
             entry=entry.model_copy(update={"extra": {**entry.extra, LATE_DAYS: str(used)}}),
             result=_result(entry, labs, points, settled=settled),
         )
 
 
-def _lab(marks: Marks, row: Row | None) -> CriterionResult:
+def _lab(marks: LabMarks, row: GradebookRow | None) -> CriterionResult:
     """Return a lab's row as a criterion: open where it is, not published, or not handed in at all."""
     result = row.result if row else None
     known = result is not None and result.status == "graded"

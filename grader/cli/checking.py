@@ -45,7 +45,7 @@ GIT_TIMEOUT_S = 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Check:
+class CheckSession:
     """What all packages of one command line share. `out` is None if the results are only shown; `told` holds what was
     said about git's state already, for another package."""
 
@@ -84,7 +84,7 @@ def check_packages(
         say_choice(chosen[0])
         source = str(Path(chosen[0].source).resolve())
         return watch_package(source, chosen[0].rubric, options, out=out, as_json=as_json)
-    check = Check(
+    check = CheckSession(
         options=options, out=out, as_json=as_json, staged=staged, several=len(chosen) > 1, full=full
     )
     return worst(check_package(one, check) for one in chosen)
@@ -96,7 +96,7 @@ def say_choice(chosen: Chosen) -> None:
         say_beside(chosen.words)
 
 
-def check_package(chosen: Chosen, check: Check) -> ExitCode:
+def check_package(chosen: Chosen, check: CheckSession) -> ExitCode:
     """Grade one package and print its report."""
     say_choice(chosen)
     options = check.options
@@ -128,7 +128,7 @@ def check_package(chosen: Chosen, check: Check) -> ExitCode:
 def _print_check(
     result: GradingResult,
     chosen: Chosen,
-    check: Check,
+    check: CheckSession,
     found: GitStatus,
     *,
     unrun: str,
@@ -252,7 +252,7 @@ def _what_next(result: GradingResult, chosen: Chosen, report: Path | None) -> It
         yield "On each save: grader check --watch"
 
 
-def _remarks(found: GitStatus, check: Check) -> Iterator[RenderableType]:
+def _remarks(found: GitStatus, check: CheckSession) -> Iterator[RenderableType]:
     """Yield what git said and has not been said yet, for another package."""
     points = tuple(point for point in found.points if point.text not in check.told)
     summary = found.summary if found.summary not in check.told else ""

@@ -21,14 +21,20 @@ from grader.files import temporary_folder
 from grader.integrations.ci_results import (
     OF_CODE,
     STUDENTS,
-    Graded,
-    Outcome,
+    JobResult,
+    JobStatus,
     add_forms,
     clear,
     describe_outcome,
     keep,
 )
-from grader.integrations.ci_systems import GitHub, GitLab, Settings, read_settings, with_pass_mark
+from grader.integrations.ci_systems import (
+    GitHubRunner,
+    GitLabRunner,
+    JobSettings,
+    read_settings,
+    with_pass_mark,
+)
 from grader.judging.summary import overall_status, total_fields
 from grader.model.result import GradingResult
 from grader.report.sentences import rubric_words, without_sandbox
@@ -45,9 +51,9 @@ def run_job(system: str) -> ExitCode:
     """Run the job of `github` or `gitlab`; it fails as `GRADER_FAIL_ON` says."""
     variables = dict(os.environ)
     teller = (
-        GitHub(variables)
+        GitHubRunner(variables)
         if system == "github"
-        else GitLab(Path(variables.get("GRADER_OUT") or "grader-results"))
+        else GitLabRunner(Path(variables.get("GRADER_OUT") or "grader-results"))
     )
     try:
         settings = read_settings(variables)
@@ -67,7 +73,7 @@ def run_job(system: str) -> ExitCode:
     return code if graded.fails else ExitCode.PASSED
 
 
-def _grade(settings: Settings) -> Graded:
+def _grade(settings: JobSettings) -> JobResult:
     settings.check_attempt()
     chosen = _choose(settings)
     source, rubric = chosen.source, with_pass_mark(chosen.rubric, settings.mark)
@@ -98,7 +104,7 @@ def _grade(settings: Settings) -> Graded:
     return _outcome_of(result, rubric, settings, prefix)
 
 
-def _choose(settings: Settings) -> Chosen:
+def _choose(settings: JobSettings) -> Chosen:
     try:
         return only(choose_all(settings.path, settings.lab, settings.package))
     except RubricError:
@@ -124,7 +130,7 @@ def _prefix(result: GradingResult, source: Path) -> str:
     return package_prefix(result, source if cloned and source.is_dir() else Path.cwd()) or ""
 
 
-def _outcome_of(result: GradingResult, rubric: LoadedRubric, settings: Settings, prefix: str) -> Graded:
+def _outcome_of(result: GradingResult, rubric: LoadedRubric, settings: JobSettings, prefix: str) -> JobResult:
     counted = _counting_result(result, rubric.rubric, static=settings.static)
     error = result.error if result.status == "error" else None
     lab = rubric.rubric
@@ -134,9 +140,9 @@ def _outcome_of(result: GradingResult, rubric: LoadedRubric, settings: Settings,
     if settings.attempts is not None:
         message = f"attempt {settings.attempt} of {settings.attempts}: {message}"
     students = error is not None and error.kind in STUDENTS
-    return Graded(
+    return JobResult(
         outcome=outcome,
-        fails=outcome in settings.fail_on or (students and Outcome.BELOW in settings.fail_on),
+        fails=outcome in settings.fail_on or (students and JobStatus.BELOW in settings.fail_on),
         message=message,
         hint=hint,
         result=result,

@@ -19,10 +19,10 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.classes.batch.folder import BatchFolder
-from grader.classes.batch.job import Outcome
-from grader.classes.batch.regrade import CHANGES, Regraded, State
+from grader.classes.batch.job import SubmissionOutcome
+from grader.classes.batch.regrade import CHANGES, CriterionState, Regraded
 from grader.classes.batch.run import GRADEBOOK, INDEX, RESULTS, Watcher
-from grader.classes.gradebook import Row
+from grader.classes.gradebook import GradebookRow
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.cli.output import say, say_json
 from grader.model.batch import MISSING, ROSTER
@@ -72,7 +72,7 @@ class BatchProgress:
         """The submission of that id begins."""
         self.running[name] = self.clock()
 
-    def ended(self, outcome: Outcome) -> None:
+    def ended(self, outcome: SubmissionOutcome) -> None:
         """A submission has its outcome."""
         self.running.pop(outcome.id, None)
         self.graded += outcome.status == "graded"
@@ -131,14 +131,14 @@ def list_attention(folder: BatchFolder) -> Iterator[str]:
             yield words.format(count=found[state], folder=folder.path, overrides=folder.path / OVERRIDES)
 
 
-def _name(row: Row) -> str:
+def _name(row: GradebookRow) -> str:
     """Return the id, with the line of the roster unless the error names it already."""
     error = row.result.error
     told = error is not None and error.kind == ROSTER
     return row.entry.id if told or not row.entry.where else f"{row.entry.id} ({row.entry.where})"
 
 
-def _row_state(row: Row) -> str:
+def _row_state(row: GradebookRow) -> str:
     """Return the result's status, or `missing` if there is none yet, or `manual` if only people's criteria are open."""
     result = row.result
     if result.error is not None and result.error.kind == MISSING:
@@ -148,11 +148,11 @@ def _row_state(row: Row) -> str:
     return result.status
 
 
-def _waiting(row: Row) -> tuple[CriterionResult, ...]:
+def _waiting(row: GradebookRow) -> tuple[CriterionResult, ...]:
     return tuple(c for c in row.result.criteria if c.status in OPEN and c.counts)
 
 
-def _open(row: Row) -> str:
+def _open(row: GradebookRow) -> str:
     names = [f"{c.id} ({OPEN[c.status]})" for c in _waiting(row)]
     return first_few(names, CRITERIA_SHOWN)
 
@@ -175,7 +175,7 @@ class PlainClass(BatchProgress):
         super().__init__()
         self.stream = stream
 
-    def ended(self, outcome: Outcome) -> None:
+    def ended(self, outcome: SubmissionOutcome) -> None:
         """Print what became of it, and what is left."""
         super().ended(outcome)
         step = self.total // 100 if self.total > MANY else 1
@@ -191,7 +191,7 @@ class LiveClass(BatchProgress):
         super().__init__()
         self.console = console
 
-    def ended(self, outcome: Outcome) -> None:
+    def ended(self, outcome: SubmissionOutcome) -> None:
         """Leave a line if a person has to look at it."""
         super().ended(outcome)
         if outcome.status != "graded" or outcome.message:
@@ -211,7 +211,7 @@ class LiveClass(BatchProgress):
         return Group(table, *rest, below)
 
 
-def outcome_line(outcome: Outcome) -> str:
+def outcome_line(outcome: SubmissionOutcome) -> str:
     """`ada  85/100  graded  8.1 s`."""
     points = f"{number(outcome.points)}/{number(outcome.max_points)}" if outcome.status != "error" else "-"
     status = f"{outcome.status}, complete already" if outcome.kept else outcome.status
@@ -301,7 +301,7 @@ def _regraded_json(one: Regraded) -> dict[str, object]:
     }
 
 
-def _state_json(state: State | None) -> dict[str, object] | None:
+def _state_json(state: CriterionState | None) -> dict[str, object] | None:
     return {"status": state.status.value, "points": state.points} if state else None
 
 
@@ -343,5 +343,5 @@ def _regraded_lines(batch: BatchFolder, regraded: Sequence[Regraded]) -> Iterato
     yield f"{batch.path / GRADEBOOK}  {batch.path / CHANGES}"
 
 
-def _status_and_points(state: State | None) -> str:
+def _status_and_points(state: CriterionState | None) -> str:
     return f"{state.status.value} {number(state.points)}" if state else "-"

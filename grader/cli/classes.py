@@ -18,8 +18,8 @@ from grader.classes.batch.folder import BatchFolder, open_batch
 from grader.classes.batch.job import Executor, LocalExecutor
 from grader.classes.batch.run import RESULTS, BatchOptions, run_batch
 from grader.classes.course import (
+    LabMarks,
     LabStatus,
-    Marks,
     attempt_folder,
     book_of,
     combine,
@@ -29,11 +29,11 @@ from grader.classes.course import (
     status_of,
     with_late_days,
 )
-from grader.classes.feedback.forms import FORMS, Settings
+from grader.classes.feedback.forms import FORMS, SendSettings
 from grader.classes.feedback.publish import publication_remarks, published_rows, read_published
-from grader.classes.feedback.send import Wanted as WantedFeedback
+from grader.classes.feedback.send import Recipients as WantedFeedback
 from grader.classes.gradebook import write_gradebook
-from grader.classes.gradebook.table import Book, Form, Row
+from grader.classes.gradebook.table import Book, GradebookFormat, GradebookRow
 from grader.classes.roster import Local, Roster, read_roster
 from grader.classes.roster.entries import parse_time
 from grader.classes.roster.platforms import is_download, unpack_download
@@ -167,12 +167,12 @@ def executor(options: BatchOptions, exchange: str | None) -> Executor:
 
 
 STDOUT = "-"
-ENDINGS: dict[Form, str] = {"csv": ".csv", "jsonl": ".jsonl", "xlsx": ".xlsx"}
+ENDINGS: dict[GradebookFormat, str] = {"csv": ".csv", "jsonl": ".jsonl", "xlsx": ".xlsx"}
 COLUMNS = ("lab", "due", "graded", "open", "not graded", "published", "sent")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
+class CourseRequest:
     """What the command line of `grader course grade` says."""
 
     jobs: int | None
@@ -188,7 +188,7 @@ class WantedBook:
     """What the command line says of a gradebook. `wide`: with a column for each criterion of a class, or each lab of a
     course."""
 
-    form: Form
+    form: GradebookFormat
     out: str
     template: Path | None
     column: str
@@ -196,7 +196,7 @@ class WantedBook:
     drafts: bool
 
 
-def grade_lab(path: Path, name: str, asked: Asked) -> ExitCode:
+def grade_lab(path: Path, name: str, asked: CourseRequest) -> ExitCode:
     """Grade one lab of a course, print what came of it, and return the exit code."""
     course = load_course(path)
     lab, source = course.lab(name), course.rubric(name)
@@ -240,7 +240,7 @@ def publish_lab(path: Path, name: str, *, dry_run: bool, author: str | None) -> 
     form = course.course.feedback
     if form is None or dry_run:
         return published
-    settings = Settings(folder=folder, told=say_beside)
+    settings = SendSettings(folder=folder, told=say_beside)
     sent = publishing.send(folder, FORMS[form], settings, WantedFeedback(), drafts=False, dry_run=False)
     return sent if sent is not ExitCode.PASSED else published
 
@@ -310,7 +310,7 @@ def write_class_gradebook(folder: Path, wanted: WantedBook) -> ExitCode:
 
 
 def _write_book(
-    book: Book, rows: Iterable[Row], usual: Path, wanted: WantedBook, more: Iterable[str]
+    book: Book, rows: Iterable[GradebookRow], usual: Path, wanted: WantedBook, more: Iterable[str]
 ) -> ExitCode:
     """Write a gradebook to `--out`, else to its usual place, and print its remarks and `more` on stderr."""
     target = Path(wanted.out) if wanted.out else usual
@@ -337,7 +337,7 @@ def _write_book(
     return ExitCode.PASSED
 
 
-def _drafts(course: CourseFile, marks: Sequence[Marks], *, drafts: bool) -> Iterator[str]:
+def _drafts(course: CourseFile, marks: Sequence[LabMarks], *, drafts: bool) -> Iterator[str]:
     for one in marks:
         if one.drafts and not drafts:
             command = f"grader course publish {course.path} {one.name}"

@@ -19,7 +19,7 @@ from rich.text import Text
 
 from grader.arena.sandbox import is_shown
 from grader.arena.sandbox_files import missing_packages
-from grader.cli.host_support import Row, platform_rows, sandbox_rows
+from grader.cli.host_support import DoctorRow, platform_rows, sandbox_rows
 from grader.errors import RosMissing
 from grader.host_programs import LISTS, LOCALHOST, LOCALHOST_HINT, resolves
 from grader.installable import install_command
@@ -51,7 +51,7 @@ GIB = 1 << 30
 MIN_MEMORY_BYTES, MIN_DISK_BYTES = GIB, GIB
 
 
-def diagnose() -> tuple[Row, ...]:
+def diagnose() -> tuple[DoctorRow, ...]:
     """Return every row, in the order in which things are needed; on other systems than Linux, only what helps there."""
     if system():
         return (_python(), _git(), *platform_rows(), *_resources(), _encoding())
@@ -68,19 +68,21 @@ def diagnose() -> tuple[Row, ...]:
     )
 
 
-def diagnose_rubric(loaded: LoadedRubric) -> tuple[Row, ...]:
+def diagnose_rubric(loaded: LoadedRubric) -> tuple[DoctorRow, ...]:
     """Return a row for each ROS package that the rubric's programs and types come from, and for what it `needs`."""
     packages, own, needs = ros_packages(), loaded.rubric.packages, loaded.rubric.needs
     needed = _needed_by_package(loaded)
     rows = [_package(name, needed[name], packages) for name in sorted(needed) if name not in own]
-    brought = [Row(name=n, state="ok", detail="beside the rubric; built when the lab is graded") for n in own]
+    brought = [
+        DoctorRow(name=n, state="ok", detail="beside the rubric; built when the lab is graded") for n in own
+    ]
     return (*rows, *brought, *map(_need, look_for(ros=(), apt=needs.apt, pip=needs.pip)))
 
 
-def _need(need: Need) -> Row:
+def _need(need: Need) -> DoctorRow:
     state: Literal["ok", "missing"] = "ok" if need.here else "missing"
     detail = f"the rubric needs it ({need.kind})" + ("" if need.here else ": not installed")
-    return Row(name=need.name, state=state, detail=detail, fix="" if need.here else need.install)
+    return DoctorRow(name=need.name, state=state, detail=detail, fix="" if need.here else need.install)
 
 
 def _needed_by_package(loaded: LoadedRubric) -> dict[str, list[str]]:
@@ -109,24 +111,24 @@ def _needed_by_package(loaded: LoadedRubric) -> dict[str, list[str]]:
     return found
 
 
-def _package(name: str, asked: Sequence[str], packages: RosPackages) -> Row:
+def _package(name: str, asked: Sequence[str], packages: RosPackages) -> DoctorRow:
     folder = packages.folders.get(name)
     wanted = f"for {join_words(asked)}" if asked else "which the rubric needs"
     if folder is None:
-        return Row(
+        return DoctorRow(
             name=name,
             state="missing",
             detail=f"not installed, {wanted}",
             fix=install_command(name, _distro(packages.ros)),
         )
     if folder.is_relative_to(STANDINS):
-        return Row(name=name, state="ok", detail=f"the grader's stand-in, {wanted}")
+        return DoctorRow(name=name, state="ok", detail=f"the grader's stand-in, {wanted}")
     if packages.ros is not None and not is_shown(folder, packages.ros):
         fix = "install its workspace below /opt (catkin_make install), and name that setup.bash in $GRADER_ROS_SETUP"
-        return Row(
+        return DoctorRow(
             name=name, state="missing", detail=f"{folder} is hidden from the sandbox, {wanted}", fix=fix
         )
-    return Row(name=name, state="ok", detail=f"{folder}, {wanted}")
+    return DoctorRow(name=name, state="ok", detail=f"{folder}, {wanted}")
 
 
 def _distro(ros: RosInstallation | None) -> str:
@@ -134,44 +136,44 @@ def _distro(ros: RosInstallation | None) -> str:
     return ros.distro if ros is not None and ros.kind == "setup" else ""
 
 
-def _python() -> Row:
-    return Row(name="Python", state="ok", detail=f"{platform.python_version()} ({sys.executable})")
+def _python() -> DoctorRow:
+    return DoctorRow(name="Python", state="ok", detail=f"{platform.python_version()} ({sys.executable})")
 
 
-def _programs() -> Iterator[Row]:
+def _programs() -> Iterator[DoctorRow]:
     for name, package in PROGRAMS.items():
         path = shutil.which(name)
         if path:
-            yield Row(name=name, state="ok", detail=path)
+            yield DoctorRow(name=name, state="ok", detail=path)
         else:
-            yield Row(name=name, state="missing", detail="not found", fix=f"apt-get install {package}")
+            yield DoctorRow(name=name, state="missing", detail="not found", fix=f"apt-get install {package}")
 
 
-def _git() -> Row:
+def _git() -> DoctorRow:
     path = shutil.which("git")
     fix = "" if path else "https://git-scm.com/downloads"
-    return Row(name="git", state="ok" if path else "limited", detail=path or "not found", fix=fix)
+    return DoctorRow(name="git", state="ok" if path else "limited", detail=path or "not found", fix=fix)
 
 
-def _ros() -> Iterator[Row]:
+def _ros() -> Iterator[DoctorRow]:
     try:
         ros = find_ros()
     except RosMissing as error:
-        yield Row(name="ROS 1", state="missing", detail=error.message, fix=error.hint)
+        yield DoctorRow(name="ROS 1", state="missing", detail=error.message, fix=error.hint)
         return
     if ros is None:
-        yield Row(name="ROS 1", state="missing", detail="not found", fix=INSTALL_HINT)
+        yield DoctorRow(name="ROS 1", state="missing", detail="not found", fix=INSTALL_HINT)
         return
-    yield Row(name="ROS 1", state="ok", detail=ros.label)
+    yield DoctorRow(name="ROS 1", state="ok", detail=ros.label)
     for program in ROS_PROGRAMS:
         path = ros.program(program)
         fix = "" if path else INSTALL_HINT
-        yield Row(name=program, state="ok" if path else "missing", detail=path or "not found", fix=fix)
+        yield DoctorRow(name=program, state="ok" if path else "missing", detail=path or "not found", fix=fix)
     yield from _modules(ros)
     yield _standins(ros)
 
 
-def _modules(ros: RosInstallation) -> Iterator[Row]:
+def _modules(ros: RosInstallation) -> Iterator[DoctorRow]:
     """Look for ROS's Python packages with its own interpreter."""
     command = [ros.python, "-c", FIND_MODULES, *ROS_MODULES]
     try:
@@ -186,45 +188,47 @@ def _modules(ros: RosInstallation) -> Iterator[Row]:
             timeout=20,
         )
     except (OSError, subprocess.SubprocessError) as error:
-        yield Row(name="ROS's Python", state="missing", detail=f"{ros.python}: {error}", fix=INSTALL_HINT)
+        yield DoctorRow(
+            name="ROS's Python", state="missing", detail=f"{ros.python}: {error}", fix=INSTALL_HINT
+        )
         return
     missing = done.stdout.split()
-    yield Row(name="ROS's Python", state="ok", detail=ros.python)
+    yield DoctorRow(name="ROS's Python", state="ok", detail=ros.python)
     for module, package in ROS_MODULES.items():
         if module in missing:
             fix = f"apt-get install {package}" if ros.kind == "debian" else INSTALL_HINT
-            yield Row(name=module, state="missing", detail=f"{ros.python} cannot import it", fix=fix)
+            yield DoctorRow(name=module, state="missing", detail=f"{ros.python} cannot import it", fix=fix)
         else:
-            yield Row(name=module, state="ok", detail="found")
+            yield DoctorRow(name=module, state="ok", detail="found")
 
 
-def _standins(ros: RosInstallation) -> Row:
+def _standins(ros: RosInstallation) -> DoctorRow:
     missing = missing_packages(ros)
     detail = f"for {', '.join(missing)}, which this ROS lacks" if missing else "not needed for any package"
-    return Row(name="stand-ins", state="ok", detail=detail)
+    return DoctorRow(name="stand-ins", state="ok", detail=detail)
 
 
-def _search_paths() -> Row:
+def _search_paths() -> DoctorRow:
     """Look for entries that are not absolute paths: they mean the current folder, which may be a student's."""
     odd = [name for name in LISTS if not all(map(os.path.isabs, os.environ.get(name, "/").split(os.pathsep)))]
     if not odd:
-        return Row(name="search paths", state="ok", detail="every entry is an absolute path")
+        return DoctorRow(name="search paths", state="ok", detail="every entry is an absolute path")
     detail = f"{', '.join(odd)}: an entry means the current folder, so programs load files from there"
     fix = "write ${NAME:+$NAME:} before what you add, without an empty entry"
-    return Row(name="search paths", state="limited", detail=detail, fix=fix)
+    return DoctorRow(name="search paths", state="limited", detail=detail, fix=fix)
 
 
-def _user() -> Row:
+def _user() -> DoctorRow:
     if user_id() == 0:
-        return Row(
+        return DoctorRow(
             name="user", state="ok", detail="root; students' code runs as an unprivileged user in the sandbox"
         )
-    return Row(name="user", state="ok", detail=f"uid {user_id()}")
+    return DoctorRow(name="user", state="ok", detail=f"uid {user_id()}")
 
 
-def _resources() -> Iterator[Row]:
+def _resources() -> Iterator[DoctorRow]:
     number = cores()
-    yield Row(
+    yield DoctorRow(
         name="cores",
         state="ok" if number >= 2 else "limited",
         detail=f"{number}" if number >= 2 else "1: runs take turns, and rates may be inconclusive",
@@ -236,31 +240,31 @@ def _resources() -> Iterator[Row]:
     yield _amount("disk", shutil.disk_usage(folder).free, MIN_DISK_BYTES, f"GiB free in {folder}")
 
 
-def _amount(name: str, size_bytes: int, least_bytes: int, unit: str) -> Row:
+def _amount(name: str, size_bytes: int, least_bytes: int, unit: str) -> DoctorRow:
     enough = size_bytes >= least_bytes
     detail = f"{size_bytes / GIB:.1f} {unit}" + (
         "" if enough else f"; {least_bytes / GIB:.0f} GiB is recommended"
     )
-    return Row(name=name, state="ok" if enough else "limited", detail=detail)
+    return DoctorRow(name=name, state="ok" if enough else "limited", detail=detail)
 
 
-def _hostname() -> Row:
+def _hostname() -> DoctorRow:
     """Look up the names by which ROS nodes look for their own machine."""
     name = socket.gethostname()
     if not resolves(LOCALHOST):
         detail = "localhost does not resolve: without a sandbox, roslaunch cannot start anything"
-        return Row(name="host name", state="limited", detail=detail, fix=LOCALHOST_HINT)
+        return DoctorRow(name="host name", state="limited", detail=detail, fix=LOCALHOST_HINT)
     if resolves(name):
-        return Row(name="host name", state="ok", detail=f"{name} resolves")
+        return DoctorRow(name="host name", state="ok", detail=f"{name} resolves")
     fix = f"echo '127.0.1.1 {name}' >> /etc/hosts"
-    return Row(name="host name", state="limited", detail=f"{name} does not resolve", fix=fix)
+    return DoctorRow(name="host name", state="limited", detail=f"{name} does not resolve", fix=fix)
 
 
-def _encoding() -> Row:
+def _encoding() -> DoctorRow:
     name = locale.getpreferredencoding(do_setlocale=False)
     if name.lower().replace("-", "") == "utf8":
-        return Row(name="encoding", state="ok", detail=name)
-    return Row(
+        return DoctorRow(name="encoding", state="ok", detail=name)
+    return DoctorRow(
         name="encoding",
         state="limited",
         detail=f"{name}: reports use plain characters",
@@ -268,7 +272,7 @@ def _encoding() -> Row:
     )
 
 
-def print_rows(rows: Sequence[Row], stream: IO[str]) -> None:
+def print_rows(rows: Sequence[DoctorRow], stream: IO[str]) -> None:
     """Print a row for each thing that grading needs, and what is missing."""
     grid = Table.grid(padding=(0, 2, 0, 0))
     for _ in range(2):

@@ -24,7 +24,7 @@ from grader.rubric.own_checks import known_checks
 from grader.rubric.schema import REQUIRED, inner_records, parameters
 from grader.wording import did_you_mean, number
 
-Line = tuple[str, int]
+Paragraph = tuple[str, int]
 """A paragraph and how far it is indented."""
 
 SLIPS: tuple[tuple[tuple[str, ...], tuple[RepairKind, ...]], ...] = (
@@ -83,7 +83,7 @@ def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]
     )
 
 
-def _criterion_lines(rubric: Rubric, criterion: Criterion) -> Iterator[Line]:
+def _criterion_lines(rubric: Rubric, criterion: Criterion) -> Iterator[Paragraph]:
     yield f"{rubric.id}/{criterion.id}: {criterion.title}", 0
     yield f"{worth_of(criterion, rubric)}, judged by the check {criterion.check}", 2
     if criterion.hint:
@@ -111,7 +111,7 @@ def worth_of(criterion: Criterion, rubric: Rubric) -> str:
     return ", ".join(said)
 
 
-def _check_lines(check: Check, *, more: str = "") -> Iterator[Line]:
+def _check_lines(check: Check, *, more: str = "") -> Iterator[Paragraph]:
     """Yield all about a check; with `more`, the command that prints all, only what helps to fix it."""
     yield f"{check.name}: {check.title}", 0
     what, *measured, fix = HEADINGS
@@ -136,7 +136,7 @@ def _check_lines(check: Check, *, more: str = "") -> Iterator[Line]:
     yield "", 0
 
 
-def _section(check: Check, heading: str) -> Iterator[Line]:
+def _section(check: Check, heading: str) -> Iterator[Paragraph]:
     if heading in check.sections:
         yield "", 0
         yield heading, 0
@@ -144,7 +144,7 @@ def _section(check: Check, heading: str) -> Iterator[Line]:
             yield paragraph, 2
 
 
-def _parameter_lines(record: type[Record], heading: str) -> Iterator[Line]:
+def _parameter_lines(record: type[Record], heading: str) -> Iterator[Paragraph]:
     rows = parameters(record)
     if rows:
         yield "", 0
@@ -154,6 +154,6 @@ def _parameter_lines(record: type[Record], heading: str) -> Iterator[Line]:
         yield f"{one.name} ({one.type}; {default}): {one.meaning}".replace("`", ""), 2
 
 
-def _print(lines: Iterator[Line]) -> None:
+def _print(lines: Iterator[Paragraph]) -> None:
     parts = [Padding(Text(visible(text) or " "), (0, 0, 0, indent)) for text, indent in lines]
     emit(open_console(sys.stdout), parts)

@@ -15,7 +15,7 @@ from typing import Literal
 from pydantic import AliasChoices, Field
 
 from grader.arena.control_groups import describe, find_cgroups, has_memory
-from grader.arena.sandbox import NAMESPACES, ULIMIT_HINT, choose, refused_limits
+from grader.arena.sandbox import NAMESPACES, ULIMIT_HINT, choose_sandbox, refused_limits
 from grader.cli.output import say_beside
 from grader.errors import GraderError, HostError, RosMissing
 from grader.host_programs import HOST_ENV, find_host_program
@@ -51,7 +51,7 @@ WITHOUT = "check --static, judge, report, explain, labs, rubric validate"
 LACKS = "grade, record, and check beyond the files: ROS 1 nodes run on Linux"
 
 
-class Row(Record):
+class DoctorRow(Record):
     """A line of `grader doctor`. `missing`: not everything can be graded; `limited`: it can, but less well."""
 
     name: str
@@ -60,7 +60,7 @@ class Row(Record):
     fix: str = Field(default="", validation_alias=AliasChoices("mend", "fix"), serialization_alias="mend")
 
 
-def sandbox_rows() -> Iterator[Row]:
+def sandbox_rows() -> Iterator[DoctorRow]:
     """Return a row for each part, then one for the sandbox that `--sandbox auto` chooses."""
     yield from map(_program, PROGRAMS)
     unshare = find_host_program("unshare") or "unshare"
@@ -72,14 +72,14 @@ def sandbox_rows() -> Iterator[Row]:
     yield _chosen_sandbox()
 
 
-def _program(name: str) -> Row:
+def _program(name: str) -> DoctorRow:
     path, package = find_host_program(name), PROGRAMS[name]
     if path is None:
-        return Row(name=name, state="limited", detail="not found", fix=f"apt-get install {package}")
-    return Row(name=name, state="ok", detail=path)
+        return DoctorRow(name=name, state="limited", detail="not found", fix=f"apt-get install {package}")
+    return DoctorRow(name=name, state="ok", detail=path)
 
 
-def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
+def _probe(name: str, command: Sequence[str], *, drop: bool) -> DoctorRow:
     """Return whether namespaces of that kind can be made, by the user who needs them."""
     setpriv = find_host_program("setpriv") or "setpriv"
     unprivileged = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
@@ -98,8 +98,8 @@ def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
     except (OSError, subprocess.TimeoutExpired) as error:
         reason = str(error)
     if not reason:
-        return Row(name=name, state="ok", detail="namespaces can be made")
-    return Row(name=name, state="limited", detail=reason[:200], fix=_switch())
+        return DoctorRow(name=name, state="ok", detail="namespaces can be made")
+    return DoctorRow(name=name, state="limited", detail=reason[:200], fix=_switch())
 
 
 def _switch() -> str:
@@ -111,41 +111,41 @@ def _switch() -> str:
     return CONTAINER
 
 
-def _inherited_rows() -> Iterator[Row]:
+def _inherited_rows() -> Iterator[DoctorRow]:
     from grader.arena.inherited_limits import group, limits  # noqa: PLC0415 - other systems lack what it imports
 
     for limit in (*limits(), *group()):
         detail = f"{limit.what}: {limit.found}; a run needs {limit.needed}"
-        yield Row(
+        yield DoctorRow(
             name=limit.name, state="missing" if limit.command else "ok", detail=detail, fix=limit.command
         )
 
 
-def _limits_of_trees() -> Row:
+def _limits_of_trees() -> DoctorRow:
     if find_cgroups().memory is not None:
-        return Row(name="limits", state="ok", detail=describe())
+        return DoctorRow(name="limits", state="ok", detail=describe())
     others = DELEGATE if has_memory() else OLD_GROUPS
-    return Row(
+    return DoctorRow(
         name="limits", state="limited", detail=describe(), fix=ROOTS_GROUPS if user_id() == 0 else others
     )
 
 
-def _limits_of_processes() -> Row:
+def _limits_of_processes() -> DoctorRow:
     refused = refused_limits()
     if not refused:
-        return Row(name="ulimit", state="ok", detail="limits of students' processes can be set")
-    return Row(name="ulimit", state="missing", detail=refused, fix=ULIMIT_HINT)
+        return DoctorRow(name="ulimit", state="ok", detail="limits of students' processes can be set")
+    return DoctorRow(name="ulimit", state="missing", detail=refused, fix=ULIMIT_HINT)
 
 
-def _chosen_sandbox() -> Row:
+def _chosen_sandbox() -> DoctorRow:
     try:
-        sandbox = choose("auto")
+        sandbox = choose_sandbox("auto")
     except HostError as error:
-        return Row(name="sandbox", state="missing", detail=error.message, fix=error.hint)
+        return DoctorRow(name="sandbox", state="missing", detail=error.message, fix=error.hint)
     if sandbox.bubblewrap:
-        return Row(name="sandbox", state="ok", detail=f"--sandbox auto takes {sandbox.label}")
+        return DoctorRow(name="sandbox", state="ok", detail=f"--sandbox auto takes {sandbox.label}")
     detail = f"{without_sandbox(sandbox.label)} --sandbox require refuses."
-    return Row(name="sandbox", state="limited", detail=detail, fix="fix the rows above")
+    return DoctorRow(name="sandbox", state="limited", detail=detail, fix="fix the rows above")
 
 
 def warn_without_sandbox(mode: SandboxMode, rubric: LoadedRubric | None = None) -> None:
@@ -156,7 +156,7 @@ def warn_without_sandbox(mode: SandboxMode, rubric: LoadedRubric | None = None) 
     with suppress(GraderError):
         if (rubric is not None and not needs_ros(rubric)) or why_nodes_cannot_run():
             return
-        words = without_sandbox(choose(mode).label)
+        words = without_sandbox(choose_sandbox(mode).label)
         if words:
             say_beside(words)
 
@@ -175,11 +175,11 @@ def how_to_run_nodes() -> tuple[str, str]:
     return here, f"For the rest: {way}; see {PAGE}."
 
 
-def platform_rows() -> Iterator[Row]:
+def platform_rows() -> Iterator[DoctorRow]:
     """Return what can and cannot be done on a system other than Linux."""
-    yield Row(name=system(), state="ok", detail=f"can: {WITHOUT}")
+    yield DoctorRow(name=system(), state="ok", detail=f"can: {WITHOUT}")
     way = WAYS.get(system(), WAYS["macOS"])
-    yield Row(name="ROS 1", state="missing", detail=f"cannot: {LACKS}", fix=f"{way}; see {PAGE}")
+    yield DoctorRow(name="ROS 1", state="missing", detail=f"cannot: {LACKS}", fix=f"{way}; see {PAGE}")
 
 
 def require_room(*, gradings: int) -> None:

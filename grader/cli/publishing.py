@@ -12,12 +12,20 @@ from typing import cast
 from grader.classes.batch.folder import BatchFolder, open_batch
 from grader.classes.feedback import publish as publishing
 from grader.classes.feedback.forges import Comments
-from grader.classes.feedback.forms import FORMS, Form, Settings
-from grader.classes.feedback.publish import Publishing, Step, plan, read_published, refuse_other_rubric
-from grader.classes.feedback.send import Delivery, Failure, Selection, Wanted, deliver, faults, open_selection
+from grader.classes.feedback.forms import FORMS, FeedbackForm, SendSettings
+from grader.classes.feedback.publish import Publishing, PublishStep, plan, read_published, refuse_other_rubric
+from grader.classes.feedback.send import (
+    Delivery,
+    Recipients,
+    Selection,
+    SendFailure,
+    deliver,
+    faults,
+    open_selection,
+)
 from grader.classes.review.serve import git_user
 from grader.classes.review.session import ReviewSession, open_session
-from grader.classes.review.student_requests import Asked, fetch, rows_of, waiting, write_requests
+from grader.classes.review.student_requests import RequestRow, fetch, rows_of, waiting, write_requests
 from grader.classes.roster.entries import parse_time
 from grader.cli.output import say, say_beside, say_document, say_json
 from grader.errors import ExitCode, NotSent, UsageError
@@ -55,17 +63,17 @@ def publish(
     return _publish_code(steps)
 
 
-def _publish_code(steps: Sequence[Step]) -> ExitCode:
+def _publish_code(steps: Sequence[PublishStep]) -> ExitCode:
     if any(step.failed or (step.state == "draft" and not _waits(step)) for step in steps):
         return ExitCode.NOT_GRADED
     return ExitCode.INCONCLUSIVE if any(step.state == "draft" for step in steps) else ExitCode.PASSED
 
 
-def _waits(step: Step) -> bool:
+def _waits(step: PublishStep) -> bool:
     return step.result is not None and step.result.status == "inconclusive"
 
 
-def _step_json(step: Step) -> dict[str, object]:
+def _step_json(step: PublishStep) -> dict[str, object]:
     return {
         "id": step.entry.id,
         "state": "failed" if step.failed else step.state,
@@ -75,7 +83,7 @@ def _step_json(step: Step) -> dict[str, object]:
     }
 
 
-def _step_lines(batch: BatchFolder, steps: Sequence[Step], *, dry_run: bool) -> Iterator[str]:
+def _step_lines(batch: BatchFolder, steps: Sequence[PublishStep], *, dry_run: bool) -> Iterator[str]:
     for step in steps:
         if step.failed:
             yield f"{step.entry.id}: not published: {step.why}"
@@ -105,7 +113,7 @@ def _step_lines(batch: BatchFolder, steps: Sequence[Step], *, dry_run: bool) -> 
         yield f"{batch.path / publishing.FILE}; grader feedback {batch.path} --form … returns it to the students"
 
 
-def check_options(form: Form, given: Mapping[str, bool]) -> None:
+def check_options(form: FeedbackForm, given: Mapping[str, bool]) -> None:
     """Raise UsageError for an option that the form does not take."""
     for name, is_given in given.items():
         if is_given and name not in form.options:
@@ -123,7 +131,13 @@ def parse_since(text: str | None) -> datetime | None:
 
 
 def send(
-    folder: Path, form: Form, settings: Settings, wanted: Wanted, *, drafts: bool, dry_run: bool
+    folder: Path,
+    form: FeedbackForm,
+    settings: SendSettings,
+    wanted: Recipients,
+    *,
+    drafts: bool,
+    dry_run: bool,
 ) -> ExitCode:
     """Return a class's feedback, or show one of it; print what became of each student's."""
     batch = open_batch(folder)
@@ -145,7 +159,9 @@ def send(
     return ExitCode.NOT_GRADED if delivery.failures else ExitCode.PASSED
 
 
-def _show(form: Form, selection: Selection, failures: Sequence[Failure], settings: Settings) -> ExitCode:
+def _show(
+    form: FeedbackForm, selection: Selection, failures: Sequence[SendFailure], settings: SendSettings
+) -> ExitCode:
     failed = {failure.id for failure in failures}
     first = next((one for one in selection.todo if one.entry.id not in failed), None)
     if first is not None:
@@ -163,7 +179,7 @@ def _show(form: Form, selection: Selection, failures: Sequence[Failure], setting
     return ExitCode.NOT_GRADED if failures else ExitCode.PASSED
 
 
-def _end(form: Form, selection: Selection, delivery: Delivery) -> None:
+def _end(form: FeedbackForm, selection: Selection, delivery: Delivery) -> None:
     _say_failures(delivery.failures)
     sent = [f"{len(delivery.sent)} sent by {form.name}"]
     say(", ".join([*sent, *_others(selection), *_failure_words(delivery.failures)]))
@@ -171,7 +187,7 @@ def _end(form: Form, selection: Selection, delivery: Delivery) -> None:
         say(f"  not published: {first_few(selection.unpublished, NAMES_SHOWN)}")
 
 
-def _say_failures(failures: Sequence[Failure], what: str = "got nothing") -> None:
+def _say_failures(failures: Sequence[SendFailure], what: str = "got nothing") -> None:
     """Say each reason once, with all whom it concerns."""
     by_reason: dict[str, list[str]] = {}
     for failure in failures:
@@ -192,7 +208,7 @@ def _others(selection: Selection) -> Iterator[str]:
     return (f"{number(len(names))} {said}" for said, names in counts.items() if names)
 
 
-def _failure_words(failures: Sequence[Failure]) -> list[str]:
+def _failure_words(failures: Sequence[SendFailure]) -> list[str]:
     return [f"{len(failures)} could not be sent"] if failures else []
 
 
@@ -236,16 +252,16 @@ def list_requests(folder: Path, forge: str | None, label: str, *, as_json: bool)
     return ExitCode.NOT_GRADED if failures else ExitCode.PASSED
 
 
-def _fetch(session: ReviewSession, forge: str, label: str) -> list[Failure]:
+def _fetch(session: ReviewSession, forge: str, label: str) -> list[SendFailure]:
     """Write what is asked on a forge into the class's folder. Whose repository fails keeps the rows of before."""
-    sender = cast(Comments, FORMS[forge].open(Settings(folder=session.path, told=say_beside)))
+    sender = cast(Comments, FORMS[forge].open(SendSettings(folder=session.path, told=say_beside)))
     batch, path = session.submissions.batch(), session.path / f"requests-{forge}.csv"
-    rows, failures = list[Asked](), list[Failure]()
+    rows, failures = list[RequestRow](), list[SendFailure]()
     for entry in batch.run.entries:
         try:
             rows += fetch(sender, batch, entry, session.rubric.rubric.criteria, label)
         except NotSent as error:  # noqa: PERF203 - each repository has its own
             rows += rows_of(path, {entry.id})
-            failures.append(Failure(id=entry.id, message=error.message, hint=error.hint))
+            failures.append(SendFailure(id=entry.id, message=error.message, hint=error.hint))
     write_requests(path, rows)
     return failures

@@ -16,8 +16,8 @@ from rich.text import Text
 
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch
 from grader.classes.batch.renew_results import (
-    Judged,
-    Written,
+    JudgedFolder,
+    WrittenReports,
     figures_in,
     has_result,
     judge_all,
@@ -50,7 +50,7 @@ from grader.report.view import without_hidden
 from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import Rubric
-from grader.verification import Finding, compare, read_whole, result_folders, verify
+from grader.verification import PartFinding, compare, read_whole, result_folders, verify
 from grader.wording import first_few, number
 
 WORST_FIRST = (ExitCode.NOT_GRADED, ExitCode.BELOW_PASS_MARK, ExitCode.INCONCLUSIVE)
@@ -83,7 +83,7 @@ def judge_submissions(folders: Sequence[Path], loaded: LoadedRubric, out: str, j
     return next((code for code in WORST_FIRST if code in codes), ExitCode.PASSED)
 
 
-def _named_outcome(one: Judged) -> tuple[str, tuple[CriterionResult, ...] | str]:
+def _named_outcome(one: JudgedFolder) -> tuple[str, tuple[CriterionResult, ...] | str]:
     return one.folder.name, one.error if one.criteria is None else one.criteria
 
 
@@ -218,7 +218,7 @@ def compare_results(own: Path, official: Path) -> ExitCode:
     return _print_findings(mine, compare(read_whole(mine), read_whole(theirs)))
 
 
-def _print_findings(folder: Path, findings: Sequence[Finding]) -> ExitCode:
+def _print_findings(folder: Path, findings: Sequence[PartFinding]) -> ExitCode:
     wrong = any(finding.wrong for finding in findings)
     say(f"{folder}: {'something does not fit' if wrong else 'ok'}")
     for finding in sorted(findings, key=lambda finding: not finding.wrong):
@@ -264,7 +264,7 @@ def write_reports(folders: Sequence[Path], rubric: LoadedRubric) -> ExitCode:
     """Write every report of these submissions. NOT_GRADED if a result cannot be read."""
     if len(folders) == 1:
         digest = write_one(folders[0], rubric).rubric.digest
-        done = [Written(folder=folders[0], rubric_digest=digest)]
+        done = [WrittenReports(folder=folders[0], rubric_digest=digest)]
     else:
         done = list(write_all(folders, rubric, cores()))
     _say_others(

@@ -111,7 +111,7 @@ def _around_file(path: Path, rubric: str | None) -> Path | None:
     return around
 
 
-def _choose_named(path: Path, found: Found, rubric: LoadedRubric) -> Chosen:
+def _choose_named(path: Path, found: FoundPackages, rubric: LoadedRubric) -> Chosen:
     """Choose by the lab that was given. Of several packages the intake takes the lab's."""
     fitting = [c for c in found.packages if c.name.lower() == rubric.rubric.package.lower()]
     package = next(iter([*fitting, *found.packages]), None)
@@ -123,7 +123,7 @@ def _choose_named(path: Path, found: Found, rubric: LoadedRubric) -> Chosen:
     return Chosen(rubric=rubric, source=source, package=package.folder, words=words)
 
 
-def _choose_lab(path: Path, found: Found, lab: Lab) -> Chosen:
+def _choose_lab(path: Path, found: FoundPackages, lab: Lab) -> Chosen:
     folder = short_path(lab.package.folder)
     where = f" in {folder}" if folder != "." else ""
     words = f"Checking {lab.package.name}{where} against {lab.rubric}{f', {lab.why}' if lab.why else ''}"
@@ -136,7 +136,7 @@ def _choose_lab(path: Path, found: Found, lab: Lab) -> Chosen:
     )
 
 
-def _source(path: Path, found: Found, package: Candidate, rubric: Rubric) -> str:
+def _source(path: Path, found: FoundPackages, package: Candidate, rubric: Rubric) -> str:
     """Return the given folder if the package is in it and all of it was searched, else the package's folder; of a lab
     with several packages the folder above it, if others of them lie there."""
     inside = package.folder.resolve().is_relative_to(path.resolve())
@@ -158,7 +158,7 @@ class Lab:
     why: str
 
 
-def labs_of(found: Found) -> tuple[Lab, ...]:
+def labs_of(found: FoundPackages) -> tuple[Lab, ...]:
     """Return the labs of the packages that were found, one package each, nearest first.
 
     Raises UsageError if there is none: it says what is there, which labs there are, and which is most alike.
@@ -203,7 +203,7 @@ def _by_folder(candidate: Candidate) -> Lab | None:
     return Lab(rubric=rubric, package=candidate, why=f"the lab that its folder is named after ({name})")
 
 
-def _by_slip(found: Found) -> Iterator[Lab]:
+def _by_slip(found: FoundPackages) -> Iterator[Lab]:
     """Yield the lab whose package's name is all but that of the only package here, if there is just one such lab."""
     names = {c.name for c in found.packages}
     known = packages_of_labs()
@@ -214,7 +214,7 @@ def _by_slip(found: Found) -> Iterator[Lab]:
         yield Lab(rubric=rubric, package=found.packages[0], why=why)
 
 
-def _none(found: Found) -> UsageError:
+def _none(found: FoundPackages) -> UsageError:
     names = list(dict.fromkeys(c.name for c in found.packages))
     if not names:
         return _no_package(found)
@@ -230,7 +230,7 @@ def _none(found: Found) -> UsageError:
     return UsageError(f"no lab is for the package {listing(names)}", hint=hint)
 
 
-def _no_package(found: Found) -> UsageError:
+def _no_package(found: FoundPackages) -> UsageError:
     folder = short_path(found.root)
     if not found.whole:
         return UsageError(
@@ -305,7 +305,7 @@ _MADE_MARKS = ("CMakeCache.txt", ".catkin", "setup.sh", ".catkin_tools.yaml", ".
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
+class FoundPackages:
     """`candidates` may be packages, nearest first. `root` is the folder that was searched; if that is not the one
     that was given, `moved` says why. `whole` is false if some of it was not searched."""
 
@@ -320,7 +320,7 @@ class Found:
         return tuple(c for c in self.candidates if c.has_manifest and c.ignored_by is None)
 
 
-def find(path: Path) -> Found:
+def find(path: Path) -> FoundPackages:
     """Find the packages below the folder `path`; else the one around it; else those of its repository or workspace.
 
     From inside .git or a build's folder, the search starts outside of it. Raises UsageError if `path` cannot be read.
@@ -332,17 +332,17 @@ def find(path: Path) -> Found:
         raise UsageError(f"{path} {reason}", hint="give your package's folder") from error
 
 
-def _find(path: Path) -> Found:
+def _find(path: Path) -> FoundPackages:
     here = path.resolve()
     outside, moved = _outside(here)
     root = path if outside == here else outside
     candidates, whole = find_nearest(root)
-    found = Found(root=root, candidates=tuple(candidates), moved=moved, whole=whole)
+    found = FoundPackages(root=root, candidates=tuple(candidates), moved=moved, whole=whole)
     if found.packages:
         return found
     around = enclosing_package(outside)
     if around is not None:
-        return Found(root=around, candidates=(_as_candidate(around),), moved=moved)
+        return FoundPackages(root=around, candidates=(_as_candidate(around),), moved=moved)
     return _beside(outside) or found
 
 
@@ -363,14 +363,14 @@ def _is_made(folder: Path) -> bool:
     return any(is_there(folder.parent / mark) for mark in WORKSPACE_MARKS)
 
 
-def _beside(here: Path) -> Found | None:
+def _beside(here: Path) -> FoundPackages | None:
     """Search the rest of the repository or workspace that the folder is part of."""
     repository = repository_around(here)
     workspace = next((f for f in here.parents if any(is_there(f / mark) for mark in WORKSPACE_MARKS)), None)
     for root, what in ((workspace, "workspace"), (repository, "repository")):
         if root is not None and root not in (here, Path(root.anchor)):
             candidates, whole = find_nearest(root)
-            found = Found(
+            found = FoundPackages(
                 root=root,
                 candidates=tuple(candidates),
                 whole=whole,

@@ -22,7 +22,7 @@ FIRST_LINE_BYTES = 200
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wanted:
+class WantedPackage:
     """The package that the lab asks for, and the names of the `files` that it asks for in it.
 
     `asked` is the name of the package to grade in its place, from `--package`, or "". `others` are those that the lab
@@ -32,10 +32,10 @@ class Wanted:
     name: str
     files: frozenset[str] = frozenset()
     asked: str = ""
-    others: tuple[Wanted, ...] = ()
+    others: tuple[WantedPackage, ...] = ()
 
     @property
-    def each(self) -> tuple[Wanted, ...]:
+    def each(self) -> tuple[WantedPackage, ...]:
         """All that the lab asks for, this one first."""
         return (self, *self.others)
 
@@ -46,7 +46,7 @@ class Choice:
     hints: tuple[str, ...]
 
 
-def choose(candidates: list[Candidate], wanted: Wanted) -> Choice | None:
+def choose_package(candidates: list[Candidate], wanted: WantedPackage) -> Choice | None:
     """Return the lab's package: by its manifest's name, by that in other case, by its folder's name, in this order.
 
     What catkin does not see (a marker file, no manifest) comes after all that it does see. Last comes the only name
@@ -99,7 +99,7 @@ def is_slip(name: str, wanted: str) -> bool:
     return bool(one) and digits[0] == digits[1] and (one == other or is_one_edit(one, other))
 
 
-def _best(matches: list[Candidate], wanted: Wanted) -> Choice:
+def _best(matches: list[Candidate], wanted: WantedPackage) -> Choice:
     """Of several copies, return the one that catkin sees, then the one with most of the lab's files, then the nearest
     to the root; at one depth, a folder that is named like the package goes first."""
 
@@ -134,7 +134,7 @@ def _in_workspace(candidate: Candidate) -> bool:
     return False
 
 
-def _left_behind(chosen: Candidate, others: list[Candidate], wanted: Wanted) -> Iterator[str]:
+def _left_behind(chosen: Candidate, others: list[Candidate], wanted: WantedPackage) -> Iterator[str]:
     """Yield the lab's files that another copy has, and the one that is graded has not; each begins with its name."""
     missing = wanted.files - _files_of(chosen.folder, wanted.files)
     for other in others if missing else ():
@@ -159,7 +159,7 @@ def _files_of(folder: Path, names: frozenset[str]) -> frozenset[str]:
     return frozenset(found)
 
 
-def _name_hint(chosen: Candidate, lab: Wanted) -> str:
+def _name_hint(chosen: Candidate, lab: WantedPackage) -> str:
     folder, wanted = printable(chosen.folder.name), lab.name
     if not chosen.has_manifest:
         return f"the folder {folder} has no {MANIFEST}: it was taken for the package {wanted} by its name"
@@ -181,7 +181,7 @@ def _ignored_hint(chosen: Candidate) -> str:
 
 
 def not_found(
-    root: Path, candidates: list[Candidate], wanted: Wanted, git_links: tuple[str, ...]
+    root: Path, candidates: list[Candidate], wanted: WantedPackage, git_links: tuple[str, ...]
 ) -> PackageNotFound:
     """Return the error for a submission without the package; it says what is there instead, and what to do."""
     packages = sorted(
@@ -197,7 +197,7 @@ def not_found(
     )
 
 
-def _rename(root: Path, packages: list[Candidate], wanted: Wanted) -> str:
+def _rename(root: Path, packages: list[Candidate], wanted: WantedPackage) -> str:
     seen = {c.name: c for c in reversed(packages) if c.ignored_by is None and encodable(c.path)}
     if wanted.asked and packages:
         return "Give one of these names with --package, or leave it out."

@@ -17,7 +17,7 @@ from typing import NamedTuple, TypeVar
 
 from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.archive import unpack
-from grader.intake.choose import Choice, Wanted, choose, not_found
+from grader.intake.choose import Choice, WantedPackage, choose_package, not_found
 from grader.intake.find import Candidate, enclosing_package, find_candidates, linked_candidate
 from grader.intake.git import Git, Repository
 from grader.intake.gitdir import Repositories
@@ -79,7 +79,7 @@ class Located:
 def open_submission(
     source: str | Source,
     *,
-    package: str | Wanted,
+    package: str | WantedPackage,
     workdir: Path,
     submission_id: str | None = None,
     git_timeout_s: float = 120.0,
@@ -100,7 +100,7 @@ def open_submission(
             git = Git(base / "git-home", timeout_s=git_timeout_s)
             limits = limits or IntakeLimits()
             opened = open_source(parsed, git, base, limits)
-            wanted = Wanted(name=package) if isinstance(package, str) else package
+            wanted = WantedPackage(name=package) if isinstance(package, str) else package
             located = locate(opened, wanted)
             submission = describe(located, git, limits)
         except OSError as error:
@@ -208,7 +208,7 @@ def open_source(source: Source, git: Git, base: Path, limits: IntakeLimits) -> O
     )
 
 
-def locate(opened: Opened, wanted: Wanted) -> Located:
+def locate(opened: Opened, wanted: WantedPackage) -> Located:
     """Return the lab's package in what was opened. A folder inside the package (`lab1/src`) stands for the package.
 
     Raises PackageNotFound, or SubmissionError for an empty folder.
@@ -228,14 +228,14 @@ def locate(opened: Opened, wanted: Wanted) -> Located:
     raise not_found(opened.root, candidates, wanted, opened.git_links)
 
 
-def _locate(opened: Opened, wanted: Wanted) -> Located | None:
+def _locate(opened: Opened, wanted: WantedPackage) -> Located | None:
     candidates = find_candidates(opened.root, leave_out=opened.leave_out)
     chosen: dict[str, Choice] = {}
     for one in wanted.each:
         name, taken = one.asked or one.name, {choice.package.folder for choice in chosen.values()}
         names = {other.asked or other.name for other in wanted.each if other is not one}
         free = [c for c in candidates if c.manifest not in names and c.folder not in taken]
-        choice = choose(free, one)
+        choice = choose_package(free, one)
         if choice is None and (linked := linked_candidate(opened.root, name)):
             choice = Choice(
                 package=linked, hints=(f"{printable(name)} is a link, followed to {printable(linked.path)}",)

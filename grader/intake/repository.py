@@ -108,7 +108,7 @@ def _own(into: Path) -> Repository:
     return Repository(git_dir=into / ".git", top=into)
 
 
-def _hints(wanted: Wanted, files: _Files) -> Iterator[str]:
+def _hints(wanted: WantedRevision, files: _Files) -> Iterator[str]:
     if wanted.hint:
         yield wanted.hint
     if files.left_out:
@@ -127,7 +127,7 @@ def _remote_refs(source: Source, git: Git, into: Path) -> dict[str, str]:
     return refs
 
 
-def _fetch(source: Source, git: Git, into: Path, refs: dict[str, str], wanted: Wanted) -> str:
+def _fetch(source: Source, git: Git, into: Path, refs: dict[str, str], wanted: WantedRevision) -> str:
     """The full hash of the commit, fetched alone where the server can do that, with all history if not."""
     whole_hash = wanted.commit if wanted.commit and len(wanted.commit) in _FULL_HASHES else None
     one = wanted.refspec or whole_hash
@@ -146,7 +146,7 @@ def _fetch(source: Source, git: Git, into: Path, refs: dict[str, str], wanted: W
         raise no_such_ref(refs, source.ref or "HEAD", given=source.given) from None
 
 
-def _everything(refs: dict[str, str], wanted: Wanted) -> tuple[str, ...]:
+def _everything(refs: dict[str, str], wanted: WantedRevision) -> tuple[str, ...]:
     if wanted.refspec:
         return (wanted.refspec,)
     return _EVERYTHING if "HEAD" in refs else _EVERYTHING[:-1]
@@ -221,7 +221,7 @@ def _checkout(source: Source, git: Git, into: Path, commit: str, files: _Files) 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wanted:
+class WantedRevision:
     """`refspec` can be fetched alone. Without one, `commit` (a hash, or its beginning) is looked for."""
 
     refspec: str | None = None
@@ -235,7 +235,7 @@ def parse_refs(text: str) -> dict[str, str]:
     return {ref: commit for commit, ref in pairs}
 
 
-def choose_ref(refs: dict[str, str], ref: str | None, *, given: str) -> Wanted:
+def choose_ref(refs: dict[str, str], ref: str | None, *, given: str) -> WantedRevision:
     """Return what to fetch for `@ref`, or for none. Raises SubmissionError, naming what is there."""
     if not refs:
         raise SubmissionError(
@@ -245,7 +245,7 @@ def choose_ref(refs: dict[str, str], ref: str | None, *, given: str) -> Wanted:
         return _default(refs, given)
     for name in (f"refs/heads/{ref}", f"refs/tags/{ref}", f"refs/remotes/{ref}", ref):
         if name in refs:
-            return Wanted(refspec=name)
+            return WantedRevision(refspec=name)
     if _HASH.fullmatch(ref):
         return _by_hash(refs, ref.lower())
     raise no_such_ref(refs, ref, given=given)
@@ -262,9 +262,9 @@ def no_such_ref(refs: dict[str, str], ref: str, *, given: str) -> SubmissionErro
     return SubmissionError(f"{given}: there is no branch, tag or commit '{printable(ref)}'", hint=hint)
 
 
-def _default(refs: dict[str, str], given: str) -> Wanted:
+def _default(refs: dict[str, str], given: str) -> WantedRevision:
     if "HEAD" in refs:
-        return Wanted(refspec="HEAD")
+        return WantedRevision(refspec="HEAD")
     branches = [name for name in refs if name.startswith("refs/heads/")]
     usual = [f"refs/heads/{name}" for name in _USUAL_BRANCHES if f"refs/heads/{name}" in branches]
     chosen = (usual or branches)[:1]
@@ -275,17 +275,17 @@ def _default(refs: dict[str, str], given: str) -> Wanted:
             hint=f"Add the branch to mark, as in @{names}." if branches else "Push a branch.",
         )
     branch = printable(chosen[0].removeprefix("refs/heads/"))
-    return Wanted(
+    return WantedRevision(
         refspec=chosen[0], hint=f"the repository's default branch does not exist: {branch} was taken instead"
     )
 
 
-def _by_hash(refs: dict[str, str], commit: str) -> Wanted:
+def _by_hash(refs: dict[str, str], commit: str) -> WantedRevision:
     if len(commit) >= _TELLING_HASH:
         for name, tip in refs.items():
             if tip.startswith(commit):
-                return Wanted(refspec=name.removesuffix("^{}"))
-    return Wanted(commit=commit)
+                return WantedRevision(refspec=name.removesuffix("^{}"))
+    return WantedRevision(commit=commit)
 
 
 _PRIVATE = (

@@ -17,7 +17,7 @@ from grader.errors import GraderError, InternalError, SubmissionError
 from grader.faults import fault_of
 from grader.files import atomic_write, make_folder
 from grader.intake.source import Source, parse_source
-from grader.integrations.bundle import LostModes, Platform, Settings, read_settings
+from grader.integrations.bundle import BundleSettings, ContainerLayout, LostModes, read_settings
 from grader.integrations.platforms import GRADESCOPE, PRAIRIELEARN
 from grader.model.progress import Silence
 from grader.model.result import GradingResult
@@ -58,7 +58,7 @@ def main() -> int:
     return 0 if grade_upload(PLATFORMS[platform], Path(folder)) else 3
 
 
-def grade_upload(platform: Platform, root: Path) -> bool:
+def grade_upload(platform: ContainerLayout, root: Path) -> bool:
     """Grade the upload in the container's folder `root` and write results/results.json. Return False if that says
     that nothing was graded."""
     lab, results = root / platform.lab, root / "results"
@@ -89,7 +89,9 @@ def _write(results: Path, document: dict[str, object]) -> None:
     atomic_write(results / "results.json", json_text(document).encode(), public=True)
 
 
-def _grade(lab: Path, folder: Path, results: Path, settings: Settings) -> tuple[GradingResult, LoadedRubric]:
+def _grade(
+    lab: Path, folder: Path, results: Path, settings: BundleSettings
+) -> tuple[GradingResult, LoadedRubric]:
     """Return the result, even if it says that the submission cannot be graded."""
     rubric = load_rubric(str(lab / settings.rubric))
     out = results / REPORTS

@@ -46,7 +46,7 @@ LostModes = Literal["lost", "granted"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Platform:
+class ContainerLayout:
     """Where a platform's container keeps the `lab` and the `upload`, as folders below its root, and how results are
     written for it: `graded` and `not_graded` return the JSON document `results/results.json`."""
 
@@ -56,7 +56,7 @@ class Platform:
     not_graded: Callable[[GraderError], dict[str, Any]]
 
 
-class Settings(Record):
+class BundleSettings(Record):
     """The file `grader.json` of an exported grader, beside the rubric's folder.
 
     `rubric` is the path of the rubric from the folder of the settings, `minutes` the platform's time limit. `modes`
@@ -80,10 +80,10 @@ class Settings(Record):
         return f"{self.model_dump_json(indent=2)}\n".encode()
 
 
-def read_settings(folder: Path) -> Settings:
+def read_settings(folder: Path) -> BundleSettings:
     """Read the settings in `folder`. Raises InternalError: an export wrote them, not a student."""
     try:
-        return Settings.model_validate_json((folder / SETTINGS_FILE).read_bytes())
+        return BundleSettings.model_validate_json((folder / SETTINGS_FILE).read_bytes())
     except (OSError, ValidationError) as error:
         raise InternalError(
             f"{folder / SETTINGS_FILE} cannot be read: {type(error).__name__}", hint="export the grader again"

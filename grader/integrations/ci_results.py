@@ -24,7 +24,7 @@ from grader.rubric.model import Rubric
 from grader.wording import number
 
 
-class Outcome(str, Enum):
+class JobStatus(str, Enum):
     """The values of the output `status` and of the input `fail-on`, which later steps compare."""
 
     PASSED = "passed"
@@ -35,18 +35,18 @@ class Outcome(str, Enum):
 
 
 OF_CODE = {
-    ExitCode.PASSED: Outcome.PASSED,
-    ExitCode.BELOW_PASS_MARK: Outcome.BELOW,
-    ExitCode.USAGE: Outcome.WRONG_INPUT,
-    ExitCode.NOT_GRADED: Outcome.NOT_GRADED,
-    ExitCode.INCONCLUSIVE: Outcome.INCONCLUSIVE,
+    ExitCode.PASSED: JobStatus.PASSED,
+    ExitCode.BELOW_PASS_MARK: JobStatus.BELOW,
+    ExitCode.USAGE: JobStatus.WRONG_INPUT,
+    ExitCode.NOT_GRADED: JobStatus.NOT_GRADED,
+    ExitCode.INCONCLUSIVE: JobStatus.INCONCLUSIVE,
 }
 TITLES = {
-    Outcome.PASSED: "Passed",
-    Outcome.BELOW: "Below the pass mark",
-    Outcome.INCONCLUSIVE: "Not decided yet",
-    Outcome.NOT_GRADED: "Not graded",
-    Outcome.WRONG_INPUT: "Wrong input",
+    JobStatus.PASSED: "Passed",
+    JobStatus.BELOW: "Below the pass mark",
+    JobStatus.INCONCLUSIVE: "Not decided yet",
+    JobStatus.NOT_GRADED: "Not graded",
+    JobStatus.WRONG_INPUT: "Wrong input",
 }
 STUDENTS = {SubmissionError.kind, PackageNotFound.kind}
 """The kinds of error that are the student's fault."""
@@ -63,14 +63,14 @@ SECTION = "== "
 
 
 @dataclass(frozen=True, kw_only=True)
-class Graded:
+class JobResult:
     """A result without its hidden criteria. `fails` is whether the job fails.
 
     `message` and `hint` are a line each about the outcome. `counted` holds the criteria that were asked for, which may
     be only those of the files. `folder` has the reports, `prefix` is the package's folder in the repository.
     """
 
-    outcome: Outcome
+    outcome: JobStatus
     fails: bool
     message: str
     hint: str
@@ -83,7 +83,7 @@ class Graded:
     @property
     def title(self) -> str:
         """The outcome in a few words; a rubric that the student can change is never a plain pass."""
-        judged = self.outcome not in (Outcome.NOT_GRADED, Outcome.WRONG_INPUT)
+        judged = self.outcome not in (JobStatus.NOT_GRADED, JobStatus.WRONG_INPUT)
         theirs = judged and self.result.rubric_origin == "submission"
         return (
             f"{TITLES[self.outcome]}, by a rubric {RUBRIC_FROM['submission']}"
@@ -92,20 +92,20 @@ class Graded:
         )
 
 
-def outcome_of_error(error: GraderError) -> Outcome:
+def outcome_of_error(error: GraderError) -> JobStatus:
     """Return the outcome of a job without any result."""
     return OF_CODE[error.exit_code]
 
 
 def describe_outcome(
-    counted: GradingResult, rubric: Rubric, outcome: Outcome, *, static: bool
+    counted: GradingResult, rubric: Rubric, outcome: JobStatus, *, static: bool
 ) -> tuple[str, str]:
     """Return a line about the outcome, with its cause where that is not the student's, and a hint or ""."""
-    if outcome is Outcome.NOT_GRADED:
+    if outcome is JobStatus.NOT_GRADED:
         return _describe_error(counted)
     files = " that can be judged from the files alone (nothing was run)" if static else ""
     reached = f"{number(counted.points)} of {number(counted.max_points)} points{files}"
-    if outcome is not Outcome.INCONCLUSIVE:
+    if outcome is not JobStatus.INCONCLUSIVE:
         return f"{reached}; {points_to_pass(rubric, counted.max_points)}", ""
     waiting = arrange(counted, rubric).open
     if not waiting:
@@ -126,7 +126,7 @@ def points_to_pass(rubric: Rubric, points: float) -> str:
     return f"to pass, it takes {number(needed)}"
 
 
-def summarize(graded: Graded) -> str:
+def summarize(graded: JobResult) -> str:
     """Return the report as Markdown, of what was asked for alone: with one verdict, that of the job."""
     if graded.counted is graded.result:
         report = graded.folder / "report.md"

@@ -19,7 +19,7 @@ from typing import cast
 from grader.errors import GraderError, OutputError, SubmissionError, UsageError
 from grader.files import atomic_write
 from grader.intake.names import is_package_name
-from grader.integrations.ci_results import TITLES, Graded, Outcome, outcome_of_error, summarize
+from grader.integrations.ci_results import TITLES, JobResult, JobStatus, outcome_of_error, summarize
 from grader.model import SandboxMode
 from grader.report.classroom import render_classroom
 from grader.report.findings import EACH_MAX, Severity, github_annotation, render_annotations
@@ -30,7 +30,7 @@ from grader.wording import number, plural
 
 MODES = ("auto", "require", "none")
 YES, NO = {"true", "yes", "on", "1"}, {"", "false", "no", "off", "0"}
-FAILING = (Outcome.BELOW, Outcome.NOT_GRADED, Outcome.INCONCLUSIVE)
+FAILING = (JobStatus.BELOW, JobStatus.NOT_GRADED, JobStatus.INCONCLUSIVE)
 NEVER = "never"
 OUT = "grader-results"
 COUNTERS = ("GITHUB_RUN_NUMBER", "CI_PIPELINE_IID")
@@ -41,7 +41,7 @@ MARK_HINT = "write points (12.5) or a percentage of the visible points (60%)"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class JobSettings:
     """`lab` is a rubric's id or file, or None if the package's name decides. `package` is the name of the package to
     grade in place of the lab's, or "". `attempt` is the number of this run by the system's count, `attempts` how many
     are graded at most; None where no limit is asked for. `fail_on` holds the outcomes that fail the job. `out` is the
@@ -51,7 +51,7 @@ class Settings:
     path: Path
     package: str
     mark: PassMark | None
-    fail_on: frozenset[Outcome]
+    fail_on: frozenset[JobStatus]
     static: bool
     sandbox: SandboxMode
     out: Path
@@ -76,7 +76,7 @@ class Settings:
             )
 
 
-def read_settings(variables: Mapping[str, str]) -> Settings:
+def read_settings(variables: Mapping[str, str]) -> JobSettings:
     """Read `GRADER_LAB`, `_PATH`, `_PACKAGE`, `_PASS_MARK`, `_FAIL_ON`, `_STATIC`, `_SANDBOX`, `_ATTEMPTS` and
     `_OUT`. One that is missing or empty has its default. Raises UsageError that names the input of the action, as the
     variable is named."""
@@ -85,7 +85,7 @@ def read_settings(variables: Mapping[str, str]) -> Settings:
         return variables.get(f"GRADER_{name}", "").strip()
 
     workspace = variables.get("GITHUB_WORKSPACE") or variables.get("CI_PROJECT_DIR")
-    return Settings(
+    return JobSettings(
         lab=given("LAB") or None,
         path=Path(given("PATH") or "."),
         package=_package(given("PACKAGE")),
@@ -114,7 +114,7 @@ def _attempts(text: str) -> int | None:
     return int(text) if text else None
 
 
-def _fail_on(text: str) -> frozenset[Outcome]:
+def _fail_on(text: str) -> frozenset[JobStatus]:
     words = [word for word in re.split(r"[\s,]+", text.lower()) if word]
     if words == [NEVER]:
         return frozenset()
@@ -194,7 +194,7 @@ def with_pass_mark(loaded: LoadedRubric, mark: PassMark | None) -> LoadedRubric:
 LINE_CHARS = 1000
 
 
-class GitHub:
+class GitHubRunner:
     """Tells GitHub's runner. `variables` are those of the step; without the name of a file, that part is left out."""
 
     def __init__(self, variables: Mapping[str, str]) -> None:
@@ -211,7 +211,7 @@ class GitHub:
         finally:
             _print(f"\n::{token}::\n")
 
-    def tell(self, graded: Graded) -> None:
+    def tell(self, graded: JobResult) -> None:
         """Write the annotations, summary and outputs of a result. Raises OutputError."""
         result = graded.counted.model_copy(update={"error": None})  # it is in `text`, with whose fault it is
         text = "\n".join(part for part in (graded.message, graded.hint) if part)
@@ -251,9 +251,9 @@ class GitHub:
             ) from error
 
 
-def _values(graded: Graded) -> dict[str, str]:
-    counted = graded.outcome is not Outcome.NOT_GRADED
-    passed = graded.outcome is Outcome.PASSED
+def _values(graded: JobResult) -> dict[str, str]:
+    counted = graded.outcome is not JobStatus.NOT_GRADED
+    passed = graded.outcome is JobStatus.PASSED
     encoded = render_classroom(graded.counted, graded.rubric, passed=passed, prefix=graded.prefix).rstrip()
     report = graded.folder / "report.html"
     return {
@@ -267,8 +267,8 @@ def _values(graded: Graded) -> dict[str, str]:
     }
 
 
-def _severity(graded: Graded) -> Severity:
-    if graded.outcome is Outcome.PASSED and graded.result.rubric_origin != "submission":
+def _severity(graded: JobResult) -> Severity:
+    if graded.outcome is JobStatus.PASSED and graded.result.rubric_origin != "submission":
         return Severity.NOTICE
     return Severity.ERROR if graded.fails else Severity.WARNING
 
@@ -287,7 +287,7 @@ def _print(text: str) -> None:
 VARIABLES = "grader.env"
 
 
-class GitLab:
+class GitLabRunner:
     """Tells GitLab's runner through files in `out`."""
 
     def __init__(self, out: Path) -> None:
@@ -298,9 +298,9 @@ class GitLab:
         """Do nothing: GitLab obeys only escape sequences, and the reports have none."""
         yield
 
-    def tell(self, graded: Graded) -> None:
+    def tell(self, graded: JobResult) -> None:
         """Write the points as variables. Raises OutputError."""
-        counted = graded.outcome is not Outcome.NOT_GRADED
+        counted = graded.outcome is not JobStatus.NOT_GRADED
         self._write(
             {
                 "GRADER_POINTS": number(graded.counted.points) if counted else "",

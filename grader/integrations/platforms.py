@@ -13,8 +13,8 @@ from grader.files import atomic_write
 from grader.integrations.bundle import (
     SETTINGS_FILE,
     Bundle,
-    Platform,
-    Settings,
+    BundleSettings,
+    ContainerLayout,
     add_lab,
     system_script,
     template,
@@ -31,7 +31,7 @@ from grader.wording import number
 ENTRYPOINT = "/usr/local/bin/grade-question"
 
 
-def gradescope_autograder(rubric: LoadedRubric, settings: Settings) -> bytes:
+def gradescope_autograder(rubric: LoadedRubric, settings: BundleSettings) -> bytes:
     """Return the zip to upload. Raises UsageError if the grader is not installed."""
     bundle = Bundle()
     name, data = wheel()
@@ -73,13 +73,13 @@ def _gradescope_fault(fault: GraderError) -> dict[str, Any]:
     }
 
 
-GRADESCOPE = Platform(
+GRADESCOPE = ContainerLayout(
     lab="source", upload="submission", graded=_gradescope_results, not_graded=_gradescope_fault
 )
 """Its folders lie below /autograder."""
 
 
-def prairielearn_question(rubric: LoadedRubric, settings: Settings, image: str) -> Bundle:
+def prairielearn_question(rubric: LoadedRubric, settings: BundleSettings, image: str) -> Bundle:
     """Return the folder `question/` for a course, and `image/`, the files of a Docker image that suits every lab."""
     bundle = Bundle()
     name, data = wheel()
@@ -110,7 +110,7 @@ def write_question(bundle: Bundle, target: Path) -> None:
     bundle.write(target)
 
 
-def _info(rubric: LoadedRubric, settings: Settings, image: str) -> bytes:
+def _info(rubric: LoadedRubric, settings: BundleSettings, image: str) -> bytes:
     """Return info.json. Its uuid comes from the rubric's id, so that a second export is the same question."""
     lab = rubric.rubric
     info = {
@@ -131,7 +131,7 @@ def _info(rubric: LoadedRubric, settings: Settings, image: str) -> bytes:
     return f"{json.dumps(info, indent=4, ensure_ascii=False)}\n".encode()
 
 
-def _page(rubric: LoadedRubric, settings: Settings) -> bytes:
+def _page(rubric: LoadedRubric, settings: BundleSettings) -> bytes:
     text = template("question.html").decode()
     package = html(settings.package or rubric.rubric.package)
     return text.replace("@TITLE@", html(rubric.rubric.title)).replace("@PACKAGE@", package).encode()
@@ -163,7 +163,7 @@ def _prairielearn_fault(fault: GraderError) -> dict[str, Any]:
     return _invalid(fault.message, fault.hint)
 
 
-PRAIRIELEARN = Platform(
+PRAIRIELEARN = ContainerLayout(
     lab="tests", upload="student", graded=_prairielearn_results, not_graded=_prairielearn_fault
 )
 """Its folders lie below /grade."""

@@ -55,7 +55,7 @@ class Environment:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Files:
+class UncommittedFiles:
     """The package's files that git lacks, by path relative to its folder. `staged` of the changed ones need no
     `git add`; `renamed` are those of which only the case differs, as git and the disk call them; `pointers` are
     folders of which git only has the commit of another repository."""
@@ -72,7 +72,7 @@ class Files:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Server:
+class RemoteBranch:
     """The remote that is pushed to, and how HEAD differs from the branch there that is `marked`: usually the default
     one, as `origin/main`; None where that is not known. `upstream` is where the current branch is pushed to."""
 
@@ -178,7 +178,7 @@ class _Advice:
             text = f"git does not know that this is executable: {listing(list(files.modes))}"
             yield Point(kind="mode", text=text, fix=commands.make_executable(files.modes))
 
-    def _push_advice(self, server: Server) -> Iterator[Point]:
+    def _push_advice(self, server: RemoteBranch) -> Iterator[Point]:
         """What the server lacks, or has on another branch than the marked one. Commits that do not touch the package
         do not matter."""
         branch, name, git = self._branch, server.name or "REMOTE", self._commands.git
@@ -197,7 +197,7 @@ class _Advice:
         elif server.differing:
             yield self._differs(server, server.marked, push)
 
-    def _differs(self, server: Server, marked: str, push: str) -> Point:
+    def _differs(self, server: RemoteBranch, marked: str, push: str) -> Point:
         branch, git = self._branch, self._commands.git
         default = marked.partition("/")[2]
         where = f"{printable(marked)} differs in {listing(list(server.differing))}"
@@ -262,7 +262,7 @@ def _relative(path: Path, base: Path) -> str:
         return str(path)
 
 
-def read_files(view: View, package: Path) -> tuple[str | None, str | None, Files]:
+def read_files(view: View, package: Path) -> tuple[str | None, str | None, UncommittedFiles]:
     """Return the branch (None where none is checked out), the commit (None before the first one), and the files.
 
     Raises GitFailed, OSError.
@@ -286,7 +286,7 @@ def read_files(view: View, package: Path) -> tuple[str | None, str | None, Files
         for sign in "?!"
     }
     branch, commit = heads.get("branch.head"), heads.get("branch.oid")
-    files = Files(
+    files = UncommittedFiles(
         changed=tuple(changed),
         staged=frozenset(p for p, fields in changed.items() if fields[0] == "1" and fields[1][1] == "."),
         conflicts=any(fields[0] == "u" for fields in changes),
@@ -364,7 +364,7 @@ def _is_used(package: Path, path: str) -> bool:
     return name == "CMakeLists.txt" or Path(name).suffix in USED or is_script(package, path)
 
 
-def read_server(view: View, package: Path, branch: str | None, commit: str | None) -> Server:
+def read_server(view: View, package: Path, branch: str | None, commit: str | None) -> RemoteBranch:
     """Return what is known of the server. Raises GitFailed."""
     names, settings = view.remote_names, view.settings
     refs = _remote_branches(view)
@@ -377,19 +377,19 @@ def read_server(view: View, package: Path, branch: str | None, commit: str | Non
     )
     name = next((name for name in candidates if name in names), None)
     if commit is None or name is None:
-        return Server(remotes=names, name=name, has_head=commit is not None and _has_head(view))
+        return RemoteBranch(remotes=names, name=name, has_head=commit is not None and _has_head(view))
     merged = settings.get(f"branch.{branch}.merge", "").removeprefix("refs/heads/")
     own = merged if merged and settings.get(f"branch.{branch}.remote") == name else branch
     upstream = f"{name}/{own}" if f"{name}/{own}" in refs else None
     marked = _default_branch(name, refs) or upstream
     if marked is None or refs[marked] == commit:
         has_head = marked is not None or _has_head(view)
-        return Server(remotes=names, name=name, upstream=upstream, marked=marked, has_head=has_head)
+        return RemoteBranch(remotes=names, name=name, upstream=upstream, marked=marked, has_head=has_head)
     ref = f"{TRACKING}{marked}"
     arguments = ("diff-tree", "-r", "-z", "--name-only", "--no-renames", "--relative", ref, "HEAD", "--", ".")
     differing = [os.fsdecode(path) for path in view.run(*arguments, cwd=package).split(b"\0") if path]
     ahead, behind = view.run("rev-list", "--left-right", "--count", f"HEAD...{ref}", "--").split()
-    return Server(
+    return RemoteBranch(
         remotes=names,
         name=name,
         upstream=upstream,

@@ -18,7 +18,7 @@ from grader.report.terminal import NOT_DECIDED, TO_FIX, Terminal, emit, open_con
 from grader.report.text import line
 from grader.report.view import arrange, points_of
 from grader.rubric.model import Rubric
-from grader.student.watching import Outcome, Screen
+from grader.student.watching import Screen, WatchedResult
 from grader.wording import first_few, number
 
 NAME_CHARS, TEXT_CHARS = 60, 300
@@ -73,7 +73,7 @@ class TerminalScreen(Screen):
         self._at = self._clock()
         self._say(f"{self._saved_text(saved)}: nothing has changed … {ENDS}")
 
-    def end(self, outcome: Outcome, saved: tuple[str, ...]) -> None:
+    def end(self, outcome: WatchedResult, saved: tuple[str, ...]) -> None:
         """See `Screen`."""
         result = outcome.result
         if self._console.is_terminal and self._ended:
@@ -144,7 +144,7 @@ class JsonLines(Screen):
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
-    def end(self, outcome: Outcome, _saved: tuple[str, ...]) -> None:
+    def end(self, outcome: WatchedResult, _saved: tuple[str, ...]) -> None:
         """See `Screen`."""
         ascii_only = (self._stream.encoding or "ascii").lower().replace("-", "") != "utf8"
         rows = result_text(outcome.result, ascii_only=ascii_only).split("\n")

@@ -25,7 +25,7 @@ from grader.errors import ExitCode, GraderError, SubmissionError, UsageError
 from grader.faults import error_result
 from grader.files import temporary_folder
 from grader.intake import open_submission
-from grader.intake.choose import Wanted
+from grader.intake.choose import WantedPackage
 from grader.intake.source import identify
 from grader.model.package import SourceFile
 from grader.model.progress import Progress
@@ -71,7 +71,7 @@ class Snapshot:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class WatchedResult:
     """One result. While it is `undecided`, a save is reason enough to try again, even if no file has changed."""
 
     result: GradingResult
@@ -88,7 +88,7 @@ class Screen:
     def restart(self) -> None:
         """Show that a run was stopped because something was saved during it."""
 
-    def end(self, outcome: Outcome, saved: tuple[str, ...]) -> None:
+    def end(self, outcome: WatchedResult, saved: tuple[str, ...]) -> None:
         """Show a result."""
 
     def unchanged(self, saved: tuple[str, ...]) -> None:
@@ -108,7 +108,7 @@ class Grading:
     code: Callable[[GradingResult], ExitCode]
     _begun: bool = field(default=False, init=False)
 
-    def __call__(self, stop: Stop) -> Outcome:
+    def __call__(self, stop: Stop) -> WatchedResult:
         """Return the outcome. Raises Stopped, and GraderError where no save can help: a wrong use, or a fault of the
         machine at the very start."""
         try:
@@ -123,8 +123,8 @@ class Grading:
         undecided = not self.options.static_only and any(c.status.is_retryable for c in result.criteria)
         shown = without_hidden(result, self.rubric.rubric)
         if shown.status == "error":
-            return Outcome(result=shown, code=ExitCode.NOT_GRADED, undecided=True)
-        return Outcome(result=shown, code=self.code(shown), undecided=undecided)
+            return WatchedResult(result=shown, code=ExitCode.NOT_GRADED, undecided=True)
+        return WatchedResult(result=shown, code=self.code(shown), undecided=undecided)
 
     def _error_result(self, error: GraderError) -> GradingResult:
         name, source = identify(self.source) or (Path(self.source).name, self.source)
@@ -143,14 +143,14 @@ class Watch:
         folder: Path,
         *,
         look: Callable[[], Snapshot],
-        grade: Callable[[Stop], Outcome],
+        grade: Callable[[Stop], WatchedResult],
         saves: Saves,
         screen: Screen,
     ) -> None:
         self._folder = folder
         self._take, self._grade, self._saves, self._screen = look, grade, saves, screen
         self._graded: Snapshot | None = None
-        self._last: Outcome | None = None
+        self._last: WatchedResult | None = None
         self._saved: set[str] = set()
 
     def run(self) -> ExitCode:
@@ -342,7 +342,7 @@ def changed_files(before: Snapshot, after: Snapshot) -> tuple[str, ...]:
     return tuple(sorted(changed, key=lambda path: (path.startswith("../"), path)))
 
 
-def take_snapshot(source: str, package: str | Wanted, *, without: Path | None = None) -> Snapshot:
+def take_snapshot(source: str, package: str | WantedPackage, *, without: Path | None = None) -> Snapshot:
     """Return the package as `grader check SOURCE` sees it now, without what is in the folder `without`.
 
     Raises SubmissionError where there is no such package or a file cannot be read, OSError where one vanishes.

@@ -12,7 +12,7 @@ import pytest
 
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.sandbox import choose, why_no_sandbox
+from grader.arena.sandbox import choose_sandbox, why_no_sandbox
 from grader.arena.sandbox_files import prepare
 from grader.arena.scenario import run_scenario
 from grader.arena.workspace import make_workspace, run_in_place
@@ -77,7 +77,7 @@ def make_place(
         top = Path(name)
         top.chmod(0o711)
         submission = make_submission(folder or top / "submission", files)
-        chosen, ros = choose(sandbox), require_ros()  # type: ignore[arg-type]
+        chosen, ros = choose_sandbox(sandbox), require_ros()  # type: ignore[arg-type]
         prepare(top / "place", ros)
         scripts = [f for f in files if f.endswith(".py")]
         facts = read_package(submission.package)

@@ -76,9 +76,9 @@ def bwrap(folder: Path, monkeypatch, script: str) -> None:
 def test_where_the_kernel_forbids_it_grading_goes_without(monkeypatch, said: str) -> None:
     monkeypatch.setattr(sandbox, "_refusal", lambda *_: said)
     assert sandbox.why_no_sandbox() == said
-    assert (sandbox.choose("auto").bubblewrap, sandbox.choose("auto").reason) == (False, said)
+    assert (sandbox.choose_sandbox("auto").bubblewrap, sandbox.choose_sandbox("auto").reason) == (False, said)
     with pytest.raises(SandboxMissing):
-        sandbox.choose("require")
+        sandbox.choose_sandbox("require")
 
 
 @pytest.mark.parametrize("said", UNKNOWN)
@@ -86,18 +86,18 @@ def test_where_the_kernel_forbids_it_grading_goes_without(monkeypatch, said: str
 def test_an_answer_that_is_not_known_stops_the_grading(monkeypatch, said: str, mode) -> None:
     monkeypatch.setattr(sandbox, "_refusal", lambda *_: said)
     with pytest.raises(SandboxMissing) as caught:
-        sandbox.choose(mode)
+        sandbox.choose_sandbox(mode)
     assert caught.value.exit_code == ExitCode.NOT_GRADED
     assert said in caught.value.message
     assert "--sandbox none" in caught.value.hint
-    assert not sandbox.choose("none").bubblewrap
+    assert not sandbox.choose_sandbox("none").bubblewrap
 
 
 def test_a_bubblewrap_that_does_not_answer_stops_the_grading(tmp_path, monkeypatch) -> None:
     bwrap(tmp_path, monkeypatch, "exec sleep 60")
     monkeypatch.setattr(sandbox, "PROBE_S", 0.5)
     with pytest.raises(SandboxMissing, match=r"no answer within 0\.5 s"):
-        sandbox.choose("auto")
+        sandbox.choose_sandbox("auto")
 
 
 def test_what_did_not_answer_is_asked_again(monkeypatch) -> None:
@@ -120,7 +120,7 @@ def test_a_program_that_cannot_be_started_stops_the_grading(tmp_path, monkeypatc
     bwrap(tmp_path, monkeypatch, "exit 0")
     monkeypatch.setattr(sandbox.sys, "executable", str(tmp_path / "no-python"))
     with pytest.raises(SandboxMissing, match="No such file"):
-        sandbox.choose("auto")
+        sandbox.choose_sandbox("auto")
 
 
 @pytest.mark.parametrize(
@@ -137,15 +137,15 @@ def test_namespaces_in_the_sandbox_are_allowed_only_where_they_cannot_be_forbidd
     monkeypatch, first: str, nesting: bool
 ) -> None:
     monkeypatch.setattr(sandbox, "_refusal", lambda *more: first if more else "")
-    assert sandbox.choose("auto").bubblewrap
-    assert sandbox.choose("auto").nesting is nesting
+    assert sandbox.choose_sandbox("auto").bubblewrap
+    assert sandbox.choose_sandbox("auto").nesting is nesting
 
 
 def test_a_probe_that_fails_only_now_allows_no_namespaces_in_the_sandbox(monkeypatch) -> None:
     busy = "bwrap: Creating new namespace failed: Resource temporarily unavailable"
     monkeypatch.setattr(sandbox, "_refusal", lambda *more: busy if more else "")
     with pytest.raises(SandboxMissing, match="Resource temporarily unavailable"):
-        sandbox.choose("auto")
+        sandbox.choose_sandbox("auto")
 
 
 def test_the_probe_sees_nothing_of_whoever_grades(tmp_path, monkeypatch) -> None:
@@ -166,7 +166,7 @@ def test_root_who_may_not_become_a_student_is_told_so(monkeypatch) -> None:
         sandbox, "refused_limits", lambda: "setpriv: setresuid failed: Operation not permitted"
     )
     with pytest.raises(HostError) as caught:
-        sandbox.choose("auto")
+        sandbox.choose_sandbox("auto")
     assert "CAP_SETUID" in caught.value.hint
 
 
@@ -188,7 +188,7 @@ def test_limits_are_asked_for_as_the_user_who_gets_them(monkeypatch) -> None:
 def test_without_a_sandbox_the_machine_has_to_know_localhost(monkeypatch) -> None:
     """`roslaunch` asks for its address; in a sandbox there is a file of its own."""
     monkeypatch.setattr(sandbox, "resolves", lambda name: name != "localhost")
-    assert sandbox.choose("require").bubblewrap
+    assert sandbox.choose_sandbox("require").bubblewrap
     with pytest.raises(HostError, match="localhost does not resolve") as caught:
-        sandbox.choose("none")
+        sandbox.choose_sandbox("none")
     assert caught.value.hint == "echo '127.0.0.1 localhost' >> /etc/hosts"

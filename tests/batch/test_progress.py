@@ -7,7 +7,7 @@ import io
 import pytest
 from rich.console import Console
 
-from grader.classes.batch.job import Outcome, _Steps
+from grader.classes.batch.job import SubmissionOutcome, _Steps
 from grader.cli.class_display import LATELY, BatchProgress, LiveClass, PlainClass, summary
 
 
@@ -18,8 +18,8 @@ class Clock:
         return self.now_s
 
 
-def outcome(name: str, **more) -> Outcome:
-    return Outcome(
+def outcome(name: str, **more) -> SubmissionOutcome:
+    return SubmissionOutcome(
         **{"id": name, "status": "graded", "points": 80.0, "max_points": 100.0, "wall_s": 2.0, **more}
     )
 

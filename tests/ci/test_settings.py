@@ -6,7 +6,7 @@ import pytest
 
 from grader.cli.outcome import exit_code
 from grader.errors import ExitCode, SubmissionError, UsageError
-from grader.integrations.ci_results import Outcome, points_to_pass
+from grader.integrations.ci_results import JobStatus, points_to_pass
 from grader.integrations.ci_systems import FAILING, PassMark, read_pass_mark, read_settings, with_pass_mark
 from grader.rubric.load import load_rubric
 from tests.support.a_class import criterion
@@ -67,8 +67,8 @@ def test_just_the_mark_is_reached_whatever_floating_point_says(tenths):
     [
         ("", set(FAILING)),
         ("never", set()),
-        ("below-pass-mark", {Outcome.BELOW}),
-        (" Not-Graded ,\n inconclusive ", {Outcome.NOT_GRADED, Outcome.INCONCLUSIVE}),
+        ("below-pass-mark", {JobStatus.BELOW}),
+        (" Not-Graded ,\n inconclusive ", {JobStatus.NOT_GRADED, JobStatus.INCONCLUSIVE}),
     ],
 )
 def test_when_a_job_fails(text, outcomes):

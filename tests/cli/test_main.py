@@ -14,7 +14,7 @@ from grader import __version__
 from grader.arena.sandbox import is_shown
 from grader.checks import CHECKS
 from grader.cli import doctor
-from grader.cli.doctor import Row
+from grader.cli.host_support import DoctorRow
 from grader.cli.main import run
 from grader.errors import EvidenceError
 from grader.judging.summary import criteria_bytes
@@ -226,7 +226,7 @@ def test_inspect_says_what_is_wrong_with_a_file(content, tmp_path, capsys):
 
 @pytest.mark.parametrize(("state", "code"), [("ok", 0), ("limited", 0), ("missing", 3)])
 def test_doctor_tells_by_its_exit_code(state, code, capsys, monkeypatch):
-    row = Row(name="ROS 1", state=state, detail="x\x1b", fix="apt-get install ros")
+    row = DoctorRow(name="ROS 1", state=state, detail="x\x1b", fix="apt-get install ros")
     monkeypatch.setattr("grader.cli.doctor.diagnose", lambda: (row,))
     assert run(["doctor"]) == code
     out = capsys.readouterr().out

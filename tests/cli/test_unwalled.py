@@ -52,7 +52,7 @@ def _begins(tmp_path: Path, monkeypatch) -> None:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_it_is_said_before_anything_is_run(command: str, monkeypatch, capsys) -> None:
     none = Sandbox(bubblewrap=False, uid=None, reason="bwrap is not installed")
-    monkeypatch.setattr("grader.cli.host_support.choose", lambda _: none)
+    monkeypatch.setattr("grader.cli.host_support.choose_sandbox", lambda _: none)
     assert run(COMMANDS[command][0]) == 3
     said = capsys.readouterr().err
     assert said.count(SAID) == 1, said
@@ -63,7 +63,7 @@ def test_it_is_said_before_anything_is_run(command: str, monkeypatch, capsys) ->
 @pytest.mark.parametrize("command", COMMANDS)
 def test_nothing_is_said_of_a_sandbox_that_is_there(command: str, monkeypatch, capsys) -> None:
     there = Sandbox(bubblewrap=True, uid=None)
-    monkeypatch.setattr("grader.cli.host_support.choose", lambda _: there)
+    monkeypatch.setattr("grader.cli.host_support.choose_sandbox", lambda _: there)
     assert run(COMMANDS[command][0]) == 3
     assert "students' code" not in capsys.readouterr().err
 

@@ -12,11 +12,11 @@ from grader.arena.control_groups import Cgroup, Cgroups
 from grader.arena.sandbox import Sandbox
 from grader.cli import host_support
 from grader.cli.doctor import diagnose
-from grader.cli.host_support import Row
+from grader.cli.host_support import DoctorRow
 from grader.errors import HostError, SandboxMissing
 
 
-def rows() -> dict[str, Row]:
+def rows() -> dict[str, DoctorRow]:
     return {row.name: row for row in host_support.sandbox_rows()}
 
 
@@ -35,7 +35,7 @@ def test_a_program_that_is_not_installed(monkeypatch, program: str, package: str
         host_support, "find_host_program", lambda name: None if name == program else f"/usr/bin/{name}"
     )
     none = Sandbox(bubblewrap=False, uid=None, reason=f"{program} is not installed")
-    monkeypatch.setattr(host_support, "choose", lambda _: none)
+    monkeypatch.setattr(host_support, "choose_sandbox", lambda _: none)
     found = rows()
     assert (found[program].state, found[program].fix) == ("limited", f"apt-get install {package}")
     assert found["sandbox"].state == "limited"
@@ -70,7 +70,7 @@ def test_a_probe_that_does_not_answer_is_not_taken_for_a_machine_without(monkeyp
     def no_answer(_mode: str) -> None:
         raise SandboxMissing("no answer within 20 s", hint="look at each part")
 
-    monkeypatch.setattr(host_support, "choose", no_answer)
+    monkeypatch.setattr(host_support, "choose_sandbox", no_answer)
     row = rows()["sandbox"]
     assert (row.state, row.detail, row.fix) == ("missing", "no answer within 20 s", "look at each part")
 
@@ -108,7 +108,7 @@ def test_limits_that_cannot_be_set_keep_everything_from_being_graded(monkeypatch
         raise HostError("the limits cannot be set", hint="raise them")
 
     monkeypatch.setattr(host_support, "refused_limits", lambda: "prlimit: Operation not permitted")
-    monkeypatch.setattr(host_support, "choose", refuses)
+    monkeypatch.setattr(host_support, "choose_sandbox", refuses)
     found = rows()
     assert (found["ulimit"].state, found["ulimit"].detail) == ("missing", "prlimit: Operation not permitted")
     assert (found["sandbox"].state, found["sandbox"].fix) == ("missing", "raise them")

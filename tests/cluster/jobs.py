@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from fixtures.make import declared, faulty_package
-from grader.classes.batch.job import Job, Outcome
+from grader.classes.batch.job import GradingJob, SubmissionOutcome
 from grader.model.batch import Entry
 from grader.results import RESULT
 from grader.rubric.load import load_rubric
@@ -20,16 +20,18 @@ def sources() -> list[Path]:
     return [faulty_package(LAB, name) for name in sorted(declared(LAB))]
 
 
-def jobs_for(out: Path, count: int, *, static_only: bool = True, names: Iterable[str] = ()) -> Iterator[Job]:
+def jobs_for(
+    out: Path, count: int, *, static_only: bool = True, names: Iterable[str] = ()
+) -> Iterator[GradingJob]:
     """`count` submissions, made of the fixtures in turn."""
     rubric = load_rubric(LAB)
     chosen = [faulty_package(LAB, name) for name in names] or sources()
     for number in range(count):
         entry = Entry(id=f"s{number:03}", source=str(chosen[number % len(chosen)]))
-        yield Job(entry=entry, rubric=rubric, out=out, static_only=static_only)
+        yield GradingJob(entry=entry, rubric=rubric, out=out, static_only=static_only)
 
 
-def named_job(out: Path, name: str) -> Job:
+def named_job(out: Path, name: str) -> GradingJob:
     """One submission of that id."""
     job = next(jobs_for(out, 1))
     return job.model_copy(update={"entry": job.entry.model_copy(update={"id": name})})
@@ -44,5 +46,5 @@ def verdicts(out: Path) -> dict[str, list[tuple[str, str, float]]]:
     return found
 
 
-def ids(outcomes: Iterable[Outcome]) -> list[str]:
+def ids(outcomes: Iterable[SubmissionOutcome]) -> list[str]:
     return sorted(outcome.id for outcome in outcomes)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.arena.limits import RunLimits
-from grader.classes.batch.job import Job, Outcome
+from grader.classes.batch.job import GradingJob, SubmissionOutcome
 from grader.classes.cluster import executor
 from grader.classes.cluster.exchange import Exchange, Parcel, Report, pack
 from grader.classes.cluster.executor import ParcelLost, store_results
@@ -27,7 +27,7 @@ def exchange(tmp_path: Path, monkeypatch) -> Exchange:
 
 
 @pytest.fixture
-def job(tmp_path: Path) -> Job:
+def job(tmp_path: Path) -> GradingJob:
     return next(jobs_for(tmp_path / "out", 1))
 
 
@@ -44,16 +44,16 @@ def _sent(
     return exchange.put(packed, "s000")
 
 
-def _outcome(status: str = "graded", kind: str = "") -> Outcome:
-    return Outcome.model_validate({"id": "s000", "status": status, "kind": kind})
+def _outcome(status: str = "graded", kind: str = "") -> SubmissionOutcome:
+    return SubmissionOutcome.model_validate({"id": "s000", "status": status, "kind": kind})
 
 
-def _words(job: Job) -> str:
+def _words(job: GradingJob) -> str:
     return str(json.loads((job.out / "s000" / "result.json").read_text())["words"])
 
 
 def test_of_two_attempts_the_one_that_was_reported_counts(
-    exchange: Exchange, job: Job, tmp_path: Path
+    exchange: Exchange, job: GradingJob, tmp_path: Path
 ) -> None:
     believed_lost = _sent(exchange, tmp_path, words="first", evidence="first")
     reported = _sent(exchange, tmp_path, words="second", evidence="second")
@@ -68,7 +68,7 @@ def test_of_two_attempts_the_one_that_was_reported_counts(
 
 @pytest.mark.parametrize(("kind", "stays"), [("host", True), ("killed", True), ("submission", False)])
 def test_only_an_error_of_the_submission_takes_the_place_of_a_complete_result(
-    kind: str, stays: bool, exchange: Exchange, job: Job, tmp_path: Path
+    kind: str, stays: bool, exchange: Exchange, job: GradingJob, tmp_path: Path
 ) -> None:
     earlier = _sent(exchange, tmp_path / "a", words="earlier", evidence="earlier")
     store_results(job, Report(outcome=_outcome(), parcel=earlier), exchange)
@@ -81,14 +81,14 @@ def test_only_an_error_of_the_submission_takes_the_place_of_a_complete_result(
     assert list(Path(exchange.url).iterdir()) == []
 
 
-def test_a_result_that_was_kept_needs_no_parcel(exchange: Exchange, job: Job) -> None:
+def test_a_result_that_was_kept_needs_no_parcel(exchange: Exchange, job: GradingJob) -> None:
     kept = _outcome().model_copy(update={"kept": True})
     assert store_results(job, Report(outcome=kept), exchange) == kept
     assert not job.out.exists()
 
 
 def test_a_parcel_that_is_not_there_or_not_whole_changes_nothing(
-    exchange: Exchange, job: Job, tmp_path: Path
+    exchange: Exchange, job: GradingJob, tmp_path: Path
 ) -> None:
     earlier = _sent(exchange, tmp_path, words="earlier", evidence="earlier")
     store_results(job, Report(outcome=_outcome(), parcel=earlier), exchange)
@@ -104,7 +104,7 @@ def test_a_parcel_that_is_not_there_or_not_whole_changes_nothing(
 
 
 def test_a_submission_that_another_grader_works_on_is_left_to_it(
-    exchange: Exchange, job: Job, tmp_path: Path
+    exchange: Exchange, job: GradingJob, tmp_path: Path
 ) -> None:
     parcel = _sent(exchange, tmp_path)
     with Results(job.out / "s000"), pytest.raises(Busy):

@@ -11,7 +11,7 @@ import pytest
 
 from grader.errors import HostError
 from grader.integrations.autograde import ID, PLATFORMS, REPORTS, grade_upload
-from grader.integrations.bundle import SETTINGS_FILE, Platform, Settings
+from grader.integrations.bundle import SETTINGS_FILE, BundleSettings, ContainerLayout
 from grader.integrations.platforms import GRADESCOPE, PRAIRIELEARN
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
@@ -62,7 +62,7 @@ def test_prairielearn_takes_no_attempt_for_what_was_not_graded(kind) -> None:
     assert STEERING.search(json.dumps(document, ensure_ascii=False)) is None
 
 
-def laid_out(root: Path, name: str, settings: str | None) -> Platform:
+def laid_out(root: Path, name: str, settings: str | None) -> ContainerLayout:
     platform = PLATFORMS[name]
     (root / platform.lab).mkdir()
     (root / platform.upload).mkdir()
@@ -73,7 +73,7 @@ def laid_out(root: Path, name: str, settings: str | None) -> Platform:
 
 @pytest.mark.parametrize("name", PLATFORMS)
 @pytest.mark.parametrize(
-    "settings", [None, "{", Settings(rubric="rubric/none.yaml", minutes=10).to_json().decode()]
+    "settings", [None, "{", BundleSettings(rubric="rubric/none.yaml", minutes=10).to_json().decode()]
 )
 def test_a_grader_that_cannot_grade_says_so_and_gives_no_score(name, settings, tmp_path, capsys) -> None:
     platform = laid_out(tmp_path, name, settings)
@@ -88,7 +88,7 @@ def test_a_grader_that_cannot_grade_says_so_and_gives_no_score(name, settings, t
 @pytest.mark.parametrize("name", PLATFORMS)
 def test_a_platform_can_read_what_it_is_told_and_the_reports_stay_closed(name, tmp_path) -> None:
     lab = Path(__file__).parents[2] / "benchmarks" / "data" / "static.yaml"
-    platform = laid_out(tmp_path, name, Settings(rubric=str(lab), minutes=10).to_json().decode())
+    platform = laid_out(tmp_path, name, BundleSettings(rubric=str(lab), minutes=10).to_json().decode())
     shutil.copytree(REFERENCE, tmp_path / platform.upload / "lab1")
     before = os.umask(0o022)
     try:
@@ -103,7 +103,7 @@ def test_a_platform_can_read_what_it_is_told_and_the_reports_stay_closed(name, t
 @pytest.mark.parametrize("name", PLATFORMS)
 def test_a_class_whose_packages_have_another_name_is_graded_under_that(name, tmp_path) -> None:
     lab = Path(__file__).parents[2] / "benchmarks" / "data" / "static.yaml"
-    settings = Settings(rubric=str(lab), minutes=10, package="week1")
+    settings = BundleSettings(rubric=str(lab), minutes=10, package="week1")
     platform = laid_out(tmp_path, name, settings.to_json().decode())
     package = tmp_path / platform.upload / "week1"
     shutil.copytree(REFERENCE, package)
@@ -118,7 +118,7 @@ def test_a_class_whose_packages_have_another_name_is_graded_under_that(name, tmp
 @pytest.mark.parametrize("name", PLATFORMS)
 def test_an_interrupted_grading_says_that_it_took_too_long(name, tmp_path, monkeypatch) -> None:
     lab = Path(__file__).parents[2] / "rubrics" / "mcr2-basic-comms.yaml"
-    platform = laid_out(tmp_path, name, Settings(rubric=str(lab), minutes=10).to_json().decode())
+    platform = laid_out(tmp_path, name, BundleSettings(rubric=str(lab), minutes=10).to_json().decode())
     (tmp_path / platform.upload / "package.xml").touch()
 
     def interrupted(*_: object) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.feedback.files import Folder
+from grader.classes.feedback.files import FeedbackFolder
 from grader.classes.feedback.forms import FORMS, Feedback
 from grader.classes.feedback.publish import read_published
 from grader.cli.main import run
@@ -98,14 +98,14 @@ def test_a_failure_costs_one_student(published: Path, capsys) -> None:
 
 
 def test_what_is_interrupted_goes_on(published: Path, capsys, monkeypatch: pytest.MonkeyPatch) -> None:
-    send = Folder.send
+    send = FeedbackFolder.send
 
-    def one_only(self: Folder, feedback: Feedback, *, look: bool = False) -> str:
+    def one_only(self: FeedbackFolder, feedback: Feedback, *, look: bool = False) -> str:
         if feedback.entry.id != "ada":
             raise KeyboardInterrupt
         return send(self, feedback, look=look)
 
-    monkeypatch.setattr(Folder, "send", one_only)
+    monkeypatch.setattr(FeedbackFolder, "send", one_only)
     assert feedback(published, "folder") == 130
     assert "grader: 1 of 4 sent; the same command continues\n" in capsys.readouterr().err
     monkeypatch.undo()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.classes.gradebook import Book, Row
+from grader.classes.gradebook import Book, GradebookRow
 from grader.model.batch import Entry
 from grader.model.result import AppliedOverride, Automatic, CriterionResult, Lateness
 from grader.model.verdict import Status
@@ -25,7 +25,7 @@ def criterion(criterion_id: str, points: float, status: Status = Status.PARTIAL)
 
 def row(
     who: str, points: float = 87.5, *, name: str = "", open_: str = "", error: str = "", **extra: str
-) -> Row:
+) -> GradebookRow:
     """`open_` is a criterion that a person has to look at. `extra` are the roster's further columns."""
     criteria = [criterion("rate", points - 40), criterion("name", 40.0), criterion("advice", 0.0)]
     if open_:
@@ -39,10 +39,10 @@ def row(
         error=error,
     )
     columns = {column.replace("_", " "): text for column, text in extra.items()}
-    return Row(entry=Entry(id=who, source="s", name=name, extra=columns), result=result)
+    return GradebookRow(entry=Entry(id=who, source="s", name=name, extra=columns), result=result)
 
 
-def late(one: Row, before: float) -> Row:
+def late(one: GradebookRow, before: float) -> GradebookRow:
     """The same, handed in a day late."""
     lateness = Lateness(
         late_s=86400, points_before=before, points=one.result.points, text="1 day late: 10 taken"
@@ -50,7 +50,7 @@ def late(one: Row, before: float) -> Row:
     return one.model_copy(update={"result": one.result.model_copy(update={"late": lateness})})
 
 
-def overridden(one: Row) -> Row:
+def overridden(one: GradebookRow) -> GradebookRow:
     """The same, with a person's points."""
     said = Automatic(status=Status.FAIL, points=0, message="")
     override = AppliedOverride(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.gradebook import Row, write_gradebook
+from grader.classes.gradebook import GradebookRow, write_gradebook
 from tests.gradebook.made import BOOK, row
 
 DOWNLOAD = (
@@ -19,7 +19,9 @@ DOWNLOAD = (
 )
 
 
-def filled(folder: Path, export: bytes, rows: list[Row], **options: object) -> tuple[bytes, list[str]]:
+def filled(
+    folder: Path, export: bytes, rows: list[GradebookRow], **options: object
+) -> tuple[bytes, list[str]]:
     (folder / "gc.xls").write_bytes(export)
     remarks = write_gradebook(
         BOOK, rows, folder / "out.xls", "blackboard", template=folder / "gc.xls", **options

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.gradebook import Book, Row, write_gradebook
+from grader.classes.gradebook import Book, GradebookRow, write_gradebook
 from grader.errors import UsageError
 from tests.gradebook.made import BOOK, late, row
 
@@ -26,7 +26,7 @@ EXPORT = (
 
 
 def filled(
-    folder: Path, rows: list[Row], *, export: bytes = EXPORT, **options: object
+    folder: Path, rows: list[GradebookRow], *, export: bytes = EXPORT, **options: object
 ) -> tuple[bytes, list[str]]:
     (folder / "export.csv").write_bytes(export)
     target = folder / "out.csv"
@@ -35,7 +35,7 @@ def filled(
 
 
 def made(
-    folder: Path, rows: list[Row], book: Book = BOOK, **options: bool
+    folder: Path, rows: list[GradebookRow], book: Book = BOOK, **options: bool
 ) -> tuple[list[list[str]], list[str]]:
     target = folder / "out.csv"
     remarks = write_gradebook(book, rows, target, "canvas", **options)

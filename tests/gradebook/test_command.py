@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.batch.folder import write_run
-from grader.classes.gradebook import FORMS, Row
+from grader.classes.gradebook import FORMS, GradebookRow
 from grader.classes.gradebook.table import header
 from grader.cli.main import build_parser, run
 from grader.model.batch import BatchRun, RosterFault
@@ -31,7 +31,7 @@ def batch(tmp_path: Path) -> Path:
     return folder
 
 
-def batch_run(rows: list[Row]) -> BatchRun:
+def batch_run(rows: list[GradebookRow]) -> BatchRun:
     return BatchRun(
         state="complete",
         grader="1",

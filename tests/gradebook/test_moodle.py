@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.gradebook import Book, Row, write_gradebook
+from grader.classes.gradebook import Book, GradebookRow, write_gradebook
 from grader.errors import UsageError
 from tests.gradebook.made import BOOK, late, row
 
@@ -27,7 +27,9 @@ REPORT = (
 )
 
 
-def filled(folder: Path, export: bytes, rows: list[Row], **options: object) -> tuple[bytes, list[str]]:
+def filled(
+    folder: Path, export: bytes, rows: list[GradebookRow], **options: object
+) -> tuple[bytes, list[str]]:
     (folder / "export.csv").write_bytes(export)
     remarks = write_gradebook(
         BOOK, rows, folder / "out.csv", "moodle", template=folder / "export.csv", **options
@@ -36,7 +38,7 @@ def filled(folder: Path, export: bytes, rows: list[Row], **options: object) -> t
 
 
 def made(
-    folder: Path, rows: list[Row], book: Book = BOOK, **options: bool
+    folder: Path, rows: list[GradebookRow], book: Book = BOOK, **options: bool
 ) -> tuple[list[list[str]], list[str]]:
     remarks = write_gradebook(book, rows, folder / "out.csv", "moodle", **options)
     text = (folder / "out.csv").read_bytes().decode()

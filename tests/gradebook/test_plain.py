@@ -13,7 +13,7 @@ from pathlib import Path
 import openpyxl
 import pytest
 
-from grader.classes.gradebook import Book, Row, write_gradebook
+from grader.classes.gradebook import Book, GradebookRow, write_gradebook
 from grader.classes.gradebook.write import json_line
 from grader.errors import OutputError, UsageError
 from grader.model.result import GradingResult
@@ -30,7 +30,7 @@ ROWS = [
 ]
 
 
-def written(folder: Path, rows: list[Row], book: Book = BOOK) -> list[dict[str, str]]:
+def written(folder: Path, rows: list[GradebookRow], book: Book = BOOK) -> list[dict[str, str]]:
     target = folder / "book.csv"
     assert write_gradebook(book, iter(rows), target, "csv") == ()
     text = target.read_bytes().decode()
@@ -154,7 +154,7 @@ def test_an_empty_class(tmp_path: Path) -> None:
 
 def test_rows_are_read_one_by_one(tmp_path: Path) -> None:
     """When the next row is asked for, nobody holds the one before any more."""
-    alive: list[weakref.ref[Row]] = []
+    alive: list[weakref.ref[GradebookRow]] = []
     most = []
 
     def rows():

@@ -10,7 +10,7 @@ import pytest
 
 from grader.errors import PackageNotFound, SubmissionError
 from grader.intake import enclosing_package, find_packages
-from grader.intake.choose import Wanted
+from grader.intake.choose import WantedPackage
 from tests.intake.samples import lab, manifest, opened, repository, write
 
 BROKEN = "<package><name>lab1</name><oops></package>"
@@ -143,7 +143,7 @@ def test_what_is_there_instead_is_named(files, message, hint, tmp_path):
     ],
 )
 def test_what_has_the_labs_files_is_named(files, message, hint, tmp_path):
-    wanted = Wanted(name="lab1", files=frozenset({"talker.py", "listener.py"}))
+    wanted = WantedPackage(name="lab1", files=frozenset({"talker.py", "listener.py"}))
     with pytest.raises(PackageNotFound) as caught:
         opened(write(tmp_path / "repo", files), tmp_path, package=wanted)
     assert message in caught.value.message
@@ -152,7 +152,7 @@ def test_what_has_the_labs_files_is_named(files, message, hint, tmp_path):
 
 def test_what_another_copy_has_and_the_graded_one_has_not_is_named(tmp_path):
     files = {**tree("src/lab1", "lab1"), "lab1/scripts/talker.py": "", "src/lab1/scripts/listener.py": ""}
-    wanted = Wanted(name="lab1", files=frozenset({"talker.py", "listener.py"}))
+    wanted = WantedPackage(name="lab1", files=frozenset({"talker.py", "listener.py"}))
     found = opened(write(tmp_path / "repo", files), tmp_path, package=wanted)
     assert found.package.path == "src/lab1"
     assert found.hints[-1] == (
@@ -345,7 +345,9 @@ def test_a_package_that_is_asked_for_is_taken_by_its_own_name(asked, path, tmp_p
     files = tree("a:lab_1", "lab1", "other", "z/src/other", "dots:../..", "blank:a\nb")
     files["z/.catkin_workspace"] = ""
     submission = opened(
-        write(tmp_path / "repo", files), tmp_path, package=Wanted(name="lab1", files=FILES, asked=asked)
+        write(tmp_path / "repo", files),
+        tmp_path,
+        package=WantedPackage(name="lab1", files=FILES, asked=asked),
     )
     assert (submission.package.path, submission.package.name) == (path, asked)
 
@@ -353,7 +355,7 @@ def test_a_package_that_is_asked_for_is_taken_by_its_own_name(asked, path, tmp_p
 def test_a_package_that_is_asked_for_and_is_not_there(tmp_path):
     repo = write(tmp_path / "repo", tree("a:lab_1", "lab1"))
     with pytest.raises(PackageNotFound, match=r"no package lab_2 .*: lab1, lab_1") as caught:
-        opened(repo, tmp_path, package=Wanted(name="lab1", asked="lab_2"))
+        opened(repo, tmp_path, package=WantedPackage(name="lab1", asked="lab_2"))
     assert caught.value.hint == "Give one of these names with --package, or leave it out."
 
 
@@ -370,7 +372,7 @@ def test_a_thousand_copies_are_chosen_from_in_no_time(tmp_path):
     copies = {f"c{i:04}/package.xml": manifest("lab1") for i in range(1000)}
     repo = write(tmp_path / "repo", {**copies, "c0030/src/numeric_talker.py": ""})
     begun = time.process_time()
-    submission = opened(repo, tmp_path, package=Wanted(name="lab1", files=FILES))
+    submission = opened(repo, tmp_path, package=WantedPackage(name="lab1", files=FILES))
     assert submission.package.path == "c0030"
     assert len(submission.hints[0]) < 300
     assert time.process_time() - begun < 10

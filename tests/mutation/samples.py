@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from grader.authoring.mutation.package_tree import Entry, Tree
+from grader.authoring.mutation.package_tree import Tree, TreeFile
 from grader.authoring.mutation.solution import Solution, find_reference, load_solution
 from grader.rubric.load import load_rubric
 
@@ -127,7 +127,7 @@ CATKIN_PACKAGE() ; catkin_install_python(PROGRAMS scripts/timer.py
 def tree_of(files: dict[str, str], folder: str = "") -> Tree:
     """Files with a shebang are executable."""
     return {
-        folder + name: Entry(data=text.encode(), executable=text.startswith("#!"))
+        folder + name: TreeFile(data=text.encode(), executable=text.startswith("#!"))
         for name, text in files.items()
     }
 

@@ -10,7 +10,7 @@ import pytest
 
 from fixtures.make import declared
 from grader.authoring.mutation import rubric_test
-from grader.classes.batch.job import Graded
+from grader.classes.batch.job import GradedSubmission
 from grader.cli.main import run
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import ROOT
@@ -38,7 +38,7 @@ class Judge:
             mutant = declared(LAB).get(job.name)
             criteria = self.criteria(lost, mutant.says if mutant else {})
             points = (mutant.points if mutant else None) or 100
-            yield Graded(name=job.name, result=result(criteria=criteria, points=points))
+            yield GradedSubmission(name=job.name, result=result(criteria=criteria, points=points))
 
     def criteria(self, lost: dict[str, str], says: dict[str, tuple[str, ...]]):
         return tuple(

@@ -3,24 +3,24 @@ from __future__ import annotations
 import pytest
 
 from grader.authoring.mutation import package_tree as tree_module
-from grader.authoring.mutation.package_tree import Entry, read_tree, unified_diff, write_tree
-from grader.authoring.mutation.source_edits import Edit, apply_edits
+from grader.authoring.mutation.package_tree import TreeFile, read_tree, unified_diff, write_tree
+from grader.authoring.mutation.source_edits import TextEdit, apply_edits
 from grader.errors import UsageError
 
 
 def test_what_is_written_is_read_back(tmp_path):
     tree = {
-        "a/ü b.py": Entry(data=b"#!/bin/sh\r\n", executable=True),
-        "link": Entry(data=b"", link="nowhere/at/all"),
-        "bytes": Entry(data=bytes(range(256))),
+        "a/ü b.py": TreeFile(data=b"#!/bin/sh\r\n", executable=True),
+        "link": TreeFile(data=b"", link="nowhere/at/all"),
+        "bytes": TreeFile(data=bytes(range(256))),
     }
     write_tree(tree, tmp_path / "x")
     assert read_tree(tmp_path / "x") == tree
 
 
 def test_writing_takes_the_place_of_what_was_there(tmp_path):
-    write_tree({"old": Entry(data=b"1")}, tmp_path / "x")
-    write_tree({"new": Entry(data=b"2")}, tmp_path / "x")
+    write_tree({"old": TreeFile(data=b"1")}, tmp_path / "x")
+    write_tree({"new": TreeFile(data=b"2")}, tmp_path / "x")
     assert sorted(p.name for p in (tmp_path / "x").iterdir()) == ["new"]
 
 
@@ -51,16 +51,16 @@ def test_a_folder_that_is_no_package_is_refused(tmp_path, monkeypatch):
 
 def test_a_diff_says_what_cannot_be_seen():
     before = {
-        "mode": Entry(data=b"x\n", executable=True),
-        "gone": Entry(data=b"1\n"),
-        "ends": Entry(data=b"a\nb"),
-        "same": Entry(data=b"same"),
+        "mode": TreeFile(data=b"x\n", executable=True),
+        "gone": TreeFile(data=b"1\n"),
+        "ends": TreeFile(data=b"a\nb"),
+        "same": TreeFile(data=b"same"),
     }
     after = {
-        "mode": Entry(data=b"x\n"),
-        "new": Entry(data=b"2\n"),
-        "ends": Entry(data=b"\xef\xbb\xbfa\r\nb"),
-        "same": Entry(data=b"same"),
+        "mode": TreeFile(data=b"x\n"),
+        "new": TreeFile(data=b"2\n"),
+        "ends": TreeFile(data=b"\xef\xbb\xbfa\r\nb"),
+        "same": TreeFile(data=b"same"),
     }
     text = unified_diff(before, after)
     assert "old mode 100755\nnew mode 100644\n" in text
@@ -71,6 +71,6 @@ def test_a_diff_says_what_cannot_be_seen():
 
 
 def test_edits_are_made_from_their_places():
-    assert apply_edits("abcdef", [Edit(4, 5, "E"), Edit(1, 3, ""), Edit(1, 1, "+")]) == "a+dEf"
+    assert apply_edits("abcdef", [TextEdit(4, 5, "E"), TextEdit(1, 3, ""), TextEdit(1, 1, "+")]) == "a+dEf"
     with pytest.raises(ValueError, match="overlap"):
-        apply_edits("abcdef", [Edit(0, 3, ""), Edit(2, 4, "")])
+        apply_edits("abcdef", [TextEdit(0, 3, ""), TextEdit(2, 4, "")])

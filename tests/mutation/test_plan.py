@@ -10,7 +10,7 @@ from grader.authoring.mutation.faulty_packages import (
     select_mutants,
 )
 from grader.authoring.mutation.operators import OPERATORS
-from grader.authoring.mutation.package_tree import Entry, unified_diff
+from grader.authoring.mutation.package_tree import TreeFile, unified_diff
 from grader.authoring.mutation.solution import Solution
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import Mutant
@@ -137,9 +137,9 @@ def test_every_kind_of_edit():
     assert planned.mistake == "All of it."
     made = NODE.replace("'a'", "'c'").replace("\n", "\r\n") + "# end\r\n"
     assert planned.tree == {
-        "scripts/a.py": Entry(data=b"\xef\xbb\xbf" + made.encode()),
-        "scripts/b.py": Entry(data=b"new", executable=True),
-        "scripts/d.py": Entry(data=b"", link="c.py"),
+        "scripts/a.py": TreeFile(data=b"\xef\xbb\xbf" + made.encode()),
+        "scripts/b.py": TreeFile(data=b"new", executable=True),
+        "scripts/d.py": TreeFile(data=b"", link="c.py"),
     }
 
 

@@ -12,7 +12,7 @@ from grader.authoring.mutation import rubric_test
 from grader.authoring.mutation.faulty_packages import Planned, plan_all
 from grader.authoring.mutation.rubric_test import Comparison, Plan, compare, find_lost, run_test
 from grader.authoring.mutation.solution import Solution
-from grader.classes.batch.job import FolderJob, Graded
+from grader.classes.batch.job import FolderJob, GradedSubmission
 from grader.errors import HostError
 from grader.model.mutants import Mutant
 from grader.model.progress import Silence
@@ -49,7 +49,7 @@ class Lab:
         }
         return Plan(**{**data, **changes})
 
-    def grade_all(self, jobs, side_by_side, begun) -> Iterator[Graded]:
+    def grade_all(self, jobs, side_by_side, begun) -> Iterator[GradedSubmission]:
         for job in jobs:
             begun(job.name)
             self.calls.append((job.name, side_by_side))
@@ -58,14 +58,14 @@ class Lab:
             (job.out / job.name / "evidence").mkdir(exist_ok=True, parents=True)
             yield self.graded(job)
 
-    def graded(self, job: FolderJob) -> Graded:
+    def graded(self, job: FolderJob) -> GradedSubmission:
         judged = self.judged(job)
         if isinstance(judged, str):
-            return Graded(name=job.name, result=None, error=judged)
+            return GradedSubmission(name=job.name, result=None, error=judged)
         points = {"talker-node": 40, "chatter-rate": 60, "advice": 0}
         statuses = {"talker-node": "pass", "chatter-rate": "pass", **judged}
         found = tuple(criterion(name, status, 0, points[name]) for name, status in statuses.items())
-        return Graded(name=job.name, result=result(criteria=found))
+        return GradedSubmission(name=job.name, result=result(criteria=found))
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from grader.report.forms import FORMS
 from grader.report.sentences import repair_words
 from grader.report.terminal import Terminal, open_console
 from grader.report.view import arrange, without_hidden
-from grader.results import PARTS, RESULT
+from grader.results import RESULT, RESULT_FILES
 from tests.report.hostile import result, rubric
 from tests.support.a_class import criterion
 
@@ -274,5 +274,5 @@ def test_carets_stand_below_what_is_meant_whatever_the_encoding(encoding, number
 
 def test_files_beside_a_result_are_known_wherever_they_are_handled():
     written = {form.file for form in FORMS.values() if form.in_results}
-    for names in (PARTS, SHOWN_AT_THE_END, SHOWN_IN_REVIEW, REPORT_NAMES):
+    for names in (RESULT_FILES, SHOWN_AT_THE_END, SHOWN_IN_REVIEW, REPORT_NAMES):
         assert written | {RESULT} <= set(names)

@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 import pytest
 from rich.console import Console
 
-from grader.classes.gradebook import Book, Row, write_gradebook
-from grader.classes.gradebook.table import Form
+from grader.classes.gradebook import Book, GradebookRow, write_gradebook
+from grader.classes.gradebook.table import GradebookFormat
 from grader.model.batch import Entry
 from grader.model.result import GradingResult
 from grader.model.verdict import Status
@@ -44,7 +44,7 @@ def terminal(encoding: str, width: int = 80, *, full: bool = False) -> bytes:
     return raw.getvalue()
 
 
-def gradebook(kind: Form) -> bytes:
+def gradebook(kind: GradebookFormat) -> bytes:
     shown = worst()
     criteria = tuple((c.id, c.title, c.max_points) for c in shown.criteria)
     book = Book(
@@ -54,7 +54,7 @@ def gradebook(kind: Form) -> bytes:
     entry = Entry(id="ada", source="/home/ada", name=f"{FORMULA} {WIDE}", group=ESCAPES, extra=extra)
     with TemporaryDirectory() as folder:
         place = Path(folder, "book")
-        write_gradebook(book, [Row(entry=entry, result=shown)], place, kind)
+        write_gradebook(book, [GradebookRow(entry=entry, result=shown)], place, kind)
         return place.read_bytes()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.classes.review.student_requests import Request, read_requests, request_files
+from grader.classes.review.student_requests import StudentRequest, read_requests, request_files
 from grader.judging.settle import settle
 from grader.model.batch import Entry
 from grader.model.verdict import Status
@@ -30,8 +30,8 @@ def asked(out):
 def test_rows_become_requests_and_faults_name_their_line(tmp_path) -> None:
     found = read(tmp_path, "\ufeff" + ASKED)
     assert found.found == {
-        "dana": {"counter-wrap": (Request(text="Why 0?\nIt is <b>right</b>.", when="2026-11-09"),)},
-        "ada": {"style": (Request(text="Could I have more?", when=""),)},
+        "dana": {"counter-wrap": (StudentRequest(text="Why 0?\nIt is <b>right</b>.", when="2026-11-09"),)},
+        "ada": {"style": (StudentRequest(text="Could I have more?", when=""),)},
     }
     assert found.faults == (
         'requests.csv:5: there is no submission "danna" (did you mean "dana"?)',
@@ -66,12 +66,12 @@ ID;x,student,text,criterion
 """,
     )
     first, second = (
-        Request(text="Please look again", when="2026/11/20 10:01"),
-        Request(text="Please look again"),
+        StudentRequest(text="Please look again", when="2026/11/20 10:01"),
+        StudentRequest(text="Please look again"),
     )
-    both = Request(text="Both?", when="2026/11/20 10:03")
+    both = StudentRequest(text="Both?", when="2026/11/20 10:03")
     assert found.found == {
-        "dana": {"counter-wrap": (Request(text="Why 0?", when="2026/11/20 10:00"),)},
+        "dana": {"counter-wrap": (StudentRequest(text="Why 0?", when="2026/11/20 10:00"),)},
         "ada": {"style": (first, both, second), "counter-wrap": (both,)},
     }
     assert found.faults == ('requests.csv:4: there is no submission "Someone"',)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.similarity.comparison import Request
+from grader.classes.similarity.comparison import ComparisonRequest
 from grader.classes.similarity.matching import compare_class
 from grader.model.batch import Similarity
 from tests.similarity.classes import (
@@ -26,7 +26,7 @@ ALL = ("average", "generator", "laser", "machine", "monitor", "odometry", "servi
 
 def compared(folders: dict[str, Path], **also: object) -> Similarity:
     fields = {"starter": (), "groups": {}, "threshold": 0.8, "jobs": 2} | also
-    return compare_class(Request(folders=folders, **fields))
+    return compare_class(ComparisonRequest(folders=folders, **fields))
 
 
 def named(similarity: Similarity) -> set[tuple[str, str]]:

@@ -8,9 +8,9 @@ import re
 import pytest
 
 from grader.classes.similarity import compare, fingerprints, matching
-from grader.classes.similarity.comparison import Request
+from grader.classes.similarity.comparison import ComparisonRequest
 from grader.classes.similarity.fingerprints import CodeSource, read_files, read_place, reading_ended
-from grader.classes.similarity.sources import Source
+from grader.classes.similarity.sources import ProgramText
 from grader.workers import WorkerEnded
 from tests.similarity.classes import class_of, hand_in, solution
 
@@ -55,7 +55,7 @@ def test_a_regular_expression_without_end_is_interrupted(monkeypatch) -> None:
 
     monkeypatch.setattr(fingerprints, "FILE_S", 0.2)
     monkeypatch.setattr(fingerprints, "read_text", stuck)
-    read = read_files(CodeSource(name="ann"), (Source(path="a.py", code="", language="python"),))
+    read = read_files(CodeSource(name="ann"), (ProgramText(path="a.py", code="", language="python"),))
     assert [(one.file, one.reason) for one in read.left_out] == [("a.py", "took longer than 0.2 s to read")]
 
 
@@ -127,7 +127,7 @@ def test_a_class_with_too_much_code_is_compared_as_far_as_there_is_room(tmp_path
     monkeypatch.setattr(matching, "PRINTS_MAX", 700)
     folders = class_of(tmp_path, {name: {"a.py": GOOD} for name in ("ann", "ben", "cem")})
     similarity = matching.compare_class(
-        Request(folders=folders, starter=(), groups={}, threshold=0.8, jobs=1)
+        ComparisonRequest(folders=folders, starter=(), groups={}, threshold=0.8, jobs=1)
     )
     assert [(pair.a, pair.b) for pair in similarity.pairs] == [("ann", "ben")]
     assert [(one.id, one.reason[:24]) for one in similarity.not_compared] == [

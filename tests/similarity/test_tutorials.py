@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.similarity import compare
-from grader.classes.similarity.comparison import Request
+from grader.classes.similarity.comparison import ComparisonRequest
 from grader.classes.similarity.matching import compare_class
 from tests.similarity.classes import class_of, renamed, solution
 
@@ -82,7 +82,9 @@ int main(int argc, char **argv)
 
 def compared(folders, **also):
     return compare_class(
-        Request(folders=folders, **({"starter": (), "groups": {}, "threshold": 0.5, "jobs": 2} | also))
+        ComparisonRequest(
+            folders=folders, **({"starter": (), "groups": {}, "threshold": 0.5, "jobs": 2} | also)
+        )
     )
 
 

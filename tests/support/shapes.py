@@ -10,9 +10,9 @@ from itertools import product
 from fixtures.make import labs, rubric_of
 from fixtures.make import solution_of as reference_of
 from grader.authoring.mutation.operators import OPERATORS
-from grader.authoring.mutation.package_tree import Entry, Tree
+from grader.authoring.mutation.package_tree import Tree, TreeFile
 from grader.authoring.mutation.solution import Site, Solution
-from grader.authoring.mutation.source_edits import Edit, apply_edits
+from grader.authoring.mutation.source_edits import TextEdit, apply_edits
 from grader.model.repair import RepairKind
 from grader.package.repairs import wanted_of
 
@@ -153,19 +153,19 @@ def _merged(base: Tree, changed: list[Tree]) -> Tree | None:
         except ValueError:
             return None
         executable = all(other.executable for other in (entry, *others))
-        merged[path] = Entry(data=text.encode(errors="surrogateescape"), executable=executable)
+        merged[path] = TreeFile(data=text.encode(errors="surrogateescape"), executable=executable)
     return merged
 
 
-def _text(entry: Entry) -> str:
+def _text(entry: TreeFile) -> str:
     return entry.data.decode(errors="surrogateescape")
 
 
-def _edits(entry: Entry, other: Entry) -> Iterator[Edit]:
+def _edits(entry: TreeFile, other: TreeFile) -> Iterator[TextEdit]:
     old, new = (_text(one).splitlines(keepends=True) for one in (entry, other))
     starts = [0]
     for line in old:
         starts.append(starts[-1] + len(line))
     for tag, i, j, k, n in difflib.SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
         if tag != "equal":
-            yield Edit(starts[i], starts[j], "".join(new[k:n]))
+            yield TextEdit(starts[i], starts[j], "".join(new[k:n]))

@@ -11,7 +11,7 @@ from grader.errors import ExitCode
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
-from grader.student.watching import WAIT_S, Outcome, Saves, Screen, Watch, take_snapshot
+from grader.student.watching import WAIT_S, Saves, Screen, Watch, WatchedResult, take_snapshot
 from tests.report.hostile import criterion, result
 
 Step = Callable[[], object]
@@ -65,7 +65,7 @@ class MadeUpGrading:
         self.verdicts: dict[str, Status] = {}
         self.error: ErrorInfo | None = None
 
-    def __call__(self, stop: Stop) -> Outcome:
+    def __call__(self, stop: Stop) -> WatchedResult:
         self.begun += 1
         if self.during:
             self.during.pop(0)()
@@ -75,10 +75,12 @@ class MadeUpGrading:
         if self.after:
             self.after.pop(0)()
         if self.error is not None:
-            return Outcome(result=self._result(error=self.error), code=ExitCode.NOT_GRADED, undecided=True)
+            return WatchedResult(
+                result=self._result(error=self.error), code=ExitCode.NOT_GRADED, undecided=True
+            )
         statuses = set(self.verdicts.values())
         code = ExitCode.BELOW_PASS_MARK if statuses - {Status.PASS} else ExitCode.PASSED
-        return Outcome(
+        return WatchedResult(
             result=self._result(), code=code, undecided=any(status.is_retryable for status in statuses)
         )
 
@@ -96,7 +98,7 @@ class Remembered(Screen):
 
     def __init__(self) -> None:
         self.words: list[str] = []
-        self.ends: list[Outcome] = []
+        self.ends: list[WatchedResult] = []
 
     def begin(self, saved: tuple[str, ...]) -> None:
         self.words.append(" ".join(("begin", *saved)))
@@ -107,7 +109,7 @@ class Remembered(Screen):
     def unchanged(self, saved: tuple[str, ...]) -> None:
         self.words.append(" ".join(("unchanged", *saved)))
 
-    def end(self, outcome: Outcome, saved: tuple[str, ...]) -> None:
+    def end(self, outcome: WatchedResult, saved: tuple[str, ...]) -> None:
         self.words.append(" ".join(("end", *saved)))
         self.ends.append(outcome)
 

@@ -13,7 +13,7 @@ from grader.model.result import ErrorInfo, GradingResult
 from grader.model.verdict import Status
 from grader.report.terminal import MINUS
 from grader.student.watch_screen import DASH, JsonLines, TerminalScreen, compare
-from grader.student.watching import Outcome
+from grader.student.watching import WatchedResult
 from tests.report.hostile import ESCAPES, MARKDOWN, RICH, XML, criterion, result, rubric
 
 NOON = datetime(2026, 3, 2, 12, 3, 4, tzinfo=timezone.utc)
@@ -57,7 +57,7 @@ def shown(stream, *results: GradingResult, **options) -> str:
         if number:
             screen.begin(("src/talker.py",))
         saved = ("src/talker.py",) if number else ()
-        screen.end(Outcome(result=one, code=ExitCode.PASSED), saved)
+        screen.end(WatchedResult(result=one, code=ExitCode.PASSED), saved)
     return stream.getvalue()
 
 
@@ -136,7 +136,7 @@ def test_hostile_text_steers_nothing() -> None:
         screen = TerminalScreen("lab\x1b[31m", lab(bad), stream, clock=lambda: NOON)
         for saved, one in (((), graded(bad)), ((words,), graded(bad)), ((words,), wrong)):
             screen.begin(saved)
-            screen.end(Outcome(result=one, code=ExitCode.PASSED), saved)
+            screen.end(WatchedResult(result=one, code=ExitCode.PASSED), saved)
         text = stream.getvalue()
         assert "\x1b]0;" not in text
         assert "\x1b[31mred" not in text
@@ -159,7 +159,7 @@ def test_json_is_one_document_a_line_for_each_run() -> None:
     screen.begin(())
     for message in ("fine", words):
         one = graded(criterion("rate", Status.FAIL, 0.0, 10.0, message=message))
-        screen.end(Outcome(result=one, code=ExitCode.PASSED), ())
+        screen.end(WatchedResult(result=one, code=ExitCode.PASSED), ())
     screen.restart()
     rows = buffer.getvalue().decode().split("\n")
     assert [json.loads(row)["criteria"][0]["message"] for row in rows[:-1]] == ["fine", words]

@@ -16,7 +16,7 @@ from typing import Any
 import yaml
 
 from grader.authoring.mutation.operators import OPERATORS
-from grader.authoring.mutation.package_tree import Entry, Tree
+from grader.authoring.mutation.package_tree import Tree, TreeFile
 from grader.authoring.mutation.solution import Site, Solution
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import (
@@ -304,7 +304,7 @@ def _replace(tree: Tree, edit: ReplaceText) -> None:
 
 def _write(tree: Tree, edit: WriteFile) -> None:
     executable = edit.executable or (edit.file in tree and tree[edit.file].executable)
-    tree[edit.file] = Entry(data=edit.text.encode(), executable=executable)
+    tree[edit.file] = TreeFile(data=edit.text.encode(), executable=executable)
 
 
 def _append(tree: Tree, edit: AppendText) -> None:
@@ -328,7 +328,7 @@ def _delete(tree: Tree, edit: ChosenFile) -> None:
 
 
 def _link(tree: Tree, edit: SymbolicLink) -> None:
-    tree[edit.file] = Entry(data=b"", link=edit.to)
+    tree[edit.file] = TreeFile(data=b"", link=edit.to)
 
 
 def _move(tree: Tree, edit: MoveFiles) -> None:

@@ -17,7 +17,7 @@ SHEBANG = b"#!"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entry:
+class TreeFile:
     """One file; `link` is the target of a symbolic link, whose `data` is empty."""
 
     data: bytes
@@ -25,7 +25,7 @@ class Entry:
     link: str | None = None
 
 
-Tree = dict[str, Entry]
+Tree = dict[str, TreeFile]
 
 
 def read_tree(folder: Path, *, modes: bool = True) -> Tree:
@@ -53,17 +53,17 @@ def read_tree(folder: Path, *, modes: bool = True) -> Tree:
     return tree
 
 
-def _entry(path: Path, *, modes: bool) -> Entry | None:
+def _entry(path: Path, *, modes: bool) -> TreeFile | None:
     try:
         if path.is_symlink():
-            return Entry(data=b"", link=path.readlink().as_posix())
+            return TreeFile(data=b"", link=path.readlink().as_posix())
         if not path.is_file():
             return None
         data = path.read_bytes()
         executable = bool(path.stat().st_mode & 0o100) if modes else data.startswith(SHEBANG)
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror}") from error
-    return Entry(data=data, executable=executable)
+    return TreeFile(data=data, executable=executable)
 
 
 def write_tree(tree: Tree, folder: Path) -> None:
@@ -105,11 +105,11 @@ def _file_diff(name: str, before: Tree, after: Tree) -> Iterator[str]:
     )
 
 
-def _mode(entry: Entry) -> str:
+def _mode(entry: TreeFile) -> str:
     return "100755" if entry.executable else "100644"
 
 
-def _lines(entry: Entry | None) -> list[str]:
+def _lines(entry: TreeFile | None) -> list[str]:
     """Return the lines, each with one `\\n`; what a reader cannot see is written out."""
     if entry is None:
         return []

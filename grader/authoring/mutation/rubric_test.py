@@ -13,7 +13,7 @@ from pathlib import Path
 from grader.authoring.mutation.faulty_packages import Planned
 from grader.authoring.mutation.package_tree import Tree, unified_diff, write_tree
 from grader.authoring.mutation.solution import Solution
-from grader.classes.batch.job import FolderJob, Graded, grade_all
+from grader.classes.batch.job import FolderJob, GradedSubmission, grade_all
 from grader.errors import HostError
 from grader.files import temporary_folder
 from grader.model import SandboxMode
@@ -152,7 +152,7 @@ def _describe(result: MutantResult) -> str:
 
 
 def _judge_mutant(
-    plan: Plan, mutant: Planned, graded: Graded, ignored: frozenset[str], took_s: float
+    plan: Plan, mutant: Planned, graded: GradedSubmission, ignored: frozenset[str], took_s: float
 ) -> MutantResult:
     criteria = graded.result.criteria if graded.result else ()
     compared = compare(mutant.costs, criteria, ignored) if graded.result else Comparison(state="error")
@@ -190,7 +190,7 @@ def _find_uncosted(plan: Plan, results: Sequence[MutantResult]) -> tuple[str, ..
 
 def _grade_trees(
     plan: Plan, trees: Mapping[str, Tree], jobs: int, begun: Callable[[str], None]
-) -> Generator[Graded, None, None]:
+) -> Generator[GradedSubmission, None, None]:
     """Grade each tree into `out/<name>/`.
 
     The trees are written outside of any repository: the modes that git knows would count for more than the disk's.

@@ -12,8 +12,8 @@ import cmake_parser
 from cmake_parser.ast import Command
 from cmake_parser.error import CMakeParseError
 
-from grader.authoring.mutation.package_tree import Entry, Tree, read_tree
-from grader.authoring.mutation.source_edits import Document, Edit, Script, apply_edits, line_at
+from grader.authoring.mutation.package_tree import Tree, TreeFile, read_tree
+from grader.authoring.mutation.source_edits import Document, Script, TextEdit, apply_edits, line_at
 from grader.errors import UsageError
 from grader.rubric.find import rubrics_folder
 from grader.rubric.load import LoadedRubric
@@ -33,7 +33,7 @@ class Site:
     line: int | None = None
 
 
-Change = Sequence[Edit] | bytes | Tree | None
+Change = Sequence[TextEdit] | bytes | Tree | None
 """What an operator makes of a place: edits of the file, its new content, or a whole new tree; None for nothing."""
 
 
@@ -49,7 +49,7 @@ class CodePlace:
     line: int | None = None
     xml: Document | None = None
 
-    def site(self, solution: Solution, change: Sequence[Edit] | bytes | Tree) -> Site:
+    def site(self, solution: Solution, change: Sequence[TextEdit] | bytes | Tree) -> Site:
         """Return the mutant that is made here."""
         line = self.line
         if isinstance(change, bytes):
@@ -81,7 +81,7 @@ class Solution:
         inside = [name.removeprefix(self.folder) for name in self.tree if name.startswith(self.folder)]
         return tuple(sorted(name for name in inside if PurePosixPath(name).parts[0] not in BUILT))
 
-    def entry(self, path: str) -> Entry:
+    def entry(self, path: str) -> TreeFile:
         return self.tree[self.folder + path]
 
     def text(self, path: str) -> str:
@@ -138,7 +138,7 @@ class Solution:
 
     # ---- what is made of it
 
-    def with_entry(self, path: str, entry: Entry) -> Tree:
+    def with_entry(self, path: str, entry: TreeFile) -> Tree:
         return {**self.tree, self.folder + path: entry}
 
     def with_data(self, path: str, data: bytes) -> Tree:
@@ -151,14 +151,14 @@ class Solution:
     def without(self, path: str) -> Tree:
         return {name: entry for name, entry in self.tree.items() if name != self.folder + path}
 
-    def edited(self, path: str, edits: Sequence[Edit]) -> Tree:
+    def edited(self, path: str, edits: Sequence[TextEdit]) -> Tree:
         """Return the tree with edits in one text file."""
         text = apply_edits(self.text(path), edits)
         return self.with_data(path, text.encode(errors="surrogateescape"))
 
-    def edited_xml(self, document: Document, edits: Sequence[Edit]) -> Tree:
+    def edited_xml(self, document: Document, edits: Sequence[TextEdit]) -> Tree:
         """Return the same for XML, whose places count bytes; what the edits insert is written as UTF-8."""
-        wide = [Edit(e.start, e.end, e.text.encode().decode("latin-1")) for e in edits]
+        wide = [TextEdit(e.start, e.end, e.text.encode().decode("latin-1")) for e in edits]
         return self.with_data(document.path, apply_edits(document.text, wide).encode("latin-1"))
 
     def then(self, tree: Tree) -> Solution:

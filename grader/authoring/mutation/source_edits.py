@@ -15,7 +15,7 @@ from xml.parsers import expat
 
 
 @dataclass(frozen=True, order=True)
-class Edit:
+class TextEdit:
     """`text` takes the place of the characters from `start` up to `end`."""
 
     start: int
@@ -23,7 +23,7 @@ class Edit:
     text: str
 
 
-def apply_edits(text: str, edits: Iterable[Edit]) -> str:
+def apply_edits(text: str, edits: Iterable[TextEdit]) -> str:
     """Return the text with all edits made. Raises ValueError where two of them overlap."""
     parts, position = [], 0
     for edit in sorted(edits):
@@ -155,22 +155,22 @@ class Document:
 
     # ---- edits, in places of `text`
 
-    def remove(self, element: Element) -> Edit:
-        return Edit(*whole_lines(self.text, element.start, element.end), "")
+    def remove(self, element: Element) -> TextEdit:
+        return TextEdit(*whole_lines(self.text, element.start, element.end), "")
 
-    def set_content(self, element: Element, content: str) -> Edit:
+    def set_content(self, element: Element, content: str) -> TextEdit:
         end = self.data.rfind(b"</", element.inner, element.end)
-        return Edit(element.inner, end, content)
+        return TextEdit(element.inner, end, content)
 
-    def set_attribute(self, element: Element, name: str, value: str) -> Edit:
+    def set_attribute(self, element: Element, name: str, value: str) -> TextEdit:
         start, end = self._attribute(element, name)
-        return Edit(start, end, f'{name}="{value}"')
+        return TextEdit(start, end, f'{name}="{value}"')
 
-    def remove_attribute(self, element: Element, name: str) -> Edit:
+    def remove_attribute(self, element: Element, name: str) -> TextEdit:
         start, end = self._attribute(element, name)
         while self.data[start - 1 : start].isspace():
             start -= 1
-        return Edit(start, end, "")
+        return TextEdit(start, end, "")
 
     def _attribute(self, element: Element, name: str) -> tuple[int, int]:
         found = ATTRIBUTE.finditer(self.data, element.start, element.inner)
@@ -260,30 +260,30 @@ class Script:
 
     # ---- edits
 
-    def replace(self, node: ast.AST, text: str) -> Edit:
-        return Edit(*self.span(node), text)
+    def replace(self, node: ast.AST, text: str) -> TextEdit:
+        return TextEdit(*self.span(node), text)
 
-    def remove(self, statement: ast.stmt) -> Edit:
+    def remove(self, statement: ast.stmt) -> TextEdit:
         """Remove the statement's lines, or replace it by `pass` where its block would be empty without it."""
         alone = len(self.block(statement)) == 1 or not self.has_lines(statement)
-        return self.replace(statement, "pass") if alone else Edit(*self._line_span([statement]), "")
+        return self.replace(statement, "pass") if alone else TextEdit(*self._line_span([statement]), "")
 
-    def before(self, statement: ast.stmt, *lines: str) -> Edit:
+    def before(self, statement: ast.stmt, *lines: str) -> TextEdit:
         start = self.starts[statement.lineno - 1]
-        return Edit(start, start, self._indent(statement, lines))
+        return TextEdit(start, start, self._indent(statement, lines))
 
-    def after(self, statement: ast.stmt, *lines: str) -> Edit:
+    def after(self, statement: ast.stmt, *lines: str) -> TextEdit:
         end = self._line_span([statement])[1]
         glue = "" if self.text[:end].endswith("\n") else "\n"
-        return Edit(end, end, glue + self._indent(statement, lines))
+        return TextEdit(end, end, glue + self._indent(statement, lines))
 
-    def wrap(self, statements: Sequence[ast.stmt], header: str, footer: Sequence[str] = ()) -> Edit:
+    def wrap(self, statements: Sequence[ast.stmt], header: str, footer: Sequence[str] = ()) -> TextEdit:
         """Put the statements one step deeper under the header; the footer's lines come after them."""
         start, end = self._line_span(statements)
         lines = self.text[start:end].removesuffix("\n").split("\n")
         inner = "".join(f"{self.unit}{line}\n" if line.strip() else f"{line}\n" for line in lines)
         first = statements[0]
-        return Edit(start, end, self._indent(first, [header]) + inner + self._indent(first, footer))
+        return TextEdit(start, end, self._indent(first, [header]) + inner + self._indent(first, footer))
 
     def can_wrap(self, statements: Sequence[ast.stmt]) -> bool:
         """Whether deeper indentation keeps their meaning: lines of their own, and no string over several lines."""
@@ -291,7 +291,7 @@ class Script:
         long = any(n.end_lineno != n.lineno for n in strings)
         return bool(statements) and not long and all(self.has_lines(s) for s in statements)
 
-    def preamble(self, *lines: str) -> Edit:
+    def preamble(self, *lines: str) -> TextEdit:
         """Insert lines at the top level, after the docstring and the first imports."""
         body = self.module.body
         docstring = isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant)
@@ -314,7 +314,7 @@ class Script:
 PREAMBLE = ("import itertools", "every_second = itertools.cycle((True, False))")
 
 
-def every_second_time(script: Script, statements: Sequence[ast.stmt]) -> list[Edit]:
+def every_second_time(script: Script, statements: Sequence[ast.stmt]) -> list[TextEdit]:
     """Return edits that run statements of one block in every second turn only; none where they cannot be indented."""
     if not script.can_wrap(statements):
         return []

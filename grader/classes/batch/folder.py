@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader import __version__
-from grader.classes.gradebook import Book, Row
+from grader.classes.gradebook import Book, GradebookRow
 from grader.errors import UsageError
 from grader.files import atomic_write
 from grader.intake import safe_name
@@ -69,14 +69,16 @@ class BatchFolder:
             columns=run.columns,
         )
 
-    def rows(self) -> Iterator[Row]:
+    def rows(self) -> Iterator[GradebookRow]:
         """Yield every submission in the roster's order, read one by one; those that a faulty roster keeps from being
         graded come last. One without a result has one of status `error` here, which says so."""
         known = set()
         for entry in self.run.entries:
             known.add(safe_name(entry.id).casefold())
             result = self.earlier(entry)
-            yield Row(entry=entry, result=result or self.empty_result(entry, MISSING, "not graded yet"))
+            yield GradebookRow(
+                entry=entry, result=result or self.empty_result(entry, MISSING, "not graded yet")
+            )
         for fault in self.run.faults:
             if fault.id is not None and safe_name(fault.id).casefold() not in known:
                 known.add(safe_name(fault.id).casefold())
@@ -88,7 +90,7 @@ class BatchFolder:
                     group=fault.group,
                     extra=fault.extra,
                 )
-                yield Row(entry=entry, result=self.empty_result(entry, ROSTER, str(fault)))
+                yield GradebookRow(entry=entry, result=self.empty_result(entry, ROSTER, str(fault)))
 
     def empty_result(self, entry: Entry, kind: str, message: str) -> GradingResult:
         """Return a result of status `error` that says why there is no other one, by one of the keys of `HINTS`."""

@@ -1,4 +1,4 @@
-"""One submission of a class: its `Job`, how it is fetched and graded, and its `Outcome`.
+"""One submission of a class: its `GradingJob`, how it is fetched and graded, and its `SubmissionOutcome`.
 
 An executor does many jobs: `LocalExecutor` with processes of this machine, `classes.cluster` with other machines.
 `grade_all` grades folders side by side without a class, for rubric tests and benchmarks.
@@ -39,7 +39,7 @@ WARM_UP = "grader.pipeline:warm_up"
 KILLED_HINT = "check whether this machine has too little memory, then grade it again with --only"
 
 
-class Job(Record):
+class GradingJob(Record):
     """One submission's grading into `out/<id>/`. It can be sent to another process, and to another machine.
 
     `before` is the time before which the commit that counts is looked for (`--before`), `overrides` map criteria to
@@ -61,7 +61,7 @@ class Job(Record):
     fetched_since: float = 0.0
 
 
-class Outcome(Record):
+class SubmissionOutcome(Record):
     """What became of a job, in short: the rest is in its folder.
 
     `kept`: the earlier result stays. `handed_in` is the submission's time, None if it could not be found out. `message`
@@ -84,7 +84,7 @@ class Outcome(Record):
 class Executor(Protocol):
     """Does many jobs at a time."""
 
-    def run(self, jobs: Iterable[Job], *, begun: Callable[[str], None]) -> Iterator[Outcome]:
+    def run(self, jobs: Iterable[GradingJob], *, begun: Callable[[str], None]) -> Iterator[SubmissionOutcome]:
         """Yield each job's outcome as it comes. Jobs are taken when they can be started; `begun` gets the id of each.
 
         There is an outcome for every job, whatever happens to it. When the caller stops iterating, running jobs are
@@ -99,7 +99,7 @@ class LocalExecutor:
     def __init__(self, count: int) -> None:
         self.count = count
 
-    def run(self, jobs: Iterable[Job], *, begun: Callable[[str], None]) -> Iterator[Outcome]:
+    def run(self, jobs: Iterable[GradingJob], *, begun: Callable[[str], None]) -> Iterator[SubmissionOutcome]:
         """See `Executor.run`."""
         return run_each(
             grade_job,
@@ -111,13 +111,15 @@ class LocalExecutor:
         )
 
 
-def failed_outcome(job: Job, *, kind: str, message: str, hint: str) -> Outcome:
+def failed_outcome(job: GradingJob, *, kind: str, message: str, hint: str) -> SubmissionOutcome:
     """Return the outcome of a job that could not be done."""
     most = job.rubric.rubric.max_points
-    return Outcome(id=job.entry.id, status="error", max_points=most, kind=kind, message=message, hint=hint)
+    return SubmissionOutcome(
+        id=job.entry.id, status="error", max_points=most, kind=kind, message=message, hint=hint
+    )
 
 
-def outcome_of_ended(job: Job, error: WorkerEnded) -> Outcome:
+def outcome_of_ended(job: GradingJob, error: WorkerEnded) -> SubmissionOutcome:
     """Return the outcome of a job whose process ended, with kind `killed` or `interrupted`."""
     if error.interrupted:
         return failed_outcome(job, kind="interrupted", message="interrupted", hint="")
@@ -125,7 +127,7 @@ def outcome_of_ended(job: Job, error: WorkerEnded) -> Outcome:
     return failed_outcome(job, kind="killed", message=message, hint=KILLED_HINT)
 
 
-def grade_job(job: Job) -> Outcome:
+def grade_job(job: GradingJob) -> SubmissionOutcome:
     """Fetch and grade the job's submission into `job.out/<its id>/`, unless that has been done already.
 
     Raises KeyboardInterrupt, and nothing else.
@@ -140,7 +142,7 @@ def grade_job(job: Job) -> Outcome:
     return outcome.model_copy(update={"wall_s": round(time.monotonic() - begun, 3)})
 
 
-def _grade(job: Job, folder: Path) -> Outcome:
+def _grade(job: GradingJob, folder: Path) -> SubmissionOutcome:
     try:
         obtained = _fetch(job, folder)
     except Exception as error:
@@ -171,7 +173,7 @@ def _grade(job: Job, folder: Path) -> Outcome:
     return _outcome(job, result, kept=result is job.earlier, handed_in=obtained.handed_in)
 
 
-def _fetch(job: Job, folder: Path) -> Obtained:
+def _fetch(job: GradingJob, folder: Path) -> Obtained:
     """A missing source is the submission's fault here, not the command line's."""
     rubric = job.rubric.rubric
     rule = Rule(
@@ -186,7 +188,7 @@ def _fetch(job: Job, folder: Path) -> Obtained:
         raise SubmissionError(error.message, hint=error.hint) from error
 
 
-def _attempt(job: Job) -> GradingContext:
+def _attempt(job: GradingJob) -> GradingContext:
     """Return what the result of a submission that could not be fetched says."""
     about = SubmissionInfo(
         id=safe_name(job.entry.id),
@@ -206,7 +208,7 @@ def _attempt(job: Job) -> GradingContext:
     )
 
 
-def _find_complete(job: Job, about: SubmissionInfo) -> GradingResult | None:
+def _find_complete(job: GradingJob, about: SubmissionInfo) -> GradingResult | None:
     """Return the earlier result if it is complete for the same commit, content, rubric and grader."""
     earlier = job.earlier
     if earlier is None or earlier.status == "error" or job.again:
@@ -222,16 +224,16 @@ def _find_complete(job: Job, about: SubmissionInfo) -> GradingResult | None:
 
 
 def _outcome(
-    job: Job,
+    job: GradingJob,
     result: GradingResult,
     *,
     kept: bool,
     handed_in: HandedIn | None = None,
     fault: GraderError | None = None,
-) -> Outcome:
+) -> SubmissionOutcome:
     error = fault or result.error
     message = error.message if error else ""
-    return Outcome(
+    return SubmissionOutcome(
         id=job.entry.id,
         status=result.status,
         points=result.points,
@@ -257,7 +259,7 @@ class FolderJob:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Graded:
+class GradedSubmission:
     """A grading's result, or in one line why there is none. `again` is how many of its runs were made again."""
 
     name: str
@@ -266,7 +268,9 @@ class Graded:
     again: int = 0
 
 
-def grade_all(jobs: Sequence[FolderJob], most: int, begun: Callable[[str], None]) -> Iterator[Graded]:
+def grade_all(
+    jobs: Sequence[FolderJob], most: int, begun: Callable[[str], None]
+) -> Iterator[GradedSubmission]:
     """Yield each job's result as it comes, `most` at a time. `begun` gets each job's name when it starts."""
     for sandbox in {job.sandbox for job in jobs}:
         prepare(GradeOptions(sandbox=sandbox))
@@ -280,17 +284,17 @@ def grade_all(jobs: Sequence[FolderJob], most: int, begun: Callable[[str], None]
     )
 
 
-def _grading_ended(job: FolderJob, error: WorkerEnded) -> Graded:
-    return Graded(name=job.name, result=None, error=f"the process that graded it {error.reason}")
+def _grading_ended(job: FolderJob, error: WorkerEnded) -> GradedSubmission:
+    return GradedSubmission(name=job.name, result=None, error=f"the process that graded it {error.reason}")
 
 
-def _grade_folder(job: FolderJob) -> Graded:
+def _grade_folder(job: FolderJob) -> GradedSubmission:
     options, steps = GradeOptions(sandbox=job.sandbox, submission_id=job.name), _Steps()
     try:
         result = grade(str(job.source), _load_once(str(job.rubric)), job.out, options, steps)
     except GraderError as error:
-        return Graded(name=job.name, result=None, error=error.message)
-    return Graded(name=job.name, result=result, again=steps.again)
+        return GradedSubmission(name=job.name, result=None, error=error.message)
+    return GradedSubmission(name=job.name, result=result, again=steps.again)
 
 
 _load_once = lru_cache(maxsize=8)(load_rubric)

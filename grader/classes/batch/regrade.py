@@ -49,7 +49,7 @@ NOTHING, NOT_AGAIN = "nothing was recorded", "it could not be run again"
 COLUMNS = ("id", "criterion", "status before", "status", "points before", "points", "max_points", "why")
 
 
-class State(NamedTuple):
+class CriterionState(NamedTuple):
     """What one criterion came to. `counts` is false where the rubric left it out."""
 
     status: Status
@@ -59,13 +59,13 @@ class State(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Change:
+class CriterionChange:
     """One criterion of two results. A new one has no `before`, one that is gone no `after`. `why` is what the check
     says now."""
 
     criterion: str
-    before: State | None
-    after: State | None
+    before: CriterionState | None
+    after: CriterionState | None
     why: str
 
 
@@ -81,28 +81,32 @@ class Regraded:
     id: str
     points_before: float | None
     points: float | None = None
-    changes: tuple[Change, ...] = ()
+    changes: tuple[CriterionChange, ...] = ()
     missing: tuple[str, ...] = ()
-    first: Mapping[str, State] = field(default_factory=dict)
+    first: Mapping[str, CriterionState] = field(default_factory=dict)
     error: str = ""
 
 
-def states_of(result: GradingResult) -> dict[str, State]:
+def states_of(result: GradingResult) -> dict[str, CriterionState]:
     """Return what each criterion came to."""
-    return {c.id: State(c.status, c.points, c.max_points, c.left_out is None) for c in result.criteria}
+    return {
+        c.id: CriterionState(c.status, c.points, c.max_points, c.left_out is None) for c in result.criteria
+    }
 
 
-def pairs(before: Mapping[str, State], after: GradingResult) -> Iterator[Change]:
+def pairs(before: Mapping[str, CriterionState], after: GradingResult) -> Iterator[CriterionChange]:
     """Yield every criterion of two results, changed or not, in the order of the later one."""
     now = states_of(after)
     for one in after.criteria:
         why = one.message or one.measured or one.title
-        yield Change(criterion=one.id, before=before.get(one.id), after=now[one.id], why=why)
+        yield CriterionChange(criterion=one.id, before=before.get(one.id), after=now[one.id], why=why)
     for name in (name for name in before if name not in now):
-        yield Change(criterion=name, before=before[name], after=None, why="the rubric no longer has it")
+        yield CriterionChange(
+            criterion=name, before=before[name], after=None, why="the rubric no longer has it"
+        )
 
 
-def _changes(before: Mapping[str, State], after: GradingResult) -> tuple[Change, ...]:
+def _changes(before: Mapping[str, CriterionState], after: GradingResult) -> tuple[CriterionChange, ...]:
     return tuple(c for c in pairs(before, after) if (c.before or ())[:3] != (c.after or ())[:3])
 
 

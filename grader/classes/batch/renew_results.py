@@ -36,7 +36,7 @@ PACKAGE, SCENARIO = "package.mcap", "scenario.digest"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judged:
+class JudgedFolder:
     """One submission's criteria, or in one line why there are none and what to do about it.
 
     `missing` are the rubric's scenarios without a recording that fits.
@@ -49,7 +49,7 @@ class Judged:
     hint: str = ""
 
 
-def judge_all(folders: Sequence[Path], rubric: LoadedRubric, jobs: int) -> Iterator[Judged]:
+def judge_all(folders: Sequence[Path], rubric: LoadedRubric, jobs: int) -> Iterator[JudgedFolder]:
     """Judge every submission's evidence again, `jobs` at a time; yield each as it comes.
 
     What is wrong with one submission is in its `error` and stops no other, even if it ends the process.
@@ -57,12 +57,14 @@ def judge_all(folders: Sequence[Path], rubric: LoadedRubric, jobs: int) -> Itera
     return run_each(partial(judge_one, rubric), folders, min(jobs, len(folders)), ended=_judging_ended)
 
 
-def _judging_ended(folder: Path, _: WorkerEnded) -> Judged:
+def _judging_ended(folder: Path, _: WorkerEnded) -> JudgedFolder:
     hint = "check whether this machine has too little memory, then judge it by itself"
-    return Judged(folder=folder, criteria=None, error=f"{folder}: judging it ended the process", hint=hint)
+    return JudgedFolder(
+        folder=folder, criteria=None, error=f"{folder}: judging it ended the process", hint=hint
+    )
 
 
-def judge_one(rubric: LoadedRubric, folder: Path, *, fitting: bool = False) -> Judged:
+def judge_one(rubric: LoadedRubric, folder: Path, *, fitting: bool = False) -> JudgedFolder:
     """Judge one submission's evidence again, in a worker.
 
     With `fitting`, a recording counts only if it was made with the rubric's present scenario.
@@ -73,13 +75,15 @@ def judge_one(rubric: LoadedRubric, folder: Path, *, fitting: bool = False) -> J
         runs = fitting_runs(lab, runs) if fitting else runs
         criteria = judge(lab, runs, rubric.checks, rubric.handed_out)
     except GraderError as error:
-        return Judged(folder=folder, criteria=None, error=error.message, hint=error.hint)
+        return JudgedFolder(folder=folder, criteria=None, error=error.message, hint=error.hint)
     except Exception as error:  # noqa: BLE001 - whatever it is, the others are judged
         message = f"{folder}: internal error: {type(error).__name__}: {error}"
-        return Judged(folder=folder, criteria=None, error=message, hint="judge it by itself with --debug")
+        return JudgedFolder(
+            folder=folder, criteria=None, error=message, hint="judge it by itself with --debug"
+        )
     scenarios = dict.fromkeys(c.scenario for c in lab.criteria if c.scenario is not None)
     missing = tuple(name for name in scenarios if name not in runs)
-    return Judged(folder=folder, criteria=criteria, missing=missing)
+    return JudgedFolder(folder=folder, criteria=criteria, missing=missing)
 
 
 def fitting_runs(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
@@ -134,7 +138,7 @@ CONSOLE = "console.log"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Written:
+class WrittenReports:
     """One submission's reports are written, or `error` says in one line why not."""
 
     folder: Path
@@ -143,14 +147,14 @@ class Written:
     hint: str = ""
 
 
-def write_all(folders: Sequence[Path], rubric: LoadedRubric, jobs: int) -> Iterator[Written]:
+def write_all(folders: Sequence[Path], rubric: LoadedRubric, jobs: int) -> Iterator[WrittenReports]:
     """Write each submission's reports, `jobs` at a time; yield each as it comes. A faulty one stops no other."""
     return run_each(partial(_try_write, rubric), folders, min(jobs, len(folders)), ended=_writing_ended)
 
 
-def _writing_ended(folder: Path, error: WorkerEnded) -> Written:
+def _writing_ended(folder: Path, error: WorkerEnded) -> WrittenReports:
     message = f"{folder}: the process that wrote it {error.reason}"
-    return Written(folder=folder, error=message, hint="write it by itself")
+    return WrittenReports(folder=folder, error=message, hint="write it by itself")
 
 
 def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
@@ -198,16 +202,16 @@ def result_in(folder: Path, rubric: LoadedRubric | None = None) -> GradingResult
     return result
 
 
-def _try_write(rubric: LoadedRubric, folder: Path) -> Written:
+def _try_write(rubric: LoadedRubric, folder: Path) -> WrittenReports:
     """In a worker."""
     try:
         result = write_one(folder, rubric)
     except GraderError as error:
-        return Written(folder=folder, error=error.message, hint=error.hint)
+        return WrittenReports(folder=folder, error=error.message, hint=error.hint)
     except Exception as error:  # noqa: BLE001 - whatever it is, the others are written
         message = f"{folder}: internal error: {type(error).__name__}: {error}"
-        return Written(folder=folder, error=message, hint="write it by itself with --debug")
-    return Written(folder=folder, rubric_digest=result.rubric.digest)
+        return WrittenReports(folder=folder, error=message, hint="write it by itself with --debug")
+    return WrittenReports(folder=folder, rubric_digest=result.rubric.digest)
 
 
 @dataclass(frozen=True)
@@ -283,7 +287,7 @@ class Rewriting:
     result: GradingResult
 
 
-def rewrite_all(jobs: Sequence[Rewriting], rubric: LoadedRubric, count: int) -> Iterator[Written]:
+def rewrite_all(jobs: Sequence[Rewriting], rubric: LoadedRubric, count: int) -> Iterator[WrittenReports]:
     """Do as `rewrite` for each, `count` at a time; yield each as it comes. A faulty one stops no other."""
     return run_each(
         partial(_try_rewrite, rubric),
@@ -293,13 +297,13 @@ def rewrite_all(jobs: Sequence[Rewriting], rubric: LoadedRubric, count: int) -> 
     )
 
 
-def _try_rewrite(rubric: LoadedRubric, job: Rewriting) -> Written:
+def _try_rewrite(rubric: LoadedRubric, job: Rewriting) -> WrittenReports:
     """In a worker."""
     try:
         rewrite(job.folder, job.result, rubric.rubric, rubric.docs)
     except GraderError as error:
-        return Written(folder=job.folder, error=error.message, hint=error.hint)
-    return Written(folder=job.folder, rubric_digest=job.result.rubric.digest)
+        return WrittenReports(folder=job.folder, error=error.message, hint=error.hint)
+    return WrittenReports(folder=job.folder, rubric_digest=job.result.rubric.digest)
 
 
 def figures_in(folder: Path, result: GradingResult, rubric: Rubric) -> Figures | None:

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 from grader import __version__
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch, write_run
-from grader.classes.batch.job import Executor, Job, Outcome
+from grader.classes.batch.job import Executor, GradingJob, SubmissionOutcome
 from grader.classes.batch.renew_results import Settler, rewrite
 from grader.classes.fetching import prefetch
 from grader.classes.gradebook import write_gradebook
@@ -88,7 +88,7 @@ class Watcher(Protocol):
     def begun(self, name: str) -> None:
         """The submission of that id begins."""
 
-    def ended(self, outcome: Outcome) -> None:
+    def ended(self, outcome: SubmissionOutcome) -> None:
         """A submission has its outcome."""
 
 
@@ -161,7 +161,7 @@ def _keep_private(out: Path, *, is_new: bool) -> bool:
     return is_new
 
 
-def _grade_all(batch: _Batch, executor: Executor, watcher: Watcher) -> Iterator[Outcome]:
+def _grade_all(batch: _Batch, executor: Executor, watcher: Watcher) -> Iterator[SubmissionOutcome]:
     """Yield each submission's outcome as it comes; one that was complete is settled again."""
     options = batch.options
     todo = list(_select(batch.roster.entries, options.only, batch.folder.earlier))
@@ -179,10 +179,10 @@ def _grade_all(batch: _Batch, executor: Executor, watcher: Watcher) -> Iterator[
             yield _settle_again(batch, entry, outcome) if outcome.kept or decided else outcome
 
 
-def _job(batch: _Batch, entry: Entry, *, again: bool, since: float) -> Job:
+def _job(batch: _Batch, entry: Entry, *, again: bool, since: float) -> GradingJob:
     options = batch.options
     earlier = batch.folder.earlier(entry)
-    return Job(
+    return GradingJob(
         entry=entry,
         rubric=batch.rubric,
         out=options.out.absolute(),
@@ -197,7 +197,7 @@ def _job(batch: _Batch, entry: Entry, *, again: bool, since: float) -> Job:
     )
 
 
-def _settle_again(batch: _Batch, entry: Entry, outcome: Outcome) -> Outcome:
+def _settle_again(batch: _Batch, entry: Entry, outcome: SubmissionOutcome) -> SubmissionOutcome:
     """An override, an extension or a deadline may be newer than the result, and people may award points for what could
     not be graded."""
     earlier = batch.folder.earlier(entry)

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, cast
 from urllib.parse import urlsplit
 
-from grader.classes.batch.job import Job, Outcome
+from grader.classes.batch.job import GradingJob, SubmissionOutcome
 from grader.errors import HostError, PackageNotFound, SubmissionError, UsageError
 from grader.files import make_folder
 from grader.model.record import Record
@@ -46,7 +46,7 @@ class GradeRequest(Record):
     any, in the exchange too.
     """
 
-    job: Job
+    job: GradingJob
     exchange: str
     batch: str
     seen: bool
@@ -56,11 +56,11 @@ class GradeRequest(Record):
 class Report(Record):
     """What became of a request. Without a `parcel` there are no results to put into place."""
 
-    outcome: Outcome
+    outcome: SubmissionOutcome
     parcel: Parcel | None = None
 
 
-def is_machines(outcome: Outcome) -> bool:
+def is_machines(outcome: SubmissionOutcome) -> bool:
     """Return whether it is an error that is not the submission's."""
     return outcome.status == "error" and outcome.kind not in BLAME_SUBMISSION
 

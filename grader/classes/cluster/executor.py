@@ -21,7 +21,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from grader.classes.batch.job import Job, Outcome, failed_outcome
+from grader.classes.batch.job import GradingJob, SubmissionOutcome, failed_outcome
 from grader.classes.cluster import worker
 from grader.classes.cluster.connect import LOCAL, Needs, Recruits, check_address, connect, is_encrypted
 from grader.classes.cluster.exchange import (
@@ -83,7 +83,7 @@ class ClusterExecutor:
         self._exchange = Exchange(_exchange_url(out, exchange))
         self._say, self._patience_s = say, patience_s
 
-    def run(self, jobs: Iterable[Job], *, begun: Callable[[str], None]) -> Iterator[Outcome]:
+    def run(self, jobs: Iterable[GradingJob], *, begun: Callable[[str], None]) -> Iterator[SubmissionOutcome]:
         """See `classes.batch.job.Executor.run`. Raises HostError if no scheduler can be reached, or it is lost."""
         waiting = iter(jobs)
         first = next(waiting, None)
@@ -123,7 +123,7 @@ def _exchange_url(out: Path, exchange: str | None) -> str:
 class _Task:
     """A job and the future of its grading by one of `workers`. `losses`: how often that came to nothing."""
 
-    job: Job
+    job: GradingJob
     future: Any = None
     workers: frozenset[str] = frozenset()
     losses: int = 0
@@ -150,7 +150,7 @@ class _Tasks:
         self._count = 0
         self._looked_s, self._idle_since_s = 0.0, time.monotonic()
 
-    def run(self, jobs: Iterable[Job], begun: Callable[[str], None]) -> Iterator[Outcome]:
+    def run(self, jobs: Iterable[GradingJob], begun: Callable[[str], None]) -> Iterator[SubmissionOutcome]:
         """See `ClusterExecutor.run`."""
         waiting = iter(jobs)
         try:
@@ -172,7 +172,7 @@ class _Tasks:
         finally:
             self._stop()
 
-    def _submit(self, waiting: Iterator[Job], begun: Callable[[str], None]) -> bool:
+    def _submit(self, waiting: Iterator[GradingJob], begun: Callable[[str], None]) -> bool:
         """Give each thread that can grade a task. Return whether there may be more jobs."""
         while len(self._running) < self._recruits.threads:
             task = self._back.popleft() if self._back else None
@@ -205,7 +205,7 @@ class _Tasks:
         self._count += 1
         self._running.append(task)
 
-    def _finish(self, task: _Task) -> Outcome | None:
+    def _finish(self, task: _Task) -> SubmissionOutcome | None:
         """Put the results into place. Return the outcome; None if the job is done once more."""
         from distributed import CancelledError, KilledWorker  # noqa: PLC0415 - slow to load
 
@@ -227,7 +227,7 @@ class _Tasks:
             message = f"a worker failed: {type(error).__name__}: {error}"
             return failed_outcome(task.job, kind="internal", message=message, hint=hint)
 
-    def _repeat(self, task: _Task, why: str) -> Outcome | None:
+    def _repeat(self, task: _Task, why: str) -> SubmissionOutcome | None:
         """Queue the job once more, or give it up."""
         with suppress(Exception):  # its worker is gone, or the scheduler
             task.future.cancel()
@@ -240,7 +240,7 @@ class _Tasks:
             task.job, kind="worker-lost", message=f"{why}, at least {LOSSES} times", hint=hint
         )
 
-    def _look(self) -> Iterator[Outcome]:
+    def _look(self) -> Iterator[SubmissionOutcome]:
         """Once a second, look which workers there are. Repeat what was given only to workers that are gone."""
         self._recruits.settle()
         now_s = time.monotonic()
@@ -298,7 +298,7 @@ def put_lab(rubric: LoadedRubric, exchange: Exchange) -> Parcel | None:
         return exchange.put(packed, "lab")
 
 
-def store_results(job: Job, report: Report, exchange: Exchange) -> Outcome:
+def store_results(job: GradingJob, report: Report, exchange: Exchange) -> SubmissionOutcome:
     """Unpack a report's results into `job.out`, and return the outcome.
 
     A complete result is replaced by no error but the submission's own. Raises ParcelLost, and what `Results` raises.

@@ -31,7 +31,7 @@ class Scheduler(distributed.Scheduler):  # type: ignore[misc] # Dask has no type
         """Nothing listens."""
 
 
-class Worker(distributed.Worker):  # type: ignore[misc] # Dask has no types
+class LocalWorker(distributed.Worker):  # type: ignore[misc] # Dask has no types
     """Without a port for pages."""
 
     def start_http_server(self, *_: object, **__: object) -> None:
@@ -73,7 +73,7 @@ def _nanny(security: Security, folder: Path) -> dict[str, Any]:
         "memory_limit": 0,
         "local_directory": str(folder),
         "silence_logs": logging.CRITICAL,
-        "worker_class": Worker,
+        "worker_class": LocalWorker,
         "dashboard": False,
     }
     return {"cls": distributed.Nanny, "options": options}

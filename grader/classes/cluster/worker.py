@@ -20,7 +20,7 @@ from pathlib import Path
 import pydantic
 
 import grader
-from grader.classes.batch.job import Job, Outcome, grade_job, outcome_of_ended
+from grader.classes.batch.job import GradingJob, SubmissionOutcome, grade_job, outcome_of_ended
 from grader.classes.cluster.exchange import Exchange, GradeRequest, Parcel, Report, is_machines, pack, unpack
 from grader.errors import GraderError, HostError
 from grader.files import temporary_folder
@@ -121,7 +121,7 @@ def grade(request: GradeRequest, is_wanted: Callable[[], bool]) -> Report:
 
 
 @contextmanager
-def _lab(request: GradeRequest) -> Iterator[Job]:
+def _lab(request: GradeRequest) -> Iterator[GradingJob]:
     """Yield the job with its rubric where the files are that it brings along."""
     if request.lab is None:
         yield request.job
@@ -134,7 +134,7 @@ def _lab(request: GradeRequest) -> Iterator[Job]:
         yield request.job.model_copy(update={"rubric": moved})
 
 
-def _grade_in(folder: Path, request: GradeRequest, is_wanted: Callable[[], bool]) -> Outcome:
+def _grade_in(folder: Path, request: GradeRequest, is_wanted: Callable[[], bool]) -> SubmissionOutcome:
     job = request.job.model_copy(update={"out": folder})
     with _processes.borrow(request.batch) as process, _interrupt_unwanted(process, is_wanted):
         try:

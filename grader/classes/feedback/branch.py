@@ -11,7 +11,7 @@ import re
 import shlex
 from pathlib import Path
 
-from grader.classes.feedback.forms import PAGE, TEXT, Feedback, Sender, Settings
+from grader.classes.feedback.forms import PAGE, TEXT, Feedback, Sender, SendSettings
 from grader.errors import GraderError, NotSent, UsageError
 from grader.files import temporary_folder
 from grader.host_programs import find_user_program
@@ -50,7 +50,7 @@ _PLAIN = re.compile(
 class Branch(Sender):
     """Pushes to the branch of `--branch`, by default `feedback`."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: SendSettings) -> None:
         super().__init__(settings)
         self.branch = settings.branch or NAME
         if not _BRANCH.fullmatch(self.branch):

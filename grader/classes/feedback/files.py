@@ -19,7 +19,7 @@ from typing import Literal
 
 from typing_extensions import Self
 
-from grader.classes.feedback.forms import PAGE, TEXT, Feedback, Sender, Settings
+from grader.classes.feedback.forms import PAGE, TEXT, Feedback, Sender, SendSettings
 from grader.classes.gradebook.platforms import kinds
 from grader.classes.roster.platforms import platform_name
 from grader.errors import NotSent, UsageError
@@ -44,7 +44,7 @@ class Archive(Sender):
     together = True
     platform = ""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: SendSettings) -> None:
         super().__init__(settings)
         if settings.out is not None and settings.out.exists():
             raise UsageError(f"{settings.out} is there already", hint="give another name with --out")
@@ -111,7 +111,7 @@ class Moodle(Archive):
         )
 
 
-class Canvas(Archive):
+class CanvasFiles(Archive):
     """`lovelaceada_12345_67890_lab1.zip`: Canvas looks for the numbers of the student and of the submitted file."""
 
     platform = "Canvas"
@@ -164,7 +164,7 @@ def _free(folder: Path, stem: str) -> Path:
     return next(name for name in names if not name.exists())
 
 
-class Folder(Sender):
+class FeedbackFolder(Sender):
     """Writes into `--out`, by default `feedback/` in the class's folder."""
 
     def place(self, feedback: Feedback) -> str:

@@ -17,8 +17,8 @@ from itertools import chain
 from typing import Any
 from urllib.parse import quote, unquote, urlsplit
 
-from grader.classes.feedback.forms import Feedback, Sender, Settings, Unsure
-from grader.classes.feedback.rest import TRIES, Api, Broken, Refused, token_for
+from grader.classes.feedback.forms import Feedback, Sender, SendSettings, Unsure
+from grader.classes.feedback.rest import TRIES, Api, NoAnswer, Refused, token_for
 from grader.errors import GraderError, HostError, NotSent
 from grader.intake.source import parse_source
 from grader.model.batch import Entry
@@ -106,7 +106,7 @@ class Comments(Sender):
             return self._once(feedback, path, look=look)
         except Refused as error:
             raise self._error(error, self.place(feedback)) from error
-        except Broken as error:
+        except NoAnswer as error:
             raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
 
     def _once(self, feedback: Feedback, path: str, *, look: bool) -> str:
@@ -116,7 +116,7 @@ class Comments(Sender):
                 return found
             try:
                 return self._make(feedback, path)
-            except Broken as error:
+            except NoAnswer as error:
                 look = True
                 if not left:
                     raise Unsure(
@@ -159,7 +159,7 @@ class Comments(Sender):
                 yield from (post for post in self.comments(path, commit) if MARK not in post.text)
         except Refused as error:
             raise self._error(error, f"{self.server}/{path}") from error
-        except Broken as error:
+        except NoAnswer as error:
             raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
 
     def _error(self, error: Refused, where: str) -> GraderError:
@@ -211,12 +211,12 @@ def mark(feedback: Feedback) -> str:
     return f"{MARK}{feedback.publication.digest} -->"
 
 
-class GitHub(Comments):
+class GitHubComments(Comments):
     """One comment or issue for each student."""
 
     name, token = "GitHub", "GITHUB_TOKEN"
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: SendSettings) -> None:
         super().__init__(settings)
         server = os.environ.get("GITHUB_SERVER_URL") or "https://github.com"
         token = token_for(server, self.token, "GH_TOKEN")
@@ -276,12 +276,12 @@ def _github_posts(found: Iterator[dict[str, Any]]) -> Iterator[Post]:
         )
 
 
-class GitLab(Comments):
+class GitLabComments(Comments):
     """One comment or issue for each student."""
 
     name, token = "GitLab", "GITLAB_TOKEN"
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: SendSettings) -> None:
         super().__init__(settings)
         server = (
             os.environ.get("CI_SERVER_URL") or f"https://{os.environ.get('CI_SERVER_HOST') or 'gitlab.com'}"

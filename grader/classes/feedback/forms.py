@@ -68,7 +68,7 @@ class Feedback:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class SendSettings:
     """What the command line says. `folder` is the class's, `out` where files go, empty for a place in `folder`.
     `told` gets a line where a server is waited for."""
 
@@ -93,7 +93,7 @@ class Sender:
     together = False
     unsure: WhenUnsure = "again"
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: SendSettings) -> None:
         self.settings = settings
 
     def __enter__(self) -> Self:
@@ -118,7 +118,7 @@ class Sender:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Form:
+class FeedbackForm:
     """`sender` is `module:class` in this package; `purpose` is a line for people; `options` are those it takes."""
 
     name: str
@@ -126,7 +126,7 @@ class Form:
     purpose: str
     options: frozenset[str] = frozenset()
 
-    def open(self, settings: Settings) -> Sender:
+    def open(self, settings: SendSettings) -> Sender:
         """Return the sender. Raises UsageError if a setting is missing, HostError if a server cannot be reached."""
         module, _, name = self.sender.partition(":")
         made: Sender = getattr(import_module(f"{__package__}.{module}"), name)(settings)
@@ -134,49 +134,49 @@ class Form:
 
 
 _FORMS = (
-    Form(
+    FeedbackForm(
         name="folder",
-        sender="files:Folder",
+        sender="files:FeedbackFolder",
         purpose="a folder for each student, with `report.md` and `report.html`",
         options=frozenset({"--out"}),
     ),
-    Form(
+    FeedbackForm(
         name="moodle",
         sender="files:Moodle",
         purpose="Moodle's zip of feedback files, with `report.html` for each student",
         options=frozenset({"--out"}),
     ),
-    Form(
+    FeedbackForm(
         name="canvas",
-        sender="files:Canvas",
+        sender="files:CanvasFiles",
         purpose="Canvas' zip for re-upload: the reports under the names of the submitted files",
         options=frozenset({"--out"}),
     ),
-    Form(
+    FeedbackForm(
         name="email",
         sender="mail:Mail",
         purpose="a mail to each student: as files, or through a server with `--smtp`",
         options=frozenset({"--out", "--smtp", "--from"}),
     ),
-    Form(
+    FeedbackForm(
         name="git",
         sender="branch:Branch",
         purpose="a branch `feedback` in each student's repository",
         options=frozenset({"--branch"}),
     ),
-    Form(
+    FeedbackForm(
         name="github",
-        sender="forges:GitHub",
+        sender="forges:GitHubComments",
         purpose="a comment on the commit that was graded, or an issue",
         options=frozenset({"--issues", "--public"}),
     ),
-    Form(
+    FeedbackForm(
         name="gitlab",
-        sender="forges:GitLab",
+        sender="forges:GitLabComments",
         purpose="a comment on the commit that was graded, or an issue",
         options=frozenset({"--issues", "--public"}),
     ),
 )
-FORMS: Mapping[str, Form] = {form.name: form for form in _FORMS}
+FORMS: Mapping[str, FeedbackForm] = {form.name: form for form in _FORMS}
 FORGES = tuple(form.name for form in _FORMS if "--issues" in form.options)
 """Those through which students can ask back."""

@@ -24,7 +24,7 @@ from urllib.parse import urlsplit
 
 from typing_extensions import Self
 
-from grader.classes.feedback.forms import PAGE, Feedback, Sender, Settings, Unsure
+from grader.classes.feedback.forms import PAGE, Feedback, Sender, SendSettings, Unsure
 from grader.classes.gradebook.platforms import kinds
 from grader.errors import HostError, NotSent, UsageError
 from grader.files import atomic_write
@@ -49,7 +49,7 @@ ATTACHED = "The whole report is attached: open report.html in a browser."
 class Mail(Sender):
     """With `--smtp` mails are sent, else they are files in `--out`, by default `mails/` in the class's folder."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: SendSettings) -> None:
         super().__init__(settings)
         self.sender = settings.sender or os.environ.get(FROM, "")
         if settings.smtp and not self.sender:
@@ -62,7 +62,7 @@ class Mail(Sender):
             raise UsageError(
                 "--out is for mails that are written, and --smtp sends them", hint="leave out one"
             )
-        self.server = Server(settings.smtp, self.sender) if settings.smtp else None
+        self.server = MailServer(settings.smtp, self.sender) if settings.smtp else None
         self.unsure = "ask" if self.server else "again"
 
     def __enter__(self) -> Self:
@@ -140,7 +140,7 @@ def letter(feedback: Feedback) -> str:
     return f"{plain.removeprefix('# ')}\n\n{ATTACHED}\n"
 
 
-class Server:
+class MailServer:
     """A mail server at `smtps://HOST[:465]` (TLS from the start) or `smtp://HOST[:587]` (STARTTLS).
 
     Without TLS nothing is sent but to a server on this machine. What the server puts off is tried again.

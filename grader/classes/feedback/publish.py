@@ -20,7 +20,7 @@ from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.regrade import pairs, states_of
 from grader.classes.batch.renew_results import figures_in
 from grader.classes.batch.run import hold_folder
-from grader.classes.gradebook import Row
+from grader.classes.gradebook import GradebookRow
 from grader.errors import EvidenceError, GraderError, UsageError
 from grader.files import atomic_write, make_folder
 from grader.intake import safe_name
@@ -39,7 +39,7 @@ from grader.workers import WorkerEnded, run_each
 FILE, FOLDER = "published.jsonl", ".published"
 TEXT, PAGE = "report.md", "report.html"
 NAME_CHARS = 16
-State = Literal["new", "changed", "same", "draft"]
+PublishState = Literal["new", "changed", "same", "draft"]
 WORDING = "the words of the report, and no points"
 
 
@@ -72,11 +72,11 @@ class Published:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Step:
+class PublishStep:
     """What publishing does with one submission. `why` says why it is a draft, or why it could not be published."""
 
     entry: Entry
-    state: State
+    state: PublishState
     result: GradingResult | None = None
     changes: tuple[str, ...] = ()
     why: str = ""
@@ -123,7 +123,7 @@ def check_only(folder: BatchFolder, only: Sequence[str]) -> frozenset[str]:
     return frozenset(map(safe_name, only)) or frozenset(known)
 
 
-def plan(folder: BatchFolder, published: Published, only: Sequence[str] = ()) -> Iterator[Step]:
+def plan(folder: BatchFolder, published: Published, only: Sequence[str] = ()) -> Iterator[PublishStep]:
     """Yield what publishing does with each submission, in the roster's order; with `only`, with these.
 
     What is still open, or could not be graded for no fault of the student's, stays a draft unless it is named.
@@ -135,14 +135,14 @@ def plan(folder: BatchFolder, published: Published, only: Sequence[str] = ()) ->
         result = folder.earlier(entry)
         why = _draft(result, named=bool(only))
         if why or result is None:
-            yield Step(entry=entry, state="draft", result=result, why=why)
+            yield PublishStep(entry=entry, state="draft", result=result, why=why)
             continue
         before = published.result(entry)
         changes = changes_between(before, result) if before else ()
         if before and not changes and only and digest_of(before) != digest_of(result):
             changes = (WORDING,)
-        state: State = "changed" if changes else "same" if before else "new"
-        yield Step(entry=entry, state=state, result=result, changes=changes)
+        state: PublishState = "changed" if changes else "same" if before else "new"
+        yield PublishStep(entry=entry, state=state, result=result, changes=changes)
 
 
 def _draft(result: GradingResult | None, *, named: bool) -> str:
@@ -172,7 +172,7 @@ class Publishing:
     jobs: int = 1
 
 
-def publish(folder: BatchFolder, rubric: LoadedRubric, how: Publishing) -> tuple[Step, ...]:
+def publish(folder: BatchFolder, rubric: LoadedRubric, how: Publishing) -> tuple[PublishStep, ...]:
     """Publish what `plan` says; return what was done. What is ready when this is interrupted is published.
 
     Raises UsageError if the class was judged by another rubric, Busy if a batch works in the folder or feedback is
@@ -227,7 +227,7 @@ class _Frozen:
     error: str = ""
 
 
-def _job(folder: BatchFolder, published: Published, how: Publishing, step: Step) -> Freezing:
+def _job(folder: BatchFolder, published: Published, how: Publishing, step: PublishStep) -> Freezing:
     assert step.result is not None  # noqa: S101 - only a draft has none
     before = published.result(step.entry)
     changes = (changes_between(before, step.result, how.hidden) or (WORDING,)) if before else ()
@@ -301,7 +301,7 @@ def _append(path: Path, lines: Sequence[Publication]) -> None:
         atomic_write(path, before + new.encode())
 
 
-def published_rows(folder: BatchFolder, published: Published) -> Iterator[Row]:
+def published_rows(folder: BatchFolder, published: Published) -> Iterator[GradebookRow]:
     """Yield the class's rows with what is published; what is not has a result of status `error` that says so."""
     for row in folder.rows():
         result = published.result(row.entry)
@@ -309,7 +309,7 @@ def published_rows(folder: BatchFolder, published: Published) -> Iterator[Row]:
             yield row
         else:
             empty = result or folder.empty_result(row.entry, UNPUBLISHED, "not published yet")
-            yield Row(entry=row.entry, result=empty)
+            yield GradebookRow(entry=row.entry, result=empty)
 
 
 def publication_remarks(folder: BatchFolder, published: Published) -> Iterator[str]:

@@ -38,7 +38,7 @@ class Refused(Exception):
         self.status, self.text = status, text
 
 
-class Broken(Exception):
+class NoAnswer(Exception):
     """No answer came, or one that says nothing of whether the request was carried out."""
 
 
@@ -82,7 +82,7 @@ class Api:
     def get(self, path: str) -> Any:  # noqa: ANN401 - JSON
         """Return what is there. Raises Refused, Broken."""
         for failed in range(1, TRIES):
-            with suppress(Broken):
+            with suppress(NoAnswer):
                 return self._ask("GET", path, None)
             self._sleep(2.0**failed)
         return self._ask("GET", path, None)
@@ -115,7 +115,7 @@ class Api:
             wait_s = _wait_s(answer, limited)
             if wait_s is None or limited >= TRIES:
                 if answer.status >= 500:
-                    raise Broken(f"{answer.status} {_error_text(answer)}")
+                    raise NoAnswer(f"{answer.status} {_error_text(answer)}")
                 raise Refused(answer.status, _error_text(answer))
             if wait_s > WAIT_MAX_S:
                 raise HostError(
@@ -137,7 +137,7 @@ class Api:
                 return _Answer(error.code, _lower(error.headers), error.read(ANSWER_BYTES_MAX))
         except (URLError, OSError, HTTPException) as error:
             reason = error.reason if isinstance(error, URLError) else error
-            raise Broken(line(str(reason) or type(error).__name__, SAID_CHARS)) from error
+            raise NoAnswer(line(str(reason) or type(error).__name__, SAID_CHARS)) from error
 
     def _new_address(self, url: str, answer: _Answer) -> str:
         """Return where a repository that was renamed is, on the same server."""
@@ -155,7 +155,7 @@ def _json(data: bytes) -> Any:  # noqa: ANN401 - JSON
     try:
         return json.loads(data or b"null")
     except ValueError as error:
-        raise Broken("the answer is not JSON") from error
+        raise NoAnswer("the answer is not JSON") from error
 
 
 def _error_text(answer: _Answer) -> str:

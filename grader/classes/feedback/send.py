@@ -20,7 +20,7 @@ from pydantic import ValidationError
 
 from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.run import hold_folder
-from grader.classes.feedback.forms import Feedback, Form, Sender, Unsure
+from grader.classes.feedback.forms import Feedback, FeedbackForm, Sender, Unsure
 from grader.classes.feedback.publish import (
     FOLDER,
     Freezing,
@@ -119,7 +119,7 @@ UNKNOWN = "it is not known whether it was sent: the run before was stopped in th
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wanted:
+class Recipients:
     """Whose feedback is sent: of these ids, of what was published after a time.
 
     With `again` it is sent to those who have it, too. With `drafts`, the class's rubric, results are taken as they are
@@ -144,7 +144,7 @@ class Selection:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Failure:
+class SendFailure:
     """Why one student got nothing."""
 
     id: str
@@ -157,7 +157,7 @@ class Delivery:
     """What became of a selection."""
 
     sent: list[str] = field(default_factory=list)
-    failures: list[Failure] = field(default_factory=list)
+    failures: list[SendFailure] = field(default_factory=list)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,13 +167,13 @@ class _Class:
     folder: BatchFolder
     published: Published
     log: SentLog
-    wanted: Wanted
+    wanted: Recipients
     jobs: int
 
 
 @contextmanager
 def open_selection(
-    folder: BatchFolder, form: Form, wanted: Wanted, *, jobs: int
+    folder: BatchFolder, form: FeedbackForm, wanted: Recipients, *, jobs: int
 ) -> Iterator[tuple[Selection, SentLog]]:
     """Hold the class's feedback and give what is to be sent, and the log of what was.
 
@@ -268,16 +268,16 @@ def _freezing_ended(job: Freezing, error: WorkerEnded) -> str:
     return f"{job.publication.id}: the process that wrote its report {error.reason}"
 
 
-def faults(sender: Sender, selection: Selection) -> Iterator[Failure]:
+def faults(sender: Sender, selection: Selection) -> Iterator[SendFailure]:
     """Yield whose feedback cannot be sent as things are."""
     return filter(None, (_fault(sender, feedback) for feedback in selection.todo))
 
 
-def _fault(sender: Sender, feedback: Feedback) -> Failure | None:
+def _fault(sender: Sender, feedback: Feedback) -> SendFailure | None:
     try:
         sender.place(feedback)
     except NotSent as error:
-        return Failure(id=feedback.entry.id, message=error.message, hint=error.hint)
+        return SendFailure(id=feedback.entry.id, message=error.message, hint=error.hint)
     return None
 
 
@@ -306,7 +306,9 @@ def deliver(
             try:
                 place = _send(sender, feedback, log, again=again)
             except NotSent as error:
-                delivery.failures.append(Failure(id=publication.id, message=error.message, hint=error.hint))
+                delivery.failures.append(
+                    SendFailure(id=publication.id, message=error.message, hint=error.hint)
+                )
                 if not isinstance(error, Unsure):
                     log.add([publication], "failed", message=error.message)
                 told(f"{publication.id}: not sent: {error.message}")

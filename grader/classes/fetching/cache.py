@@ -28,7 +28,7 @@ _FOLDER = os.O_RDONLY | DIRECTORY | NOFOLLOW | CLOEXEC
 
 
 @dataclass(frozen=True, kw_only=True)
-class State:
+class MirrorState:
     """`fetched_at` in seconds since 1970, before the server was asked; `listing` is what it said that it has."""
 
     fetched_at: float
@@ -36,7 +36,7 @@ class State:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Failure:
+class NetworkFailure:
     """That the network failed: what git said (without the address), how often it was tried, and until when."""
 
     at: float
@@ -55,16 +55,16 @@ class MirrorFolder:
     def mirror(self) -> Path:
         return self.folder / "mirror.git"
 
-    def state(self) -> State | None:
+    def state(self) -> MirrorState | None:
         """None where the mirror is not complete."""
         try:
             data = json.loads((self.folder / "state.json").read_bytes())
-            found = State(fetched_at=float(data["fetched_at"]), listing=str(data["listing"]))
+            found = MirrorState(fetched_at=float(data["fetched_at"]), listing=str(data["listing"]))
         except (OSError, ValueError, TypeError, KeyError, RecursionError):
             return None
         return found if self.mirror.is_dir() else None
 
-    def complete(self, state: State) -> None:
+    def complete(self, state: MirrorState) -> None:
         """Say that the mirror is what the server said."""
         data = {"fetched_at": state.fetched_at, "listing": state.listing, "bytes": _size(self.mirror)}
         beside = self.folder / "state.json.new"
@@ -73,11 +73,11 @@ class MirrorFolder:
 
         (self.folder / "failure.json").unlink(missing_ok=True)
 
-    def failure(self) -> Failure | None:
+    def failure(self) -> NetworkFailure | None:
         """Return the last failure, if nothing went well since."""
         try:
             data = json.loads((self.folder / "failure.json").read_bytes())
-            return Failure(
+            return NetworkFailure(
                 at=float(data["at"]),
                 said=str(data["said"]),
                 tries=int(data["tries"]),
@@ -86,7 +86,7 @@ class MirrorFolder:
         except (OSError, ValueError, TypeError, KeyError, RecursionError):
             return None
 
-    def failed(self, failure: Failure) -> None:
+    def failed(self, failure: NetworkFailure) -> None:
         """Tell the next process, so that not all of them wait for a server that does not answer."""
         with suppress(OSError):
             (self.folder / "failure.json").write_text(json.dumps(asdict(failure)), encoding="utf-8")

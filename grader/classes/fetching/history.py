@@ -66,7 +66,7 @@ class Limit(NamedTuple):
         return f"{self.name} {local_time(self.at)}{self.more}"
 
 
-class Found(NamedTuple):
+class ChosenCommit(NamedTuple):
     """The commit and how many commits of the branch are later than it."""
 
     commit: Commit
@@ -135,7 +135,7 @@ def not_chosen(rule: Rule, entry: Entry, at: datetime | None = None, note: str =
     )
 
 
-def choose(
+def choose_commit(
     commits: Iterable[Commit], *, rule: Rule, entry: Entry, branch: str, given: str
 ) -> tuple[Commit, HandedIn]:
     """Return the commit of a branch that counts, and what to say of it. `commits` are the branch's, the newest
@@ -175,7 +175,7 @@ def choose(
     return found.commit, handed_in
 
 
-def _last(tip: Commit, rest: Iterator[Commit], time: datetime) -> tuple[Found | None, Commit]:
+def _last(tip: Commit, rest: Iterator[Commit], time: datetime) -> tuple[ChosenCommit | None, Commit]:
     """Return the newest commit that is not dated after `time` (None if there is none), and the oldest one looked at."""
     commit, later_ones = tip, 0
     while commit.at > time:
@@ -183,10 +183,10 @@ def _last(tip: Commit, rest: Iterator[Commit], time: datetime) -> tuple[Found | 
         if following is None:
             return None, commit
         commit, later_ones = following, later_ones + 1
-    return Found(commit, later_ones), commit
+    return ChosenCommit(commit, later_ones), commit
 
 
-def _by_commit(found: Found, branch: str, limit: Limit, submitted: datetime | None) -> str:
+def _by_commit(found: ChosenCommit, branch: str, limit: Limit, submitted: datetime | None) -> str:
     at = _beside(found.commit.at, limit.at)
     text = f"commit {found.commit.hash[:7]} of {at} is the last one on {printable(branch)} before {limit}"
     if submitted is not None:
@@ -195,7 +195,7 @@ def _by_commit(found: Found, branch: str, limit: Limit, submitted: datetime | No
 
 
 def _by_roster(
-    found: Found | None, tip: Commit, submitted: datetime, branch: str, limit: Limit | None
+    found: ChosenCommit | None, tip: Commit, submitted: datetime, branch: str, limit: Limit | None
 ) -> str:
     before = f", before {limit}" if limit else ""
     if found is None:

@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from grader.classes.fetching.cache import Failure, MirrorFolder, State, name_of
+from grader.classes.fetching.cache import MirrorFolder, MirrorState, NetworkFailure, name_of
 from grader.classes.fetching.history import Commit, read_commit
 from grader.errors import SubmissionError
 from grader.intake.credentials import split_address
 from grader.intake.git import Git, GitFailed, GitTimeout, Repository
-from grader.intake.repository import Wanted, ask, explained, may_pass, parse_refs
+from grader.intake.repository import WantedRevision, ask, explained, may_pass, parse_refs
 from grader.intake.source import Source
 
 _EVERYTHING = ("+refs/heads/*:refs/heads/*", "+refs/tags/*:refs/tags/*")
@@ -88,13 +88,13 @@ class Mirror:
         if listing.head in refs and str(listing.head).startswith("refs/heads/"):
             self._run("symbolic-ref", "HEAD", str(listing.head))
 
-    def fetch_alone(self, listing: Listing, wanted: Wanted) -> None:
+    def fetch_alone(self, listing: Listing, wanted: WantedRevision) -> None:
         """One commit without its history."""
         sha256 = any(len(commit) == _WHOLE_HASHES[1] for commit in listing.refs.values())
         self._begin(self.path, sha256=sha256)
         self._fetch(("--depth=1",), str(wanted.refspec or wanted.commit))
 
-    def commit(self, listing: Listing, wanted: Wanted) -> str | None:
+    def commit(self, listing: Listing, wanted: WantedRevision) -> str | None:
         """The full hash of what is wanted, fetched where no branch or tag reaches it; None where it is not there."""
         name = listing.refs[wanted.refspec] if wanted.refspec else str(wanted.commit)
         found = self._commit_of(name)
@@ -218,15 +218,15 @@ def bring_up_to_date(place: MirrorFolder, request: FetchRequest, room: Path) -> 
             place.failed(_without_address(problem, request.source))
         raise
     if listing.refs:
-        place.complete(State(fetched_at=asked_at, listing=listing.text))
+        place.complete(MirrorState(fetched_at=asked_at, listing=listing.text))
     return asked, listing
 
 
-def _without_address(problem: GivenUp, source: Source) -> Failure:
+def _without_address(problem: GivenUp, source: Source) -> NetworkFailure:
     """For the cache, in which no address is written down."""
     said = problem.failure.stderr.replace(split_address(source.url)[0], "…") if source.remote else ""
     timeout = isinstance(problem.failure, GitTimeout)
-    return Failure(at=time.time(), said=said, tries=problem.tries, timeout=timeout)
+    return NetworkFailure(at=time.time(), said=said, tries=problem.tries, timeout=timeout)
 
 
 def _listing(mirror: Mirror) -> Listing:

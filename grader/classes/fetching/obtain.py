@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.classes.fetching.cache import MirrorFolder, cache_folder, locked, tidy_now_and_then
-from grader.classes.fetching.history import Commit, NothingInTime, Rule, choose, not_chosen
+from grader.classes.fetching.history import Commit, NothingInTime, Rule, choose_commit, not_chosen
 from grader.classes.fetching.mirror import (
     FetchRequest,
     GivenUp,
@@ -33,7 +33,7 @@ from grader.files import temporary_folder
 from grader.intake import unreadable
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.names import brief, printable
-from grader.intake.repository import Wanted, choose_ref, no_such_ref, served
+from grader.intake.repository import WantedRevision, choose_ref, no_such_ref, served
 from grader.intake.source import Source, as_repository, parse_source, with_ref
 from grader.intake.tree import is_there
 from grader.model.batch import Entry
@@ -207,7 +207,7 @@ def _commit_of(place: MirrorFolder, task: Task, room: Path) -> Obtained:
 
 
 def _choose_commit(
-    mirror: Mirror, listing: Listing, wanted: Wanted, tip: str, task: Task
+    mirror: Mirror, listing: Listing, wanted: WantedRevision, tip: str, task: Task
 ) -> tuple[Commit, HandedIn]:
     branch = branch_of(listing, task.source.ref, wanted)
     with mirror.history(tip) as commits:
@@ -216,7 +216,7 @@ def _choose_commit(
             note = f"the roster names {brief(task.source.ref or '')}: {commit}" if task.rule.is_any else ""
             return commit, not_chosen(task.rule, task.entry, commit.at, note)
         try:
-            commit, handed_in = choose(
+            commit, handed_in = choose_commit(
                 commits, rule=task.rule, entry=task.entry, branch=branch, given=task.source.given
             )
         except NothingInTime as error:
@@ -229,7 +229,7 @@ def _choose_commit(
     return commit, handed_in
 
 
-def branch_of(listing: Listing, ref: str | None, wanted: Wanted) -> str | None:
+def branch_of(listing: Listing, ref: str | None, wanted: WantedRevision) -> str | None:
     """The branch whose commits are looked at; None where someone chose a tag or a commit."""
     refs = listing.refs
     if ref is None or ref == "HEAD":
@@ -249,7 +249,7 @@ def _without_history(task: Task, room: Path) -> Obtained:
     source = replace(task.source, url=(room / "view").as_uri()) if local else task.source
     shutil.rmtree(room / "commit.git", ignore_errors=True)
 
-    def ask() -> tuple[Mirror, Listing, Wanted]:
+    def ask() -> tuple[Mirror, Listing, WantedRevision]:
         mirror = Mirror(source=source, path=room / "alone.git", room=room, git=git_in(room))
         listing = mirror.listing()
         wanted = choose_ref(listing.refs, source.ref, given=source.given)
@@ -269,7 +269,9 @@ def _without_history(task: Task, room: Path) -> Obtained:
     return _obtain_commit(task, commit, not_chosen(task.rule, task.entry, commit.at), wanted, room)
 
 
-def _obtain_commit(task: Task, commit: Commit, handed_in: HandedIn, wanted: Wanted, room: Path) -> Obtained:
+def _obtain_commit(
+    task: Task, commit: Commit, handed_in: HandedIn, wanted: WantedRevision, room: Path
+) -> Obtained:
     copy = room / "commit.git"
     source = replace(
         task.source,

@@ -16,7 +16,7 @@ from typing import Literal
 
 from grader.classes.gradebook.table import (
     Book,
-    Row,
+    GradebookRow,
     comment,
     criterion_points,
     csv_line,
@@ -29,10 +29,10 @@ from grader.model.result import GradingResult
 from grader.report.text import html
 
 Platform = Literal["canvas", "moodle", "blackboard"]
-Kind = Literal["platform", "number", "login", "email", "name", "first", "last", "section"]
+ColumnKind = Literal["platform", "number", "login", "email", "name", "first", "last", "section"]
 
 # A column's name without blanks and signs, in small letters; the platforms' own names in a few languages.
-_KINDS: Mapping[Kind, str] = {
+_KINDS: Mapping[ColumnKind, str] = {
     "number": "sisuserid sisid studentid studentnumber studentno idnumber matriculationnumber matrikelnummer "
     "registrationnumber matricule idnummer númerodeid numérodidentification",
     "login": "sisloginid loginid login username user userid netid uniqueid benutzername anmeldename "
@@ -50,9 +50,9 @@ _OWN_ID: Mapping[Platform, str] = {
 }
 
 
-def kinds(columns: Iterable[str], platform: Platform) -> dict[str, Kind]:
+def kinds(columns: Iterable[str], platform: Platform) -> dict[str, ColumnKind]:
     """What each column says of a student, for those that say anything."""
-    known: dict[str, Kind] = {name: kind for kind, names in _KINDS.items() for name in names.split()}
+    known: dict[str, ColumnKind] = {name: kind for kind, names in _KINDS.items() for name in names.split()}
     known |= dict.fromkeys(_OWN_ID[platform].split(), "platform")
     return {
         column: known[letters_and_digits(column)] for column in columns if letters_and_digits(column) in known
@@ -81,7 +81,7 @@ class Identity:
     name: str = ""
 
 
-def row_identity(fields: Mapping[str, str], known: Mapping[str, Kind]) -> Identity:
+def row_identity(fields: Mapping[str, str], known: Mapping[str, ColumnKind]) -> Identity:
     """Of a row of a platform's export, or of a roster's further columns."""
     identity, first, last = Identity(), "", ""
     for column, kind in known.items():
@@ -110,7 +110,7 @@ def entry_identity(entry: Entry, platform: Platform) -> Identity:
     return identity
 
 
-def _sure(kind: Kind, text: str) -> tuple[str, str]:
+def _sure(kind: ColumnKind, text: str) -> tuple[str, str]:
     """Many log in by their address, so both are one kind. Moodle writes `Participant 123` for the number 123."""
     if kind == "platform":
         number = re.search(r"\d+$", text)
@@ -180,10 +180,10 @@ MOODLE_MAX = 100.0
 
 
 def new_import_file(
-    platform: Platform, marks: Sequence[Mark], wanted: Sequence[Wanted], columns: Sequence[str]
+    platform: Platform, marks: Sequence[Mark], wanted: Sequence[PointsColumn], columns: Sequence[str]
 ) -> Made:
     """Return the lines of the file, and remarks. `columns` are the roster's further ones."""
-    made: dict[Platform, Callable[[Sequence[Mark], Sequence[Wanted], _Roster], Made]] = {
+    made: dict[Platform, Callable[[Sequence[Mark], Sequence[PointsColumn], _Roster], Made]] = {
         "canvas": _canvas,
         "moodle": _moodle,
         "blackboard": _blackboard,
@@ -197,10 +197,10 @@ class _Roster:
     def __init__(self, columns: Sequence[str], platform: Platform) -> None:
         self.known = kinds(columns, platform)
 
-    def has(self, *wanted: Kind) -> bool:
+    def has(self, *wanted: ColumnKind) -> bool:
         return any(kind in wanted for kind in self.known.values())
 
-    def text(self, entry: Entry, *wanted: Kind) -> str:
+    def text(self, entry: Entry, *wanted: ColumnKind) -> str:
         """Return the first field that says any of these."""
         for kind in wanted:
             for column, found in self.known.items():
@@ -209,7 +209,7 @@ class _Roster:
         return ""
 
 
-def _canvas(marks: Sequence[Mark], wanted: Sequence[Wanted], roster: _Roster) -> Made:
+def _canvas(marks: Sequence[Mark], wanted: Sequence[PointsColumn], roster: _Roster) -> Made:
     remarks = _missing(
         roster,
         "Canvas",
@@ -237,9 +237,9 @@ def _canvas(marks: Sequence[Mark], wanted: Sequence[Wanted], roster: _Roster) ->
     return lines(), remarks
 
 
-def _moodle(marks: Sequence[Mark], wanted: Sequence[Wanted], roster: _Roster) -> Made:
+def _moodle(marks: Sequence[Mark], wanted: Sequence[PointsColumn], roster: _Roster) -> Made:
     """By one column that every row has: Moodle takes a row without it for one more of the student before."""
-    names: dict[Kind, str] = {"email": "Email address", "login": "Username", "number": "ID number"}
+    names: dict[ColumnKind, str] = {"email": "Email address", "login": "Username", "number": "ID number"}
     filled = Counter(kind for mark in marks for kind in names if roster.text(mark.entry, kind))
     kind = max(names, key=lambda kind: filled[kind])
     by_id = not filled[kind]
@@ -266,7 +266,7 @@ def _moodle(marks: Sequence[Mark], wanted: Sequence[Wanted], roster: _Roster) ->
     return lines(), remarks
 
 
-def _blackboard(marks: Sequence[Mark], wanted: Sequence[Wanted], roster: _Roster) -> Made:
+def _blackboard(marks: Sequence[Mark], wanted: Sequence[PointsColumn], roster: _Roster) -> Made:
     remarks = _missing(roster, "Blackboard", ("login",), "column 'Username'", "Username")
     remarks.append(
         "Blackboard makes a column of text of each new column: with --template it fills in one that is there"
@@ -295,7 +295,9 @@ def _names(entry: Entry, roster: _Roster) -> tuple[str, str]:
     return last.strip(), first.strip()
 
 
-def _missing(roster: _Roster, platform: str, wanted: Sequence[Kind], columns: str, instead: str) -> list[str]:
+def _missing(
+    roster: _Roster, platform: str, wanted: Sequence[ColumnKind], columns: str, instead: str
+) -> list[str]:
     if roster.has(*wanted):
         return []
     remarks = [f"the roster has no {columns}, by which {platform} finds students: ids stand as {instead}"]
@@ -308,7 +310,7 @@ def _missing(roster: _Roster, platform: str, wanted: Sequence[Kind], columns: st
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wanted:
+class PointsColumn:
     """A column of points. `title` is what a new one is called, `names` what one that is there may be called."""
 
     title: str
@@ -331,16 +333,16 @@ class Mark:
     gated: bool = False
 
 
-def wanted_columns(book: Book, column: str, *, per_criterion: bool) -> tuple[Wanted, ...]:
+def wanted_columns(book: Book, column: str, *, per_criterion: bool) -> tuple[PointsColumn, ...]:
     """One column for the points, or one for each criterion that is worth any."""
     base = column or book.title
     if not per_criterion:
         names = (column,) if column else (book.title, book.rubric_id)
-        return (Wanted(title=base, names=names, max_points=book.max_points),)
+        return (PointsColumn(title=base, names=names, max_points=book.max_points),)
     worth = [criterion for criterion in book.criteria if criterion.max_points > 0 or criterion.extra]
     titles = [criterion.title for criterion in worth]
     return tuple(
-        Wanted(
+        PointsColumn(
             title=f"{base} - {c.title}" + (f" ({c.id})" if titles.count(c.title) > 1 else ""),
             names=(f"{base} - {c.title}", f"{base} - {c.id}", c.id)
             if titles.count(c.title) == 1
@@ -351,7 +353,7 @@ def wanted_columns(book: Book, column: str, *, per_criterion: bool) -> tuple[Wan
     )
 
 
-def marks_of(book: Book, rows: Iterable[Row], *, per_criterion: bool) -> list[Mark]:
+def marks_of(book: Book, rows: Iterable[GradebookRow], *, per_criterion: bool) -> list[Mark]:
     """Every row's mark. Of a result of status `error` no points count, of an inconclusive one those that are sure."""
     worth = [criterion.id for criterion in book.criteria if criterion.max_points > 0 or criterion.extra]
     return [_mark(row, worth if per_criterion else None) for row in rows]
@@ -370,7 +372,7 @@ def remarks_of(marks: Sequence[Mark], *, per_criterion: bool) -> Iterator[str]:
         yield f"criteria are without what a gate cost: {', '.join(gated)}"
 
 
-def _mark(row: Row, worth: Sequence[str] | None) -> Mark:
+def _mark(row: GradebookRow, worth: Sequence[str] | None) -> Mark:
     result, late = row.result, row.result.late
     cost = late.points_before - late.points if late else 0.0
     return Mark(

@@ -15,11 +15,11 @@ from grader.model.result import AppliedOverride, GradingResult
 from grader.report.text import csv_cell
 from grader.untrusted_text import line
 
-Form = Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"]
-FORMS: tuple[Form, ...] = ("csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard")
+GradebookFormat = Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"]
+FORMS: tuple[GradebookFormat, ...] = ("csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard")
 
 
-class Row(Record):
+class GradebookRow(Record):
     """One submission of the roster and its result."""
 
     entry: Entry
@@ -60,7 +60,7 @@ def header(book: Book) -> tuple[str, ...]:
     return (*names[:criteria], *AFTER, *names[criteria:])
 
 
-def cells(book: Book, row: Row) -> Iterator[Cell]:
+def cells(book: Book, row: GradebookRow) -> Iterator[Cell]:
     """What stands below each name of `header`."""
     entry, result = row.entry, row.result
     yield from (entry.id, entry.name, entry.group, result.status)

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader.classes.gradebook.platforms import (
+    ColumnKind,
     Identity,
-    Kind,
     Mark,
     Platform,
-    Wanted,
+    PointsColumn,
     entry_identity,
     kinds,
     letters_and_digits,
@@ -35,15 +35,15 @@ class _Work:
 
     platform: Platform
     sheet: Sheet
-    known: dict[str, Kind]
-    wanted: Sequence[Wanted]
+    known: dict[str, ColumnKind]
+    wanted: Sequence[PointsColumn]
     places: list[int] = field(default_factory=list)
     maximum: int | None = None
     remarks: list[str] = field(default_factory=list)
 
 
 def fill_template(
-    template: Path, platform: Platform, marks: Sequence[Mark], wanted: Sequence[Wanted], *, named: bool
+    template: Path, platform: Platform, marks: Sequence[Mark], wanted: Sequence[PointsColumn], *, named: bool
 ) -> tuple[bytes, list[str]]:
     """Return the export with the points of the students found in it, every other byte as it was; and remarks.
 
@@ -72,16 +72,16 @@ def fill_template(
     return sheet.to_bytes(), work.remarks
 
 
-def _is_student(record: Record) -> bool:
+def _is_student(record: TemplateRow) -> bool:
     values = [record.value(column) for column in range(len(record.cells))]
     return "Points Possible" not in values[0] and not all(_POSTING.fullmatch(value) for value in values)
 
 
-def _identity(record: Record, work: _Work) -> Identity:
+def _identity(record: TemplateRow, work: _Work) -> Identity:
     return row_identity(_fields(record, work), work.known)
 
 
-def _fields(record: Record, work: _Work) -> dict[str, str]:
+def _fields(record: TemplateRow, work: _Work) -> dict[str, str]:
     return {name: record.value(column) for column, name in enumerate(work.sheet.header) if name in work.known}
 
 
@@ -102,7 +102,7 @@ def _find_columns(work: _Work, *, named: bool) -> None:
         work.places.append(_add_column(work, wanted) if place is None else place)
 
 
-def _add_column(work: _Work, wanted: Wanted) -> int:
+def _add_column(work: _Work, wanted: PointsColumn) -> int:
     """A new column at the end of every row."""
     place = len(work.sheet.header)
     points = number_text(wanted.max_points)
@@ -122,7 +122,7 @@ def _add_column(work: _Work, wanted: Wanted) -> int:
     return place
 
 
-def _maxima(work: _Work, students: Sequence[Record]) -> Iterator[str]:
+def _maxima(work: _Work, students: Sequence[TemplateRow]) -> Iterator[str]:
     """Where the platform counts to another maximum, points stay as they are: that is for a person to settle."""
     for wanted, place in zip(work.wanted, work.places, strict=True):
         said = _maximum(work, students, place)
@@ -133,7 +133,7 @@ def _maxima(work: _Work, students: Sequence[Record]) -> Iterator[str]:
             )
 
 
-def _maximum(work: _Work, students: Sequence[Record], place: int) -> float | None:
+def _maximum(work: _Work, students: Sequence[TemplateRow], place: int) -> float | None:
     if work.platform == "blackboard":
         return maximum_in(work.sheet.header[place])
     if work.maximum is not None:
@@ -142,7 +142,7 @@ def _maximum(work: _Work, students: Sequence[Record], place: int) -> float | Non
     return next((_number(record.value(place)) for record in possible), None)
 
 
-def _fill(work: _Work, record: Record, mark: Mark) -> None:
+def _fill(work: _Work, record: TemplateRow, mark: Mark) -> None:
     for place, points in zip(work.places, mark.points, strict=True):
         record.cells += [""] * (place + 1 - len(record.cells))
         there = record.value(place).strip()
@@ -158,7 +158,7 @@ def _fill(work: _Work, record: Record, mark: Mark) -> None:
 
 
 def _unmatched_remarks(
-    work: _Work, students: Sequence[Record], theirs: Sequence[Identity], taken: set[int]
+    work: _Work, students: Sequence[TemplateRow], theirs: Sequence[Identity], taken: set[int]
 ) -> Iterator[str]:
     """Yield a remark for each student who is in the export only."""
     for place, (record, identity) in enumerate(zip(students, theirs, strict=True)):
@@ -181,7 +181,12 @@ SHOWN_MAX = 12
 
 
 def find_column(
-    header: Sequence[str], wanted: Wanted, platform: Platform, known: dict[str, Kind], *, named: bool
+    header: Sequence[str],
+    wanted: PointsColumn,
+    platform: Platform,
+    known: dict[str, ColumnKind],
+    *,
+    named: bool,
 ) -> int | None:
     """Its place; None where there is none. With `named`, the instructor has said what it is called.
 
@@ -206,7 +211,7 @@ def find_column(
     return found[0] if found else None
 
 
-def worksheet_columns(header: Sequence[str], known: dict[str, Kind]) -> tuple[int, int | None] | None:
+def worksheet_columns(header: Sequence[str], known: dict[str, ColumnKind]) -> tuple[int, int | None] | None:
     """The places of the grade and of its maximum in Moodle's offline grading worksheet; None where it is none."""
     plains = [letters_and_digits(name) for name in header]
     grade = next((place for place, name in enumerate(plains) if name in _GRADE), None)
@@ -221,7 +226,7 @@ def maximum_in(header: str) -> float | None:
     return float(found[1]) if found and found[1].count(".") < 2 else None
 
 
-def new_header(wanted: Wanted, platform: Platform, points: str) -> str:
+def new_header(wanted: PointsColumn, platform: Platform, points: str) -> str:
     """What a column is called that the platform does not have yet."""
     return f"{wanted.title} [Total Pts: {points} Score]" if platform == "blackboard" else wanted.title
 
@@ -236,7 +241,7 @@ def _titles(name: str, platform: Platform) -> set[str]:
     return {letters_and_digits(bare), letters_and_digits(bare.partition(":")[2]) or letters_and_digits(bare)}
 
 
-def _others(header: Sequence[str], known: dict[str, Kind]) -> str:
+def _others(header: Sequence[str], known: dict[str, ColumnKind]) -> str:
     names = [name for name in header if name.strip() and name not in known]
     return f"there are: {first_few(names, SHOWN_MAX)}"
 
@@ -246,7 +251,7 @@ _EXPORT = "export it from the platform as CSV, and do not save it from a spreads
 
 
 @dataclass(kw_only=True)
-class Record:
+class TemplateRow:
     """The cells of one row as they are written, quotation marks too, and the line end behind them."""
 
     cells: list[str]
@@ -269,7 +274,7 @@ class Sheet:
     mark: bytes
     encoding: str
     delimiter: str
-    records: list[Record]
+    records: list[TemplateRow]
 
     @property
     def header(self) -> list[str]:
@@ -317,7 +322,7 @@ def read_sheet(path: Path) -> Sheet:
     return sheet
 
 
-def _records(text: str, delimiter: str) -> Iterator[Record]:
+def _records(text: str, delimiter: str) -> Iterator[TemplateRow]:
     """Whatever is there becomes a cell; joined again, the records are the same text."""
     cell = re.compile(
         rf'("[^"]*(?:""[^"]*)*"[^{delimiter}\r\n]*|[^{delimiter}\r\n]*)({delimiter}|\r\n|\n|\r|\Z)'
@@ -328,7 +333,7 @@ def _records(text: str, delimiter: str) -> Iterator[Record]:
         if found[2] == delimiter:
             continue
         if found[2] or len(cells) > 1 or cells[0]:
-            yield Record(cells=cells, end=found[2])
+            yield TemplateRow(cells=cells, end=found[2])
         cells = []
 
 

@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.classes.gradebook.platforms import Platform, marks_of, new_import_file, remarks_of, wanted_columns
-from grader.classes.gradebook.table import Book, Cell, Form, Row, cells, csv_line, header, visible_text
+from grader.classes.gradebook.table import (
+    Book,
+    Cell,
+    GradebookFormat,
+    GradebookRow,
+    cells,
+    csv_line,
+    header,
+    visible_text,
+)
 from grader.classes.gradebook.template import fill_template
 from grader.errors import OutputError, UsageError
 from grader.files import atomic_write, temporary_folder, whole_file
@@ -20,14 +29,18 @@ if TYPE_CHECKING:
     from xlsxwriter.format import Format
     from xlsxwriter.worksheet import Worksheet
 
-PLATFORMS: Mapping[Form, Platform] = {"canvas": "canvas", "moodle": "moodle", "blackboard": "blackboard"}
+PLATFORMS: Mapping[GradebookFormat, Platform] = {
+    "canvas": "canvas",
+    "moodle": "moodle",
+    "blackboard": "blackboard",
+}
 
 
 def write_gradebook(
     book: Book,
-    rows: Iterable[Row],
+    rows: Iterable[GradebookRow],
     target: Path,
-    form: Form,
+    form: GradebookFormat,
     *,
     per_criterion: bool = False,
     template: Path | None = None,
@@ -67,7 +80,7 @@ def write_gradebook(
     return (*remarks, *more)
 
 
-def _write_plain(book: Book, rows: Iterable[Row], target: Path, form: Form) -> None:
+def _write_plain(book: Book, rows: Iterable[GradebookRow], target: Path, form: GradebookFormat) -> None:
     if form == "csv":
         write_csv(book, rows, target)
     elif form == "jsonl":
@@ -82,20 +95,20 @@ OPTIONAL = {
 """What `result.json` has only where there is any."""
 
 
-def write_csv(book: Book, rows: Iterable[Row], target: Path) -> None:
+def write_csv(book: Book, rows: Iterable[GradebookRow], target: Path) -> None:
     """UTF-8 without a mark, as programs read it; the workbook is for Excel."""
     with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
         file.write(csv_line(header(book)))
         file.writelines(csv_line(list(cells(book, row))) for row in rows)
 
 
-def write_jsonl(rows: Iterable[Row], target: Path) -> None:
+def write_jsonl(rows: Iterable[GradebookRow], target: Path) -> None:
     """A line is what `result.json` says (`grader.result/1`), and what the roster says of it under `roster`."""
     with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
         file.writelines(json_line(row) for row in rows)
 
 
-def json_line(row: Row) -> str:
+def json_line(row: GradebookRow) -> str:
     """One line, with its end. Nothing in it steers or hides."""
     result = row.result.model_dump(mode="json", by_alias=True)
     data = {key: value for key, value in result.items() if value or key not in OPTIONAL}
@@ -115,7 +128,7 @@ WORKBOOK = {
 }
 
 
-def write_workbook(book: Book, rows: Iterable[Row], target: Path) -> None:
+def write_workbook(book: Book, rows: Iterable[GradebookRow], target: Path) -> None:
     """Write two sheets: the gradebook, and what its criteria are. No text is a formula or a link."""
     import xlsxwriter  # noqa: PLC0415 - slow to load
     from xlsxwriter.exceptions import XlsxWriterException  # noqa: PLC0415 - as above
@@ -137,7 +150,7 @@ def write_workbook(book: Book, rows: Iterable[Row], target: Path) -> None:
                 sheet.row_data_fh.close()
 
 
-def _gradebook(sheet: Worksheet, book: Book, rows: Iterable[Row], bold: Format) -> None:
+def _gradebook(sheet: Worksheet, book: Book, rows: Iterable[GradebookRow], bold: Format) -> None:
     names = header(book)
     _widths(sheet, names)
     _write(sheet, 0, names, bold)

@@ -29,7 +29,7 @@ WAIT_S, LOOK_S = 30.0, 0.02
 
 
 Entry = Override | WrittenOverride | BankComment
-Change = tuple[str, str, Entry | None]
+OverrideChange = tuple[str, str, Entry | None]
 """A submission, a criterion, and what is to stand there; None takes it out. Of a comment: its criterion and its id."""
 
 
@@ -38,7 +38,7 @@ def write_override(path: Path, submission: str, criterion: str, override: Entry 
     write_overrides(path, [(submission, criterion, override)])
 
 
-def write_overrides(path: Path, changes: Iterable[Change]) -> None:
+def write_overrides(path: Path, changes: Iterable[OverrideChange]) -> None:
     """Make all of these changes in the file, which need not exist, or none. Several writers wait for each other.
 
     The file may be one of comments, which is written in the same way.
@@ -110,7 +110,7 @@ def _changed_text(path: Path, raw: bytes, changes: Sequence[tuple[str, str, Fiel
         )
     called = {folder_key(key): key for key in reversed(before) if key != SCHEMA_KEY}
     edits = [
-        Edit(called.setdefault(folder_key(submission), submission), criterion, fields)
+        OverrideEdit(called.setdefault(folder_key(submission), submission), criterion, fields)
         for submission, criterion, fields in changes
     ]
     new = edited(raw.decode("utf-8-sig"), before, edits)
@@ -138,7 +138,7 @@ def _data(path: Path, raw: bytes) -> dict[str, Any]:
     return as_map(source.data)
 
 
-def _expected_data(before: dict[str, Any], edits: Iterable[Edit]) -> dict[str, Any]:
+def _expected_data(before: dict[str, Any], edits: Iterable[OverrideEdit]) -> dict[str, Any]:
     after = {key: dict(value) if isinstance(value, dict) else value for key, value in before.items()}
     for key, criterion, fields in edits:
         if fields is not None:
@@ -162,7 +162,7 @@ Fields = dict[str, Any]
 """An override as the file's data have it, what is empty left out."""
 
 
-class Edit(NamedTuple):
+class OverrideEdit(NamedTuple):
     """What is to be changed: `submission` is what it is called in the file; None takes the override out."""
 
     submission: str
@@ -170,7 +170,7 @@ class Edit(NamedTuple):
     fields: Fields | None
 
 
-def edited(text: str, before: Mapping[str, Any], edits: Iterable[Edit]) -> str:
+def edited(text: str, before: Mapping[str, Any], edits: Iterable[OverrideEdit]) -> str:
     """`before` are the text's data.
 
     Where the text uses what this does not know (anchors, say), the new one may hold other data than it should.
@@ -181,7 +181,9 @@ def edited(text: str, before: Mapping[str, Any], edits: Iterable[Edit]) -> str:
     return text
 
 
-def _pass(text: str, before: Mapping[str, Any], edits: Sequence[Edit]) -> tuple[str, list[Edit]]:
+def _pass(
+    text: str, before: Mapping[str, Any], edits: Sequence[OverrideEdit]
+) -> tuple[str, list[OverrideEdit]]:
     """Change each submission once, and return what is left to do; a map in braces is changed in one place at a time."""
     root = compose(text)
     if not isinstance(root, yaml.MappingNode):
@@ -190,7 +192,7 @@ def _pass(text: str, before: Mapping[str, Any], edits: Sequence[Edit]) -> tuple[
             return text, []
         return spliced(text, [_first(text, edits[first])]), [*edits[:first], *edits[first + 1 :]]
     pairs = {key.value: (key, value) for key, value in root.value if isinstance(key, yaml.ScalarNode)}
-    splices, new, later, done = list[Splice](), list[Edit](), list[Edit](), set[str]()
+    splices, new, later, done = list[Splice](), list[OverrideEdit](), list[OverrideEdit](), set[str]()
     for edit in edits:
         if edit.submission in done or (root.flow_style and done):
             later.append(edit)
@@ -207,7 +209,7 @@ def _pass(text: str, before: Mapping[str, Any], edits: Sequence[Edit]) -> tuple[
     return spliced(text, [*splices, *([_add_entries(text, root, new)] if new else [])]), later
 
 
-def _without(text: str, root: yaml.MappingNode, submission: Pair, criterion: str) -> list[Splice]:
+def _without(text: str, root: yaml.MappingNode, submission: NodePair, criterion: str) -> list[Splice]:
     of = submission[1]
     found = _pair(of, criterion)
     if found is None or not isinstance(of, yaml.MappingNode):
@@ -215,7 +217,7 @@ def _without(text: str, root: yaml.MappingNode, submission: Pair, criterion: str
     return [drop_pair(text, of, found) if len(of.value) > 1 else drop_pair(text, root, submission)]
 
 
-def _with(text: str, submission: Pair, now: object, criterion: str, fields: Fields) -> list[Splice]:
+def _with(text: str, submission: NodePair, now: object, criterion: str, fields: Fields) -> list[Splice]:
     of, entry = submission[1], _entry(criterion, fields)
     if not isinstance(of, yaml.MappingNode):
         return [set_value(text, submission, f"{{{entry}}}")]
@@ -223,19 +225,19 @@ def _with(text: str, submission: Pair, now: object, criterion: str, fields: Fiel
     return _update_entry(text, found, now, fields) if found else [add_pairs(text, of, [entry])]
 
 
-def _pair(node: yaml.Node, key: str) -> Pair | None:
+def _pair(node: yaml.Node, key: str) -> NodePair | None:
     pairs = node.value if isinstance(node, yaml.MappingNode) else []
     return next(((k, v) for k, v in pairs if isinstance(k, yaml.ScalarNode) and k.value == key), None)
 
 
-def _first(text: str, edit: Edit) -> Splice:
+def _first(text: str, edit: OverrideEdit) -> Splice:
     """The first override of a file that is empty, or holds comments only."""
     lines = _lines(edit)
     schema = COMMENTS if "text" in (edit.fields or {}) else OVERRIDES
     return block_lines(text, len(text), 0, lines if text.strip() else [f"{SCHEMA_KEY}: {schema}", *lines])
 
 
-def _add_entries(text: str, root: yaml.MappingNode, edits: Iterable[Edit]) -> Splice:
+def _add_entries(text: str, root: yaml.MappingNode, edits: Iterable[OverrideEdit]) -> Splice:
     """More submissions."""
     if root.flow_style or not root.value:
         entries = [f"{_key(e.submission)}: {{{_entry(e.criterion, e.fields or {})}}}" for e in edits]
@@ -243,11 +245,11 @@ def _add_entries(text: str, root: yaml.MappingNode, edits: Iterable[Edit]) -> Sp
     return add_pairs(text, root, [line for edit in edits for line in _lines(edit)])
 
 
-def _lines(edit: Edit) -> list[str]:
+def _lines(edit: OverrideEdit) -> list[str]:
     return [f"{_key(edit.submission)}:", f"  {_entry(edit.criterion, edit.fields or {})}"]
 
 
-def _update_entry(text: str, found: Pair, now: object, fields: Fields) -> list[Splice]:
+def _update_entry(text: str, found: NodePair, now: object, fields: Fields) -> list[Splice]:
     """Only what changed, so that comments inside of it stay; the whole where something is to go."""
     node, current = found[1], as_map(now)
     gone = [name for name in current if current[name] is not None and name in KNOWN and name not in fields]
@@ -291,7 +293,7 @@ def _quote(text: str) -> str:
     return str(yaml.safe_dump(text, default_style='"', allow_unicode=True, width=10**9)).rstrip("\n")
 
 
-Pair = tuple[yaml.Node, yaml.Node]
+NodePair = tuple[yaml.Node, yaml.Node]
 
 
 class Splice(NamedTuple):
@@ -323,7 +325,7 @@ def end_of(text: str, node: yaml.Node) -> int:
     return int(end)
 
 
-def set_value(text: str, pair: Pair, written: str) -> Splice:
+def set_value(text: str, pair: NodePair, written: str) -> Splice:
     """`written` in place of the pair's value."""
     start = pair[1].start_mark.index
     end = max(start, end_of(text, pair[1]))
@@ -351,7 +353,7 @@ def block_lines(text: str, after: int, column: int, written: list[str]) -> Splic
     return Splice(newline + 1, newline + 1, lines)
 
 
-def drop_pair(text: str, node: yaml.MappingNode, pair: Pair) -> Splice:
+def drop_pair(text: str, node: yaml.MappingNode, pair: NodePair) -> Splice:
     """Nothing in place of a pair: its lines in a map of lines, the pair and a comma in a map in braces."""
     start, end = pair[0].start_mark.index, _end_of_pair(text, pair)
     if not node.flow_style:
@@ -363,5 +365,5 @@ def drop_pair(text: str, node: yaml.MappingNode, pair: Pair) -> Splice:
     return Splice(_end_of_pair(text, node.value[place - 1]) if place else start, end, "")
 
 
-def _end_of_pair(text: str, pair: Pair) -> int:
+def _end_of_pair(text: str, pair: NodePair) -> int:
     return max(end_of(text, pair[0]), end_of(text, pair[1]))

@@ -28,7 +28,7 @@ from werkzeug.exceptions import Forbidden, HTTPException, NotFound
 from werkzeug.wrappers import Response as AnyResponse
 
 from grader.classes.batch.renew_results import figures_in
-from grader.classes.gradebook import Row
+from grader.classes.gradebook import GradebookRow
 from grader.classes.overrides import bounds
 from grader.classes.review.cards import (
     MANUAL,
@@ -56,7 +56,7 @@ from grader.classes.review.guard import (
     reports_of,
 )
 from grader.classes.review.session import Conflict, ReviewSession, override_as_written
-from grader.classes.review.submissions import Item, across, alike, place_of
+from grader.classes.review.submissions import ListedSubmission, across, alike, place_of
 from grader.errors import GraderError, RubricError
 from grader.model.result import AppliedOverride, WrittenOverride
 from grader.report.html.page import render_html
@@ -177,7 +177,7 @@ class _Views:
             )
         return self._saved_response(item, criterion, waits)
 
-    def _saved_as(self, item: Item, criterion: str, wanted: WrittenOverride | None) -> str:
+    def _saved_as(self, item: ListedSubmission, criterion: str, wanted: WrittenOverride | None) -> str:
         """Save it for one, or for all that are alike; return what is to be said of that."""
         do, session = request.form.get("do"), self._session
         if do == "undo" and (one := session.decisions().written.get(item.entry.id, {}).get(criterion)):
@@ -249,7 +249,7 @@ class _Views:
         file = open_evidence(self._session.path / item.key, name)
         return send_opened(file, "application/octet-stream", download=f"{item.key}-{name}")
 
-    def _report_without_names(self, item: Item, name: str) -> Response:
+    def _report_without_names(self, item: ListedSubmission, name: str) -> Response:
         row, _, _ = self._row(item, {})
         if name != "report.html" or row.result.error is not None:
             raise NotFound(HIDDEN)
@@ -259,11 +259,11 @@ class _Views:
         page = render_html(row.result, rubric.rubric, shown, docs=rubric.docs)
         return Response(page, mimetype="text/html", headers={"Content-Security-Policy": FRAMED})
 
-    def _commit(self, item: Item) -> str | None:
+    def _commit(self, item: ListedSubmission) -> str | None:
         row = self._session.submissions.row(item.key)
         return row.result.submission.commit if row else None
 
-    def _masked_text(self, item: Item, text: str) -> str:
+    def _masked_text(self, item: ListedSubmission, text: str) -> str:
         mask = self._session.mask(item, None)
         return mask.text(text) if mask else text
 
@@ -275,13 +275,13 @@ class _Views:
         """Saves without a reload, and keys."""
         return _cacheable(_own("review.js"), "text/javascript")
 
-    def _item(self, key: str) -> Item:
+    def _item(self, key: str) -> ListedSubmission:
         item = self._session.item(key)
         if item is None:
             raise NotFound("The class has no such submission.")
         return item
 
-    def _override_from_form(self, item: Item, asked: Criterion) -> WrittenOverride | None:
+    def _override_from_form(self, item: ListedSubmission, asked: Criterion) -> WrittenOverride | None:
         form, (least, most) = request.form, bounds(asked)
         if form.get("do") in {"remove", "undo"}:
             return None
@@ -301,7 +301,7 @@ class _Views:
         answered = self._session.answered(item, asked.id, wanted.answer) if form.get("do") != "alike" else ()
         return wanted.model_copy(update={"answered": answered})
 
-    def _page(self, item: Item, drafts: Mapping[str, Draft]) -> str:
+    def _page(self, item: ListedSubmission, drafts: Mapping[str, Draft]) -> str:
         row, found, troubles = self._row(item, drafts)
         folder = self._session.path / item.key
         there = reports_of(folder)
@@ -326,7 +326,7 @@ class _Views:
             evidence=evidence_of(folder) if not item.alias else [],
         )
 
-    def _code(self, item: Item, criterion: str) -> list[CodeFile]:
+    def _code(self, item: ListedSubmission, criterion: str) -> list[CodeFile]:
         asked = next(c for c in self._session.rubric.rubric.criteria if c.id == criterion)
         row = self._session.submissions.row(item.key)
         result = next((c for c in row.result.criteria if c.id == criterion), None) if row else None
@@ -336,9 +336,11 @@ class _Views:
         hide = mask.text if mask else str
         return code_of(self._session.path / item.key, asked, result, self._session.starter, hide)
 
-    def _row(self, item: Item, drafts: Mapping[str, Draft]) -> tuple[Row, Cards, list[str]]:
+    def _row(
+        self, item: ListedSubmission, drafts: Mapping[str, Draft]
+    ) -> tuple[GradebookRow, Cards, list[str]]:
         """The submission as it counts now, its cards, and what is in the way of saving."""
-        row = self._session.submissions.row(item.key) or Row(entry=item.entry, result=None)
+        row = self._session.submissions.row(item.key) or GradebookRow(entry=item.entry, result=None)
         rubric = self._session.rubric.rubric
         try:
             found = self._session.decisions()
@@ -357,7 +359,7 @@ class _Views:
             row = row.model_copy(update={"result": without})
         return row, cards(row, rubric, known, drafts), troubles
 
-    def _known_of(self, item: Item) -> Known:
+    def _known_of(self, item: ListedSubmission) -> Known:
         found, name = self._session.decisions(), item.entry.id
         come_to, written = found.come_to.get(name, {}), found.written.get(name, {})
         decided = {of: Decided(written=written[of], override=come_to[of]) for of in written}
@@ -384,13 +386,13 @@ class _Views:
             )
         return found
 
-    def _not_saved(self, item: Item, criterion: str, draft: Draft, code: int) -> AnyResponse:
+    def _not_saved(self, item: ListedSubmission, criterion: str, draft: Draft, code: int) -> AnyResponse:
         if SCRIPT not in request.headers:
             return Response(self._page(item, {criterion: draft}), code)
         data = {"error": draft.error} | (self._parts(item, criterion, draft) if draft.conflict else {})
         return with_code(jsonify(data), code)
 
-    def _saved_response(self, item: Item, criterion: str, waits: str) -> AnyResponse:
+    def _saved_response(self, item: ListedSubmission, criterion: str, waits: str) -> AnyResponse:
         at = _now()
         go_on = request.form.get("do") == "next"
         place = place_of(self._session.items(), request.form, at=item.key)
@@ -405,7 +407,7 @@ class _Views:
         back = url_for("submission", key=item.address, saved=criterion, at=at, **place.kept)
         return redirect(f"{back}#c-{criterion}", 303)
 
-    def _parts(self, item: Item, criterion: str, draft: Draft | None) -> dict[str, object]:
+    def _parts(self, item: ListedSubmission, criterion: str, draft: Draft | None) -> dict[str, object]:
         """What of a card changes, as a script puts it in place."""
         row, _, _ = self._row(item, {})
         drafts = {criterion: draft} if draft else {}

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from datetime import date
 from itertools import chain, count
 
-from grader.classes.gradebook import Row
+from grader.classes.gradebook import GradebookRow
 from grader.classes.review.session import mark
-from grader.classes.review.student_requests import Request
+from grader.classes.review.student_requests import StudentRequest
 from grader.model.result import (
     AUTHOR_CHARS,
     BANK_CHARS,
@@ -65,7 +65,7 @@ class Card:
     applied: AppliedOverride | None
     draft: Draft | None
     bank: Mapping[str, BankComment]
-    requests: Sequence[Request] = ()
+    requests: Sequence[StudentRequest] = ()
 
     @property
     def override(self) -> Override | None:
@@ -156,10 +156,10 @@ class Known:
 
     decided: Mapping[str, Decided]
     bank: Mapping[str, Mapping[str, BankComment]]
-    requests: Mapping[str, Sequence[Request]] = field(default_factory=dict)
+    requests: Mapping[str, Sequence[StudentRequest]] = field(default_factory=dict)
 
 
-def cards(row: Row, rubric: Rubric, known: Known, drafts: Mapping[str, Draft]) -> Cards:
+def cards(row: GradebookRow, rubric: Rubric, known: Known, drafts: Mapping[str, Draft]) -> Cards:
     """Return the cards of a submission."""
     found = [card(row, rubric, name, known, drafts) for name in (c.id for c in row.result.criteria)]
     whole = row.result.error is None
@@ -169,7 +169,9 @@ def cards(row: Row, rubric: Rubric, known: Known, drafts: Mapping[str, Draft]) -
     return Cards(waiting=waiting, decided=mine, rest=sorted(others, key=_nothing_lost))
 
 
-def card(row: Row, rubric: Rubric, criterion: str, known: Known, drafts: Mapping[str, Draft]) -> Card:
+def card(
+    row: GradebookRow, rubric: Rubric, criterion: str, known: Known, drafts: Mapping[str, Draft]
+) -> Card:
     """One of them; the result has a criterion of that id."""
     result = row.result
     asked = next((c for c in rubric.criteria if c.id == criterion), None)

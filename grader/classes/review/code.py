@@ -36,7 +36,7 @@ RUNS_KEPT = 24
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class CodeLine:
     """A line: its `number`, None for one of the starter that is gone; `kind` is `plus`, `minus` or empty."""
 
     number: int | None
@@ -50,7 +50,7 @@ class CodeFile:
     """A file of the student's; `told` says in words what differs from the starter, and what is left out."""
 
     path: str
-    rows: Sequence[Row]
+    rows: Sequence[CodeLine]
     cited: bool
     told: str
 
@@ -129,18 +129,18 @@ def _file(
 
 def _rows(
     shown: Sequence[Markup], lines: Sequence[str], before: Sequence[str] | None, marks: set[int]
-) -> Iterator[Row]:
+) -> Iterator[CodeLine]:
     if before is None:
-        yield from (Row(number=i, text=text, marked=i in marks) for i, text in enumerate(shown, start=1))
+        yield from (CodeLine(number=i, text=text, marked=i in marks) for i, text in enumerate(shown, start=1))
         return
     plain = [[text.rstrip() for text in part] for part in (before, lines)]
     for kind, was, was_end, now, now_end in SequenceMatcher(None, plain[0], plain[1]).get_opcodes():
         if kind in ("delete", "replace"):
             gone = (line(text.expandtabs(4), LINE_CHARS) for text in before[was:was_end])
-            yield from (Row(number=None, text=escape(text), kind="minus") for text in gone)
+            yield from (CodeLine(number=None, text=escape(text), kind="minus") for text in gone)
         new = "" if kind == "equal" else "plus"
         for place in range(now, now_end):
-            yield Row(number=place + 1, text=shown[place], kind=new, marked=place + 1 in marks)
+            yield CodeLine(number=place + 1, text=shown[place], kind=new, marked=place + 1 in marks)
 
 
 def _handed_out(path: str, starter: Mapping[str, bytes]) -> list[str] | None:

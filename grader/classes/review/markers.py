@@ -12,7 +12,7 @@ from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.run import ids_of
 from grader.classes.overrides import COMMENTS_FILE as BANK
 from grader.classes.overrides import FILE, read_bank, read_written
-from grader.classes.overrides.write import Change, write_overrides
+from grader.classes.overrides.write import OverrideChange, write_overrides
 from grader.classes.review.session import hold_review
 from grader.errors import UsageError
 from grader.files import atomic_write
@@ -25,7 +25,7 @@ SHARES = "markers.json"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Share:
+class MarkingShare:
     """`number` of `of` shares, counted from 0, and of these only the submissions of `group`, where it is given."""
 
     number: int = 0
@@ -42,7 +42,7 @@ class Share:
 Shown = Callable[[Entry], bool]
 
 
-def share_of(folder: Path, marker: str | None, of: str | None, group: str | None) -> Share:
+def share_of(folder: Path, marker: str | None, of: str | None, group: str | None) -> MarkingShare:
     """Return a marker's share: `of` is how many there are, or the names of all of them with commas between.
 
     Of a number each name takes the next share that is free, which is kept in `markers.json`. Raises UsageError.
@@ -50,7 +50,7 @@ def share_of(folder: Path, marker: str | None, of: str | None, group: str | None
     if of is None or marker is None:
         if of is not None:
             raise UsageError("--of needs --marker", hint="--marker ann --of 4")
-        return Share(group=group)
+        return MarkingShare(group=group)
     if of.isdigit() and 0 < int(of) < 1000:
         with hold_review(folder):
             names, count = _claim_share(folder, marker, int(of)), int(of)
@@ -59,7 +59,7 @@ def share_of(folder: Path, marker: str | None, of: str | None, group: str | None
         count = len(names)
     if marker not in names:
         raise UsageError(f"--marker {marker}: the shares are those of {join_words(names)}")
-    return Share(number=names.index(marker), of=count, group=group)
+    return MarkingShare(number=names.index(marker), of=count, group=group)
 
 
 def _claim_share(folder: Path, marker: str, count: int) -> list[str]:
@@ -102,12 +102,12 @@ def merge(batch: BatchFolder, rubric: Rubric, other: Path) -> Merged:
         bank, their_bank = read_bank(batch.path / BANK, rubric), read_bank(other / BANK, rubric)
         mine = read_written(batch.path / FILE, rubric, ids, bank)
         theirs = read_written(other / FILE, rubric, ids, their_bank)
-        comments: list[Change] = []
+        comments: list[OverrideChange] = []
         unlike: set[tuple[str, str]] = set()
         for of, found in their_bank.items():
             comments += [(of, name, one) for name, one in found.items() if name not in bank.get(of, {})]
             unlike |= {(of, name) for name, one in found.items() if bank.get(of, {}).get(name, one) != one}
-        changes: list[Change] = []
+        changes: list[OverrideChange] = []
         same, conflicts = 0, [f"{BANK}: {of}.{name} says something else there" for of, name in sorted(unlike)]
         for submission, decided in theirs.items():
             for of, one in decided.items():

@@ -35,7 +35,15 @@ from grader.classes.overrides import (
 from grader.classes.overrides.write import write_override, write_overrides
 from grader.classes.review.background import BackgroundWriter, Pace
 from grader.classes.review.student_requests import Requests, read_requests, request_files, waiting
-from grader.classes.review.submissions import Item, Mask, Submissions, aliases, alike, mask_of, stamp_of
+from grader.classes.review.submissions import (
+    ListedSubmission,
+    Mask,
+    Submissions,
+    aliases,
+    alike,
+    mask_of,
+    stamp_of,
+)
 from grader.errors import Busy, GraderError, OutputError, RubricError, UsageError
 from grader.files import unwritable
 from grader.model.batch import Entry, State
@@ -141,7 +149,7 @@ class ReviewSession:
                 self._decisions = found
         return found[1]
 
-    def items(self) -> tuple[Item, ...]:
+    def items(self) -> tuple[ListedSubmission, ...]:
         """Return every submission of the share, with what was decided since its result was written."""
         items = self._anonymous_items(item for item in self.submissions.items() if self.share(item.entry))
         with suppress(RubricError):
@@ -166,7 +174,7 @@ class ReviewSession:
                 self._requests = found
         return found[1]
 
-    def answered(self, item: Item, criterion: str, answer: str) -> tuple[str, ...]:
+    def answered(self, item: ListedSubmission, criterion: str, answer: str) -> tuple[str, ...]:
         """Return the digests of the questions that an answer is to: those of now, and as before if it is as before."""
         before = self.decisions().written.get(item.entry.id, {}).get(criterion)
         if not answer or (before and before.answer == answer):
@@ -174,18 +182,18 @@ class ReviewSession:
         asked = self.requests().found.get(item.entry.id, {}).get(criterion, ())
         return tuple(dict.fromkeys(one.digest for one in asked))[:100]
 
-    def item(self, address: str) -> Item | None:
+    def item(self, address: str) -> ListedSubmission | None:
         """Return the submission of an address; None where the class has none."""
         if not self.blind:
             return self.submissions.item(address)
         items = self._anonymous_items(self.submissions.items())
         return next((item for item in items if item.address == address), None)
 
-    def mask(self, item: Item, commit: str | None) -> Mask | None:
+    def mask(self, item: ListedSubmission, commit: str | None) -> Mask | None:
         """Return what takes a submission's names out of its texts; None where they are not hidden."""
         return mask_of(item.entry, commit or "", self._names()[1]) if item.alias else None
 
-    def _anonymous_items(self, items: Iterable[Item]) -> tuple[Item, ...]:
+    def _anonymous_items(self, items: Iterable[ListedSubmission]) -> tuple[ListedSubmission, ...]:
         """Return them in another order and without names, but for those that are published."""
         if not self.blind:
             return tuple(items)
@@ -214,7 +222,13 @@ class ReviewSession:
         return Counter()
 
     def save(
-        self, item: Item, criterion: str, wanted: WrittenOverride | None, seen: str, *, soon: bool = True
+        self,
+        item: ListedSubmission,
+        criterion: str,
+        wanted: WrittenOverride | None,
+        seen: str,
+        *,
+        soon: bool = True,
     ) -> str:
         """Put a decision in place of the one that was `seen` (its `mark`), or take that out (None).
 
@@ -239,7 +253,9 @@ class ReviewSession:
         self.background.changed()
         return waits
 
-    def save_together(self, item: Item, criterion: str, wanted: WrittenOverride, seen: str) -> int:
+    def save_together(
+        self, item: ListedSubmission, criterion: str, wanted: WrittenOverride, seen: str
+    ) -> int:
         """Decide the same for a submission and all that are `alike`; return how many these are.
 
         All are written at once, with a word by which they can be taken back at once. Raises Conflict as `save` does.
@@ -267,7 +283,9 @@ class ReviewSession:
             self._write_together(those, criterion, None)
         return len(those)
 
-    def _write_together(self, items: Sequence[Item], criterion: str, wanted: WrittenOverride | None) -> None:
+    def _write_together(
+        self, items: Sequence[ListedSubmission], criterion: str, wanted: WrittenOverride | None
+    ) -> None:
         write_overrides(self.path / FILE, [(item.entry.id, criterion, wanted) for item in items])
         self._follow_soon({item.key for item in items})
 
@@ -290,7 +308,7 @@ class ReviewSession:
             self._books_behind = True
         self.background.changed()
 
-    def result(self, item: Item, overrides: Overrides) -> GradingResult | None:
+    def result(self, item: ListedSubmission, overrides: Overrides) -> GradingResult | None:
         """Return a submission's result as it counts with these overrides; None where it has none."""
         result = read_result(self.path / item.key) if item.gradable else None
         if (
@@ -301,7 +319,7 @@ class ReviewSession:
             return result
         return Settler(self.rubric.rubric, overrides).settle_again(result, item.entry.id, None)
 
-    def waits(self, item: Item) -> str:
+    def waits(self, item: ListedSubmission) -> str:
         """Why the files of a submission do not say yet what was decided; empty where they do."""
         with self._guard:
             pending = item.key in self._pending
@@ -317,7 +335,7 @@ class ReviewSession:
         except Busy:
             return True
 
-    def _settled_soon(self, item: Item) -> str:
+    def _settled_soon(self, item: ListedSubmission) -> str:
         """Settle one submission now, or say why that comes later."""
         if not item.gradable:
             return "it counts as soon as the submission has a result"
@@ -372,7 +390,9 @@ class ReviewSession:
         with self._guard:
             return len(self._pending) + self._being_written
 
-    def _settle_result(self, item: Item, overrides: Overrides) -> tuple[GradingResult | None, str]:
+    def _settle_result(
+        self, item: ListedSubmission, overrides: Overrides
+    ) -> tuple[GradingResult | None, str]:
         """Return the result that is to be written, None where the one that is there is right, and why there is none."""
         batch = self.submissions.batch()
         if batch.run.rubric.digest != self.rubric.digest:
@@ -431,7 +451,7 @@ class ReviewSession:
                 yield item.key
 
     @staticmethod
-    def _behind(item: Item, result: GradingResult, overrides: Overrides) -> bool:
+    def _behind(item: ListedSubmission, result: GradingResult, overrides: Overrides) -> bool:
         """Return whether a result says something else than `overrides.yaml`."""
         known = {criterion.id for criterion in result.criteria}
         given = {k: v for k, v in overrides.get(item.entry.id, {}).items() if k in known}

@@ -46,7 +46,7 @@ _FORMULA = re.compile(r"\s*[=+\-@]")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class StudentRequest:
     """What one student asks; `when` and `source`, its address, in the form's own words."""
 
     text: str
@@ -63,17 +63,17 @@ class Request:
 class Requests:
     """By submission, then by criterion; each fault says which row is left out, and why."""
 
-    found: Mapping[str, Mapping[str, tuple[Request, ...]]]
+    found: Mapping[str, Mapping[str, tuple[StudentRequest, ...]]]
     faults: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
+class RequestRow:
     """A row of such a file: for whom, about which criterion, and what is asked."""
 
     student: str
     criterion: str
-    request: Request
+    request: StudentRequest
 
     def cells(self) -> tuple[str, ...]:
         """Return the row in the order of `COLUMNS`, without control characters."""
@@ -82,7 +82,7 @@ class Asked:
         return tuple(visible(cell, lines=True) for cell in cells)
 
 
-def waiting(asked: Sequence[Request], decided: Override | None) -> list[Request]:
+def waiting(asked: Sequence[StudentRequest], decided: Override | None) -> list[StudentRequest]:
     """Return those of a criterion's questions that have no answer. One by hand, which names none, is to all."""
     if decided is None or not decided.answer:
         return list(asked)
@@ -94,7 +94,7 @@ def request_files(folder: Path) -> tuple[Path, ...]:
     return tuple(folder / name for name in sorted(fnmatch.filter(os.listdir(folder), FILES)))  # noqa: PTH208 - a thousand entries
 
 
-def write_requests(path: Path, rows: Sequence[Asked]) -> None:
+def write_requests(path: Path, rows: Sequence[RequestRow]) -> None:
     """Write such a file anew; no cell is a formula in a spreadsheet."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\r\n")
@@ -104,13 +104,13 @@ def write_requests(path: Path, rows: Sequence[Asked]) -> None:
     atomic_write(path, out.getvalue().encode())
 
 
-def rows_of(path: Path, students: Collection[str]) -> list[Asked]:
+def rows_of(path: Path, students: Collection[str]) -> list[RequestRow]:
     """Return what such a file, as `write_requests` writes it, has of these students."""
     return [
-        Asked(
+        RequestRow(
             student=str(row["student"]),
             criterion=str(row.get("criterion") or ""),
-            request=Request(
+            request=StudentRequest(
                 **{name: _without_formula_sign(str(row.get(name) or "")) for name in COLUMNS[2:]}
             ),
         )
@@ -121,22 +121,22 @@ def rows_of(path: Path, students: Collection[str]) -> list[Asked]:
 
 def fetch(
     forge: Comments, batch: BatchFolder, entry: Entry, criteria: Sequence[Criterion], label: str
-) -> Iterator[Asked]:
+) -> Iterator[RequestRow]:
     """Yield what a student asks on a forge: a row for each criterion that is named, else one. Raises NotSent."""
     result = read_result(batch.folder_of(entry))
     commit = (result.submission.commit if result else None) or ""
     for post in forge.questions(entry, commit, label):
         text = "\n\n".join(filter(None, (post.title, post.text)))[:TEXT_CHARS]
-        request = Request(text=text, when=post.when, source=post.address)
+        request = StudentRequest(text=text, when=post.when, source=post.address)
         for name in criteria_named(post.title, criteria) or criteria_named(post.text, criteria) or [""]:
-            yield Asked(student=entry.id, criterion=name, request=request)
+            yield RequestRow(student=entry.id, criterion=name, request=request)
 
 
 def read_requests(paths: Sequence[Path], entries: Sequence[Entry], criteria: Sequence[Criterion]) -> Requests:
     """Return what these files ask about submissions and criteria. The same question about the same criterion counts
     once."""
     students, known = _Students(entries), [criterion.id for criterion in criteria]
-    found: dict[str, dict[str, tuple[Request, ...]]] = {}
+    found: dict[str, dict[str, tuple[StudentRequest, ...]]] = {}
     faults = []
     for path in paths:
         rows = csv.DictReader(io.StringIO(_text(path), newline=""))
@@ -163,7 +163,7 @@ def read_requests(paths: Sequence[Path], entries: Sequence[Entry], criteria: Seq
                 what = f'there is no criterion "{line(asks, 80)}"{did_you_mean(asks, known)}'
                 faults.append(f"{where}: {what if asks else f'no criterion is named: {line(text, 80)}'}")
                 continue
-            asked = Request(
+            asked = StudentRequest(
                 text=_without_formula_sign(text)[:TEXT_CHARS],
                 when=when[:WHEN_CHARS],
                 source=source[:SOURCE_CHARS],

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch
-from grader.classes.gradebook import Row
+from grader.classes.gradebook import GradebookRow
 from grader.intake import safe_name
 from grader.judging.settle import awarded
 from grader.model.batch import MISSING, ROSTER, Entry
@@ -65,7 +65,7 @@ T = TypeVar("T", bound=Record)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class ListedCriterion:
     """What a list shows of one criterion of a submission; `kinds` are the filters that show it, `said` is what its
     check said. `diagnosis` is the same for what checks said alike, and empty where the check itself awards the points.
     `waits` says whether it would be open without a decision."""
@@ -81,7 +81,7 @@ class Line:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Item:
+class ListedSubmission:
     """One submission in the list. `key` names its folder and stands in addresses, `kinds` are the filters that show it,
     `open` counts the criteria that no one has decided, by status; `lines` has what is to be said of each criterion,
     and `decided` names those that a person has decided as the result says.
@@ -96,7 +96,7 @@ class Item:
     kinds: frozenset[str]
     late: bool
     gradable: bool
-    lines: Mapping[str, Line]
+    lines: Mapping[str, ListedCriterion]
     decided: frozenset[str]
     alias: str = ""
 
@@ -140,7 +140,7 @@ class Item:
         one = self.lines.get(criterion)
         return one.kinds if one else frozenset()
 
-    def with_requests(self, waiting: Collection[str]) -> Item:
+    def with_requests(self, waiting: Collection[str]) -> ListedSubmission:
         """Return it with the criteria about which its student asks and has no answer."""
         lines = {
             name: replace(self.lines[name], kinds=self.lines[name].kinds | {ASKED})
@@ -149,7 +149,7 @@ class Item:
         }
         return replace(self, kinds=self.kinds | {ASKED}, lines={**self.lines, **lines}) if waiting else self
 
-    def with_decisions(self, decided: Mapping[str, Override]) -> Item:
+    def with_decisions(self, decided: Mapping[str, Override]) -> ListedSubmission:
         """Return it as the list shows it with these decisions, which its result may not have yet."""
         changed = {}
         with_points = {name: one for name, one in decided.items() if one.awards}
@@ -176,22 +176,22 @@ class Submissions:
         self.path = path
         self._lock = threading.Lock()
         self._run: tuple[Stamp, BatchFolder, Mapping[str, BatchFolder]] | None = None
-        self._items: dict[str, tuple[object, Item]] = {}
+        self._items: dict[str, tuple[object, ListedSubmission]] = {}
 
     def batch(self) -> BatchFolder:
         """Return the batch's folder as `run.json` says now. Raises UsageError where that cannot be read."""
         return self._read()[0]
 
-    def items(self) -> tuple[Item, ...]:
+    def items(self) -> tuple[ListedSubmission, ...]:
         """Every submission; those that the roster itself keeps from being graded come last."""
         return tuple(self._item(key, one) for key, one in self._read()[1].items())
 
-    def item(self, key: str) -> Item | None:
+    def item(self, key: str) -> ListedSubmission | None:
         """Return the submission of that folder; None where the class has none."""
         one = self._read()[1].get(key)
         return self._item(key, one) if one else None
 
-    def row(self, key: str) -> Row | None:
+    def row(self, key: str) -> GradebookRow | None:
         """Return the same with its result; one of status `error` stands for a result that is not there."""
         one = self._read()[1].get(key)
         return next(one.rows()) if one else None
@@ -205,7 +205,7 @@ class Submissions:
                 self._run = (stamp, batch, dict(_each(batch)))
             return self._run[1:]
 
-    def _item(self, key: str, one: BatchFolder) -> Item:
+    def _item(self, key: str, one: BatchFolder) -> ListedSubmission:
         run = one.run
         made_of = (stamp_of(f"{self.path}/{key}/{RESULT}"), run.entries, run.faults, run.rubric)
         with self._lock:
@@ -232,7 +232,7 @@ def _each(batch: BatchFolder) -> Iterator[tuple[str, BatchFolder]]:
             yield key, BatchFolder(batch.path, run.model_copy(update=update))
 
 
-def item_of(row: Row) -> Item:
+def item_of(row: GradebookRow) -> ListedSubmission:
     """What the list shows of a submission."""
     result = row.result
     waiting = {
@@ -240,7 +240,7 @@ def item_of(row: Row) -> Item:
         for status in (Status.MANUAL, Status.INCONCLUSIVE, Status.ERROR)
     }
     kind = result.error.kind if result.error else ""
-    return Item(
+    return ListedSubmission(
         key=safe_name(row.entry.id),
         entry=row.entry,
         status="missing" if kind == MISSING else result.status,
@@ -258,7 +258,7 @@ def item_of(row: Row) -> Item:
 _diagnosis = lru_cache(maxsize=20_000)(reduced)
 
 
-def _lines(result: GradingResult) -> dict[str, Line]:
+def _lines(result: GradingResult) -> dict[str, ListedCriterion]:
     """What is to be said of each criterion; of what could not be graded, only what a person has decided."""
     decided = awarded(result.overrides)
     found = {}
@@ -277,7 +277,7 @@ def _lines(result: GradingResult) -> dict[str, Line]:
         said = line(automatic.message, SAID_CHARS)
         waits = automatic.status.is_open and criterion.counts
         is_lost_or_waits = automatic.status.is_lost or waits
-        found[criterion.id] = Line(
+        found[criterion.id] = ListedCriterion(
             status=criterion.status,
             points=criterion.points,
             full=criterion.full,
@@ -328,7 +328,7 @@ class Navigation:
     kind: str
     q: str
     criterion: str
-    shown: Sequence[Item]
+    shown: Sequence[ListedSubmission]
     counts: Mapping[str, int]
     total: int
     before: str = ""
@@ -347,7 +347,7 @@ class Navigation:
         return (self.page - 1) * PAGE
 
     @property
-    def rows(self) -> Sequence[Item]:
+    def rows(self) -> Sequence[ListedSubmission]:
         """The submissions of the page."""
         return self.shown[self.first : self.first + PAGE]
 
@@ -363,7 +363,7 @@ class Navigation:
         return FILTERS_OF_ONE if self.criterion else FILTERS
 
 
-def place_of(items: Sequence[Item], asked: Mapping[str, str], *, at: str = "") -> Navigation:
+def place_of(items: Sequence[ListedSubmission], asked: Mapping[str, str], *, at: str = "") -> Navigation:
     """Return the place that an address or a form asks for; what it asks for and is not known is left out."""
     criterion = asked.get("c", "")
     criterion = criterion if any(criterion in item.lines for item in items) else ""
@@ -391,7 +391,7 @@ def place_of(items: Sequence[Item], asked: Mapping[str, str], *, at: str = "") -
     )
 
 
-def _pages(shown: Sequence[Item]) -> int:
+def _pages(shown: Sequence[ListedSubmission]) -> int:
     return max(1, -(-len(shown) // PAGE))
 
 
@@ -410,7 +410,7 @@ class Across:
     first: str
 
 
-def across(items: Sequence[Item], criteria: Iterable[tuple[str, str]]) -> list[Across]:
+def across(items: Sequence[ListedSubmission], criteria: Iterable[tuple[str, str]]) -> list[Across]:
     """Return this of each of these criteria (id, title), those with most open ones first."""
     counts: dict[str, Counter[str]] = defaultdict(Counter)
     first: dict[str, str] = {}
@@ -426,7 +426,7 @@ def across(items: Sequence[Item], criteria: Iterable[tuple[str, str]]) -> list[A
     return sorted(found, key=lambda one: -one.counts["open"])
 
 
-def alike(items: Iterable[Item], criterion: str, to: Item) -> list[Item]:
+def alike(items: Iterable[ListedSubmission], criterion: str, to: ListedSubmission) -> list[ListedSubmission]:
     """Return that submission, and all others whose check said the same of the criterion and about which no person has
     said anything. None where the check itself awards the points."""
     diagnosis = to.lines[criterion].diagnosis if criterion in to.lines else ""

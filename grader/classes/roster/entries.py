@@ -16,7 +16,7 @@ from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from urllib.parse import unquote
 
-from grader.classes.roster.table import Row, Table
+from grader.classes.roster.table import RosterRow, Table
 from grader.errors import GraderError, SubmissionError, UsageError
 from grader.intake.names import brief, encodable, is_package_name, safe_name
 from grader.intake.source import parse_source
@@ -144,23 +144,23 @@ def entries_of(table: Table, path: Path, local: Local) -> Roster:
     """Raises UsageError where a column is missing, or is there twice."""
     names = known_columns(table, path)
     header = f"{path.name}:{table.line}"
-    found = [Found(where=header, faults=(meant,)) for _, meant in near_misses(table.columns)]
+    found = [FoundEntry(where=header, faults=(meant,)) for _, meant in near_misses(table.columns)]
     found += [_read_row(row, names, table, path, local) for row in table.rows]
     further = tuple(column for column in table.columns if column and column not in names)
     return gather(path, found, columns=further)
 
 
-def _read_row(row: Row, names: dict[str, str], table: Table, path: Path, local: Local) -> Found:
+def _read_row(row: RosterRow, names: dict[str, str], table: Table, path: Path, local: Local) -> FoundEntry:
     where, base = f"{path.name}:{row.line}", path.parent
     fields = {names[column]: field for column, field in row.fields.items() if column in names}
     if row.faults:  # what stands in which column is not sure
         sure = not row.shifted or names.get(table.columns[0]) == "id"
-        return Found(where=where, id=fields.get("id", "") if sure else "", faults=row.faults)
+        return FoundEntry(where=where, id=fields.get("id", "") if sure else "", faults=row.faults)
     faults = tuple(_faults(fields, base, local))
     extra = {column: field for column, field in row.fields.items() if column not in names}
     entry = None if faults else _entry(fields, extra, where, base)
     name, group = fields.get("name", ""), fields.get("group", "")
-    return Found(
+    return FoundEntry(
         where=where, id=fields.get("id", ""), entry=entry, faults=faults, name=name, group=group, extra=extra
     )
 
@@ -203,7 +203,7 @@ ID_BYTES_MAX = 255
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
+class FoundEntry:
     """One submission, or what was meant for one. `id` is empty where it has none, `entry` None where it has faults;
     `name`, `group` and `extra` are what is known of the student even then."""
 
@@ -216,7 +216,7 @@ class Found:
     extra: Mapping[str, str] = field(default_factory=dict)
 
 
-def gather(file: Path, found: Sequence[Found], *, columns: tuple[str, ...] = ()) -> Roster:
+def gather(file: Path, found: Sequence[FoundEntry], *, columns: tuple[str, ...] = ()) -> Roster:
     """The first of those that share an id stays; each later one is a fault that says where the first is."""
     times = Counter(_key(one.id) for one in found)
     first: dict[str, str] = {}

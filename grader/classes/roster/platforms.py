@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from grader.classes.roster.entries import (
     REFUSED,
-    Found,
+    FoundEntry,
     Local,
     columns_of,
     gather,
@@ -28,7 +28,7 @@ from grader.classes.roster.entries import (
     source_fault,
     whole_source,
 )
-from grader.classes.roster.table import Row, Table, text_of
+from grader.classes.roster.table import RosterRow, Table, text_of
 from grader.errors import HostError, UsageError
 from grader.files import make_folder, temporary_folder, unwritable
 from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable
@@ -73,33 +73,33 @@ def _inside(folder: Path) -> list[Path]:
         raise UsageError(f"{folder}: cannot be read: {error.strerror}") from error
 
 
-def _check_links(found: Found, folder: Path, local: Local) -> Found:
+def _check_links(found: FoundEntry, folder: Path, local: Local) -> FoundEntry:
     """A link may lead out of the folder."""
     fault = local_fault(found.entry.source, folder, local) if found.entry else ""
     return _faulty(found.entry, fault) if fault and found.entry else found
 
 
-def _faulty(entry: Entry, fault: str) -> Found:
+def _faulty(entry: Entry, fault: str) -> FoundEntry:
     """What is wrong with a submission, with what is known of its student."""
-    return Found(
+    return FoundEntry(
         where=entry.where, id=entry.id, faults=(fault,), name=entry.name, group=entry.group, extra=entry.extra
     )
 
 
-def _student(files: list[tuple[Path, Named | None]]) -> Found:
+def _student(files: list[tuple[Path, Named | None]]) -> FoundEntry:
     path, named = files[0]
     if named is not None:
         return _from_download([(path, named) for path, named in files if named])
     where = printable(path.name)
     if not encodable(path.name):
-        return Found(where=where, faults=("its name is not UTF-8: rename it",))
+        return FoundEntry(where=where, faults=("its name is not UTF-8: rename it",))
     if not _can_be_graded(path):
-        return Found(where=where, faults=("neither a folder nor an archive",))
+        return FoundEntry(where=where, faults=("neither a folder nor an archive",))
     name = path.name if path.is_dir() else archive_stem(path.name)
-    return Found(where=where, id=name, entry=Entry(id=name, source=str(path.absolute()), where=where))
+    return FoundEntry(where=where, id=name, entry=Entry(id=name, source=str(path.absolute()), where=where))
 
 
-def _from_download(files: list[tuple[Path, Named]]) -> Found:
+def _from_download(files: list[tuple[Path, Named]]) -> FoundEntry:
     """What a platform has from one student: the one folder, or the one archive among the files."""
     taken = [one for one in files if _can_be_graded(one[0]) and not one[1].is_text]
     path, named = (taken or files)[0]
@@ -111,7 +111,7 @@ def _from_download(files: list[tuple[Path, Named]]) -> Found:
     if len(taken) > 1:
         more = listing([other.name for other, _ in taken[1:]])
         return _faulty(entry, f"not the only one of this student, there is {more}: leave one there")
-    return Found(where=entry.where, id=name, entry=entry)
+    return FoundEntry(where=entry.where, id=name, entry=entry)
 
 
 def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
@@ -306,12 +306,12 @@ def with_roster_columns(table: Table) -> Table:
     return Table(columns, tuple(_row(row) for row in table.rows), table.line)
 
 
-def _row(row: Row) -> Row:
+def _row(row: RosterRow) -> RosterRow:
     fields = _rename_columns(row.fields)
     if row.faults or fields.get("source"):
-        return Row(row.line, fields, row.faults, row.shifted)
+        return RosterRow(row.line, fields, row.faults, row.shifted)
     who = fields.get("name") or fields["id"] or "?"
-    return Row(row.line, fields, (f"{who} has no repository",))
+    return RosterRow(row.line, fields, (f"{who} has no repository",))
 
 
 def _rename_columns(fields: Mapping[str, str]) -> dict[str, str]:
@@ -339,16 +339,16 @@ def from_gitlab(path: Path, local: Local) -> Roster:
     return gather(path, found, columns=columns_of(one.entry for one in found))
 
 
-def _read_project(project: object, where: str, base: Path, local: Local) -> Found:
+def _read_project(project: object, where: str, base: Path, local: Local) -> FoundEntry:
     if not isinstance(project, dict):
-        return Found(where=where, faults=("no project",))
+        return FoundEntry(where=where, faults=("no project",))
     texts = {key: text for key, text in project.items() if isinstance(text, str) and encodable(text)}
     source = next((texts[key] for key in ADDRESSES if texts.get(key)), None)
     name = texts.get("path") or texts.get("name", "")
     if source is None or not name:
-        return Found(where=where, id=name, faults=("no http_url_to_repo, or no path",))
+        return FoundEntry(where=where, id=name, faults=("no http_url_to_repo, or no path",))
     if fault := source_fault(source, base, local):
-        return Found(where=where, id=name, faults=(f"source: {fault}",))
+        return FoundEntry(where=where, id=name, faults=(f"source: {fault}",))
     namespace = project.get("namespace")
     group = namespace.get("full_path") if isinstance(namespace, dict) else None
     entry = Entry(
@@ -359,10 +359,10 @@ def _read_project(project: object, where: str, base: Path, local: Local) -> Foun
         where=where,
         extra={"path_with_namespace": texts["path_with_namespace"]} if "path_with_namespace" in texts else {},
     )
-    return Found(where=where, id=name, entry=entry)
+    return FoundEntry(where=where, id=name, entry=entry)
 
 
-def _told_apart(found: list[Found]) -> list[Found]:
+def _told_apart(found: list[FoundEntry]) -> list[FoundEntry]:
     """Projects of one name in several subgroups (`lab/ada/ros`, `lab/bob/ros`) are named by the subgroup too."""
     sources = {(one.id, one.entry.source) for one in found if one.entry}
     shared = {name for name, times in Counter(name for name, _ in sources).items() if times > 1}
@@ -371,12 +371,12 @@ def _told_apart(found: list[Found]) -> list[Found]:
     return [_by_path(one, common) if one.id in shared else one for one in found]
 
 
-def _by_path(one: Found, common: str) -> Found:
+def _by_path(one: FoundEntry, common: str) -> FoundEntry:
     path = one.entry.extra.get("path_with_namespace") if one.entry else None
     if one.entry is None or path is None:
         return one
     name = path.removeprefix(common).strip("/").replace("/", "-") or one.id
-    return Found(where=one.where, id=name, entry=one.entry.model_copy(update={"id": name}))
+    return FoundEntry(where=one.where, id=name, entry=one.entry.model_copy(update={"id": name}))
 
 
 def _projects(path: Path) -> list[object]:

@@ -20,7 +20,7 @@ DELIMITERS = (",", ";", "\t")
 _SEPARATOR = re.compile(r"\"?sep=(.)\"?[\r\n]*", re.IGNORECASE)
 
 
-class Row(NamedTuple):
+class RosterRow(NamedTuple):
     """The fields of one row by their column's name, the line in which it begins, counted from 1, and what is wrong.
 
     In a row that is `shifted`, no field but the first can be told to be in its column.
@@ -36,7 +36,7 @@ class Table(NamedTuple):
     """Column names as they are written, the line that names them, and the rows that are not empty, in their order."""
 
     columns: tuple[str, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[RosterRow, ...]
     line: int = 1
 
 
@@ -95,7 +95,7 @@ def _explain_csv(error: csv.Error) -> str:
     return f"no CSV: {said}"
 
 
-def _row(columns: Sequence[str], line: int, fields: list[str], faults: tuple[str, ...]) -> Row:
+def _row(columns: Sequence[str], line: int, fields: list[str], faults: tuple[str, ...]) -> RosterRow:
     named = {name: _bare(field) for name, field in zip(columns, fields, strict=False) if name}
     shifted = any(field.strip() for field in fields[len(columns) :])
     found = list(faults)
@@ -103,7 +103,7 @@ def _row(columns: Sequence[str], line: int, fields: list[str], faults: tuple[str
         found.append(f"{len(fields)} fields, but the first line names {len(columns)} columns")
     if any(len(field) > FIELD_LETTERS_MAX for field in fields):
         found.append(f"a field of more than {FIELD_LETTERS_MAX} letters")
-    return Row(line, named, tuple(found), shifted)
+    return RosterRow(line, named, tuple(found), shifted)
 
 
 def _bare(field: str) -> str:

@@ -24,7 +24,7 @@ HEAD = (
 )  # fmt: skip
 
 
-class Request(Record):
+class ComparisonRequest(Record):
     """What the process is asked: `folders` of results by id, starter code as folders and files, a share from 0 to 1."""
 
     folders: dict[str, Path]
@@ -52,7 +52,7 @@ def compare(
     """
     require_library()
     with temporary_folder("source") as place:
-        request = Request(
+        request = ComparisonRequest(
             folders={name: folder.absolute() for name, folder in folders.items()},
             starter=tuple(_unpack(path, place / str(number)) for number, path in enumerate(starter)),
             groups=dict(groups or {}),
@@ -85,7 +85,7 @@ def _unpack(path: Path, into: Path) -> Path:
     return into
 
 
-def _compare_apart(request: Request) -> Similarity:
+def _compare_apart(request: ComparisonRequest) -> Similarity:
     """Compare in a worker, which has limits and can be ended with all that it started."""
     worker = Worker(LIMITS)
     hint = "give it more memory, or compare fewer submissions"
@@ -102,7 +102,7 @@ def _compare_apart(request: Request) -> Similarity:
         worker.close()
 
 
-def _compare_class(request: Request) -> Similarity:
+def _compare_class(request: ComparisonRequest) -> Similarity:
     from grader.classes.similarity.matching import compare_class  # noqa: PLC0415 - of the extra `similarity`
 
     return compare_class(request)

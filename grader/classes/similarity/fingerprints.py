@@ -23,7 +23,7 @@ from pygments import token
 from pygments.lexer import Lexer
 from pygments.lexers import get_lexer_by_name
 
-from grader.classes.similarity.sources import Language, Source, read_starter, read_submission
+from grader.classes.similarity.sources import Language, ProgramText, read_starter, read_submission
 from grader.errors import GraderError
 from grader.model.batch import NotCompared
 from grader.workers import WorkerEnded, WorkerLimits
@@ -52,7 +52,7 @@ Numbers: TypeAlias = Annotated[
     PlainSerializer(lambda numbers: b64encode(numbers.tobytes()).decode(), return_type=str),
 ]
 """In a worker's answer, the numbers' bytes in base64."""
-Marks: TypeAlias = NDArray[np.bool_]
+BoolArray: TypeAlias = NDArray[np.bool_]
 
 # In Python; what C++ includes becomes one sign anyway.
 _IMPORT = re.compile(
@@ -124,7 +124,7 @@ def leave_out(place: CodeSource, reason: str) -> Fingerprints:
 
 
 def read_files(
-    place: CodeSource, files: tuple[Source, ...], left_out: tuple[NotCompared, ...] = ()
+    place: CodeSource, files: tuple[ProgramText, ...], left_out: tuple[NotCompared, ...] = ()
 ) -> Fingerprints:
     """Return the fingerprints of these files, each within `FILE_S`."""
     tried = [_try_read(place.name, file) for file in files]
@@ -135,7 +135,7 @@ def read_files(
     )
 
 
-def _try_read(name: str, file: Source) -> Text | NotCompared:
+def _try_read(name: str, file: ProgramText) -> Text | NotCompared:
     try:
         return _read_in_time(file)
     except _TooLong:
@@ -147,7 +147,7 @@ def _try_read(name: str, file: Source) -> Text | NotCompared:
     return NotCompared(id=name, file=file.path, reason=reason)
 
 
-def _read_in_time(file: Source) -> Text:
+def _read_in_time(file: ProgramText) -> Text:
     """Regular expressions look out for signals, so that even one without end is interrupted."""
     before = signal.signal(signal.SIGVTALRM, _interrupt)
     signal.setitimer(signal.ITIMER_VIRTUAL, FILE_S)
@@ -173,7 +173,7 @@ def read_text(path: str, code: str, language: Language) -> Text:
     return Text(path=path, prints=prints, lines=np.searchsorted(ends, places).astype(np.int64) + 1)
 
 
-def mark_covered(text: Text, chosen: Marks) -> Marks:
+def mark_covered(text: Text, chosen: BoolArray) -> BoolArray:
     """Mark the signs that lie in one of the chosen fingerprints."""
     marks = np.zeros(len(text.lines), dtype=np.bool_)
     for begin, end in get_copied_slices(np.flatnonzero(chosen), GRAM).T.astype(int):
@@ -307,10 +307,10 @@ int main(int argc, char **argv)
 _QUIET_TALKER = _TALKER.replace(", anonymous=True", "").replace("        rospy.loginfo(text)\n", "")
 _QUIET_LISTENER = _LISTENER.replace(", anonymous=True", "").replace('rospy.get_caller_id() + "it', '"it')
 TUTORIALS = (
-    Source(path="talker.py", code=_TALKER, language="python"),
-    Source(path="talker.py without a log", code=_QUIET_TALKER, language="python"),
-    Source(path="listener.py", code=_LISTENER, language="python"),
-    Source(path="listener.py without its id", code=_QUIET_LISTENER, language="python"),
-    Source(path="talker.cpp", code=_TALKER_CPP, language="cpp"),
-    Source(path="listener.cpp", code=_LISTENER_CPP, language="cpp"),
+    ProgramText(path="talker.py", code=_TALKER, language="python"),
+    ProgramText(path="talker.py without a log", code=_QUIET_TALKER, language="python"),
+    ProgramText(path="listener.py", code=_LISTENER, language="python"),
+    ProgramText(path="listener.py without its id", code=_QUIET_LISTENER, language="python"),
+    ProgramText(path="talker.cpp", code=_TALKER_CPP, language="cpp"),
+    ProgramText(path="listener.cpp", code=_LISTENER_CPP, language="cpp"),
 )

@@ -9,13 +9,13 @@ from importlib import metadata
 
 import numpy as np
 
-from grader.classes.similarity.comparison import Request
+from grader.classes.similarity.comparison import ComparisonRequest
 from grader.classes.similarity.fingerprints import (
     ENVIRONMENT,
     LIMITS,
+    BoolArray,
     CodeSource,
     Fingerprints,
-    Marks,
     Numbers,
     Text,
     leave_out,
@@ -43,7 +43,7 @@ NEAR = 0.25
 _NONE = np.zeros(0, dtype=np.int64)
 
 
-def compare_class(request: Request) -> Similarity:
+def compare_class(request: ComparisonRequest) -> Similarity:
     """Compare a class. Its submissions are read in workers."""
     read = read_all(request)
     starter = [text for one in read.starter for text in one.texts]
@@ -85,7 +85,7 @@ class _Class:
     left_out: list[NotCompared] = field(default_factory=list)
 
 
-def read_all(request: Request) -> _Class:
+def read_all(request: ComparisonRequest) -> _Class:
     """Read submissions, starter code and tutorials, `request.jobs` at a time, each in a worker."""
     places = [
         CodeSource(),
@@ -125,7 +125,7 @@ def _starter_notes(starter: Sequence[Fingerprints]) -> list[str]:
     return notes[:STARTER_NOTES]
 
 
-def _pairs(works: Sequence[Work], request: Request) -> tuple[list[Pair], int, bool]:
+def _pairs(works: Sequence[Work], request: ComparisonRequest) -> tuple[list[Pair], int, bool]:
     """The pairs that a person should see, how many were left out for their group, and whether the rest was cut."""
     near, cut = candidates(works)
     found, same_group = [], 0
@@ -153,7 +153,7 @@ def _same_group(one: Pair, groups: Mapping[str, str]) -> bool:
     return bool(group) and group == groups.get(one.b)
 
 
-def _notes(request: Request, count: int, found: Sequence[Sequence[str]], *, cut: bool) -> list[str]:
+def _notes(request: ComparisonRequest, count: int, found: Sequence[Sequence[str]], *, cut: bool) -> list[str]:
     notes = []
     if count < COMMON_FROM and not request.starter:
         notes.append(
@@ -175,8 +175,8 @@ class Own:
     """One file without what is no one's own: `prints` and `signs` mark what is left of the text's."""
 
     text: Text
-    prints: Marks
-    signs: Marks
+    prints: BoolArray
+    signs: BoolArray
 
 
 @dataclass(frozen=True)
@@ -279,7 +279,7 @@ def _shared_counts(works: Sequence[Work]) -> np.ndarray:
     return shared
 
 
-def _hits(work: Work, others: Numbers) -> list[Marks]:
+def _hits(work: Work, others: Numbers) -> list[BoolArray]:
     """For each file, which of its own signs are in the other submission too."""
     return [
         file.signs & mark_covered(file.text, file.prints & np.isin(file.text.prints, others))
@@ -287,11 +287,11 @@ def _hits(work: Work, others: Numbers) -> list[Marks]:
     ]
 
 
-def _size(hits: Sequence[Marks]) -> int:
+def _size(hits: Sequence[BoolArray]) -> int:
     return sum(int(marks.sum()) for marks in hits)
 
 
-def _line_count(work: Work, hits: Sequence[Marks]) -> int:
+def _line_count(work: Work, hits: Sequence[BoolArray]) -> int:
     return sum(len(np.unique(file.text.lines[marks])) for file, marks in zip(work.files, hits, strict=True))
 
 

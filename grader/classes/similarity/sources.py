@@ -35,7 +35,7 @@ STARTER_FILES_MAX = 2_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Source:
+class ProgramText:
     """A program's text, at `path` of its package."""
 
     path: str
@@ -47,7 +47,7 @@ class Source:
 class Sources:
     """A submission's programs, and the files that cannot be compared."""
 
-    files: tuple[Source, ...]
+    files: tuple[ProgramText, ...]
     left_out: tuple[NotCompared, ...]
 
 
@@ -87,7 +87,7 @@ def _read_head(path: Path) -> bytes:
 
 def _choose(name: str, files: list[tuple[str, bytes]]) -> Sources:
     """Take small programs first, so that large ones do not take their room."""
-    chosen: list[Source] = []
+    chosen: list[ProgramText] = []
     left_out: list[NotCompared] = []
     room_bytes = SUBMISSION_BYTES_MAX
     for path, data, language in sorted(_programs(files), key=lambda one: len(one[1])):
@@ -96,7 +96,7 @@ def _choose(name: str, files: list[tuple[str, bytes]]) -> Sources:
             left_out.append(NotCompared(id=name, file=path, reason=reason))
             continue
         room_bytes -= len(data)
-        chosen.append(Source(path=path, code=data.decode(errors="replace"), language=language))
+        chosen.append(ProgramText(path=path, code=data.decode(errors="replace"), language=language))
     chosen.sort(key=lambda one: one.path)
     return Sources(files=tuple(chosen), left_out=tuple(left_out[:FILES_MAX]))
 

@@ -69,7 +69,7 @@ def grade(
     return classes.grade_lab(
         course,
         lab,
-        classes.Asked(
+        classes.CourseRequest(
             jobs=jobs, only=only, allow_local=allow_local, static=static, sandbox=sandbox, as_json=as_json
         ),
     )

@@ -98,8 +98,8 @@ def feedback(
     A failure costs one student, not the run; the same command goes on where it was stopped.
     """
     with loading():
-        from grader.classes.feedback.forms import Settings
-        from grader.classes.feedback.send import Wanted
+        from grader.classes.feedback.forms import SendSettings
+        from grader.classes.feedback.send import Recipients
         from grader.cli import publishing
         from grader.cli.output import say_beside
     given = {
@@ -111,7 +111,7 @@ def feedback(
         "--public": public,
     }
     publishing.check_options(FORMS[form], given)
-    settings = Settings(
+    settings = SendSettings(
         folder=folder,
         out=out,
         smtp=smtp,
@@ -121,7 +121,7 @@ def feedback(
         public=public,
         told=say_beside,
     )
-    wanted = Wanted(only=only, changed_since=publishing.parse_since(changed_since), again=again)
+    wanted = Recipients(only=only, changed_since=publishing.parse_since(changed_since), again=again)
     return publishing.send(folder, FORMS[form], settings, wanted, drafts=drafts, dry_run=dry_run)
 
 

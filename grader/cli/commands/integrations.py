@@ -66,12 +66,12 @@ def export_gradescope(
     with loading():
         from grader.cli.output import say
         from grader.files import atomic_write
-        from grader.integrations.bundle import Settings
+        from grader.integrations.bundle import BundleSettings
         from grader.integrations.platforms import gradescope_autograder
         from grader.rubric.load import load_rubric
     rubric = load_rubric(lab)
     modes: Literal["lost", "granted"] = "granted" if assume_executable else "lost"
-    settings = Settings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes, package=package or "")
+    settings = BundleSettings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes, package=package or "")
     data = gradescope_autograder(rubric, settings)
     if str(out) == STDOUT:
         sys.stdout.buffer.write(data)
@@ -104,12 +104,12 @@ def export_prairielearn(
     """Write a question with an external grader for PrairieLearn."""
     with loading():
         from grader.cli.output import say
-        from grader.integrations.bundle import Settings
+        from grader.integrations.bundle import BundleSettings
         from grader.integrations.platforms import prairielearn_question, write_question
         from grader.rubric.load import load_rubric
     rubric = load_rubric(lab)
     modes: Literal["lost", "granted"] = "granted" if assume_executable else "lost"
-    settings = Settings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes, package=package or "")
+    settings = BundleSettings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes, package=package or "")
     target = out or Path(f"{rubric.rubric.id}-prairielearn")
     write_question(prairielearn_question(rubric, settings, image), target)
     say(f"{target}: add question/ to your course's questions, and build {image} from image/")

@@ -21,8 +21,8 @@ from grader.model.batch import BatchRun, CriterionInfo, Entry
 from grader.model.result import GradingResult
 from grader.model.verdict import Status
 from grader.report.class_page.statistics import (
-    Cost,
     HeatMap,
+    MistakeCost,
     costs,
     heat_map,
     histogram,
@@ -39,7 +39,7 @@ from grader.report.class_page.submissions import (
     SALT_BYTES,
     Diagnosis,
     Gathered,
-    Line,
+    SubmissionRow,
     gather,
     gather_anonymous,
     link_to,
@@ -142,7 +142,7 @@ def _list_diagnoses(run: BatchRun, found: Sequence[Diagnosis]) -> tuple[list[Lis
     return listed[: len(shared)], listed[len(shared) :]
 
 
-def _columns(lines: Sequence[Line]) -> Iterator[tuple[str, str]]:
+def _columns(lines: Sequence[SubmissionRow]) -> Iterator[tuple[str, str]]:
     """The table's, as the script knows them and as they are called; what no one has is left out."""
     yield "id", "Submission"
     yield "points", "Points"
@@ -194,10 +194,10 @@ COLUMNS = ("id", "name", "group", "link", "state", "points", "letters", "earned"
 
 
 def page_data(
-    lines: Iterable[Line],
+    lines: Iterable[SubmissionRow],
     criteria: Iterable[CriterionInfo],
     diagnoses: Iterable[Sequence[int]],
-    costs: Iterable[Cost],
+    costs: Iterable[MistakeCost],
     heat: HeatMap | None,
 ) -> Markup:
     """`rows` (each as `COLUMNS` says), `criteria`, and by places in `rows` the members of diagnoses, costs and the heat
@@ -220,7 +220,7 @@ def in_script(text: str) -> Markup:
     return Markup(text)  # noqa: S704 - what HTML looks for is written out
 
 
-def _row(one: Line) -> list[object]:
+def _row(one: SubmissionRow) -> list[object]:
     link = link_to(one)
     usual = link == f"{one.id}/{REPORT}"
     return [
@@ -295,12 +295,12 @@ class _Kind:
     anchor: str
     title: str
     advice: str
-    holds: Callable[[Line], bool]
-    text: Callable[[Line], str]
+    holds: Callable[[SubmissionRow], bool]
+    text: Callable[[SubmissionRow], str]
     command: Callable[[BatchRun, Path], Markup]
 
 
-def _problem(found: Line) -> str:
+def _problem(found: SubmissionRow) -> str:
     return (
         " ".join(part for part in (found.problem.message, found.problem.hint) if part)
         if found.problem
@@ -352,7 +352,7 @@ KINDS = (
 )
 
 
-def todos(run: BatchRun, lines: Sequence[Line], out: Path | None) -> Iterator[Todo]:
+def todos(run: BatchRun, lines: Sequence[SubmissionRow], out: Path | None) -> Iterator[Todo]:
     """Without `out`, nothing is said of where anything is: no commands, no faults of the roster."""
     for kind in KINDS:
         found = [one for one in lines if kind.holds(one)]

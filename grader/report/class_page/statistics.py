@@ -10,13 +10,13 @@ from statistics import fmean, median
 from markupsafe import Markup
 
 from grader.model.batch import BatchRun, CriterionInfo
-from grader.report.class_page.submissions import LETTERS, LOST_LETTERS, Line
+from grader.report.class_page.submissions import LETTERS, LOST_LETTERS, SubmissionRow
 from grader.report.html import svg
 from grader.wording import number
 
 
 @dataclass(kw_only=True)
-class Cost:
+class MistakeCost:
     """What the mistakes in one criterion cost all submissions that were judged, with what followed from them.
 
     `by` are the places of the submissions that made them, `touched` counts those that have not all of its points, or
@@ -36,9 +36,9 @@ class Cost:
         return 100 * len(self.by) / self.judged if self.judged else 0.0
 
 
-def costs(lines: Iterable[Line], criteria: Sequence[CriterionInfo]) -> list[Cost]:
+def costs(lines: Iterable[SubmissionRow], criteria: Sequence[CriterionInfo]) -> list[MistakeCost]:
     """Of each criterion, in the rubric's order."""
-    found = [Cost(place=place, criterion=criterion) for place, criterion in enumerate(criteria)]
+    found = [MistakeCost(place=place, criterion=criterion) for place, criterion in enumerate(criteria)]
     for place, line in enumerate(lines):
         if line.judged:
             for cost in found:
@@ -46,14 +46,14 @@ def costs(lines: Iterable[Line], criteria: Sequence[CriterionInfo]) -> list[Cost
     return found
 
 
-def most_first(found: Iterable[Cost]) -> list[Cost]:
+def most_first(found: Iterable[MistakeCost]) -> list[MistakeCost]:
     """Those that cost anything: most points first, then what most submissions lost by."""
     return sorted(
         (cost for cost in found if cost.by), key=lambda cost: (-cost.points, -len(cost.by), cost.place)
     )
 
 
-def _add(cost: Cost, place: int, line: Line) -> None:
+def _add(cost: MistakeCost, place: int, line: SubmissionRow) -> None:
     letter = line.letters[cost.place]
     if letter == "n":
         return
@@ -183,7 +183,7 @@ class Timing:
     done: int
 
 
-def timing(run: BatchRun, lines: Sequence[Line]) -> Timing | None:
+def timing(run: BatchRun, lines: Sequence[SubmissionRow]) -> Timing | None:
     """None where no submission was timed."""
     timed = [(place, line.wall_s) for place, line in enumerate(lines) if line.wall_s > 0]
     if not timed:
@@ -242,7 +242,7 @@ class HeatMap:
         return any(len(column) > 1 for column in self.columns)
 
 
-def heat_map(lines: Sequence[Line], criteria: Sequence[CriterionInfo]) -> HeatMap | None:
+def heat_map(lines: Sequence[SubmissionRow], criteria: Sequence[CriterionInfo]) -> HeatMap | None:
     """None where nothing was judged."""
     order = sorted((p for p, line in enumerate(lines) if line.judged), key=lambda place: -lines[place].points)
     if not order or not criteria:
@@ -271,7 +271,9 @@ def _columns(order: Sequence[int]) -> list[Sequence[int]]:
     return [order[ends[i] : ends[i + 1]] for i in range(COLUMNS_MAX)]
 
 
-def _cells(lines: Sequence[Line], row: int, columns: Sequence[Sequence[int]], step: int) -> Iterator[Markup]:
+def _cells(
+    lines: Sequence[SubmissionRow], row: int, columns: Sequence[Sequence[int]], step: int
+) -> Iterator[Markup]:
     width = step - 1 if step >= 6 else step
     for i, column in enumerate(columns):
         letters = [lines[place].letters[row] for place in column]
@@ -285,7 +287,9 @@ def _shade(letters: Sequence[str]) -> str:
     return f"q{-(-5 * lost // len(letters))}"
 
 
-def _ticks(lines: Sequence[Line], columns: Sequence[Sequence[int]], step: int, y: float) -> Iterator[Markup]:
+def _ticks(
+    lines: Sequence[SubmissionRow], columns: Sequence[Sequence[int]], step: int, y: float
+) -> Iterator[Markup]:
     """The points of the submission above, wherever there is room."""
     for x in range(0, len(columns) * step - TICK // 2, TICK):
         points = lines[columns[x // step][0]].points

@@ -36,7 +36,7 @@ LETTERS: Mapping[Status, str] = {
 """A status in one sign: what the page's data and its style sheet call it."""
 ABSENT = "n"
 LOST_LETTERS, OPEN = "afb", "iem"
-State = Literal["graded", "inconclusive", "manual", "error", "missing"]
+SubmissionState = Literal["graded", "inconclusive", "manual", "error", "missing"]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -49,7 +49,7 @@ class Problem:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Line:
+class SubmissionRow:
     """One submission; texts are visible ones of bounded length.
 
     `state` is `manual` where only a person's points are missing, `missing` where it is not graded yet. `letters` has
@@ -63,7 +63,7 @@ class Line:
     name: str
     group: str
     folder: str
-    state: State
+    state: SubmissionState
     points: float
     letters: str
     earned: Mapping[int, float]
@@ -88,12 +88,12 @@ class Line:
         return self.earned.get(place, full)
 
 
-def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInfo]) -> Line:
+def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInfo]) -> SubmissionRow:
     """One submission and its result, as the page shows it."""
     by_id = {criterion.id: criterion for criterion in result.criteria}
     judged = [by_id.get(criterion.id) for criterion in criteria]
     late = result.late
-    return Line(
+    return SubmissionRow(
         id=line(entry.id, CHARS),
         name=line(entry.name, CHARS),
         group=line(entry.group, CHARS),
@@ -124,7 +124,7 @@ def _points_lost(result: GradingResult, criteria: Sequence[CriterionInfo]) -> di
     return {places[loss.criterion.id]: loss.points for loss in lost if loss.criterion.id in places}
 
 
-def link_to(one: Line) -> str:
+def link_to(one: SubmissionRow) -> str:
     """Return the submission's report; empty where it has none."""
     return f"{quote(one.folder, safe='', errors='replace')}/{REPORT}" if one.folder else ""
 
@@ -133,7 +133,7 @@ def _has_reports(result: GradingResult) -> bool:
     return result.error is None or result.error.kind not in {MISSING, ROSTER}
 
 
-def _state(result: GradingResult) -> State:
+def _state(result: GradingResult) -> SubmissionState:
     if result.error is not None and result.error.kind == MISSING:
         return "missing"
     if result.status == "inconclusive" and not _still_open(result.criteria):
@@ -177,7 +177,7 @@ def _problem(result: GradingResult) -> Problem | None:
 class Gathered:
     """Submissions in the order in which the page shows them, and diagnoses, most members first."""
 
-    lines: Sequence[Line]
+    lines: Sequence[SubmissionRow]
     diagnoses: Sequence[Diagnosis]
 
 
@@ -220,7 +220,7 @@ def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]],
     return Gathered(lines=lines, diagnoses=diagnoses)
 
 
-def _anonymous_line(named: Line, pseudonym: str, words: frozenset[str]) -> Line:
+def _anonymous_line(named: SubmissionRow, pseudonym: str, words: frozenset[str]) -> SubmissionRow:
     problem = named.problem
     if problem is not None:
         problem = replace(problem, message=withoutwords_in(problem.message, words), hint="")

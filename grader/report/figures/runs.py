@@ -273,7 +273,7 @@ def _figure(
 
 LANES_MAX = 24
 STRETCHES_MAX = 120
-PARTS = 400
+RUN_PARTS = 400
 """Messages that are nearer to each other than such a part of the run are drawn as one stretch."""
 SAYS_LETTERS = 120
 QUIET = frozenset({"clock", "interrupt", "open", "note", "left", "lookup", "read"})
@@ -355,7 +355,7 @@ def _node_stretches(run: Run, node: str) -> Iterator[Stretch]:
 
 
 def _topics(run: Run) -> Iterator[Lane]:
-    size_ns = max(1, (run.end_ns - run.start_ns) // PARTS)
+    size_ns = max(1, (run.end_ns - run.start_ns) // RUN_PARTS)
     topics = (c.topic for c in run.channels if c.topic not in SYSTEM_TOPICS and is_drawn(c.topic))
     for topic in dict.fromkeys(topics):
         times = sorted(time for c in run.channels if c.topic == topic for time in c.times_ns)

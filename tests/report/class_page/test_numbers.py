@@ -6,11 +6,11 @@ import pytest
 
 from grader.report.class_page.page import todos
 from grader.report.class_page.statistics import costs, most_first, span, spread_of, timing
-from grader.report.class_page.submissions import Line, line_of
+from grader.report.class_page.submissions import SubmissionRow, line_of
 from tests.report.class_page.made_up import made_up_rows, made_up_run
 
 
-def lines(count: int, **more: int) -> list[Line]:
+def lines(count: int, **more: int) -> list[SubmissionRow]:
     return [
         line_of(entry, result, made_up_run(count).criteria) for entry, result in made_up_rows(count, **more)
     ]

@@ -12,7 +12,14 @@ from pydantic import Field
 from grader.authoring.mutation.registry import Finder, operator
 from grader.authoring.mutation.rospy_code import argument, calls, script_place, text_literal
 from grader.authoring.mutation.solution import CodePlace, Solution
-from grader.authoring.mutation.source_edits import Document, Edit, Element, Script, misspelt_name, whole_lines
+from grader.authoring.mutation.source_edits import (
+    Document,
+    Element,
+    Script,
+    TextEdit,
+    misspelt_name,
+    whole_lines,
+)
 from grader.model.record import Record
 
 URL = re.compile(r"""https?://[^\s"'<>]+""")
@@ -58,7 +65,7 @@ def _matches(pattern: re.Pattern[str], *endings: str) -> Finder:
 
 
 @operator("launch-type-without-py", each=_elements("node", "type"))
-def launch_type_without_py(document: Document, node: Element) -> list[Edit]:
+def launch_type_without_py(document: Document, node: Element) -> list[TextEdit]:
     """Leaves .py away in a node's type.
 
     Fits every node whose type ends in .py.
@@ -68,20 +75,20 @@ def launch_type_without_py(document: Document, node: Element) -> list[Edit]:
 
 
 @operator("launch-malformed", each=_documents)
-def launch_malformed(document: Document) -> list[Edit]:
+def launch_malformed(document: Document) -> list[TextEdit]:
     """Forgets to close a node's tag.
 
     Fits every launch file with a node.
     """
     for node in document.elements("node"):
         if document.data[node.inner - 2 : node.inner] == b"/>":
-            return [Edit(node.inner - 2, node.inner, ">")]
-        return [Edit(document.data.rfind(b"</", 0, node.end), node.end, "")]
+            return [TextEdit(node.inner - 2, node.inner, ">")]
+        return [TextEdit(document.data.rfind(b"</", 0, node.end), node.end, "")]
     return []
 
 
 @operator("launch-remapped-apart", each=_elements("node"), params=RemapParams)
-def launch_remapped_apart(document: Document, node: Element, params: RemapParams) -> list[Edit]:
+def launch_remapped_apart(document: Document, node: Element, params: RemapParams) -> list[TextEdit]:
     """Remaps a topic for one node only, so that the nodes miss each other.
 
     Fits every node of a launch file that starts two or more.
@@ -90,12 +97,12 @@ def launch_remapped_apart(document: Document, node: Element, params: RemapParams
     if len(document.elements("node")) < 2:
         return []
     if document.data[node.inner - 2 : node.inner] == b"/>":
-        return [Edit(node.inner - 2, node.inner, f">{remap}</node>")]
-    return [Edit(node.inner, node.inner, remap)]
+        return [TextEdit(node.inner - 2, node.inner, f">{remap}</node>")]
+    return [TextEdit(node.inner, node.inner, remap)]
 
 
 @operator("launch-node-dropped", each=_elements("node"))
-def launch_node_dropped(document: Document, node: Element) -> list[Edit]:
+def launch_node_dropped(document: Document, node: Element) -> list[TextEdit]:
     """Does not start one of the nodes.
 
     Fits every node of a launch file.
@@ -104,7 +111,7 @@ def launch_node_dropped(document: Document, node: Element) -> list[Edit]:
 
 
 @operator("launch-name-missing", each=_elements("node", "name"))
-def launch_name_missing(document: Document, node: Element) -> list[Edit]:
+def launch_name_missing(document: Document, node: Element) -> list[TextEdit]:
     """Gives a node no name.
 
     Fits every node of a launch file with a name.
@@ -113,7 +120,7 @@ def launch_name_missing(document: Document, node: Element) -> list[Edit]:
 
 
 @operator("launch-name-changed", each=_elements("node", "name"))
-def launch_name_changed(document: Document, node: Element) -> list[Edit]:
+def launch_name_changed(document: Document, node: Element) -> list[TextEdit]:
     """Gives a node another name in the launch file.
 
     Fits every node of a launch file with a name.
@@ -122,7 +129,7 @@ def launch_name_changed(document: Document, node: Element) -> list[Edit]:
 
 
 @operator("launch-pkg-misspelt", each=_elements("node", "pkg"))
-def launch_pkg_misspelt(document: Document, node: Element) -> list[Edit]:
+def launch_pkg_misspelt(document: Document, node: Element) -> list[TextEdit]:
     """Misspells the package of a node.
 
     Fits every node of a launch file with a package.
@@ -131,7 +138,7 @@ def launch_pkg_misspelt(document: Document, node: Element) -> list[Edit]:
 
 
 @operator("launch-root-misspelt", each=_documents)
-def launch_root_misspelt(document: Document) -> list[Edit]:
+def launch_root_misspelt(document: Document) -> list[TextEdit]:
     """Begins the launch file with another tag than <launch>.
 
     Fits every launch file.
@@ -140,11 +147,11 @@ def launch_root_misspelt(document: Document) -> list[Edit]:
     close = document.data.rfind(b"</launch") if root is not None and root.tag == "launch" else -1
     if root is None or close < 0:
         return []
-    return [Edit(root.start + 1, root.start + 7, "lauch"), Edit(close + 2, close + 8, "lauch")]
+    return [TextEdit(root.start + 1, root.start + 7, "lauch"), TextEdit(close + 2, close + 8, "lauch")]
 
 
 @operator("launch-param-altered", each=_elements("param"))
-def launch_param_altered(document: Document, param: Element) -> list[Edit]:
+def launch_param_altered(document: Document, param: Element) -> list[TextEdit]:
     """Sets a parameter to another value.
 
     Fits every parameter of a launch file with a number as its value.
@@ -154,7 +161,7 @@ def launch_param_altered(document: Document, param: Element) -> list[Edit]:
 
 
 @operator("launch-param-dropped", each=_elements("param"))
-def launch_param_dropped(document: Document, param: Element) -> list[Edit]:
+def launch_param_dropped(document: Document, param: Element) -> list[TextEdit]:
     """Does not set a parameter.
 
     Fits every parameter of a launch file.
@@ -163,7 +170,7 @@ def launch_param_dropped(document: Document, param: Element) -> list[Edit]:
 
 
 @operator("launch-load-dropped", each=_elements("rosparam", "file", named=False))
-def launch_load_dropped(document: Document, load: Element) -> list[Edit]:
+def launch_load_dropped(document: Document, load: Element) -> list[TextEdit]:
     """Does not load the parameters' file.
 
     Fits every <rosparam> of a launch file with a file.
@@ -172,21 +179,21 @@ def launch_load_dropped(document: Document, load: Element) -> list[Edit]:
 
 
 @operator("url-changed", each=_matches(URL, ".sh", ".launch"))
-def url_changed(_text: str, match: re.Match[str]) -> list[Edit]:
+def url_changed(_text: str, match: re.Match[str]) -> list[TextEdit]:
     """Opens another page.
 
     Fits every address in a launch file or a shell script.
     """
-    return [Edit(*match.span(), "https://www.example.org/")]
+    return [TextEdit(*match.span(), "https://www.example.org/")]
 
 
 @operator("command-dropped", each=_matches(FIREFOX, ".sh"))
-def command_dropped(text: str, match: re.Match[str]) -> list[Edit]:
+def command_dropped(text: str, match: re.Match[str]) -> list[TextEdit]:
     """Leaves the shell script without the command that opens the page.
 
     Fits every shell script with a line that runs firefox.
     """
-    return [Edit(*whole_lines(text, *match.span()), "")]
+    return [TextEdit(*whole_lines(text, *match.span()), "")]
 
 
 Leaf = tuple[str, yaml.ScalarNode, yaml.ScalarNode]
@@ -246,40 +253,40 @@ def _yaml_keys(solution: Solution) -> Iterator[tuple[CodePlace, str, yaml.Scalar
 
 
 @operator("yaml-tabs", each=_yaml_files)
-def yaml_tabs(values: list[Leaf]) -> list[Edit]:
+def yaml_tabs(values: list[Leaf]) -> list[TextEdit]:
     """Indents the YAML file with a tab.
 
     Fits every YAML file with an indented key in a line of its own.
     """
     marks = [key.start_mark for name, key, _ in values if "/" in name and key.start_mark.column]
-    return [Edit(mark.index - mark.column, mark.index, "\t") for mark in marks[:1]]
+    return [TextEdit(mark.index - mark.column, mark.index, "\t") for mark in marks[:1]]
 
 
 @operator("yaml-malformed", each=_yaml_files)
-def yaml_malformed(values: list[Leaf]) -> list[Edit]:
+def yaml_malformed(values: list[Leaf]) -> list[TextEdit]:
     """Leaves a quotation mark open in the YAML file.
 
     Fits every YAML file with a value in a line of its own.
     """
-    return [Edit(v.start_mark.index, v.end_mark.index, f'"{v.value}') for _, _, v in values[:1]]
+    return [TextEdit(v.start_mark.index, v.end_mark.index, f'"{v.value}') for _, _, v in values[:1]]
 
 
 @operator("yaml-key-missing", each=_yaml_keys)
-def yaml_key_missing(text: str, key: yaml.ScalarNode, value: yaml.ScalarNode) -> list[Edit]:
+def yaml_key_missing(text: str, key: yaml.ScalarNode, value: yaml.ScalarNode) -> list[TextEdit]:
     """Forgets a key of the YAML file.
 
     Fits every value of a YAML file that has a line of its own.
     """
-    return [Edit(*whole_lines(text, key.start_mark.index, _line_end(text, value)), "")]
+    return [TextEdit(*whole_lines(text, key.start_mark.index, _line_end(text, value)), "")]
 
 
 @operator("yaml-key-misspelt", each=_yaml_keys)
-def yaml_key_misspelt(_text: str, key: yaml.ScalarNode, _value: yaml.ScalarNode) -> list[Edit]:
+def yaml_key_misspelt(_text: str, key: yaml.ScalarNode, _value: yaml.ScalarNode) -> list[TextEdit]:
     """Misspells a key of the YAML file.
 
     Fits every value of a YAML file that has a line of its own.
     """
-    return [Edit(key.start_mark.index, key.end_mark.index, misspelt_name(str(key.value)))]
+    return [TextEdit(key.start_mark.index, key.end_mark.index, misspelt_name(str(key.value)))]
 
 
 # ---- scripts
@@ -331,7 +338,7 @@ def _is_deeper(value: ast.AST) -> bool:
 
 
 @operator("parameter-not-read", each=_reads)
-def parameter_not_read(script: Script, node: ast.expr, value: yaml.Node) -> list[Edit]:
+def parameter_not_read(script: Script, node: ast.expr, value: yaml.Node) -> list[TextEdit]:
     """Writes the value of the YAML file into the script, and does not read the parameter.
 
     Fits every expression that reads a value of the package's YAML files.
@@ -340,7 +347,7 @@ def parameter_not_read(script: Script, node: ast.expr, value: yaml.Node) -> list
 
 
 @operator("parameter-misspelt", each=_accesses("get_param"))
-def parameter_misspelt(script: Script, _call: ast.Call, name: ast.Constant) -> list[Edit]:
+def parameter_misspelt(script: Script, _call: ast.Call, name: ast.Constant) -> list[TextEdit]:
     """Misspells the parameter that it reads.
 
     Fits every rospy.get_param() whose parameter is written out.
@@ -349,7 +356,7 @@ def parameter_misspelt(script: Script, _call: ast.Call, name: ast.Constant) -> l
 
 
 @operator("parameter-not-set", each=_accesses("set_param"))
-def parameter_not_set(script: Script, call: ast.Call, _name: ast.Constant) -> list[Edit]:
+def parameter_not_set(script: Script, call: ast.Call, _name: ast.Constant) -> list[TextEdit]:
     """Does not set the parameter.
 
     Fits every statement rospy.set_param() whose parameter is written out.
@@ -359,7 +366,7 @@ def parameter_not_set(script: Script, call: ast.Call, _name: ast.Constant) -> li
 
 
 @operator("parameter-other-value", each=_accesses("set_param"))
-def parameter_other_value(script: Script, call: ast.Call, _name: ast.Constant) -> list[Edit]:
+def parameter_other_value(script: Script, call: ast.Call, _name: ast.Constant) -> list[TextEdit]:
     """Sets the parameter to another value.
 
     Fits every rospy.set_param() whose parameter is written out.
@@ -369,7 +376,7 @@ def parameter_other_value(script: Script, call: ast.Call, _name: ast.Constant) -
 
 
 @operator("parameter-clobbered", each=_accesses("set_param"))
-def parameter_clobbered(script: Script, call: ast.Call, name: ast.Constant) -> list[Edit]:
+def parameter_clobbered(script: Script, call: ast.Call, name: ast.Constant) -> list[TextEdit]:
     """Sets a whole branch of parameters where one was meant, so that its neighbours are gone.
 
     Fits every rospy.set_param() of a parameter below another, written out.
@@ -379,11 +386,11 @@ def parameter_clobbered(script: Script, call: ast.Call, name: ast.Constant) -> l
     if not head.strip("/~") or value is None or name not in call.args:
         return []
     start, end = script.span(call.args[0])[0], script.span(value)[1]
-    return [Edit(start, end, f"{head!r}, {{{tail!r}: {script.source(value)}}}")]
+    return [TextEdit(start, end, f"{head!r}, {{{tail!r}: {script.source(value)}}}")]
 
 
 @operator("parameter-set-elsewhere", each=_accesses("set_param"))
-def parameter_set_elsewhere(script: Script, _call: ast.Call, name: ast.Constant) -> list[Edit]:
+def parameter_set_elsewhere(script: Script, _call: ast.Call, name: ast.Constant) -> list[TextEdit]:
     """Sets a parameter of another name.
 
     Fits every rospy.set_param() whose parameter is written out.

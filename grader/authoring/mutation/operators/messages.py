@@ -24,9 +24,9 @@ from grader.authoring.mutation.rospy_code import (
 )
 from grader.authoring.mutation.solution import CodePlace, Solution
 from grader.authoring.mutation.source_edits import (
-    Edit,
     Function,
     Script,
+    TextEdit,
     every_second_time,
     misspelt_literal,
     texts_in,
@@ -53,7 +53,7 @@ def _calls(values: list[ast.expr]) -> list[ast.Call]:
 
 
 @operator("message-altered", each=_messages)
-def message_altered(script: Script, values: list[ast.expr]) -> list[Edit]:
+def message_altered(script: Script, values: list[ast.expr]) -> list[TextEdit]:
     """Misspells the message.
 
     Fits every publisher whose messages are made from a text.
@@ -66,7 +66,7 @@ def message_altered(script: Script, values: list[ast.expr]) -> list[Edit]:
 
 
 @operator("message-constant-time", each=_messages)
-def message_constant_time(script: Script, values: list[ast.expr]) -> list[Edit]:
+def message_constant_time(script: Script, values: list[ast.expr]) -> list[TextEdit]:
     """Sends the same time again and again.
 
     Fits every publisher whose messages carry the time.
@@ -76,7 +76,7 @@ def message_constant_time(script: Script, values: list[ast.expr]) -> list[Edit]:
 
 
 @operator("message-nanoseconds", each=_messages)
-def message_nanoseconds(script: Script, values: list[ast.expr]) -> list[Edit]:
+def message_nanoseconds(script: Script, values: list[ast.expr]) -> list[TextEdit]:
     """Sends the time in nanoseconds, not in seconds.
 
     Fits every publisher whose messages carry the time in seconds.
@@ -105,7 +105,7 @@ def _stamps(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Assign]
 
 
 @operator("stamp-not-set", each=_stamps)
-def stamp_not_set(script: Script, line: ast.Assign) -> list[Edit]:
+def stamp_not_set(script: Script, line: ast.Assign) -> list[TextEdit]:
     """Never sets the stamp of the header.
 
     Fits every line that sets one.
@@ -125,7 +125,7 @@ def _frames(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.expr, a
 
 
 @operator("frames-swapped", each=_frames)
-def frames_swapped(script: Script, parent: ast.expr, child: ast.expr) -> list[Edit]:
+def frames_swapped(script: Script, parent: ast.expr, child: ast.expr) -> list[TextEdit]:
     """Swaps parent and child of a transform.
 
     Fits every transform whose `child_frame_id` is set in the line behind its `frame_id`.
@@ -142,7 +142,7 @@ def _preempts(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Call]
 
 
 @operator("preempt-not-heeded", each=_preempts)
-def preempt_not_heeded(script: Script, call: ast.Call) -> list[Edit]:
+def preempt_not_heeded(script: Script, call: ast.Call) -> list[TextEdit]:
     """Goes on with an action's goal that was cancelled.
 
     Fits every call of `is_preempt_requested()`.
@@ -161,14 +161,14 @@ def _fields(solution: Solution) -> Iterator[tuple[CodePlace, str, InterfaceField
 
 
 @operator("field-other-type", each=_fields)
-def field_other_type(text: str, field: InterfaceField) -> list[Edit]:
+def field_other_type(text: str, field: InterfaceField) -> list[TextEdit]:
     """Gives a field of its own message another type.
 
     Fits every field of a `.msg`, `.srv` or `.action` file that is a number of a usual type.
     """
     start = text.index(field.type, len("".join(text.splitlines(keepends=True)[: field.line - 1])))
     other = OTHER_TYPES.get(field.type)
-    return [Edit(start, start + len(field.type), other)] if other else []
+    return [TextEdit(start, start + len(field.type), other)] if other else []
 
 
 # ---- counters
@@ -195,18 +195,18 @@ def _counters(solution: Solution) -> Iterator[tuple[CodePlace, Script, Counter]]
                 yield script_place(script, topic=publisher.topic), script, counter
 
 
-def _add(script: Script, constants: list[ast.Constant], number: int) -> list[Edit]:
+def _add(script: Script, constants: list[ast.Constant], number: int) -> list[TextEdit]:
     """Each of the constants once, changed by `number`."""
     distinct = {script.span(c): c for c in constants}.values()
     return [script.replace(c, str(c.value + number)) for c in distinct if isinstance(c.value, int)]
 
 
-def _set(script: Script, constants: list[ast.Constant], number: int) -> list[Edit]:
+def _set(script: Script, constants: list[ast.Constant], number: int) -> list[TextEdit]:
     return [script.replace(c, str(number)) for c in {script.span(c): c for c in constants}.values()]
 
 
 @operator("counter-from-one", each=_counters)
-def counter_from_one(script: Script, counter: Counter) -> list[Edit]:
+def counter_from_one(script: Script, counter: Counter) -> list[TextEdit]:
     """Begins to count at 1.
 
     Fits every integer topic that is fed by a counter with a first value.
@@ -215,7 +215,7 @@ def counter_from_one(script: Script, counter: Counter) -> list[Edit]:
 
 
 @operator("counter-skips", each=_counters, params=ByParams)
-def counter_skips(script: Script, counter: Counter, params: ByParams) -> list[Edit]:
+def counter_skips(script: Script, counter: Counter, params: ByParams) -> list[TextEdit]:
     """Counts in steps that are too large.
 
     Fits every integer topic that is fed by a counter.
@@ -224,7 +224,7 @@ def counter_skips(script: Script, counter: Counter, params: ByParams) -> list[Ed
 
 
 @operator("reset-early", each=_counters, params=EarlyParams)
-def reset_early(script: Script, counter: Counter, params: EarlyParams) -> list[Edit]:
+def reset_early(script: Script, counter: Counter, params: EarlyParams) -> list[TextEdit]:
     """Goes back to the beginning too early.
 
     Fits every counter with a limit that is written as a number.
@@ -233,7 +233,7 @@ def reset_early(script: Script, counter: Counter, params: EarlyParams) -> list[E
 
 
 @operator("reset-late", each=_counters, params=ByParams)
-def reset_late(script: Script, counter: Counter, params: ByParams) -> list[Edit]:
+def reset_late(script: Script, counter: Counter, params: ByParams) -> list[TextEdit]:
     """Goes back to the beginning too late.
 
     Fits every counter with a limit that is written as a number.
@@ -242,7 +242,7 @@ def reset_late(script: Script, counter: Counter, params: ByParams) -> list[Edit]
 
 
 @operator("reset-to-one", each=_counters)
-def reset_to_one(script: Script, counter: Counter) -> list[Edit]:
+def reset_to_one(script: Script, counter: Counter) -> list[TextEdit]:
     """Goes back to 1.
 
     Fits every counter that is set back, or taken modulo a number.
@@ -251,7 +251,7 @@ def reset_to_one(script: Script, counter: Counter) -> list[Edit]:
 
 
 @operator("wrap-to-minus-128", each=_counters)
-def wrap_to_minus_128(script: Script, counter: Counter) -> list[Edit]:
+def wrap_to_minus_128(script: Script, counter: Counter) -> list[TextEdit]:
     """Goes on at -128, as an 8-bit integer of C does.
 
     Fits every counter that is set back, or taken modulo a number.
@@ -259,7 +259,7 @@ def wrap_to_minus_128(script: Script, counter: Counter) -> list[Edit]:
     return _back_to(script, counter, -128)
 
 
-def _back_to(script: Script, counter: Counter, number: int) -> list[Edit]:
+def _back_to(script: Script, counter: Counter, number: int) -> list[TextEdit]:
     edits = _set(script, counter.resets, number)
     for modulo in counter.modulos:
         if isinstance(modulo.right, ast.Constant) and isinstance(modulo.right.value, int):
@@ -269,7 +269,7 @@ def _back_to(script: Script, counter: Counter, number: int) -> list[Edit]:
 
 
 @operator("never-reset", each=_counters)
-def never_reset(script: Script, counter: Counter) -> list[Edit]:
+def never_reset(script: Script, counter: Counter) -> list[TextEdit]:
     """Never goes back to the beginning.
 
     Fits every counter that is set back by an `if`, or taken modulo a number.
@@ -284,7 +284,7 @@ def never_reset(script: Script, counter: Counter) -> list[Edit]:
     return edits
 
 
-def _without_if(script: Script, test: ast.If) -> list[Edit]:
+def _without_if(script: Script, test: ast.If) -> list[TextEdit]:
     """What is left where the branch that sets back is never taken."""
     if not script.has_lines(test):
         return []
@@ -323,7 +323,7 @@ any_callback = _callbacks()
 integer_callback = _callbacks(*INTEGER_TYPES)
 
 
-def _replace_data(script: Script, callback: Function, message: str, text: str) -> list[Edit]:
+def _replace_data(script: Script, callback: Function, message: str, text: str) -> list[TextEdit]:
     """Put `text` where the callback reads the message's data."""
     data = f"{message}.data"
     reads = [n for n in ast.walk(callback) if isinstance(n, ast.Attribute) and script.source(n) == data]
@@ -331,7 +331,9 @@ def _replace_data(script: Script, callback: Function, message: str, text: str) -
 
 
 @operator("listener-silent", each=any_callback)
-def listener_silent(script: Script, _callback: Function, _message: str, said: list[ast.Expr]) -> list[Edit]:
+def listener_silent(
+    script: Script, _callback: Function, _message: str, said: list[ast.Expr]
+) -> list[TextEdit]:
     """Prints nothing of what it hears.
 
     Fits every subscriber whose callback prints or logs.
@@ -340,7 +342,9 @@ def listener_silent(script: Script, _callback: Function, _message: str, said: li
 
 
 @operator("listener-constant", each=any_callback)
-def listener_constant(script: Script, _callback: Function, _message: str, said: list[ast.Expr]) -> list[Edit]:
+def listener_constant(
+    script: Script, _callback: Function, _message: str, said: list[ast.Expr]
+) -> list[TextEdit]:
     """Prints that it heard something, and not what.
 
     Fits every subscriber whose callback prints or logs.
@@ -352,7 +356,7 @@ def listener_constant(script: Script, _callback: Function, _message: str, said: 
 @operator("listener-drops-zero", each=integer_callback)
 def listener_drops_zero(
     script: Script, _callback: Function, message: str, said: list[ast.Expr]
-) -> list[Edit]:
+) -> list[TextEdit]:
     """Prints every number but 0.
 
     Fits every subscriber of integers whose callback prints or logs.
@@ -361,7 +365,9 @@ def listener_drops_zero(
 
 
 @operator("listener-drops-negative", each=integer_callback)
-def listener_drops_negative(script: Script, callback: Function, message: str, _said: object) -> list[Edit]:
+def listener_drops_negative(
+    script: Script, callback: Function, message: str, _said: object
+) -> list[TextEdit]:
     """Prints a number without its sign.
 
     Fits every subscriber of integers whose callback reads the message's data.
@@ -370,7 +376,7 @@ def listener_drops_negative(script: Script, callback: Function, message: str, _s
 
 
 @operator("listener-off-by-one", each=integer_callback)
-def listener_off_by_one(script: Script, callback: Function, message: str, _said: object) -> list[Edit]:
+def listener_off_by_one(script: Script, callback: Function, message: str, _said: object) -> list[TextEdit]:
     """Prints each number plus one.
 
     Fits every subscriber of integers whose callback reads the message's data.
@@ -381,7 +387,7 @@ def listener_off_by_one(script: Script, callback: Function, message: str, _said:
 @operator("listener-drops-some", each=any_callback)
 def listener_drops_some(
     script: Script, _callback: Function, _message: str, said: list[ast.Expr]
-) -> list[Edit]:
+) -> list[TextEdit]:
     """Prints every second message only.
 
     Fits every subscriber whose callback prints or logs.
@@ -390,7 +396,7 @@ def listener_drops_some(
 
 
 @operator("listener-late", each=any_callback)
-def listener_late(script: Script, callback: Function, message: str, said: list[ast.Expr]) -> list[Edit]:
+def listener_late(script: Script, callback: Function, message: str, said: list[ast.Expr]) -> list[TextEdit]:
     """Prints each message only when the next one comes, so that the last is lost.
 
     Fits every subscriber whose callback prints or logs.
@@ -403,7 +409,7 @@ def listener_late(script: Script, callback: Function, message: str, said: list[a
 
 
 @operator("callback-error", each=any_callback)
-def callback_error(script: Script, callback: Function, message: str, _said: object) -> list[Edit]:
+def callback_error(script: Script, callback: Function, message: str, _said: object) -> list[TextEdit]:
     """Misspells the message's variable in the callback.
 
     Fits every subscriber whose callback reads the message's data.

@@ -22,9 +22,9 @@ from grader.authoring.mutation.rospy_code import (
 )
 from grader.authoring.mutation.solution import CodePlace, Solution
 from grader.authoring.mutation.source_edits import (
-    Edit,
     Function,
     Script,
+    TextEdit,
     apply_edits,
     misspelt_literal,
     texts_in,
@@ -50,7 +50,7 @@ def _is_anonymous(call: ast.Call) -> bool:
 
 
 @operator("name-changed", each=_init_nodes)
-def name_changed(script: Script, call: ast.Call) -> list[Edit]:
+def name_changed(script: Script, call: ast.Call) -> list[TextEdit]:
     """Gives the node another name.
 
     Fits every script with a node whose name is written out.
@@ -60,7 +60,7 @@ def name_changed(script: Script, call: ast.Call) -> list[Edit]:
 
 
 @operator("not-anonymous", each=_init_nodes)
-def not_anonymous(script: Script, call: ast.Call) -> list[Edit]:
+def not_anonymous(script: Script, call: ast.Call) -> list[TextEdit]:
     """Leaves out `anonymous=True`.
 
     Fits every script with an anonymous node.
@@ -70,7 +70,7 @@ def not_anonymous(script: Script, call: ast.Call) -> list[Edit]:
 
 
 @operator("made-anonymous", each=_init_nodes)
-def made_anonymous(script: Script, call: ast.Call) -> list[Edit]:
+def made_anonymous(script: Script, call: ast.Call) -> list[TextEdit]:
     """Makes the node anonymous where its plain name is asked for.
 
     Fits every script with a node that is not anonymous.
@@ -81,7 +81,7 @@ def made_anonymous(script: Script, call: ast.Call) -> list[Edit]:
     if keyword is not None:
         return [script.replace(keyword.value, "True")]
     end = max(script.span(node)[1] for node in (*call.args, *call.keywords))
-    return [Edit(end, end, ", anonymous=True")]
+    return [TextEdit(end, end, ", anonymous=True")]
 
 
 # ---- how nodes live and end
@@ -103,18 +103,18 @@ def _lives(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.While | 
 
 
 @operator("node-ends-by-itself", each=_lives, params=EndsParams)
-def node_ends_by_itself(script: Script, life: ast.While | ast.Expr, params: EndsParams) -> list[Edit]:
+def node_ends_by_itself(script: Script, life: ast.While | ast.Expr, params: EndsParams) -> list[TextEdit]:
     """Lets the node come to its end: a loop that is counted, or no rospy.spin().
 
     Fits every script with a loop until shutdown or a spin.
     """
     if isinstance(life, ast.Expr):
         return [script.remove(life)]
-    return [Edit(script.span(life)[0], script.span(life.test)[1], f"for _ in range({params.turns})")]
+    return [TextEdit(script.span(life)[0], script.span(life.test)[1], f"for _ in range({params.turns})")]
 
 
 @operator("ctrl-c-swallowed", each=_lives)
-def ctrl_c_swallowed(script: Script, life: ast.While | ast.Expr) -> list[Edit]:
+def ctrl_c_swallowed(script: Script, life: ast.While | ast.Expr) -> list[TextEdit]:
     """Catches every exception and goes on, so that Ctrl-C does not end the node.
 
     Fits every script with a loop until shutdown or a spin.
@@ -133,7 +133,7 @@ def ctrl_c_swallowed(script: Script, life: ast.While | ast.Expr) -> list[Edit]:
 
 
 @operator("traceback-on-exit", each=_lives)
-def traceback_on_exit(script: Script, life: ast.While | ast.Expr) -> list[Edit]:
+def traceback_on_exit(script: Script, life: ast.While | ast.Expr) -> list[TextEdit]:
     """Uses a variable that is not there, once the node has been told to end.
 
     Fits every script with a loop until shutdown or a spin.
@@ -171,7 +171,7 @@ def _first_words(script: Script, call: ast.Call) -> str:
 
 
 @operator("log-level", each=_logs, params=LevelParams)
-def log_level(script: Script, _statement: ast.Expr, call: ast.Call, params: LevelParams) -> list[Edit]:
+def log_level(script: Script, _statement: ast.Expr, call: ast.Call, params: LevelParams) -> list[TextEdit]:
     """Logs at another level.
 
     Fits every call of rospy's logging.
@@ -182,7 +182,7 @@ def log_level(script: Script, _statement: ast.Expr, call: ast.Call, params: Leve
 
 
 @operator("log-text", each=_logs)
-def log_text(script: Script, _statement: ast.Expr, call: ast.Call) -> list[Edit]:
+def log_text(script: Script, _statement: ast.Expr, call: ast.Call) -> list[TextEdit]:
     """Misspells what it prints or logs.
 
     Fits every line that prints or logs a text.
@@ -192,7 +192,7 @@ def log_text(script: Script, _statement: ast.Expr, call: ast.Call) -> list[Edit]
 
 
 @operator("print-instead-of-log", each=_logs)
-def print_instead_of_log(script: Script, _statement: ast.Expr, call: ast.Call) -> list[Edit]:
+def print_instead_of_log(script: Script, _statement: ast.Expr, call: ast.Call) -> list[TextEdit]:
     """Prints where it should log.
 
     Fits every call of rospy's logging.
@@ -204,7 +204,7 @@ def print_instead_of_log(script: Script, _statement: ast.Expr, call: ast.Call) -
 
 
 @operator("log-dropped", each=_logs)
-def log_dropped(script: Script, statement: ast.Expr, _call: ast.Call) -> list[Edit]:
+def log_dropped(script: Script, statement: ast.Expr, _call: ast.Call) -> list[TextEdit]:
     """Does not print or log this.
 
     Fits every line that prints or logs.
@@ -217,7 +217,7 @@ def log_dropped(script: Script, statement: ast.Expr, _call: ast.Call) -> list[Ed
 OPEN_QUOTE, CLOSE_QUOTE = "\u2018", "\u2019"
 
 
-def _if_broken(script: Script, *edits: Edit) -> list[Edit]:
+def _if_broken(script: Script, *edits: TextEdit) -> list[TextEdit]:
     """Return the edits if what comes out is really not Python 3."""
     try:
         compile(apply_edits(script.text, edits), script.path, "exec", dont_inherit=True)
@@ -227,7 +227,7 @@ def _if_broken(script: Script, *edits: Edit) -> list[Edit]:
 
 
 @operator("python2-print", each=each_script)
-def python2_print(script: Script) -> list[Edit]:
+def python2_print(script: Script) -> list[TextEdit]:
     """Prints as Python 2 does.
 
     Fits every Python script that prints or logs something.
@@ -240,7 +240,7 @@ def python2_print(script: Script) -> list[Edit]:
 
 
 @operator("tabs-and-spaces", each=each_script)
-def tabs_and_spaces(script: Script) -> list[Edit]:
+def tabs_and_spaces(script: Script) -> list[TextEdit]:
     """Mixes tabs and spaces.
 
     Fits every Python script with a block of two lines.
@@ -248,21 +248,21 @@ def tabs_and_spaces(script: Script) -> list[Edit]:
     return next((edits for s in script.of(ast.stmt) if (edits := _with_other_indentation(script, s))), [])
 
 
-def _with_other_indentation(script: Script, statement: ast.stmt) -> list[Edit]:
+def _with_other_indentation(script: Script, statement: ast.stmt) -> list[TextEdit]:
     indentation = script.indentation(statement)
     first = statement is script.block(statement)[0]
     if not indentation or first or not script.has_lines(statement):
         return []
     start = script.starts[statement.lineno - 1]
     if "\t" in indentation:
-        edit = Edit(start, start + len(indentation), indentation.expandtabs(8))
+        edit = TextEdit(start, start + len(indentation), indentation.expandtabs(8))
     else:
-        edit = Edit(start, start + min(len(indentation), 8), "\t")
+        edit = TextEdit(start, start + min(len(indentation), 8), "\t")
     return _if_broken(script, edit)
 
 
 @operator("typographic-quote", each=each_script)
-def typographic_quote(script: Script) -> list[Edit]:
+def typographic_quote(script: Script) -> list[TextEdit]:
     """Copies a text with its quotes from a PDF.
 
     Fits every Python script with a text as an argument.
@@ -274,7 +274,7 @@ def typographic_quote(script: Script) -> list[Edit]:
 
 
 @operator("no-break-space", each=each_script)
-def no_break_space(script: Script) -> list[Edit]:
+def no_break_space(script: Script) -> list[TextEdit]:
     """Copies a line from a PDF, with a space that is none for Python.
 
     Fits every Python script with an assignment that has spaces around its sign.
@@ -282,12 +282,12 @@ def no_break_space(script: Script) -> list[Edit]:
     for statement in script.of(ast.Assign):
         _, end = script.span(statement.targets[-1])
         if script.text[end : end + 3] == " = ":
-            return _if_broken(script, Edit(end + 2, end + 3, "\u00a0"))
+            return _if_broken(script, TextEdit(end + 2, end + 3, "\u00a0"))
     return []
 
 
 @operator("syntax-error", each=each_script)
-def syntax_error(script: Script) -> list[Edit]:
+def syntax_error(script: Script) -> list[TextEdit]:
     """Forgets the colon after `def`, `class` or `while`.
 
     Fits every Python script that has one of them.
@@ -295,12 +295,12 @@ def syntax_error(script: Script) -> list[Edit]:
     for node in script.of(ast.stmt):
         if isinstance(node, Function | ast.ClassDef | ast.While):
             colon = script.text.rfind(":", script.span(node)[0], script.span(node.body[0])[0])
-            return _if_broken(script, Edit(colon, colon + 1, ""))
+            return _if_broken(script, TextEdit(colon, colon + 1, ""))
     return []
 
 
 @operator("missing-module", each=each_script)
-def missing_module(script: Script) -> list[Edit]:
+def missing_module(script: Script) -> list[TextEdit]:
     """Imports messages of a package that is not there.
 
     Fits every Python script that imports rospy.
@@ -310,7 +310,7 @@ def missing_module(script: Script) -> list[Edit]:
 
 
 @operator("asks-for-input", each=each_script)
-def asks_for_input(script: Script) -> list[Edit]:
+def asks_for_input(script: Script) -> list[TextEdit]:
     """Waits for someone to press Enter before it makes its node.
 
     Fits every Python script that makes a node.

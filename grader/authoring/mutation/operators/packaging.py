@@ -12,7 +12,7 @@ from cmake_parser.ast import Command, Token
 from grader.authoring.mutation.package_tree import Tree
 from grader.authoring.mutation.registry import Finder, operator
 from grader.authoring.mutation.solution import CMAKE, MANIFEST, CodePlace, Solution
-from grader.authoring.mutation.source_edits import Document, Edit, Element, whole_lines
+from grader.authoring.mutation.source_edits import Document, Element, TextEdit, whole_lines
 
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 DEPENDENCIES = ("depend", "build_depend", "build_export_depend", "exec_depend", "run_depend")
@@ -48,24 +48,24 @@ find_catkin = _calls("find_package", wanted=lambda c: bool(c.args) and c.args[0]
 install_calls = _calls("catkin_install_python")
 
 
-def _comment_out(text: str, command: Command) -> list[Edit]:
+def _comment_out(text: str, command: Command) -> list[TextEdit]:
     start, end = whole_lines(text, command.span.start, command.span.stop)
     lines = text[start:end].removesuffix("\n").split("\n")
-    return [Edit(start, end, "".join(f"# {line}\n" for line in lines))]
+    return [TextEdit(start, end, "".join(f"# {line}\n" for line in lines))]
 
 
 @operator("project-renamed", each=lambda s: ((p, s.name, c) for p, _, c in _calls("project")(s) if c.args))
-def project_renamed(package: str, command: Command) -> list[Edit]:
+def project_renamed(package: str, command: Command) -> list[TextEdit]:
     """Gives project() another name than package.xml.
 
     Fits every CMakeLists.txt with project().
     """
     span = command.args[0].span
-    return [Edit(span.start, span.stop, f"my_{package}")]
+    return [TextEdit(span.start, span.stop, f"my_{package}")]
 
 
 @operator("no-find-package", each=find_catkin)
-def no_find_package(text: str, command: Command) -> list[Edit]:
+def no_find_package(text: str, command: Command) -> list[TextEdit]:
     """Leaves find_package(catkin …) commented out.
 
     Fits every CMakeLists.txt with find_package(catkin …).
@@ -74,56 +74,56 @@ def no_find_package(text: str, command: Command) -> list[Edit]:
 
 
 @operator("no-catkin-package", each=_calls("catkin_package"))
-def no_catkin_package(text: str, command: Command) -> list[Edit]:
+def no_catkin_package(text: str, command: Command) -> list[TextEdit]:
     """Does not call catkin_package().
 
     Fits every CMakeLists.txt with catkin_package().
     """
-    return [Edit(*whole_lines(text, command.span.start, command.span.stop), "")]
+    return [TextEdit(*whole_lines(text, command.span.start, command.span.stop), "")]
 
 
 @operator("unknown-component", each=find_catkin)
-def unknown_component(_text: str, command: Command) -> list[Edit]:
+def unknown_component(_text: str, command: Command) -> list[TextEdit]:
     """Asks catkin for dep1, as the help of catkin_create_pkg does.
 
     Fits every CMakeLists.txt with find_package(catkin …).
     """
     has = any(argument.value == "COMPONENTS" for argument in command.args)
     end = command.span.stop - 1
-    return [Edit(end, end, " dep1" if has else " COMPONENTS dep1")]
+    return [TextEdit(end, end, " dep1" if has else " COMPONENTS dep1")]
 
 
 @operator("cmake-malformed", each=_last_command)
-def cmake_malformed(command: Command) -> list[Edit]:
+def cmake_malformed(command: Command) -> list[TextEdit]:
     """Leaves a bracket open in CMakeLists.txt.
 
     Fits every CMakeLists.txt with a command.
     """
-    return [Edit(command.span.stop - 1, command.span.stop, "")]
+    return [TextEdit(command.span.stop - 1, command.span.stop, "")]
 
 
 @operator("source-missing", each=_last_command)
-def source_missing(command: Command) -> list[Edit]:
+def source_missing(command: Command) -> list[TextEdit]:
     """Builds a C++ program whose source is not in the package.
 
     Fits every CMakeLists.txt with a command.
     """
     end = command.span.stop
-    return [Edit(end, end, "\n\nadd_executable(my_node src/my_node.cpp)")]
+    return [TextEdit(end, end, "\n\nadd_executable(my_node src/my_node.cpp)")]
 
 
 @operator("install-dropped", each=_find_installed)
-def install_dropped(text: str, command: Command, scripts: list[Token], script: Token) -> list[Edit]:
+def install_dropped(text: str, command: Command, scripts: list[Token], script: Token) -> list[TextEdit]:
     """Does not name a script in catkin_install_python().
 
     Fits every script that catkin_install_python() names.
     """
     span = script.span if len(scripts) > 1 else command.span
-    return [Edit(*whole_lines(text, span.start, span.stop), "")]
+    return [TextEdit(*whole_lines(text, span.start, span.stop), "")]
 
 
 @operator("install-commented", each=install_calls)
-def install_commented(text: str, command: Command) -> list[Edit]:
+def install_commented(text: str, command: Command) -> list[TextEdit]:
     """Leaves catkin_install_python() commented out.
 
     Fits every call of catkin_install_python().
@@ -132,13 +132,13 @@ def install_commented(text: str, command: Command) -> list[Edit]:
 
 
 @operator("install-elsewhere", each=install_calls)
-def install_elsewhere(_text: str, command: Command) -> list[Edit]:
+def install_elsewhere(_text: str, command: Command) -> list[TextEdit]:
     """Installs the scripts where rosrun does not look.
 
     Fits every call of catkin_install_python() into the package's programs.
     """
     spans = [argument.span for argument in command.args if argument.value == BIN]
-    return [Edit(span.start, span.stop, "${CATKIN_PACKAGE_SHARE_DESTINATION}") for span in spans]
+    return [TextEdit(span.start, span.stop, "${CATKIN_PACKAGE_SHARE_DESTINATION}") for span in spans]
 
 
 # ---- package.xml
@@ -173,7 +173,7 @@ def _package(solution: Solution) -> Iterator[tuple[CodePlace, Solution]]:
 
 
 @operator("dependency-dropped", each=_dependencies)
-def dependency_dropped(manifest: Document, elements: list[Element]) -> list[Edit]:
+def dependency_dropped(manifest: Document, elements: list[Element]) -> list[TextEdit]:
     """Does not declare a package that the nodes need.
 
     Fits every dependency of package.xml but catkin.
@@ -182,7 +182,7 @@ def dependency_dropped(manifest: Document, elements: list[Element]) -> list[Edit
 
 
 @operator("manifest-renamed", each=_elements("name"))
-def manifest_renamed(manifest: Document, element: Element) -> list[Edit]:
+def manifest_renamed(manifest: Document, element: Element) -> list[TextEdit]:
     """Gives package.xml another name than the rest of the package.
 
     Fits every package.xml with a name.
@@ -204,17 +204,17 @@ def package_renamed(solution: Solution) -> Tree:
 
 
 @operator("manifest-malformed", each=_elements("description"))
-def manifest_malformed(manifest: Document, element: Element) -> list[Edit]:
+def manifest_malformed(manifest: Document, element: Element) -> list[TextEdit]:
     """Forgets to close a tag in package.xml.
 
     Fits every package.xml with a description.
     """
     close = manifest.data.rfind(b"</", element.inner, element.end)
-    return [Edit(close, element.end, "")] if close >= 0 else []
+    return [TextEdit(close, element.end, "")] if close >= 0 else []
 
 
 @operator("buildtool-dropped", each=_elements("buildtool_depend"))
-def buildtool_dropped(manifest: Document, element: Element) -> list[Edit]:
+def buildtool_dropped(manifest: Document, element: Element) -> list[TextEdit]:
     """Does not name catkin as the build tool.
 
     Fits every package.xml with a buildtool_depend.
@@ -223,7 +223,7 @@ def buildtool_dropped(manifest: Document, element: Element) -> list[Edit]:
 
 
 @operator("email-left", each=_elements("maintainer"))
-def email_left(manifest: Document, element: Element) -> list[Edit]:
+def email_left(manifest: Document, element: Element) -> list[TextEdit]:
     """Leaves the maintainer's e-mail address as catkin_create_pkg wrote it.
 
     Fits every maintainer with an address.

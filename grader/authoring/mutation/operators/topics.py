@@ -29,7 +29,13 @@ from grader.authoring.mutation.rospy_code import (
     targets,
 )
 from grader.authoring.mutation.solution import CodePlace, Solution
-from grader.authoring.mutation.source_edits import Edit, Function, Script, every_second_time, misspelt_name
+from grader.authoring.mutation.source_edits import (
+    Function,
+    Script,
+    TextEdit,
+    every_second_time,
+    misspelt_name,
+)
 from grader.model.record import Record
 
 OTHER_TYPES = {
@@ -51,7 +57,7 @@ class OtherTypeParams(Record):
 
 
 @operator("topic-misspelt", each=each_endpoint)
-def topic_misspelt(script: Script, endpoint: Endpoint) -> list[Edit]:
+def topic_misspelt(script: Script, endpoint: Endpoint) -> list[TextEdit]:
     """Misspells the topic.
 
     Fits every publisher and subscriber whose topic is written out.
@@ -60,7 +66,7 @@ def topic_misspelt(script: Script, endpoint: Endpoint) -> list[Edit]:
 
 
 @operator("topic-capital", each=each_endpoint)
-def topic_capital(script: Script, endpoint: Endpoint) -> list[Edit]:
+def topic_capital(script: Script, endpoint: Endpoint) -> list[TextEdit]:
     """Writes the topic with a capital letter.
 
     Fits every publisher and subscriber whose topic is written out.
@@ -70,7 +76,7 @@ def topic_capital(script: Script, endpoint: Endpoint) -> list[Edit]:
 
 
 @operator("private-topic", each=each_endpoint)
-def private_topic(script: Script, endpoint: Endpoint) -> list[Edit]:
+def private_topic(script: Script, endpoint: Endpoint) -> list[TextEdit]:
     """Puts the topic into the node's private namespace.
 
     Fits every publisher and subscriber whose topic is written out.
@@ -79,7 +85,7 @@ def private_topic(script: Script, endpoint: Endpoint) -> list[Edit]:
     return [script.replace(endpoint.name, repr(f"~{name}")), *_node_first(script, endpoint)]
 
 
-def _node_first(script: Script, endpoint: Endpoint) -> list[Edit]:
+def _node_first(script: Script, endpoint: Endpoint) -> list[TextEdit]:
     """rospy knows private names only once the node has its own: init_node moves up where it comes later."""
     made = script.statement(endpoint.call)
     block = script.block(made)
@@ -90,7 +96,7 @@ def _node_first(script: Script, endpoint: Endpoint) -> list[Edit]:
 
 
 @operator("publisher-dropped", each=each_publisher)
-def publisher_dropped(script: Script, publisher: Endpoint) -> list[Edit]:
+def publisher_dropped(script: Script, publisher: Endpoint) -> list[TextEdit]:
     """Removes a publisher that should stay.
 
     Fits every publisher that is kept in a variable.
@@ -102,7 +108,7 @@ def publisher_dropped(script: Script, publisher: Endpoint) -> list[Edit]:
 
 
 @operator("subscriber-dropped", each=each_subscriber)
-def subscriber_dropped(script: Script, subscriber: Endpoint) -> list[Edit]:
+def subscriber_dropped(script: Script, subscriber: Endpoint) -> list[TextEdit]:
     """Removes a subscriber that should stay.
 
     Fits every subscriber.
@@ -111,7 +117,7 @@ def subscriber_dropped(script: Script, subscriber: Endpoint) -> list[Edit]:
 
 
 @operator("other-type", each=each_endpoint, params=OtherTypeParams)
-def other_type(script: Script, endpoint: Endpoint, params: OtherTypeParams) -> list[Edit]:
+def other_type(script: Script, endpoint: Endpoint, params: OtherTypeParams) -> list[TextEdit]:
     """Takes another message type.
 
     Fits every publisher and subscriber of a number or a text of std_msgs.
@@ -119,7 +125,7 @@ def other_type(script: Script, endpoint: Endpoint, params: OtherTypeParams) -> l
     to = params.to or OTHER_TYPES.get(endpoint.type_name, "")
     if not to or endpoint.type is None:
         return []
-    uses, edits = [endpoint.type], list[Edit]()
+    uses, edits = [endpoint.type], list[TextEdit]()
     if last_name(endpoint.call.func) == "Publisher":
         if endpoint.type_name == "String":
             edits = _send_time(script, endpoint)
@@ -138,17 +144,17 @@ def _constructors(script: Script, publisher: Endpoint) -> list[ast.expr]:
     return [call.func for call in dict.fromkeys(made) if last_name(call.func) == publisher.type_name]
 
 
-def _send_time(script: Script, publisher: Endpoint) -> list[Edit]:
+def _send_time(script: Script, publisher: Endpoint) -> list[TextEdit]:
     """A text cannot be sent as a number: the time is sent in its place."""
     found = []
     for call in publish_calls(script, publisher):
         spans = [script.span(given) for given in (*call.args, *call.keywords)]
         if spans:
-            found.append(Edit(min(spans)[0], max(end for _, end in spans), "rospy.get_time()"))
+            found.append(TextEdit(min(spans)[0], max(end for _, end in spans), "rospy.get_time()"))
     return found
 
 
-def _import(script: Script, kind: ast.expr, to: str) -> list[Edit] | None:
+def _import(script: Script, kind: ast.expr, to: str) -> list[TextEdit] | None:
     """The import that the other type needs; None where it cannot be told how this one was imported."""
     if isinstance(kind, ast.Attribute):
         return []
@@ -158,12 +164,12 @@ def _import(script: Script, kind: ast.expr, to: str) -> list[Edit] | None:
                 return []
             if alias.name == last_name(kind) and alias.asname is None:
                 end = script.span(alias)[1]
-                return [Edit(end, end, f", {to}")]
+                return [TextEdit(end, end, f", {to}")]
     return None
 
 
 @operator("publish-half", each=each_publisher)
-def publish_half(script: Script, publisher: Endpoint) -> list[Edit]:
+def publish_half(script: Script, publisher: Endpoint) -> list[TextEdit]:
     """Publishes this topic in every second turn only, its counter with it.
 
     Fits every publisher whose messages are sent by a statement of their own.
@@ -181,7 +187,7 @@ def _assigns(statement: ast.stmt, names: set[str]) -> bool:
 
 
 @operator("published-twice", each=each_publisher)
-def published_twice(script: Script, publisher: Endpoint) -> list[Edit]:
+def published_twice(script: Script, publisher: Endpoint) -> list[TextEdit]:
     """Publishes each message twice.
 
     Fits every publisher whose messages are sent by a statement of their own.
@@ -301,7 +307,7 @@ def _calls_in(script: Script, statements: Sequence[ast.stmt]) -> Iterator[ast.Ca
 
 
 @operator("other-rate", each=_paces, params=RateParams)
-def other_rate(script: Script, pace: Pace, params: RateParams) -> list[Edit]:
+def other_rate(script: Script, pace: Pace, params: RateParams) -> list[TextEdit]:
     """Publishes at another rate.
 
     Fits every script with a rate, a timer, or a sleep in a loop.
@@ -310,7 +316,7 @@ def other_rate(script: Script, pace: Pace, params: RateParams) -> list[Edit]:
 
 
 @operator("burst", each=_turns, params=BurstParams)
-def burst(script: Script, pace: Pace, turn: list[ast.stmt], params: BurstParams) -> list[Edit]:
+def burst(script: Script, pace: Pace, turn: list[ast.stmt], params: BurstParams) -> list[TextEdit]:
     """Sends many messages at once and then none for long, with the right number in the mean.
 
     Fits every script with a rate, a timer, or a sleep in a loop that publishes.
@@ -326,7 +332,7 @@ def _rate_sleeps(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Ex
 
 
 @operator("sleep-without-brackets", each=_rate_sleeps)
-def sleep_without_brackets(script: Script, statement: ast.Expr) -> list[Edit]:
+def sleep_without_brackets(script: Script, statement: ast.Expr) -> list[TextEdit]:
     """Names rate.sleep but does not call it, so that the loop floods its topics.
 
     Fits every script with a statement rate.sleep().
