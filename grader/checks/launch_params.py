@@ -191,7 +191,8 @@ def _not_loaded(
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
     if absence := refusal(run):
-        return _refusal_verdict(file, params, absence)
+        slip = _misplaced(package, file, params) if "does not exist" in absence.why else None
+        return slip.verdict(quoted(run)) if slip else _refusal_verdict(file, params, absence)
     loads = [load for load in file.loads if _is_of(load, params)]
     if not loads:
         message = f"{file.path} has no <rosparam> that loads {params.file}"
@@ -213,6 +214,18 @@ def _loaded_otherwise(run: Run, params: LaunchLoadsParams, loads: list[LaunchLoa
         return failed(message, hint=OUTSIDE.format(params.file))
     message = f"{params.file} is loaded, but {describe_missing(found, missing)}"
     return unjudged(message, hint=f"fix the names in {params.file}")
+
+
+def _misplaced(package: PackageFacts, file: LaunchFile, params: LaunchLoadsParams) -> Slip | None:
+    """A `<rosparam>` that looks for the file in another folder of the package than the one in which it lies."""
+    there = find_script(package, params.file)
+    here = f"$(find {package.name})/"
+    for load in file.loads if there else ():
+        source = load.source or ""
+        if there and _is_of(load, params) and source.startswith(here) and source != here + there.path:
+            why = f"there is no {source.removeprefix(here)} in the package; the file is {there.path}"
+            return Slip(load.file, load.line, why, f'write file="{here}{there.path}"')
+    return None
 
 
 def _refusal_verdict(file: LaunchFile, params: LaunchLoadsParams, absence: Absence) -> Verdict:
