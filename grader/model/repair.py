@@ -125,12 +125,17 @@ def advice_of(repair: Repair) -> str:
         where = f"{repair.file}: below line {repair.line}," if below and not named else f"{place}:"
         return f"{where} {repair.fix}"
     code = join_words([line if "`" in line else f"`{line}`" for line in added])
-    if repair.before not in (new[0], new[-1]):
-        return f"{place_of(repair)}: write {code}"
+    replaced, script = repair.before not in (new[0], new[-1]), repair.file.endswith(".py")
+    if replaced:
+        moved = script and _blanks(new[0]) != _blanks(repair.before)
+        return f"{place_of(repair)}: write {code}{_indentation(new[0]) if moved else ''}"
     where = "below" if repair.before == new[0] else "above"
-    beside = new[1] if where == "below" else new[0]
-    depth = _indentation(beside) if repair.file.endswith(".py") else ""
+    depth = _indentation(new[1] if where == "below" else new[0]) if script else ""
     return f"{repair.file}: {where} line {repair.line} add {code}{depth}"
+
+
+def _blanks(line: str) -> str:
+    return line[: len(line) - len(line.lstrip())]
 
 
 def advice_on(repairs: Iterable[Repair]) -> list[str]:
@@ -144,7 +149,7 @@ def advice_on(repairs: Iterable[Repair]) -> list[str]:
 
 def _indentation(line: str) -> str:
     """Return how an indented line begins, as it has to be typed: with the tabs or the spaces of the lines beside it."""
-    blanks = line[: len(line) - len(line.lstrip())]
+    blanks = _blanks(line)
     counts = ((blanks.count("\t"), "tab"), (blanks.count(" "), "space"))
     words = join_words(plural(count, kind) for count, kind in counts if count)
     return f", with {words} before it" if words else ""

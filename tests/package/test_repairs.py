@@ -107,7 +107,7 @@ CASES = {
     "head-commented-out": Case(
         swapped(TALKER, ("    while not", "   ## while not")),
         ["python-syntax"],
-        "line 9 of src/talker.py: this line begins the block below it, and is commented out",
+        "line 9: write `while not rospy.is_shutdown():`, with 4 spaces before it",
         after={TALKER: "    while not rospy"},
     ),
     "bracket-not-opened": Case(
