@@ -190,18 +190,20 @@ def _imports_again(fix: str, hint: str) -> bool:
     return bool(code) and fix.endswith("at the top") and all(f"`{one}`" in hint for one in code)
 
 
+_OTHER_TYPE = re.compile(r"(?:publish|subscribe with) (\w+)/(\w+) in .*, not (\w+)")
+
+
 def _with_later(verdict: Verdict, later: Iterable[str]) -> Verdict:
-    told = [
-        one
-        for one in dict.fromkeys(later)
-        if one not in verdict.hint and not _imports_again(one, verdict.hint)
-    ]
-    if not told or not verdict.hint:
+    hint = verdict.hint
+    told = [one for one in dict.fromkeys(later) if one not in hint and not _imports_again(one, hint)]
+    if not told or not hint:
         return verdict
+    for other in filter(None, map(_OTHER_TYPE.fullmatch, told)):  # what is not wanted is not imported first
+        hint = re.sub(rf"from \w+\.msg import {other[3]}\b", f"from {other[1]}.msg import {other[2]}", hint)
     if verdict.of_machine:
-        hint = f"{join_words(told)}. {verdict.hint.replace(NOTHING_TO_DO, 'For the rest, ', 1)}"
+        hint = f"{join_words(told)}. {hint.replace(NOTHING_TO_DO, 'For the rest, ', 1)}"
         return verdict.model_copy(update={"hint": hint})
-    return verdict.model_copy(update={"hint": f"{verdict.hint}; then {join_words(told)}"})
+    return verdict.model_copy(update={"hint": f"{hint}; then {join_words(told)}"})
 
 
 class Later:

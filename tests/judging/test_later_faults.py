@@ -170,6 +170,19 @@ def test_what_is_wrong_behind_a_mistake_is_named_with_it(case: str) -> None:
     assert told in hint_of(name, run, criteria, *slips)
 
 
+def test_a_type_that_the_lab_does_not_want_is_not_imported_first() -> None:
+    lines = [f'  File "/ws/src/lab1/{FILE}", line 3, in <module>',
+             "ImportError: cannot import name 'JointState' from 'std_msgs.msg' (/usr/lib/msg/__init__.py)"]  # fmt: skip
+    console = [{**DIES["console"][0], "lines": ["Traceback (most recent call last):", *lines]}]
+    run = {**DIES, "console": console}
+    assert hint_of("node", run, TALKER).startswith("from sensor_msgs.msg import JointState")
+    told = hint_of("node", run, TALKER, slip("publisher", "chatter"), slip("publisher-type", "JointState"))
+    assert (
+        told
+        == f"from std_msgs.msg import String; then publish std_msgs/String in line 5 of {FILE}, not JointState"
+    )
+
+
 @pytest.mark.parametrize("case", NOTHING)
 def test_nothing_is_named_behind_a_mistake_that_is_not_plainly_wrong(case: str) -> None:
     name, run, criteria, slips = NOTHING[case]

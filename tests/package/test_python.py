@@ -178,7 +178,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node("    while go:\n        if not rospy.is_shutdown():\n            p.publish(1)\n") + CALLED, []),
         (node(LOOP + "        p.publish(1)\n        if x:\n            return\n") + CALLED, []),
         (node(LOOP + "        p.publish(1)\n    rate.sleep()\n") + CALLED,
-         [("sleep-outside", 6, "`rate.sleep()` is outside the loop of line 4")]),
+         [("sleep-outside", 6, "loop of line 4: move it into that loop, below line 5, with the same spaces")]),
         (node(LOOP + "        for n in range(9):\n            p.publish(n)\n        rate.sleep()\n") + CALLED,
          [("sleep-outside", 7, "outside the loop of line 5")]),
         (node(LOOP + "        rate.sleep()\n        p.publish(1)\n    rospy.sleep(1)\n") + CALLED, []),

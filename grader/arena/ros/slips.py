@@ -213,7 +213,9 @@ def sleepless_loops(tree):
             continue
         name = dotted(outside[0].func) or "sleep"
         message = "`%s()` is outside the loop of line %d" % (name, loop.lineno)
-        fix = "move it into that loop, as the last line of it"
+        last = loop.body[-1]
+        fix = "move it into that loop, below line %d, with the same spaces or tabs before it as line %d has"
+        fix %= (last.end_lineno, last.lineno)
         yield slip(outside[0].lineno, "sleep-outside", message, fix=fix, name=name)
 
 
