@@ -49,7 +49,7 @@ from grader.judging.repeats_and_repairs import (
 from grader.judging.summary import leave_out, name_unchanged_files, round_half_up
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult, EarlyVerdict, Repaired
-from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive
+from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive, share_text
 from grader.rubric.made_up import Value, tell_made_up, values_of, with_recorded_values
 from grader.rubric.model import Criterion, Rubric
 
@@ -362,6 +362,8 @@ def result_of(
     """Return the report's line of a criterion, with the points of its verdict."""
     earned = repaired is not None and not repaired.charged and verdict.score >= repaired.share
     lost = (verdict.status.is_lost or verdict.status is Status.INCONCLUSIVE) and not earned
+    share = f"; {share_text(verdict.score)} of the points for what is right: "
+    right = share + verdict.right if verdict.status is Status.PARTIAL and verdict.right else ""
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
@@ -371,7 +373,7 @@ def result_of(
         points=round_half_up(_points(criterion, verdict), digits),
         max_points=criterion.points,
         extra=criterion.extra,
-        message=verdict.message,
+        message=f"{verdict.message}{right}",
         expected=verdict.expected,
         measured=verdict.measured,
         hint=verdict.hint or (criterion.hint if lost else ""),

@@ -349,7 +349,6 @@ def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:
     where = join_words(dict.fromkeys(place_of(repair) for repair in repairs))
     score = copy.score * share
     status = Status.PARTIAL if share < 1 and copy.status is Status.PASS else copy.status
-    of = "the points" if copy.status is Status.PASS else "what is right there"
-    points = f"{share_text(share)} of {of}; " if copy.score else ""
+    points = f"{share_text(share)} of the points; " if copy.score and not copy.right else ""
     message = f"judged on a copy with {where} repaired: {points}{copy.message}"
     return copy.model_copy(update={"status": status, "score": score, "message": message})

@@ -84,7 +84,7 @@ class Verdict(Record):
     `timing` marks a loss that one run's timing could have made: it counts only if it is seen twice. `of_machine`: it is
     open until the machine has what it lacks, and grading again before changes nothing. `cause` is what a
     process ended of, in words that are the same in every verdict that rests on it. `blocked_by` is the criterion that
-    explains the absence.
+    explains the absence, `right` what earned a part of the points.
     """
 
     status: Status
@@ -101,6 +101,7 @@ class Verdict(Record):
     of_machine: bool = False
     cause: str = ""
     blocked_by: str = ""
+    right: str = ""
 
     def about(
         self, *, expected: str | None = None, measured: str | None = None, citations: Citations | None = None
@@ -117,12 +118,11 @@ class Verdict(Record):
         return self.model_copy(update={"citations": tuple(cited)})
 
     def in_part(self, share: float, right: str) -> Verdict:
-        """Return a fail as one that earns `share` of the points, 0 to 1, for what is right, and says so. Where nothing
-        is, and where nothing could be judged, it stays as it is."""
+        """Return a fail as one that earns `share` of the points, 0 to 1, for what is right. Where nothing is, and
+        where nothing could be judged, it stays as it is."""
         if self.status is not Status.FAIL or self.unjudged or share <= 0:
             return self
-        message = f"{self.message}; {share_text(share)} of the points for what is right: {right}"
-        return self.model_copy(update={"status": Status.PARTIAL, "score": share, "message": message})
+        return self.model_copy(update={"status": Status.PARTIAL, "score": share, "right": right})
 
     def once(self) -> Verdict:
         """Return the verdict marked as a loss that one run's timing could have made."""

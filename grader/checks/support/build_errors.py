@@ -356,6 +356,9 @@ def _unused_argument(found: re.Match[str], _package: PackageFacts, _lines: Seque
     )
 
 
+FIXES_MAX = 4
+
+
 def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
     text = f"{found[1]}/{found[2]}.h does not exist when the program is compiled"
     made = {f"{folder}/{found[2]}.{folder}" for folder in ("msg", "srv")}
@@ -370,9 +373,19 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
             )
         return Explained(f"{text}: there is no such header", "check the #include and find_package(…)")
     why = f"{text}: nothing makes it wait for its message, so with -j it fails in some runs and not in others"
-    return Explained(
-        why, "add_dependencies(<program> ${${PROJECT_NAME}_EXPORTED_TARGETS}) below add_executable(…)"
+    calls = package.cmake.calls if package.cmake else ()
+    waiting = {call.args[0] for call in calls if call.name == "add_dependencies" and call.args}
+    programs = [call for call in calls if call.name == "add_executable" and call.args]
+    fixes = [
+        f"below the add_executable(…) of line {call.line}, write "
+        f"add_dependencies({call.args[0]} ${{${{PROJECT_NAME}}_EXPORTED_TARGETS}})"
+        for call in programs
+        if call.args[0] not in waiting
+    ]
+    other = (
+        "write add_dependencies(<program> ${${PROJECT_NAME}_EXPORTED_TARGETS}) below its add_executable(…)"
     )
+    return Explained(why, "; ".join(fixes[:FIXES_MAX]) or other)
 
 
 def _missing_header(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
