@@ -32,7 +32,7 @@ FAMILIES = (
     "messages",
     "reacts",
     "stamps",
-    "definition",
+    "interfaces",
     "transform",
     "rate",
     "counter",
