@@ -35,10 +35,11 @@ MESSAGES = {
     "nav_msgs": "OccupancyGrid Odometry",
     "sensor_msgs": "CompressedImage Image Imu JointState Joy LaserScan NavSatFix PointCloud2 Range",
 }
-OF_OTHER_LANGUAGES = {
+OBVIOUS_NAMES = {
     **dict.fromkeys(("true", "TRUE"), "True"),
     **dict.fromkeys(("false", "FALSE"), "False"),
     **dict.fromkeys(("null", "NULL", "none", "nil", "nullptr"), "None"),
+    **dict.fromkeys(("_name_", "__name", "_name", "name__"), "__name__"),
 }
 NAME_CHARS_MIN = 4
 """Shorter names differ by one letter because they are different names."""
@@ -109,6 +110,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             _without_old_names,
             _without_old_print,
             lambda t: _with_modules(t, types),
+            lambda t: _with_classes(t, types),
             lambda t: _with_imports(t, types),
             _with_names,
             _with_attributes,
@@ -216,6 +218,25 @@ def _with_modules(text: str, types: list[str]) -> Iterator[Step]:
                 yield step
 
 
+def _with_classes(text: str, types: list[str]) -> Iterator[Step]:
+    """`from std_msgs.msg import Sting` where the script uses `String`, which nothing imports."""
+    tree = ast.parse(text)
+    bound = _bound(tree)
+    known = {name for names in MESSAGES.values() for name in names.split()} | {
+        t.partition("/")[2] for t in types
+    }
+    used = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)} & known - bound
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.ImportFrom) or not (node.module or "").endswith(".msg"):
+            continue
+        for alias in node.names:
+            near = get_close_matches(alias.name, used, 1, 0.8) if alias.name not in known else []
+            span = _span(text.split("\n"), alias)  # type: ignore[arg-type] # an alias has a place too
+            if near and span is not None and alias.asname is None:
+                yield from _step("name", span[0] + 1, text, _edit(text, [(*span, near[0])]), alias.name)
+                return
+
+
 def _with_class_imported(text: str, node: ast.Import, known: dict[str, set[str]]) -> Iterator[Step]:
     parts = node.names[0].name.split(".")
     package, module, name = parts if len(parts) == 3 else ("", "", "")
@@ -304,7 +325,7 @@ def _with_names(text: str) -> Iterator[Step]:
         own = shared | (_bound(ast.Module([block], [])) if isinstance(block, ast.FunctionDef) else set())
         missing = [n for n in ast.walk(block) if isinstance(n, ast.Name) and n.id not in known]
         for name in dict.fromkeys(n.id for n in missing):
-            meant = OF_OTHER_LANGUAGES.get(name) or _meant_by(name, own)
+            meant = OBVIOUS_NAMES.get(name) or _meant_by(name, own)
             spans = [span for n in missing if n.id == name and (span := _span(lines, n))]
             if meant and spans:
                 after = _edit(text, [(*span, meant) for span in spans])

@@ -116,6 +116,8 @@ from std_msgs.msg import Int8
         (6, "now = datetime.datetime.now()",
          "AttributeError: type object 'datetime.datetime' has no attribute 'datetime'",
          "write `datetime` for `datetime.datetime`"),
+        (6, "rospy.init_node(talker, anonymous=True)", "TypeError: argument of type 'function' is not iterable",
+         "write `rospy.init_node('talker', anonymous=True)`"),
         (6, "hear()", "TypeError: hear() missing 1 required positional argument: 'msg'",
          "put 'msg' into its brackets, or remove the call: ROS calls a callback by itself"),
         (6, "text = text + str(3)", "TypeError: 'str' object is not callable", "give the variable `str` another name"),

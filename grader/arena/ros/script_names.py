@@ -318,6 +318,8 @@ def all_methods(tree):
 def lacking_attributes(own):
     """Yield the attributes that the methods of a class read and that its objects need not have by then."""
     astray = own.astray()
+    if astray:
+        yield slip(astray[0].lineno, "object", astray[1], fix=astray[2], name="__init__")
     inside = set(ast.walk(astray[0])) if astray else set()
     for node, method in own.reads:
         name, stores = node.attr, own.stores.get(node.attr, [])

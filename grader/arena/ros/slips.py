@@ -565,8 +565,14 @@ def asked(node, functions):
 
 
 def without_effect(tree):
-    """Statements that compute something and keep nothing of it: `++i`, `i + 1`, `i == 0`."""
+    """Statements that compute something and keep nothing of it: `++i`, `i + 1`, `i == 0`; and `i = i`."""
     for node in ast.walk(tree):
+        if isinstance(node, ast.Assign) and [dotted(t) for t in node.targets] == [dotted(node.value)] != [
+            "..."
+        ]:
+            name = dotted(node.value)
+            message, fix = "`{0} = {0}` changes nothing", "write `{0} = {0} + 1`, or what it is to be,"
+            yield slip(node.lineno, "no-effect", message.format(name), fix=fix.format(name), name=name)
         value = node.value if isinstance(node, ast.Expr) else None
         if isinstance(value, ast.UnaryOp) and isinstance(value.operand, ast.UnaryOp):
             same = type(value.op) is type(value.operand.op) and isinstance(value.op, (ast.UAdd, ast.USub))

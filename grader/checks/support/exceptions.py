@@ -256,8 +256,8 @@ def _ros_call(message: str, source: str) -> Meaning | None:
         elif slept is not None and isinstance(slept.func, ast.Attribute):
             rate = ast.unparse(slept.func.value)
         return "a Rate knows by itself how long it sleeps", f"write `{shown(rate)}.sleep()`"
-    if message == "init_node() missing 1 required positional argument: 'name'":
-        return "a node needs a name", "write the node's name into the brackets, as a text"
+    if meaning := _init_node(message, source):
+        return meaning
     if serialized := re.match(r"(\w+)\.serialize\(\) missing", message):
         name = serialized[1]
         return (
@@ -291,6 +291,17 @@ def wrong_class(source: str) -> Meaning | None:
         return None
     kind = "an action" if of_action else "a service"
     return f"the type of {kind} is the class `{shown(right)}`", rewritten(source, (type_, right))
+
+
+def _init_node(message: str, source: str) -> Meaning | None:
+    """Of `init_node(…)` without a name, or with one that is no text."""
+    if message == "init_node() missing 1 required positional argument: 'name'":
+        return "a node needs a name", "write the node's name into the brackets, as a text"
+    called = next(iter(_calls(source, "init_node")), None)
+    if called is None or not called.args or not message.startswith("argument of type"):
+        return None
+    given = called.args[0]
+    return "a node's name is a text", rewritten(source, (given, f"'{ast.unparse(given)}'"))
 
 
 def _calls(source: str, *names: str) -> list[ast.Call]:

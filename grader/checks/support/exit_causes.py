@@ -307,16 +307,17 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
             if s.kind == "object" and s.place == FileCitation(file=place.file, line=place.line)
         )
         return next(((s.message, s.fix) for s in here if re.search(rf"\b{s.name}\b", found.message)), None)
-    if found.kind == "ROSInitException" and (advice := _late_init(place, package)):
-        return CAUSES[found.kind][0], advice
-    return None
+    return _late_init(place, package) if found.kind == "ROSInitException" else None
 
 
-def _late_init(place: FileCitation, package: PackageFacts) -> str:
-    """Return the advice to move the script's `init_node` up, if it stands below the line that needs it."""
-    made = [s.line for s in package.slips if s.file == place.file and s.kind == "node-name"]
-    below = [line for line in made if place.line is not None and line > place.line]
-    return f"move `rospy.init_node(…)` from line {below[0]} up, above line {place.line}" if below else ""
+def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
+    """Return why `init_node` was not called before: it stands below that line, or in an `__init__` that is none."""
+    slips = [s for s in package.slips if s.file == place.file]
+    if astray := next((s for s in slips if (s.kind, s.name) == ("object", "__init__")), None):
+        return astray.message, astray.fix
+    below = [s.line for s in slips if s.kind == "node-name" and place.line and s.line > place.line]
+    move = f"move `rospy.init_node(…)` from line {below[0]} up, above line {place.line}" if below else ""
+    return (CAUSES["ROSInitException"][0], move) if move else None
 
 
 def _asks_for_input(
@@ -571,8 +572,7 @@ def lifetime_text(life: Life) -> str:
 
 
 def _lines_added(package: PackageFacts, path: str) -> int:
-    """Return how many lines the script that ran has more than the one that was handed in: the arena writes a first line
-    into a node's script that has none."""
+    """Return how many lines the script that ran has more than the one handed in: a missing first line is added."""
     file = package.file(path)
     is_node = any(slip.file == path and slip.kind == "node-name" for slip in package.slips)
     return int(is_node and file is not None and file.shebang is None and not file.link_problem)
