@@ -194,8 +194,9 @@ _OTHER_TYPE = re.compile(r"(?:publish|subscribe with) (\w+)/(\w+) in .*, not (\w
 
 
 def _with_later(verdict: Verdict, later: Iterable[str]) -> Verdict:
-    hint = verdict.hint
-    told = [one for one in dict.fromkeys(later) if one not in hint and not _imports_again(one, hint)]
+    hint, said = verdict.hint, in_language(verdict.hint, "python")
+    new = [one for one in dict.fromkeys(later) if one.removeprefix("publish ") not in said]
+    told = [one for one in new if not _imports_again(one, hint)]
     if not told or not hint:
         return verdict
     for other in filter(None, map(_OTHER_TYPE.fullmatch, told)):  # what is not wanted is not imported first

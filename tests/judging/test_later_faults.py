@@ -208,6 +208,16 @@ def test_words_that_stand_nowhere_in_the_source_are_named() -> None:
         assert "then" not in hint_of("node", DIES, criteria, source=f"{LACKS}say('{words}')\n")
 
 
+def test_a_text_that_takes_the_place_of_input_is_told_once() -> None:
+    asks = [f'  File "/ws/src/lab1/{FILE}", line 3, in <module>', "    said = input()"]
+    lines = ["Traceback (most recent call last):", *asks, "EOFError: EOF when reading a line"]
+    hint = hint_of(
+        "node", {**DIES, "console": [{**DIES["console"][0], "lines": lines}]}, TALKER, source=LACKS
+    )
+    assert hint.startswith('write `"hello world %s" % rospy.get_time()` in place of `input()`')
+    assert hint.count("hello world") == 1
+
+
 def test_what_a_machine_lacks_does_not_hide_what_is_the_students() -> None:
     console = {
         **DIES["console"][0],
