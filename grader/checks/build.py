@@ -161,8 +161,11 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
             verdict = _broken_build(alone, build, exit_code).moved(package.way_to(other))
             return verdict.model_copy(update={"message": f"{other.name}: {verdict.message}"})
     told = explain_error_of_build(error, package, lines) if error else None
-    place = error.place if error else None
-    line = f"{place.file}:{place.line}: " if error and place and error.kind == "cmake" else ""
+    place = (told.place if told else None) or (error.place if error else None)
+    told_where = told is not None and told.place is not None
+    line = (
+        f"{place.file}:{place.line}: " if error and place and error.kind == "cmake" and not told_where else ""
+    )
     explained = package.manifest is None or (error is not None and error.kind == "cmake")
     kind = machine_lacks if told and told.of_machine else unjudged if explained else failed
     verdict = kind(

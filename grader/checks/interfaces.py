@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from grader.checks.registry import Refers, check
 from grader.checks.support.text import shown
 from grader.model.message_definitions import BUILT_IN, FULL_NAMES, PARTS, parse_definition, refuse_unknown
-from grader.model.package import Interface, InterfaceField, PackageFacts
+from grader.model.package import Fault, Interface, InterfaceField, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed
 from grader.wording import closest, join_words, plural
@@ -147,7 +147,7 @@ def _faults(
     found: Interface, wanted: list[InterfaceField], package: PackageFacts, params: DefinitionParams
 ) -> Iterator[_Fault]:
     if found.fault is not None:
-        yield _Fault(shown(found.fault.message), found.fault.line, "one field per line, type before name")
+        yield _unreadable(found, found.fault, wanted)
         return
     there = {(one.part, one.name): one for one in found.fields}
     asked = {(one.part, one.name) for one in wanted}
@@ -159,6 +159,19 @@ def _faults(
             yield _Fault(f"{shown(_name(one))} (line {one.line}) is not asked for", one.line, "take it out")
     if (params.text or params.ordered) and asked <= there.keys():
         yield from _other_order(wanted, there)
+
+
+def _unreadable(found: Interface, fault: Fault, wanted: list[InterfaceField]) -> _Fault:
+    """Of a line that is no field, or of a `---` that is missing: it belongs below the last field of the first part."""
+    fix = fault.cause.partition(": ")[2] or "one field per line, type before name"
+    line = fault.line
+    if fault.kind == "OtherParts":
+        fix = "write `---` alone in a line between the parts"
+        first = [one.name for one in wanted if one.part == wanted[0].part]
+        lines = [one.line for one in found.fields if one.name in first]
+        if lines and len(lines) == len(first):
+            line, fix = max(lines), f"write a line `---` below line {max(lines)}"
+    return _Fault(shown(fault.message), line, fix)
 
 
 def _differs(

@@ -11,6 +11,7 @@ from pydantic import Field
 from grader.checks.launch_files import missing_node
 from grader.checks.launch_params import params_in_place, params_misplaced
 from grader.checks.registry import DependencyName, LaunchName, ProgramName, check
+from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.launch import (
     Slip,
     is_exact,
@@ -24,20 +25,21 @@ from grader.checks.support.launch import (
     own_script,
     quoted,
     read_launch,
+    refusal,
     refusals,
     roslaunch_error,
     why_died,
     why_not_up,
 )
 from grader.checks.support.launch_names import find_renaming
-from grader.checks.support.processes import GlobalName
+from grader.checks.support.processes import GlobalName, early_end
 from grader.checks.support.scripts import shebang_obstacles
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import cite, nodes_on, topics_with
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, failed, machine_lacks, passed, unjudged
+from grader.model.verdict import FileCitation, Status, Verdict, failed, machine_lacks, passed, unjudged
 from grader.wording import join_words, plural
 
 
@@ -256,6 +258,9 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
         or _find_unnamed(package, file, params, found=bool(right))
         or _judge_nodes(package, file, run, params)
     ).in_part(share, right)
+    ended = early_end(run)
+    if verdict.status is Status.FAIL and not verdict.cause and ended is not None and refusal(run, package):
+        verdict = verdict.model_copy(update={"cause": explain_end(ended, run, package).cause})
     citations = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph"))
     return verdict.about(expected=expected, measured=_listed_nodes(run), citations=citations)
 
@@ -337,6 +342,8 @@ def _find_unnamed(
     for script in params.scripts:
         if verdict := missing_node(package, file, script):
             return verdict.model_copy(update={"unjudged": verdict.unjudged or not found})
+    if twins := _twins(file, params):
+        return twins
     for name, pkg in params.nodes.items():
         if verdict := _wrong_name(file, name, pkg) or _find_swap(file, name, params):
             return verdict
@@ -362,6 +369,24 @@ def _other_type(file: LaunchFile, node: LaunchNode, name: str, params: LaunchRun
     )
     fix = "; then ".join([f'in line {node.line} write type="{name}"', *lines])
     return Slip(node.file, node.line, f'{node.pkg} has no program "{node.type}"', fix).verdict()
+
+
+def _twins(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
+    """Return the verdict where a second node of one name would be the one that is asked for in another namespace."""
+    seen: dict[str, LaunchNode] = {}
+    for node in file.brings:
+        first = seen.setdefault(node.full_name, node)
+        wanted = [f"/{name.lstrip('/')}" for name in params.nodes if name.endswith(f"/{node.name}")]
+        lacking = [name for name in wanted if name not in {one.full_name for one in file.brings}]
+        spaces = [line for line in node.renaming if line.tag != "remap"]
+        if first is node or not is_exact(node) or len(lacking) != 1 or len(spaces) != 1:
+            continue
+        lines = (spaces[0].line, first.line)
+        cited = tuple(FileCitation(file=node.file or file.path, line=line) for line in lines)
+        message = f"two nodes are called {node.full_name} (lines {first.line} and {node.line} of {file.path})"
+        hint = f'in line {lines[0]}, write ns="{lacking[0].rpartition("/")[0].strip("/")}"'
+        return failed(f"{message}, and roslaunch starts nothing", hint=hint, citations=cited)
+    return None
 
 
 def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:

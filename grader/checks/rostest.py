@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from typing import Annotated, Literal, NamedTuple
 
@@ -10,9 +11,9 @@ from pydantic import Field, ValidationError
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import Lateness, excused, why_late
-from grader.checks.support.exit_causes import explain_end, lifetime_text
+from grader.checks.support.exit_causes import Ending, explain_end, explain_error, lifetime_text
 from grader.checks.support.processes import Life, lives, not_started
-from grader.checks.support.topics import cite
+from grader.checks.support.topics import cite, nodes_on, published_topics
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -197,7 +198,19 @@ def _judge_results(found: Results, run: Run, package: PackageFacts, start_ns: in
     dead = next((one for one in lives(run) if one.ended_early and one.end and one.end.exit_code != 0), None)
     if dead is not None:
         verdict = _with_cause(verdict, dead, run, package)
+    elif error := _error_behind(verdict, package, run):
+        message = f"{verdict.message}; a callback fails: {error.cause}"
+        about = {"message": message, "hint": error.hint, "citations": error.citations, "unjudged": False}
+        verdict = verdict.model_copy(update=about)
     return excused(verdict.once(), run, start_ns, run.end_ns, _why_late)
+
+
+def _error_behind(verdict: Verdict, package: PackageFacts, run: Run) -> Ending | None:
+    """Return the error in a callback of a node that publishes on a topic which the testcase that failed first names."""
+    topics = [topic for topic in published_topics(run) if re.search(rf"{topic}(?![\w/])", verdict.message)]
+    nodes = {node for topic in topics for node in nodes_on(run, topic, "publishers")}
+    processes = {event.processes.get(node, "") for _, event in run.graph for node in nodes} - {""}
+    return explain_error(package, run, only=processes) if processes else None
 
 
 def _with_cause(verdict: Verdict, dead: Life, run: Run, package: PackageFacts) -> Verdict:

@@ -20,6 +20,7 @@ from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import (
     EvidenceCitation,
+    FileCitation,
     Verdict,
     failed,
     inconclusive,
@@ -296,7 +297,7 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         hint = (
             f"give srv/{kind}.srv the names and types of the handout, the request above ---, and build again"
         )
-        return failed(message, hint=hint)
+        return _undivided(package, kind, one) or failed(message, hint=hint)
     if "returned None" in one.detail:
         hint = f"end the callback with return {kind}Response(…)"
         return failed(f"{asked} fails: its callback returns nothing", hint=hint)
@@ -311,6 +312,20 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         return failed(f"{asked} gives no answer: {owner.name} ended ({end.cause})", hint=end.hint)
     why = shown(one.detail) or "the call was not answered"
     return failed(f"{asked} gives no answer: {why}", hint=f"try it by hand: rosservice call {service} …")
+
+
+def _undivided(package: PackageFacts, kind: str, one: Exchange) -> Verdict | None:
+    """Return the verdict on a .srv file without its `---`, which belongs below the last field of the request."""
+    name = f"/{kind}.srv"
+    own = next((i for i in package.interfaces if f"/{i.path}".endswith(name)), None)
+    if own is None or own.fault is None or own.fault.kind != "OtherParts":
+        return None
+    lines = [field.line for field in own.fields if field.name in one.request]
+    below = (
+        f"below line {max(lines)}" if lines else "between the fields of the request and those of the response"
+    )
+    place = FileCitation(file=own.path, line=max(lines, default=None))
+    return failed(f"{own.path}: {own.fault.message}", hint=f"write a line `---` {below}", citations=(place,))
 
 
 def other_type(run: Run, service: str, one: Exchange) -> Verdict | None:

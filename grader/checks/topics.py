@@ -223,7 +223,10 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
         verdict = inconclusive(message, hint="let the grader run the package itself")
     elif plain:
         hint = publisher(params.topic, "…, latch=True, queue_size=1", "1, true")
-        verdict = failed(f"{join_words(plain)} publishes on {params.topic} without latching", hint=hint)
+        cited = named_at(package, run, "publisher", params.topic)
+        hint = f"in line {cited[0].line}, add `latch=True` to `rospy.Publisher(…)`" if cited else hint
+        message = f"{join_words(plain)} publishes on {params.topic} without latching"
+        verdict = failed(message, hint=hint, citations=cited)
     else:
         verdict = passed(f"{join_words(c.callerid for c in channels)} latches {params.topic}")
     kinds = join_words(f"{'latched' if c.latching else 'not latched'} by {c.callerid}" for c in channels)

@@ -13,7 +13,7 @@ from grader.checks.registry import check
 from grader.checks.support.clocks import excused, run_seconds, why_late
 from grader.checks.support.processes import GlobalName, observed_until_ns
 from grader.checks.support.text import RATE, near_names, shown
-from grader.checks.support.topics import cite, no_message
+from grader.checks.support.topics import cite, no_message, run_slip
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -108,7 +108,8 @@ def transform(package: PackageFacts, run: Run, params: TransformParams) -> Verdi
     own = sent_on(run.student_channels())
     seen = _seen_transforms(run, own, params)
     verdict = (
-        _not_sent(package, run, own, seen, params)
+        _never_called(package, run, own, params)
+        or _not_sent(package, run, own, seen, params)
         or _other_topic(own, params)
         or _no_rotation(seen, params)
         or _other_value(seen, params)
@@ -140,6 +141,17 @@ def _edges(own: Sequence[Sent]) -> list[tuple[str, str]]:
 
 def _edge_words(edges: Sequence[tuple[str, str]]) -> str:
     return shown(join_words([f"{parent} → {child}" for parent, child in edges]))
+
+
+def _never_called(
+    package: PackageFacts, run: Run, own: Sequence[Sent], params: TransformParams
+) -> Verdict | None:
+    """Return the verdict where nothing is sent of the child, and something is defined that nothing calls."""
+    slip = run_slip(package, run, "never-called")
+    if slip is None or not own or any(params.child in {one.parent, one.child} for one in own):
+        return None
+    message = f"{params.name} is not sent: {slip.message} (line {slip.line} of {slip.file})"
+    return failed(message, hint=f"call `{slip.name}()` where it is to be sent", citations=(slip.place,))
 
 
 def _not_sent(

@@ -18,6 +18,19 @@ RULE = "=" * 80
 BUILT_IN = {*(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)), "bool", "float32", "float64",
             "string", "time", "duration"}  # fmt: skip
 FULL_NAMES = {"byte": "int8", "char": "uint8", "Header": "std_msgs/Header"}
+OTHER_TYPES = {
+    "float": "float64",
+    "double": "float64",
+    "int": "int32",
+    "integer": "int32",
+    "long": "int64",
+    "short": "int16",
+    "unsigned": "uint32",
+    "str": "string",
+    "text": "string",
+    "boolean": "bool",
+}
+"""What other languages call the types of fields."""
 _TYPE = r"(?P<type>[A-Za-z]\w*(?:/[A-Za-z]\w*)?(?:\[\d{0,9}\])?)"
 _FIELD = re.compile(rf"{_TYPE}\s+(?P<name>[A-Za-z]\w*)", re.ASCII)
 _CONSTANT = re.compile(rf"{_TYPE}\s+(?P<name>[A-Za-z]\w*)\s*=\s*(?P<value>.*)", re.ASCII)
@@ -74,13 +87,32 @@ def _parse_line(text: str, part: str, line: int) -> InterfaceField | None:
 def _no_field(text: str, path: str, line: int) -> Fault:
     shown = text.strip()[:60]
     message = f"`{shown}` is no field: a line is a type and a name, like `float64 speed`"
-    return Fault(file=path, line=line, kind="NoField", message=message, cause=f"line {line}: {message}")
+    bare = shown.partition("//")[0].strip().rstrip(";, ")
+    right = re.sub(r"^(\w+)\.", r"\1/", bare) + (
+        f"  # {note.strip()}" if (note := shown.partition("//")[2]) else ""
+    )
+    if not bare and shown.startswith("//"):
+        right = f"# {shown.lstrip('/ ')}"
+    fix = (
+        f": write `{right}`"
+        if (right != shown and _parse_line(right, "", line)) or right.startswith("#")
+        else ""
+    )
+    return Fault(
+        file=path,
+        line=line,
+        kind="NoField",
+        message=message,
+        cause=f"`{shown}` in line {line} is no field{fix}",
+    )
 
 
 def _other_parts(path: str, number: int, parts: tuple[str, ...]) -> Fault:
     lines = "one line" if len(parts) == 2 else "two lines" if parts[1:] else "no line"
     message = f"there must be {lines} `---`, not {number}"
-    if parts[1:]:
+    if parts[1:] and not number:
+        message = f"it has no line `---` between {parts[0]} and {parts[1]}"
+    elif parts[1:]:
         message += f", between {', '.join(parts[:-1])} and {parts[-1]}"
     return Fault(file=path, line=None, kind="OtherParts", message=message, cause=message)
 
@@ -95,7 +127,8 @@ def other_fields(type_: str, found: str, wanted: str) -> str:
         for text in (found, wanted)
     )
     if len(there) != len(asked):
-        return f"it has {len(there)} parts with a line --- between them, not {len(asked)}"
+        lines = "no line" if len(there) == 1 else f"{len(there) - 1} lines"
+        return f"it has {lines} `---` between its parts, not {len(asked) - 1}"
     names = ("its request", "its response") if len(asked) > 1 else ("it",)
     for name, own, other in zip(names, there, asked, strict=False):
         if own != other:

@@ -280,6 +280,7 @@ SlipKind = Literal[
     "compared",
     "publishes",
     "prints",
+    "argument-text",
 ]
 
 
@@ -310,7 +311,8 @@ class PythonSlip(Record):
     `prints`: no slips, but a text that is published or printed, `{}` for a value in it and `{data}` for that of a
     message. `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a topic;
     `name` is the variable that is given the publisher, or `anonymous`. `publisher-type` and `subscriber-type`: the
-    message type in that line.
+    message type in that line. `argument-text`: no slip, but where an argument of the command line is kept as a text;
+    `fix` is the line with a number in its place.
     """
 
     file: str

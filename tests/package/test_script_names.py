@@ -165,3 +165,17 @@ def test_what_a_loop_does_to_its_counter_and_its_rate(tmp_path, case):
     kinds = ("set-in-loop", "reset-early", "sleep-twice", "no-effect")
     slips = [(s.kind, s.line, s.fix) for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in kinds]
     assert slips == ([found] if found else [])
+
+
+ARGUMENTS = {
+    "one": ("a = sys.argv[1]\n", ["a = int(sys.argv[1])"]),
+    "several": ("a, b = rospy.myargv(sys.argv)[1:3]\n", ["a, b = map(int, rospy.myargv(sys.argv)[1:3])"]),
+    "numbers": ("a = int(sys.argv[1])\nb = values[1]\n", []),
+}
+
+
+@pytest.mark.parametrize("case", ARGUMENTS)
+def test_an_argument_that_is_kept_as_a_text(tmp_path, case):
+    text, fixes = ARGUMENTS[case]
+    (tmp_path / "a.py").write_text(f"import sys, rospy\nvalues = []\n{text}")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "argument-text"] == fixes

@@ -19,7 +19,7 @@ import warnings
 
 # `-I` leaves this folder out, and a limited child does not begin in it.
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
-from script_names import TEXT_LIMIT
+from script_names import TEXT_LIMIT, slip
 from slips import slips
 
 try:
@@ -100,8 +100,23 @@ def check(root, name):
         if error is not None:
             report["faults"].append(syntax_fault(error, data))
             return report
-        report["slips"] = slips(tree)
+        report["slips"] = [*slips(tree), *argument_texts(data.decode("utf-8", "replace"))]
     return report
+
+
+ARGUMENT = re.compile(
+    r"\s*([\w., ]{1,99}?) *= *((?:sys\.argv|argv|rospy\.myargv\([\w.=]*\))\[[\w: -]{1,20}\])\s*(?:#.*)?"
+)
+
+
+def argument_texts(text):
+    """Yield where a script keeps arguments of its command line as they come, as texts; with numbers in their place."""
+    for number, line in enumerate(text.splitlines(), 1):
+        found = ARGUMENT.fullmatch(line[:TEXT_LIMIT])
+        if found:
+            several = ":" in found.group(2).rpartition("[")[2]
+            fix = ("%s = map(int, %s)" if several else "%s = int(%s)") % found.groups()
+            yield slip(number, "argument-text", "an argument is a text", fix=fix, name=found.group(1))
 
 
 def bare_except(tree, name):

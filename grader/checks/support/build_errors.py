@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from difflib import get_close_matches
 from typing import NamedTuple
 
 from grader.checks.support.scripts import cmake_calls, installed, path_in_package
 from grader.checks.support.text import near_names, shown
-from grader.installable import ON_THE_MACHINE, ROS_2, exists_somewhere, install_hint, known_packages
+from grader.installable import (
+    ON_THE_MACHINE,
+    ROS_2,
+    exists_somewhere,
+    install_hint,
+    known_packages,
+    noetic_messages,
+)
+from grader.model.message_definitions import BUILT_IN, FULL_NAMES, OTHER_TYPES
 from grader.model.package import PackageFacts, meant_command
 from grader.model.verdict import FileCitation
 from grader.wording import join_words
@@ -84,11 +92,13 @@ class BuildError(NamedTuple):
 
 
 class Explained(NamedTuple):
-    """The error in a student's words, and what to do; `of_machine`: the grading machine lacks something."""
+    """The error in a student's words, and what to do; `of_machine`: the grading machine lacks something; `place`: the
+    line that is wrong, where that is not the one that the build names."""
 
     why: str
     hint: str
     of_machine: bool = False
+    place: FileCitation | None = None
 
 
 def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | None:
@@ -251,10 +261,57 @@ def _missing_source(found: re.Match[str], package: PackageFacts, _lines: Sequenc
     return _missing_file(found[1], package, f"a target is made of {found[1]}")
 
 
-def _message_of_another(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+def no_types(package: PackageFacts) -> Explained | None:
+    """Return what is wrong with the fields of the package's own definitions whose types there are none of; None where
+    there are all."""
+    own = {posixpath.basename(one.path).partition(".")[0] for one in package.interfaces}
+    faults = [one.fault for one in package.interfaces if one.fault is not None]
+    wrong = [
+        (FileCitation(file=one.path, line=field.line), field, right)
+        for one in package.interfaces
+        for field in one.fields
+        if (right := _meant_type(field.type, own)) != field.type
+    ]
+    if faults:
+        why, _, fix = faults[0].cause.partition(": ")
+        hint = fix or "write each line as a type and a name: `float64 speed`"
+        return Explained(f"{faults[0].file}: {why}", hint, place=faults[0].place)
+    if not wrong:
+        return None
+    place, first, _ = wrong[0]
+    fixes = [f"in line {at.line} of {at.file}, write `{right} {field.name}`" for at, field, right in wrong]
+    others = {right.partition("/")[0] for _, _, right in wrong if "/" in right}
+    named = f", and {join_words(sorted(others))} after DEPENDENCIES in generate_messages(…)" if others else ""
+    if len(wrong) == 1 and not others:
+        fixes = [f"write `{wrong[0][2]} {first.name}`"]
+    why = f"line {place.line} of {place.file}: there is no type `{shown(first.type)}` of a field"
+    return Explained(why, join_words(fixes) + named, place=place)
+
+
+def _meant_type(type_: str, own: Collection[str]) -> str:
+    """Return the type of a field that is meant by one that there is none of; the type itself where there is one."""
+    base, bracket, size = type_.partition("[")
+    if base in {*BUILT_IN, *FULL_NAMES, *own} or "/" in base:
+        return type_
+    near = near_names(base, own)
+    plain = OTHER_TYPES.get(base.lower(), base.lower())
+    having = [package for package, types in noetic_messages().items() if base in types]
+    right = plain if plain in BUILT_IN else f"{having[0]}/{base}" if having else next(iter(near), "")
+    right = right or next(iter(get_close_matches(plain, sorted(BUILT_IN), 1)), base)
+    return f"{right}{bracket}{size}"
+
+
+def _no_definition(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    """Of a line that is no field."""
+    return no_types(package) or Explained(found.string, FIRST_ERROR_HINT)
+
+
+def _message_of_another(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
     words = " ".join(word for line in lines for word in line.split())
     named = re.search(r"Cannot locate message \[(\w+)\]: unknown package \[(\w+)\]", words)
     message = posixpath.basename(found[1])
+    if wrong := no_types(package):
+        return wrong
     if named is None:
         why = f"{message} needs messages that generate_messages(DEPENDENCIES …) does not name"
         return Explained(why, FIRST_ERROR_HINT)
@@ -357,12 +414,24 @@ def _unused_argument(found: re.Match[str], _package: PackageFacts, _lines: Seque
 
 
 FIXES_MAX = 4
+MADE = (".msg", ".srv", ".action")
+"""Files of which the build makes headers."""
 
 
 def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
     text = f"{found[1]}/{found[2]}.h does not exist when the program is compiled"
     made = {f"{folder}/{found[2]}.{folder}" for folder in ("msg", "srv")}
     if found[1] != package.name or not made & {f.path for f in package.files}:
+        own = [
+            posixpath.basename(f.path).partition(".")[0]
+            for f in package.files
+            if f.path.endswith(tuple(MADE))
+        ]
+        there = own if found[1] == package.name else noetic_messages().get(found[1], ())
+        near = near_names(found[2], there) if found[2] not in there else ()
+        if near:
+            right = f"#include <{found[1]}/{near[0]}.h>"
+            return Explained(f"there is no header {found[1]}/{found[2]}.h", f"write `{right}`")
         if found[1] in known_packages():
             return _missing_package(found, package, lines)
         if any(found[1] in call.args for call in cmake_calls(package, "find_package")):
@@ -496,6 +565,7 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"roslaunch_add_file_check\(\) path '([^']+)' was not found", _missing_launch),
     (r"Cannot find source file: (\S+)", _missing_source),
     (r"Could not find messages which '([^']+)' depends on", _message_of_another),
+    (r"(Invalid declaration|is not a legal message|InvalidMsgSpec|MsgNotFound)", _no_definition),
     (r"(generate_messages)\(\) must be called before catkin_package\(\)", _before_catkin_package),
     (UNKNOWN_COMMAND + r' "(\w+)"', _unknown_command),
     (r"does not contain a CMakeLists\.txt", _no_cmake_lists),

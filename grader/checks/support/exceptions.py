@@ -9,8 +9,9 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from grader.checks.support.text import shown
+from grader.installable import noetic_messages
 from grader.model.package import PackageFacts
-from grader.wording import plural
+from grader.wording import join_words, plural
 
 Meaning = tuple[str, str]
 """The cause, and what to do."""
@@ -38,7 +39,9 @@ _NO_NUMBER = re.compile(
     r"(?:invalid literal for int\(\) with base \d+|could not convert string to float): (.+)"
 )
 _LOCAL = re.compile(r"local variable '(\w+)'")
-_OPERANDS = re.compile(r"unsupported operand type\(s\) for \S+ '(\w+)' and '(\w+)'")
+_OPERANDS = re.compile(
+    r"(?:unsupported operand type\(s\) for \S+|not supported between instances of) '(\w+)' and '(\w+)'"
+)
 _ONE_TOO_MANY = re.compile(r"(\w+)\(\) takes (\d+) positional arguments? but (\d+) (?:was|were) given")
 _TOO_FEW = re.compile(r"^(?:\w+\.)*(\w+)\(\) missing \d+ required positional arguments?: (.+)$")
 _BAD_TOPIC = re.compile(
@@ -55,6 +58,33 @@ _WANTS_NUMBER = re.compile(r"(?:real number|a number) is required, not (\w+)|mus
 _IN_ITSELF = re.compile(
     r"(?:'(?:builtin_function_or_method|function)' object|type object '[\w.]+') has no attribute '(\w+)'$"
 )
+# what rospy says of a slip that its exception's class does not tell of
+SLIPS = {
+    "name 'raw_input' is not defined": ("`raw_input` is Python 2, and a node gets no input",
+     "remove `raw_input(…)`, and put its value in the code: a node cannot ask for input"),
+    **{f"name '{old}' is not defined": (f"`{old}` is Python 2", f"write `{new}`, as in Python 3")
+       for old, new in {"xrange": "range", "unicode": "str", "basestring": "str", "long": "int", "unichr": "chr",
+                        "reduce": "functools.reduce", "file": "open"}.items()},
+    **{f"name '{old}' is not defined": (f"Python has no `{old}`", f"write `{new}` for `{old}`")
+       for old, new in {"true": "True", "false": "False", "TRUE": "True", "FALSE": "False", "null": "None",
+                        "NULL": "None", "nullptr": "None", "nil": "None", "none": "None", "this": "self",
+                        "printf": "print", "cout": "print(…)", "Pass": "pass", "Break": "break",
+                        "Continue": "continue"}.items()},
+    **{f"'{kind}' object has no attribute 'data'": (f"it is the {kind} inside the message", "leave out `.data` here")
+       for kind in ("int", "float", "str", "bool")},
+    **{f"{said} 'publish'{rest}": ("`publish` belongs to what `rospy.Publisher(…)` returns",
+       "write that name in front of it: `pub.publish(…)`")
+       for said, rest in (("name", " is not defined"), ("module 'rospy' has no attribute", ""))},
+    "namespaces are not allowed in node names": ("the name in `rospy.init_node(…)` has a slash in it",
+     "write the node's name without a slash"),
+    "init_node() has already been called with different arguments": ("`rospy.init_node(…)` is called a second time",
+     "one script is one node: call `rospy.init_node(…)` once"),
+    "Inappropriate ioctl for device": ("it reads keys from its terminal, and a node that is started for you has none",
+     "leave the keys out: publish in the loop by itself, or read keys in a node of their own"),
+    "Invalid number of arguments, args should be": (
+     "the message gets a different number of values than it has fields",
+     'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not by a comma'),
+}  # fmt: skip
 HEADING = "Traceback (most recent call last):"
 _FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
 _CARETS = re.compile(r"    \s*([~^]*\^[~^]*)")
@@ -152,6 +182,16 @@ def explain_exception(kind: str, message: str, source: str, marked: tuple[int, i
     return explain(message, source, marked) if explain else None
 
 
+def explain_number_of_values(message: str) -> Meaning | None:
+    """Return what is wrong with the number of values for a message of several fields; None of any other exception."""
+    found = re.match(r"Invalid number of arguments, args should be \[([^\]]+)\]", message)
+    fields = re.findall(r"\w+", found[1]) if found else []
+    if len(fields) < 2:
+        return None
+    named = ", ".join(f"{field}=…" for field in fields)
+    return f"there are {len(fields)} fields: {join_words(fields)}", f"give each of them a value: `{named}`"
+
+
 def _index(_message: str, source: str, marked: tuple[int, int] | None) -> Meaning:
     found = _subscript(source, marked)
     if found is None:
@@ -202,7 +242,7 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
 
 
 def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
-    if meaning := _ros_call(message, source) or _call(message, source):
+    if meaning := _ros_call(message, source) or _call(message, source) or _nested_index(message, source):
         return meaning
     if "'NoneType' object" in message:
         return _none()
@@ -213,8 +253,36 @@ def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning
         hint = "write %s for %d or %f" if "%" in source else "turn the text into a number: `float(…)`"
         return f"a number is wanted here, and it is of the type {kind}", hint
     if given := _OPERANDS.search(message):
-        return _operands(given[1], given[2])
+        return _operands(given[1], given[2], source)
     return None
+
+
+def _nested_index(message: str, source: str) -> Meaning | None:
+    """Of `grid.data[row][column]`: the fields of messages are lists of one level."""
+    if not re.match(
+        r"'(?:int|float)' object (?:is not subscriptable|does not support item assignment)", message
+    ):
+        return None
+    nested = [
+        n
+        for n in ast.walk(_tree(source))
+        if isinstance(n, ast.Subscript) and isinstance(n.value, ast.Subscript)
+    ]
+    if len(nested) != 1 or not isinstance(inner := nested[0].value, ast.Subscript):
+        return None
+    flat, row, column = (ast.unparse(part) for part in (inner.value, inner.slice, nested[0].slice))
+    cause = f"`{shown(flat)}` is one list of numbers, row after row"
+    return (
+        cause,
+        f"write `{shown(f'{flat}[{row} * width + {column}]')}`, width being how many there are in a row",
+    )
+
+
+def _tree(source: str) -> ast.AST:
+    """Return the syntax tree of a line that may begin a block; an empty one where Python cannot parse it."""
+    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        return ast.parse(f"{source} pass" if source.rstrip().endswith(":") else source)
+    return ast.Module(body=[], type_ignores=[])
 
 
 def _call(message: str, source: str) -> Meaning | None:
@@ -380,12 +448,23 @@ def _rate(call: ast.Call) -> Meaning | None:
     return None
 
 
-def _operands(left: str, right: str) -> Meaning | None:
+def _operands(left: str, right: str, source: str) -> Meaning | None:
     """Of a calculation: a whole message, or a text."""
     message = next((kind for kind in (left, right) if kind[:1].isupper() and kind != "NoneType"), "")
     if "NoneType" in (left, right):
         return _none()
     if message:
+        sides = [
+            n.left if message == left else n.right if isinstance(n, ast.BinOp) else n.comparators[-1]
+            for n in ast.walk(_tree(source))
+            if isinstance(n, ast.BinOp | ast.Compare)
+        ]
+        name = ast.unparse(sides[0]) if len(sides) == 1 else ""
+        fields = noetic_messages()["std_msgs"].get(message, ())
+        if name and fields == ("data",):
+            return f"`{shown(name)}` is the whole message ({message})", rewritten(
+                source, (sides[0], f"{name}.data")
+            )
         return f"one side is the whole message ({message})", "take its field: `msg.data`"
     if "str" in (left, right):
         return "one side is a text", "turn the text into a number first: `float(…)`"

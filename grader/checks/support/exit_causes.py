@@ -6,15 +6,17 @@ import ast
 import builtins
 import re
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
 from grader.checks.registry import Check
 from grader.checks.support.exceptions import (
+    SLIPS,
     Frame,
     Traceback,
     explain_exception,
+    explain_number_of_values,
     is_text,
     rewritten,
     tracebacks,
@@ -78,33 +80,7 @@ CAUSES = {
     "IndentationError": ("", "indent every block by four spaces, each of its lines the same"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }  # fmt: skip
-# what rospy says of a slip that its exception's class does not tell of
-SLIPS = {
-    "name 'raw_input' is not defined": ("`raw_input` is Python 2, and a node gets no input",
-     "remove `raw_input(…)`, and put its value in the code: a node cannot ask for input"),
-    **{f"name '{old}' is not defined": (f"`{old}` is Python 2", f"write `{new}`, as in Python 3")
-       for old, new in {"xrange": "range", "unicode": "str", "basestring": "str", "long": "int", "unichr": "chr",
-                        "reduce": "functools.reduce", "file": "open"}.items()},
-    **{f"name '{old}' is not defined": (f"Python has no `{old}`", f"write `{new}` for `{old}`")
-       for old, new in {"true": "True", "false": "False", "TRUE": "True", "FALSE": "False", "null": "None",
-                        "NULL": "None", "nullptr": "None", "nil": "None", "none": "None", "this": "self",
-                        "printf": "print", "cout": "print(…)", "Pass": "pass", "Break": "break",
-                        "Continue": "continue"}.items()},
-    **{f"'{kind}' object has no attribute 'data'": (f"it is the {kind} inside the message", "leave out `.data` here")
-       for kind in ("int", "float", "str", "bool")},
-    **{f"{said} 'publish'{rest}": ("`publish` belongs to what `rospy.Publisher(…)` returns",
-       "write that name in front of it: `pub.publish(…)`")
-       for said, rest in (("name", " is not defined"), ("module 'rospy' has no attribute", ""))},
-    "namespaces are not allowed in node names": ("the name in `rospy.init_node(…)` has a slash in it",
-     "write the node's name without a slash"),
-    "init_node() has already been called with different arguments": ("`rospy.init_node(…)` is called a second time",
-     "one script is one node: call `rospy.init_node(…)` once"),
-    "Inappropriate ioctl for device": ("it reads keys from its terminal, and a node that is started for you has none",
-     "leave the keys out: publish in the loop by itself, or read keys in a node of their own"),
-    "Invalid number of arguments, args should be": (
-     "the message gets a different number of values than it has fields",
-     'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not by a comma'),
-}  # fmt: skip
+_NUMBER_WANTED = re.compile(r"must be (?:an integer|unsigned integer|float) type")
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
@@ -186,7 +162,9 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     if code == 0:
         hint = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
         return _not_run(life, package) or Ending("its script ran to the end", hint, by_itself=True)
-    last = next((line.line for _, line in reversed(list(run.lines(life.name))) if line.line.strip()), "")
+    printed = [line.line for _, line in run.lines(life.name) if line.line.strip()]
+    exceptions = [line for line in printed if line.startswith("RLException: ")]
+    last = next(iter(exceptions or printed[::-1]), "")
     words = f"; its last output: {shown(last)}" if last else ""
     return Ending(f"it exited with code {code}{words}", RUN_IT)
 
@@ -206,11 +184,13 @@ def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     return Ending(cause, slip.fix or called, (slip.place,), by_itself=True)
 
 
-def explain_error(package: PackageFacts, run: Run) -> Ending | None:
-    """Return the last traceback of the student's processes before Ctrl-C; None where there is none."""
+def explain_error(package: PackageFacts, run: Run, *, only: Collection[str] | None = None) -> Ending | None:
+    """Return the last traceback before Ctrl-C of the student's processes, or of those of these names; None where there
+    is none."""
     found = [
         t
         for one in lives(run)
+        if only is None or one.name in only
         for t in process_tracebacks(run, one.name, after_ns=one.start_ns, before_ns=one.interrupt_ns)
         if not is_rospys_own(t)
     ]
@@ -307,7 +287,20 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
             if s.kind == "object" and s.place == FileCitation(file=place.file, line=place.line)
         )
         return next(((s.message, s.fix) for s in here if re.search(rf"\b{s.name}\b", found.message)), None)
+    if found.kind == "SerializationError" and _NUMBER_WANTED.search(found.message):
+        return _no_number(found, place, package)
     return _late_init(place, package) if found.kind == "ROSInitException" else None
+
+
+def _no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
+    """Return where a text comes from that a message takes for a number; None for what is published."""
+    read = next((s for s in package.slips if (s.file, s.kind) == (place.file, "argument-text")), None)
+    if read is not None:
+        return "an argument of the command line is a text", f"in line {read.line}, write `{read.fix}`"
+    if "publish(" in found.own_frames[-1].source:
+        return None
+    kind = "int" if "integer" in found.message else "float"
+    return "it takes a number but gets something else", f"turn the value into one first: `{kind}(…)`"
 
 
 def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
@@ -342,6 +335,7 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     if name and re.search(rf"//.*\b{name[1]}\b", source):
         return "a comment begins with `#` in Python", f"write `{shown(source.replace('//', '#', 1))}`"
     known = next((known for said, known in SLIPS.items() if said in found.message), None)
+    known = explain_number_of_values(found.message) or known
     meant = known or other_name(found, package)
     frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
     meant = meant or unfit_value(found, package) or _values_of_text(found.message, source)

@@ -29,8 +29,11 @@ from grader.package.repairs.editing import (
 )
 from grader.package.repairs.files import find_renames, is_own, rename_files, repair_files, to_utf8
 from grader.package.repairs.names import (
+    CPP,
     Wanted,
     is_near,
+    names_in_cpp,
+    names_remapped,
     repair_launch_files,
     repair_launch_names,
     repair_script_keys,
@@ -74,6 +77,9 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     rename_package(files, package, wanted)
     files_now = [renames.get(f.path, f.path) for f in package.files if is_own(f.path)]
     repair_launch_names(files, repair_launch_files(files, package), files_now, wanted)
+    wanted = wanted.model_copy(update={"remapped": (*wanted.remapped, *names_remapped(package))})
+    for path in (f.path for f in package.files if f.path.endswith(CPP) and is_own(f.path)):
+        names[path] = names_in_cpp(files.text(path) or "")
     for script in names:
         repair_script_names(files, script, names[script], wanted)
     repair_yaml_names(files, package, names, wanted)

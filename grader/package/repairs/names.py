@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
-from typing import Any
+from typing import Any, Literal
 
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
@@ -33,6 +33,10 @@ class Wanted(Record):
     installed: tuple[str, ...] = ()
     dependencies: tuple[str, ...] = ()
     types: tuple[str, ...] = ()
+    private: tuple[str, ...] = ()
+    """Private parameters that scripts are given on their command line (`_color:=red`), without the `~`."""
+    remapped: tuple[str, ...] = ()
+    """Topics that the command line gives another name (`state:=light`), as the scripts have to write them."""
     started: tuple[tuple[str, str], ...] = ()
     """Launch files, and the names of the scripts that each has to start."""
 
@@ -78,6 +82,7 @@ def wanted_of(rubric: Rubric, package: str = "") -> Wanted:
 def _of_scenarios(rubric: Rubric, package: str) -> Iterator[tuple[str, Any]]:
     for scenario in rubric.scenarios.values():
         for start in scenario.start:
+            yield from _of_arguments(start.args)
             yield from _each("topics", TOPICS_OF.get(start.program or ""))
             if rubric.package_of(start) == package:
                 yield from (("scripts", start.script), ("launch_files", start.launch), ("files", start.load))
@@ -93,6 +98,13 @@ def _of_scenarios(rubric: Rubric, package: str) -> Iterator[tuple[str, Any]]:
             yield ("params", step.set_param.name if step.set_param is not None else None)
         until = scenario.until
         yield from _each("topics", (*until.topics, *until.messages, *until.connected))
+
+
+def _of_arguments(args: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Yield what a command line sets and renames: `_color:=red`, `state:=light`."""
+    for name, assigned, _ in (str(arg).partition(":=") for arg in args):
+        if assigned and not name.startswith("__"):
+            yield ("private", name[1:]) if name.startswith("_") else ("remapped", name)
 
 
 def _of_criteria(criteria: Iterable[Criterion]) -> Iterator[tuple[str, Any]]:
@@ -158,6 +170,8 @@ _KEY = re.compile(r"^(?P<indent> *)(?P<quote>[\"']?)(?P<key>[A-Za-z_][\w-]*)(?P=
 def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: Wanted) -> None:
     """Find the literals of a script that are slips of what the lab asks for, where it asks for nothing else there."""
     node = next((name.value for name in names if name.role == "node"), "")
+    names = [name for name in names if not _repair_slash(files, file, name, wanted)]
+    wanted = wanted.model_copy(update={"params": (*wanted.params, *(f"/{node}/{p}" for p in wanted.private))})
     asked_of = {"node": wanted.nodes, "publisher": wanted.topics, "subscriber": wanted.topics}
     branches = [f"/{'/'.join(branch)}" for branch in _branches(wanted)]
     for role in ROLES:
@@ -169,7 +183,7 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
             right = next((w for w in absent if _is_slip(name, w, node)), "")
             if right and _resolve(name, node) not in {_bare(w, role) for w in asked}:
                 literal = _literal(name, right, node)
-                _replace_literal(files, file, name, literal, right)
+                _replace_literal(files, file, name, literal, literal if literal.startswith("~") else right)
                 node = literal if role == "node" else node
 
 
@@ -182,6 +196,51 @@ def repair_script_keys(files: Files, file: str, names: Sequence[Name], wanted: W
         near = [part for part in parts if part not in used and is_near(name.value, part)]
         if len(near) == 1:
             _replace_literal(files, file, name, near[0], near[0])
+
+
+CPP = (".c", ".cc", ".cpp", ".cxx", ".h", ".hpp")
+ROLES_OF_CPP: dict[str, Literal["publisher", "subscriber", "node"]] = {
+    "advertise": "publisher",
+    "subscribe": "subscriber",
+    "init": "node",
+}
+_NAMED_IN_CPP = re.compile(
+    r'\b(?P<call>advertise|subscribe|init)\b\s*(?:<[^;()]*>)?\s*\(\s*(?:\w+\s*,\s*\w+\s*,\s*)?"(?P<name>[^"\\]{1,200})"'
+)
+
+
+def names_in_cpp(text: str) -> tuple[Name, ...]:
+    """Return the texts in a source of C++ that name its node and its topics; what stands in a comment is none."""
+    return tuple(
+        Name(
+            role=ROLES_OF_CPP[found["call"]],
+            value=found["name"],
+            line=number,
+            start=found.start("name"),
+            end=found.end("name"),
+        )
+        for number, line in enumerate(text.split("\n"), 1)
+        if len(line) <= CPP_CHARS_MAX and not line.lstrip().startswith(("//", "*"))
+        for found in _NAMED_IN_CPP.finditer(line)
+    )
+
+
+CPP_CHARS_MAX = 500
+
+
+def names_remapped(package: PackageFacts) -> tuple[str, ...]:
+    """Return the topics that launch files rename in a namespace, as scripts have to write them: without a slash."""
+    nodes = (node for launch in package.launch_files for node in launch.brings if node.namespace != "/")
+    return tuple(dict.fromkeys(old for node in nodes for old, _ in node.remaps if not old.startswith("/")))
+
+
+def _repair_slash(files: Files, file: str, name: Name, wanted: Wanted) -> bool:
+    """Find a topic that is written with a slash, which keeps it from being renamed as the lab asks."""
+    relative = name.value.lstrip("/")
+    if KINDS[name.role] != "topic-name" or name.value == relative or relative not in wanted.remapped:
+        return False
+    _replace_literal(files, file, name, relative, f"{relative}, without the slash")
+    return True
 
 
 def _bare(name: str, role: str) -> str:
@@ -200,6 +259,8 @@ def _resolve(name: Name, node: str) -> str:
 def _is_slip(name: Name, right: str, node: str) -> bool:
     resolved, bare = _resolve(name, node), _bare(right, name.role)
     astray = resolved != bare and name.value.lstrip("/~") == bare.lstrip("/")
+    if name.role == "param" and name.value.lstrip("/") == bare.removeprefix(f"/{node.strip('/')}/"):
+        return True  # `color` for `~color`
     return is_near(resolved, bare) or astray
 
 
@@ -208,7 +269,7 @@ def _literal(name: Name, right: str, node: str) -> str:
     own = f"/{node.strip('/')}/"
     if name.role == "node":
         return right.strip("/")
-    if name.value.startswith("~") and node and right.startswith(own):
+    if (name.value.startswith("~") or name.role == "param") and node and right.startswith(own):
         return f"~{right.removeprefix(own)}"
     return right if name.value.startswith(("/", "~")) else right.lstrip("/")
 
