@@ -1,6 +1,7 @@
 """Grades the reference solution and every fixture of every lab, many times each: `make stress`.
 
 A verdict that differs even once between runs is a fault of the grader's.
+`python -m tests.stress --only LAB/reference --times 60 --loops 8` does so with one correct package on a busy machine.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import time
 from concurrent.futures import as_completed
 from pathlib import Path
 
+from benchmarks.busy import busy_loops
 from fixtures.make import labs
 from grader.errors import GraderError
 from tests.fixture_runs import (
@@ -33,7 +35,7 @@ def main() -> int:
     options = _parse()
     names = _chosen(options.only)
     began_s, wrong = time.monotonic(), 0
-    with tempfile.TemporaryDirectory() as temporary:
+    with tempfile.TemporaryDirectory() as temporary, busy_loops(options.loops):
         for turn in range(1, options.times + 1):
             found = _one_round(names, (options.out or Path(temporary)) / str(turn), options.jobs)
             wrong += len(found)
@@ -49,6 +51,7 @@ def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Grades the fixtures many times.")
     parser.add_argument("--times", type=int, default=10, help="rounds")
     parser.add_argument("--jobs", type=int, default=SIDE_BY_SIDE, help="how many side by side")
+    parser.add_argument("--loops", type=int, default=0, help="busy loops beside them")
     parser.add_argument(
         "--only",
         nargs="+",
