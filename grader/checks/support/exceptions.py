@@ -51,7 +51,7 @@ _BAD_TOPIC = re.compile(
 _COMMAND = re.compile(r"Command '(?:\[')?(.+?)(?:'\])?' returned non-zero exit status (\d+)")
 _CALLED = re.compile(r"'(\w+)' object is not callable")
 _WHOLE = re.compile(
-    r"\bnot '([A-Z]\w*)'$|^object of type '([A-Z]\w*)'|^type ([A-Z]\w*) doesn't|^'([A-Z]\w*)' object is"
+    r"\bnot '?([A-Z]\w*)'?$|^object of type '([A-Z]\w*)'|^type ([A-Z]\w*) doesn't|^'([A-Z]\w*)' object is"
 )
 """What Python says of a whole message where one of its values is meant."""
 _WANTS_NUMBER = re.compile(r"(?:real number|a number) is required, not (\w+)|must be real number, not (\w+)")
@@ -246,12 +246,8 @@ def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning
         return meaning
     if "'NoneType' object" in message:
         return _none()
-    if (whole := _WHOLE.search(message)) and (kind := whole[whole.lastindex or 0]) != "NoneType":
-        return f"this is the whole message ({kind})", "take its field: `msg.data`"
-    if wanted := _WANTS_NUMBER.search(message):
-        kind = wanted[1] or wanted[2]
-        hint = "write %s for %d or %f" if "%" in source else "turn the text into a number: `float(…)`"
-        return f"a number is wanted here, and it is of the type {kind}", hint
+    if meaning := _no_number(message, source):
+        return meaning
     if given := _OPERANDS.search(message):
         return _operands(given[1], given[2], source)
     return None
@@ -283,6 +279,18 @@ def _tree(source: str) -> ast.AST:
     with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
         return ast.parse(f"{source} pass" if source.rstrip().endswith(":") else source)
     return ast.Module(body=[], type_ignores=[])
+
+
+def _no_number(message: str, source: str) -> Meaning | None:
+    """Of a whole message, or a text, where a number is wanted."""
+    if (whole := _WHOLE.search(message)) and (kind := whole[whole.lastindex or 0]) != "NoneType":
+        return f"this is the whole message ({kind})", "take its field, as in `msg.data`"
+    if re.search(r" of (?:'str' and '(?:int|float)|'(?:int|float)' and 'str)'", message):
+        return "a text is compared with a number", "turn the text into a number first, or leave out `str(…)`"
+    if wanted := _WANTS_NUMBER.search(message):
+        hint = "write %s for %d or %f" if "%" in source else "turn the text into a number: `float(…)`"
+        return f"a number is wanted here, and it is of the type {wanted[1] or wanted[2]}", hint
+    return None
 
 
 def _call(message: str, source: str) -> Meaning | None:
@@ -497,6 +505,12 @@ def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Me
     if found := re.match(r"'(tuple|list|dict)' object has no attribute 'encode'", message):
         hint = 'put the values into the text with `%`: `"… %s" % value`, not behind a comma'
         return f"a text is published here, and this is a {found[1]}", hint
+    if "'member_descriptor' object" in message:
+        name = source.partition(".")[0].strip()
+        return (
+            f"`{name}` is the type of the messages, and no message",
+            f"write brackets where it is made: `{name} = …()`",
+        )
     return _none() if "'NoneType' object" in message else None
 
 
@@ -553,22 +567,26 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
 def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     """Return why a message does not take the value that is published: a text for a number, a number for a text, or the
     publisher of another topic."""
+    made = re.match(r"(\w+)\(\) takes no arguments", found.message)
+    if made and any(one.path.endswith(f"/{made[1]}.srv") for one in package.interfaces):
+        fix = f"write `{made[1]}Response(…)`, and import it beside {made[1]}"
+        return f"`{made[1]}` is the service's type, and its answer is another one", fix
+    frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
     wants_text = "must be of type bytes or an ascii string" in found.message
     if not wants_text and "must be an integer type" not in found.message:
         return None
-    frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
     kind, other = ("string", "numbers") if wants_text else ("whole number", "strings")
     sent = next(iter(_calls(frame.source, "publish")), None)
     owner = ast.unparse(sent.func.value) if sent is not None and isinstance(sent.func, ast.Attribute) else ""
     slips = [s for s in package.slips if frame.file.endswith(f"/{s.file}")]
     types = {s.line: s.message for s in slips if s.kind == "publisher-type"}
-    made = {s.name: s for s in slips if s.kind == "publisher" and s.line in types}
+    owners = {s.name: s for s in slips if s.kind == "publisher" and s.line in types}
     texts = [n for n in _calls(frame.source, "str") if len(n.args) == 1]
     if texts and not wants_text:
         why = f"the message takes a {kind}, and `str(…)` makes a string of it"
         return why, rewritten(frame.source, (texts[0], texts[0].args[0]))
-    here = made.get(owner)
-    others = [s for s in made.values() if (types[s.line] == "String") is not wants_text]
+    here = owners.get(owner)
+    others = [s for s in owners.values() if (types[s.line] == "String") is not wants_text]
     if here is not None and here not in others and len(others) == 1:
         why = f"`{owner}` publishes {types[here.line]} on {here.message} (line {here.line})"
         lines = sorted((here.line, others[0].line))

@@ -336,9 +336,9 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
         return "a comment begins with `#` in Python", f"write `{shown(source.replace('//', '#', 1))}`"
     known = next((known for said, known in SLIPS.items() if said in found.message), None)
     known = explain_number_of_values(found.message) or known
-    meant = known or other_name(found, package)
+    meant = unfit_value(found, package) or known or other_name(found, package)
     frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
-    meant = meant or unfit_value(found, package) or _values_of_text(found.message, source)
+    meant = meant or _values_of_text(found.message, source)
     return meant or explain_exception(found.kind, found.message, frame.source, frame.marked)
 
 
