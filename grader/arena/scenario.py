@@ -171,6 +171,9 @@ async def _run(
         await runner.run()
         await _await_rostests(scenario, arena, tell)
         if scenario.steps or any(start.tests or start.is_rostest for start in scenario.start):
+            if runner.unheeded:  # steps that were left out leave less to see than the criteria ask for
+                left_s = arena.live.first_node_s + arena.live.least_s - time.monotonic()
+                await arena.wait(lambda: not arena.live.running, max(0.0, left_s))
             arena.live.begin_wait(time.monotonic(), heeded=not runner.unheeded)
             if runner.stopped_all or (arena.live.running and not waits(scenario.until)):
                 return "complete", ""

@@ -154,11 +154,10 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
     error = first_error(lines, package)
     if error is None or error.place is None:
         # all of the lab's packages are built together, and the first error may be another one's
-        found = ((one, first_error(lines, one)) for one in package.also)
+        found = ((one, first_error(lines, one)) for one in package.views()[1:])
         other = next((one for one, its in found if its is not None and its.place is not None), None)
         if other is not None:
-            alone = other.model_copy(update={"also": ()})
-            verdict = _broken_build(alone, build, exit_code).moved(package.way_to(other))
+            verdict = _broken_build(other, build, exit_code).moved(package.way_to(other))
             return verdict.model_copy(update={"message": f"{other.name}: {verdict.message}"})
     told = explain_error_of_build(error, package, lines) if error else None
     place = (told.place if told else None) or (error.place if error else None)

@@ -21,7 +21,7 @@ from grader.checks.support.fields import (
     value_text,
 )
 from grader.checks.support.processes import GlobalName, observed_until_ns
-from grader.checks.support.topics import cite, misfit, no_message
+from grader.checks.support.topics import cite, misfit, no_message, refused_type, unheard
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -257,6 +257,10 @@ def _judge_unanswered(
     hint = f"publish on {params.effect.topic} in the callback of {params.cause.topic}"
     if not answers and (unsent := misfit(run, params.cause.topic)):
         return unsent
+    deaf = refused_type(run, params.cause.topic) or unheard(run)
+    if not answers and deaf:
+        verdict = failed(f"{params.effect.words} follows nothing: {deaf.message}", hint=deaf.hint)
+        return verdict.model_copy(update={"cause": deaf.message})
     if not answers:
         message = f"{params.cause.words} did not come, or so late that no answer could be waited for"
         return inconclusive(message, hint="grade again")

@@ -30,6 +30,10 @@ from std_msgs.msg import Int8
 @pytest.mark.parametrize(
     ("line", "source", "error", "hint"),
     [
+        (6, "add(1, 2)", "rospy.service.ServiceException: service [/add] unavailable",
+         "wait for it before the call: `rospy.wait_for_service('/add')`"),
+        (6, "add(1, 2)", "rospy.service.ServiceException: remote error reported: md5sums do not match: [1] vs. [2]",
+         "give both the same .srv, with the names and types of the handout, and build again"),
         (6, "while true:", "NameError: name 'true' is not defined. Did you mean: 'True'?", "write `True` for `true`"),
         (6, "last = null", "NameError: name 'null' is not defined", "write `None` for `null`"),
         (6, "n = 0 // start", "NameError: name 'start' is not defined", "write `n = 0 # start`"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import random
 from io import BytesIO
 
@@ -11,6 +12,7 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
+from grader.checks.support.console_output import printed_lines
 from grader.errors import EvidenceError
 from grader.evidence import container, reader
 from grader.evidence.events import ConsoleLine
@@ -265,3 +267,10 @@ def test_the_console_is_told_in_the_order_of_the_runs_and_without_colours() -> N
     assert console_log(runs) == (
         "== package\n   0.500 node stderr: built\n== listener\n   0.500 node stderr: late\n"
     )
+
+
+def test_a_run_is_sent_without_what_checks_have_worked_out_of_it():
+    run = Run(evidence="a.mcap", scenario="a", clock="real", warp=1, metadata={}, start_ns=1, end_ns=2)
+    assert printed_lines(run) == ()
+    assert run.grader_nodes == frozenset()
+    assert pickle.loads(pickle.dumps(run)) == run  # noqa: S301 - made here

@@ -41,6 +41,7 @@ def complete_facts(given: Mapping[str, Any]) -> PackageFacts:
     facts["cmake"] = _cmake(facts["cmake"])
     facts["files"] = [_file(file) for file in facts["files"]]
     facts["launch_files"] = [_launch(file) for file in facts["launch_files"]]
+    facts["also"] = [complete_facts(one) for one in facts.get("also", ())]
     return PackageFacts.model_validate(facts)
 
 

@@ -190,6 +190,19 @@ def _misspelt_components(package: PackageFacts) -> dict[str, str]:
     return found
 
 
+def _of_submission(name: str, packages: Sequence[PackageFacts]) -> Explained | None:
+    """Explain a package that the lab asks for: it was not handed in, or another one that needs it does not declare it.
+    catkin builds a package after those that it declares."""
+    mine = next((one for one in packages if one.name == name), None)
+    others = [one.manifest.dependencies for one in packages if one.manifest and one is not mine]
+    if mine and not mine.files:
+        return Explained(f"it needs the package {name}, which is not here", f"hand in {name} too")
+    if mine and any(all(needed.name != name for needed in declared) for declared in others):
+        why = f"it needs the package {name}, and is built before it, since package.xml does not declare it"
+        return Explained(why, f"add <depend>{name}</depend> to package.xml")
+    return None
+
+
 def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
     name = found[1]
     near = get_close_matches(name, (*ALWAYS_THERE, *known_packages()), 1, ONE_EDIT)
@@ -202,8 +215,8 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
             "there is no package of that name" if len(slips) == 1 else "there are no packages of these names"
         )
         return Explained(f"find_package(…) names {wrong}, and {what}", f"{right}; in package.xml too")
-    if any(one.name == name and not one.files for one in package.also):
-        return Explained(f"it needs the package {name}, which is not here", f"hand in {name} too")
+    if explained := _of_submission(name, (package, *package.also)):
+        return explained
     if name in ROS_2:
         return Explained(f"it needs {name}, which is from ROS 2", f"take {name} out: this lab is for ROS 1")
     placeholder = re.fullmatch(r"dep(end)?\d", name) is not None

@@ -547,6 +547,16 @@ def _command(message: str, _source: str, _marked: tuple[int, int] | None) -> Mea
     )
 
 
+def _service(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    if absent := re.match(r"service \[(\S+)\] unavailable", message):
+        hint = f"wait for it before the call: `rospy.wait_for_service('{shown(absent[1])}')`"
+        return "nobody offers the service yet, or under another name", hint
+    if "md5sum" in message:
+        hint = "give both the same .srv, with the names and types of the handout, and build again"
+        return "the service has another type than the one that is called", hint
+    return None
+
+
 _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | None]] = {
     "IndexError": _index,
     "KeyError": _key,
@@ -556,6 +566,7 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
     "AttributeError": _attribute,
     "FileNotFoundError": _file,
     "CalledProcessError": _command,
+    "ServiceException": _service,
     "ZeroDivisionError": _zero,
     "RecursionError": lambda *_: (
         "a function calls itself without an end",
