@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.exceptions import Traceback
+from grader.checks.support.console_output import Traceback
 from grader.checks.support.exit_causes import explain_end, explain_traceback, process_tracebacks
 from grader.checks.support.fields import differences, fields_text
 from grader.checks.support.processes import GlobalName, TypeName, life_of, plain_type

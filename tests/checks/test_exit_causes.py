@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.checks.support.exceptions import tracebacks
+from grader.checks.support.console_output import tracebacks
 from grader.checks.support.exit_causes import explain_traceback
 from tests.package.trees import facts_of
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from typing import NamedTuple
 
+from grader.checks.support.missing_names import meant_type
 from grader.checks.support.scripts import cmake_calls, installed, path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
@@ -18,7 +19,6 @@ from grader.installable import (
     known_packages,
     noetic_messages,
 )
-from grader.model.message_definitions import BUILT_IN, FULL_NAMES, OTHER_TYPES
 from grader.model.package import PackageFacts, meant_command
 from grader.model.verdict import FileCitation
 from grader.wording import join_words
@@ -283,7 +283,7 @@ def no_types(package: PackageFacts) -> Explained | None:
         (FileCitation(file=one.path, line=field.line), field, right)
         for one in package.interfaces
         for field in one.fields
-        if (right := _meant_type(field.type, own)) != field.type
+        if (right := meant_type(field.type, own)) != field.type
     ]
     if faults:
         why, _, fix = faults[0].cause.partition(": ")
@@ -299,19 +299,6 @@ def no_types(package: PackageFacts) -> Explained | None:
         fixes = [f"write `{wrong[0][2]} {first.name}`"]
     why = f"line {place.line} of {place.file}: there is no type `{shown(first.type)}` of a field"
     return Explained(why, join_words(fixes) + named, place=place)
-
-
-def _meant_type(type_: str, own: Collection[str]) -> str:
-    """Return the type of a field that is meant by one that there is none of; the type itself where there is one."""
-    base, bracket, size = type_.partition("[")
-    if base in {*BUILT_IN, *FULL_NAMES, *own} or "/" in base:
-        return type_
-    near = near_names(base, own)
-    plain = OTHER_TYPES.get(base.lower(), base.lower())
-    having = [package for package, types in noetic_messages().items() if base in types]
-    right = plain if plain in BUILT_IN else f"{having[0]}/{base}" if having else next(iter(near), "")
-    right = right or next(iter(get_close_matches(plain, sorted(BUILT_IN), 1)), base)
-    return f"{right}{bracket}{size}"
 
 
 def _no_definition(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:

@@ -1,10 +1,11 @@
-"""What nodes printed and logged, and whether the messages that were sent are in it.
+"""What nodes printed and logged, whether the messages that were sent are in it, and Python's tracebacks as records.
 
 Two senders of a topic may send the same text at once: then it has to be printed once more than the other one sent it.
 """
 
 from __future__ import annotations
 
+import ast
 import re
 from bisect import bisect_right
 from collections import Counter, defaultdict
@@ -12,7 +13,6 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from itertools import accumulate
 from typing import Literal, NamedTuple
 
-from grader.checks.support.exceptions import HEADING, tracebacks
 from grader.checks.support.text import VALUE, line_pattern, words_pattern
 from grader.evidence.run import Run, once_for_each_run
 from grader.untrusted_text import without_colours
@@ -43,6 +43,13 @@ PUNCTUATION = ".,;:!?'\"()[]{}<>"
 Level = Literal["debug", "info", "warn", "error", "fatal"]
 LEVELS: dict[int, Level] = {1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal"}
 _CONSOLE = re.compile(r"^\s*\[\s*(DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*\[[^\]]*\]\s*:?\s?(.*)$")
+
+
+HEADING = "Traceback (most recent call last):"
+_FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
+_CARETS = re.compile(r"    \s*([~^]*\^[~^]*)")
+_LAST = re.compile(r"^([A-Za-z_][\w.]*)(?:: ?(.*))?$")
+_LIBRARY = ("/dist-packages/", "/site-packages/", "/usr/lib/python", "<frozen", "/opt/ros/")
 
 
 class Probe(NamedTuple):
@@ -339,3 +346,90 @@ def split_log_line(line: str) -> tuple[str, str] | None:
     """Return the level and text of a line as rospy and roscpp print what they log; None for any other line."""
     match = _CONSOLE.match(without_colours(line))
     return (match[1].lower(), match[2]) if match else None
+
+
+# ---- tracebacks
+
+
+class Frame(NamedTuple):
+    """A line of a file, and its source where Python printed it."""
+
+    file: str
+    line: int
+    source: str = ""
+    marked: tuple[int, int] | None = None
+    """What Python's carets point at, as a slice of `source`."""
+
+    @property
+    def in_library(self) -> bool:
+        return any(part in self.file for part in _LIBRARY)
+
+
+class Traceback(NamedTuple):
+    """`kind` is the exception's class without its module; `first` and `last` are the indices of its lines."""
+
+    kind: str
+    message: str
+    frames: tuple[Frame, ...]
+    first: int
+    last: int
+
+    @property
+    def text(self) -> str:
+        """The last line, as Python prints it."""
+        return f"{self.kind}: {self.message}" if self.message else self.kind
+
+    @property
+    def own_frames(self) -> tuple[Frame, ...]:
+        """Those outside Python's and ROS's own code, the innermost last."""
+        return tuple(f for f in self.frames if not f.in_library)
+
+
+def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
+    """Return every traceback, also the bare `File …` form of a syntax error. One that was cut short is left out."""
+    found: list[Traceback] = []
+    frames: list[Frame] = []
+    first: int | None = None
+    bare = _followed_by_syntax_error(lines)
+    for index, line in enumerate(lines):
+        frame = _FRAME.match(line)
+        if HEADING in line:
+            first, frames = index, []
+        elif frame and (first is not None or bare[index]):
+            first = index if first is None else first
+            frames.append(Frame(frame[1], int(frame[2])))
+        elif frames and not frames[-1].source and line.startswith("    "):
+            frames[-1] = frames[-1]._replace(source=line.strip())
+        elif frames and frames[-1].source and not frames[-1].marked and (carets := _CARETS.fullmatch(line)):
+            frames[-1] = frames[-1]._replace(marked=(carets.start(1) - 4, carets.end(1) - 4))
+        elif first is not None and line and not line[0].isspace():
+            last = _LAST.match(line)
+            if last:
+                kind = last[1].rpartition(".")[2]
+                found.append(Traceback(kind, (last[2] or "").strip(), tuple(frames), first, index))
+            first = None
+    return tuple(found)
+
+
+def unpack_traceback(line: str) -> list[str]:
+    """Return the lines of a traceback that rospy logs as a list on one line: that of a service's callback. Any other
+    line stays as it is."""
+    start = line.find("['" + HEADING)
+    if start < 0:
+        return [line]
+    try:
+        parts = ast.literal_eval(line[start:].strip())
+    except (SyntaxError, ValueError):
+        return [line]
+    return "".join(map(str, parts)).splitlines()
+
+
+def _followed_by_syntax_error(lines: Sequence[str]) -> list[bool]:
+    """For each line whether only indented ones come, then the name of a syntax error: one of the script itself has no
+    heading."""
+    found, named = [False] * len(lines), False
+    for index in range(len(lines) - 1, -1, -1):
+        found[index], line = named, lines[index]
+        if line and not line[0].isspace():
+            named = line.startswith(("SyntaxError", "IndentationError", "TabError"))
+    return found

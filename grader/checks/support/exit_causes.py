@@ -11,17 +11,14 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from grader.checks.registry import Check
+from grader.checks.support.console_output import Frame, Traceback, tracebacks, unpack_traceback
 from grader.checks.support.exceptions import (
     SLIPS,
-    Frame,
-    Traceback,
     explain_exception,
     explain_number_of_values,
     is_text,
     rewritten,
-    tracebacks,
     unfit_value,
-    unpack_traceback,
     wrong_class,
 )
 from grader.checks.support.missing_names import (
@@ -297,7 +294,7 @@ def _no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> 
     read = next((s for s in package.slips if (s.file, s.kind) == (place.file, "argument-text")), None)
     if read is not None:
         return "an argument of the command line is a text", f"in line {read.line}, write `{read.fix}`"
-    if "publish(" in found.own_frames[-1].source:
+    if ".publish(" in found.own_frames[-1].source:
         return None
     kind = "int" if "integer" in found.message else "float"
     return "it takes a number but gets something else", f"turn the value into one first: `{kind}(…)`"
