@@ -50,6 +50,7 @@ GRAPH_EVERY_S, GRAPH_S = 0.25, 5.0
 STARTING_S = 1.5
 EXPECTED_HZ = 10.0
 WATCHED_MORE_S = 0.5
+WATCHED_LONGER_S = 0.05
 
 HELD_S = 0.1
 UP_S, SETTLE_S = 5.0, 0.2
@@ -117,6 +118,8 @@ async def run_scenario(
                 at_once = {spec["name"] for start, spec in starts if start.name not in scenario.started_later}
                 async with release_when_up(leave, at_once, arena):
                     outcome, detail = await _run(scenario, starts, arena, tell, beside)
+                    if outcome == "complete":
+                        await _watch_on(arena, watched_s)
                 await stop(scenario.start, arena, warped=scenario.clock == "warped")
                 await arena.finish()
                 arena.course(ScenarioEvent(event="end", outcome=outcome, detail=detail))
@@ -178,6 +181,16 @@ async def _run(
             if runner.stopped_all or (arena.live.running and not waits(scenario.until)):
                 return "complete", ""
         return await _observe(scenario, arena, tell)
+
+
+async def _watch_on(arena: ArenaSession, watched_s: float) -> None:
+    """Let the nodes go on until they have been watched for so long after their first messages: steps may be over sooner
+    than a criterion asks a node to live, above all where `/clock` runs ahead."""
+    live = arena.live
+    first_s = max([live.first_node_s, *(live.talking[node] for node in live.nodes & live.talking.keys())])
+    left_s = first_s + watched_s + WATCHED_LONGER_S - time.monotonic()
+    if watched_s and left_s > 0:
+        await arena.wait(lambda: not live.running, left_s)
 
 
 async def _await_node(process: str, scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:

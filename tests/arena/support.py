@@ -100,9 +100,16 @@ def repaired(place: ProcessEnvironment) -> ProcessEnvironment:
     return place
 
 
-def run(place: ProcessEnvironment, scenario: Scenario, path: Path, *, beside: Path | None = None) -> Run:
+def run(
+    place: ProcessEnvironment,
+    scenario: Scenario,
+    path: Path,
+    *,
+    beside: Path | None = None,
+    watched_s: float = 0.0,
+) -> Run:
     """Record a scenario and read it back. `beside` is the rubric's folder."""
-    asyncio.run(_bounded(repaired(place), scenario, path, beside))
+    asyncio.run(_bounded(repaired(place), scenario, path, beside, watched_s))
     return load_run(path)
 
 
@@ -120,8 +127,16 @@ def run_script(
         return run(place, scenario, tmp_path / "run.mcap")
 
 
-async def _bounded(place: ProcessEnvironment, scenario: Scenario, path: Path, beside: Path | None) -> None:
-    about = {"path": path, "metadata": {}, "tell": lambda _: None, "beside": beside}
+async def _bounded(
+    place: ProcessEnvironment, scenario: Scenario, path: Path, beside: Path | None, watched_s: float
+) -> None:
+    about = {
+        "path": path,
+        "metadata": {},
+        "tell": lambda _: None,
+        "beside": beside,
+        "watched_s": watched_s,
+    }
     await asyncio.wait_for(run_scenario("run", scenario, place, **about), RUN_S)  # type: ignore[arg-type]
 
 

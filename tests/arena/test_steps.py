@@ -43,6 +43,24 @@ def _did(seen: Run, action: str) -> list[tuple[str | None, Any, str]]:
     return [(e.topic, e.value, e.detail) for _, e in seen.actors if e.action == action]
 
 
+def test_nodes_are_watched_as_long_as_a_criterion_asks_though_the_steps_are_over(tmp_path: Path) -> None:
+    """Simulated seconds go by in a quarter of the time."""
+    talker = NODE + (
+        "from std_msgs.msg import Int8\nrospy.init_node('talker')\npub = rospy.Publisher('n', Int8, queue_size=10)\n"
+        "rate = rospy.Rate(10)\nwhile not rospy.is_shutdown():\n    pub.publish(1)\n    rate.sleep()\n"
+    )
+    start = (Start(name="talker", script="scripts/talker.py"),)
+    steps = [{"wait": {"topic": "/n"}}, {"wait": {"seconds": 1}}]
+    about = {"title": "steps", "start": start, "until": Until(messages={}), "clock": "warped", "warp": 4}
+    scenario = Scenario.model_validate({**about, "steps": steps})
+    with make_place({"scripts/talker.py": talker}) as place:
+        seen = run(place, scenario, tmp_path / "run.mcap", watched_s=2.0)
+    (life,), (sent,) = lives(seen), seen.student_channels("/n")
+    assert life.until_ns(seen) - sent.times_ns[0] >= 2_000_000_000
+    assert life.end is not None
+    assert life.end.stopped_by == "INT"
+
+
 @pytest.mark.parametrize("clock", ["real", "warped"])
 def test_messages_that_change_and_what_is_waited_for(tmp_path: Path, clock: str) -> None:
     scan = {
