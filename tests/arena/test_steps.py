@@ -231,7 +231,7 @@ SERVER = (
     + "pub = rospy.Publisher('count/result', Result, queue_size=10)\n"
     + "def end(name, status, total):\n    result = Result()\n    result.status.goal_id.id = name\n"
     + "    result.status.status = status\n    result.result.total = total\n    pub.publish(result)\n"
-    + "def goal(message):\n    if message.goal.target > 0:\n"
+    + "def goal(message):\n    for _ in range(80 if message.goal.target == 7 else 0):\n        rospy.sleep(0.1)\n    if message.goal.target > 0:\n"
     + "        end('another', 3, 0)\n        end(message.goal_id.id, 3, message.goal.target)\n"
     + "rospy.Subscriber('count/cancel', GoalID, lambda m: end(m.id, 2, -1))\n"
     + "rospy.Subscriber('count/goal', Goal, goal)\nrospy.spin()\n"
@@ -248,13 +248,16 @@ def test_goals_have_results_and_can_be_cancelled(tmp_path: Path) -> None:
         [
             {"action": {**about, "goal": {"target": 5}}},
             {"action": {**about, "goal": {"target": -1}, "cancel_after_s": 0.5}},
+            {"action": {**about, "goal": {"target": 7}}},
             {"action": {**about, "goal": {"targt": 1}}},
             {"action": {**about, "goal": {"target": -1}, "limit_s": 0.2}},
         ],
     )
     results = [(value and value["total"], detail) for _, value, detail in _did(seen, "result")]
-    assert results == [(5, "SUCCEEDED"), (-1, "PREEMPTED"), (None, "no result within 0.2 s")]
-    assert [value for _, value, _ in _did(seen, "goal")] == [{"target": 5}, {"target": -1}, {"target": -1}]
+    # The one of 7 takes eight seconds, in silence
+    ended = [(5, "SUCCEEDED"), (-1, "PREEMPTED"), (7, "SUCCEEDED"), (None, "no result within 0.2 s")]
+    assert results == ended
+    assert [value["target"] for _, value, _ in _did(seen, "goal")] == [5, -1, 7, -1]
     assert len(_did(seen, "cancel")) == 1
     assert any("no field targt" in detail for _, _, detail in _did(seen, "note"))
 
