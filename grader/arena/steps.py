@@ -536,7 +536,9 @@ class StepRunner:
 
         def is_never() -> bool:
             if self._live.listened.get(f"{action.name}/goal"):
-                return self._is_over()  # a server may work on its goal in silence, for as long as the rubric gives it
+                return (
+                    self._is_over()
+                )  # a server may work on its goal in silence, for as long as the rubric gives it
             return self._is_over() or is_silent(self._live, topics, self._scenario.until, time.monotonic())
 
         await self._arena.wait(lambda: own() is not None or is_never(), limit_s)
