@@ -198,6 +198,11 @@ class RunState:
         """The topics of the grader's to which a node has subscribed."""
         return self.subscribers.keys()
 
+    @property
+    def all_began_s(self) -> float:
+        """When the last of the nodes that are there sent its first message; without any, when the first node came."""
+        return max([self.first_node_s, *(self.talking[node] for node in self.nodes & self.talking.keys())])
+
     def note_lookup(self, node: str, service: str, *, is_there: bool) -> None:
         """Take note that a node asked for a service. One that is not there is sought by a node that asks again: the
         first time may be a call that it can do without."""
@@ -323,8 +328,7 @@ def _at_rest_since(live: RunState, now_s: float) -> float | None:
             return None
     if _is_awaited(live) and any(computes(live, process) for process in live.running):
         return None
-    first_s = max([live.first_node_s, *(live.talking[node] for node in live.nodes & live.talking.keys())])
-    if now_s < first_s + live.least_s:
+    if now_s < live.all_began_s + live.least_s:
         return None
     found = [rest for rest in rests if rest is not None]
     since_s = max(live.graph_changed_s, live.last_start_s)

@@ -146,7 +146,7 @@ def _tell_what_is_known(
         for name, path in scripts.items()
         if place.has_line(PUBLISHER, path) and not place.has_line(PUBLISHES, path, programs=PROGRAM)
     )
-    # What steps wait for comes besides: a node that makes one of them wait in vain is watched for half of them first.
+    # Half of what the steps take: where one of them waits for something that never comes, its wait is added to this.
     least_s = expected_s(scenario) - STARTING_S - _steps_s(scenario) / 2
     session.live.least_s = max(watched_s + WATCHED_MORE_S, least_s)
 
@@ -187,8 +187,7 @@ async def _watch_on(arena: ArenaSession, watched_s: float) -> None:
     """Let the nodes go on until they have been watched for so long after their first messages: steps may be over sooner
     than a criterion asks a node to live, above all where `/clock` runs ahead."""
     live = arena.live
-    first_s = max([live.first_node_s, *(live.talking[node] for node in live.nodes & live.talking.keys())])
-    left_s = first_s + watched_s + WATCHED_LONGER_S - time.monotonic()
+    left_s = live.all_began_s + watched_s + WATCHED_LONGER_S - time.monotonic()
     if watched_s and left_s > 0:
         await arena.wait(lambda: not live.running, left_s)
 

@@ -535,11 +535,10 @@ class StepRunner:
         topics = tuple(f"{action.name}/{part}" for part in ("result", "feedback"))
 
         def is_never() -> bool:
-            if self._live.listened.get(f"{action.name}/goal"):
-                return (
-                    self._is_over()
-                )  # a server may work on its goal in silence, for as long as the rubric gives it
-            return self._is_over() or is_silent(self._live, topics, self._scenario.until, time.monotonic())
+            # A server may work on its goal in silence, for as long as the rubric gives it
+            served = bool(self._live.listened.get(f"{action.name}/goal"))
+            until = self._scenario.until
+            return self._is_over() or (not served and is_silent(self._live, topics, until, time.monotonic()))
 
         await self._arena.wait(lambda: own() is not None or is_never(), limit_s)
         found = own()
