@@ -50,7 +50,7 @@ class Kernel:
     def __init__(self, *, joined: bool | None = True, half_closed: bool = False) -> None:
         self._joined, self._half_closed = joined, half_closed
 
-    def __call__(self, _owners: object) -> Kernel:
+    def __call__(self, _owners: object, _calls: object) -> Kernel:
         return self
 
     def joined(self, *_: str) -> bool | None:
@@ -267,7 +267,8 @@ def two(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iter
 
 
 def ties(*programs: Program) -> Ties:
-    return Ties(Owners(lambda: [("all", [program.process.pid for program in programs])]))
+    owners = Owners(lambda: [("all", [program.process.pid for program in programs])])
+    return Ties(owners, {program.ports[0] for program in programs})
 
 
 def joined(two: tuple[Program, Program], transport: str = "TCPROS") -> bool | None:
@@ -310,16 +311,18 @@ def test_datagrams(two) -> None:
     assert joined(two) is False
 
 
-def test_whose_other_end_has_gone(two) -> None:
+@pytest.mark.parametrize(("port", "of"), [("call", 0), ("data", 1)])
+def test_whose_other_end_has_gone(two, port, of) -> None:
+    """Whoever asked the node something a moment ago has gone too, and is no subscriber."""
     publisher, subscriber = two
-    publisher.tell("data")
-    subscriber.tell(publisher.ports[1])
+    publisher.tell(port)
+    subscriber.tell(publisher.ports[of])
     publisher.wait()
     subscriber.wait()
     subscriber.tell("close")
     subscriber.wait()
     assert joined(two) is False
-    assert ties(*two).half_closed(publisher.api)
+    assert ties(*two).half_closed(publisher.api) == (port == "data")
 
 
 def test_what_the_kernel_does_not_say(two, monkeypatch) -> None:

@@ -40,7 +40,7 @@ class Links:
         """Return the connections between these nodes (addresses by names), all asked side by side: a node that does
         not answer in time has none."""
         answers = self._ask(apis)
-        ties = Ties(self._owners)
+        ties = Ties(self._owners, {port_of(api) for api in apis.values()})
         found, doubts = [], []
         for node, answer in answers.items():
             for said in answer.serves:
@@ -118,11 +118,11 @@ class Links:
 class Ties:
     """Which nodes are connected in the kernel's table, read once: whose processes hold the two ends of a connection.
 
-    A node's processes are those that have the socket open on which its slave API listens. A connection to that port is
-    a call, no topic's.
+    A node's processes are those that have the socket open on which its slave API listens. A connection to such a port
+    (`calls`) is a call, no topic's: whoever was asked a moment ago has one that is about to be closed.
     """
 
-    def __init__(self, owners):
+    def __init__(self, owners, calls):
         self._owners = owners
         self._joined = {}
         self._listening = collections.defaultdict(set)
@@ -134,7 +134,7 @@ class Ties:
         for row in rows:
             if row.state == sockets.LISTEN:
                 self._listening[row.near] |= pids[row.inode]
-            elif row.state == sockets.CLOSE_WAIT:
+            elif row.state == sockets.CLOSE_WAIT and calls.isdisjoint((row.near, row.far)):
                 self._half_closed |= pids[row.inode]
 
     def joined(self, publisher, subscriber, transport):
