@@ -27,7 +27,7 @@ from grader.evidence.run import Run
 from grader.model.package import Fault, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.submission import chmod_hint
-from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words
 
 # a script without its first line is run by the shell, which knows no `import`
@@ -111,7 +111,9 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
     elif obstacles:
         why = "; it also ".join(o.why for o in obstacles)
         message = f"{found.path} {why}{_rosrun_answer(build, found.path)}"
+        kind: MistakeKind = "cannot-be-run" if of_first_line else "not-executable"
         verdict = failed(message, hint="; ".join(o.fix for o in obstacles))
+        verdict = verdict if found.shebang_fault == "empty-file" else verdict.by(kind, found.path)
     else:
         message = f"whether {found.path} is executable cannot be seen: the submission carries no file modes"
         verdict = inconclusive(
@@ -182,15 +184,16 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     scripts = [p for n, p in names.items() if n.endswith(".py")]
     seen = f"; there is {join_words(near)}" if near else ""
     hint = f"git mv {movable[0]} {path}" if movable else add_hint(package, path)
+    kind: MistakeKind = "file-elsewhere" if movable else "file-missing"
     if not movable and (elsewhere := package.hints_on(wanted.name)):
         where, _, hint = elsewhere[0].partition(": ")
-        seen = f"; {where}"
+        seen, kind = f"; {where}", "file-elsewhere"
     return unjudged(
         f"{path} is not in the package{seen}",
         measured=f"scripts: {join_words(sorted(scripts))}" if scripts else "no Python script in the package",
         hint=hint,
         citations=tuple(FileCitation(file=p) for p in near[:3]),
-    )
+    ).by(kind, path)
 
 
 def _mode_obstacles(file: SourceFile, remarks: tuple[str, ...]) -> Iterator[Obstacle]:

@@ -34,12 +34,14 @@ class LayoutParams(Record):
 
 
 class Slip(NamedTuple):
-    """What is not in its place, how to fix it, where it lies. `explained`: another criterion names the cause."""
+    """What is not in its place, how to fix it, where it lies. `explained`: another criterion names the cause;
+    `missing`: the file that is nowhere."""
 
     what: str
     fix: str
     place: str = ""
     explained: bool = False
+    missing: str = ""
 
 
 @check("layout", params=LayoutParams, run_anyway=True)
@@ -74,13 +76,14 @@ def layout(package: PackageFacts, params: LayoutParams) -> Verdict:
         return passed(message, expected=expected, measured=measured)
     places = tuple(FileCitation(file=slip.place) for slip in slips if slip.place)
     verdict = unjudged if all(slip.explained for slip in slips) else failed
-    return verdict(
+    lost = verdict(
         "; ".join(slip.what for slip in slips),
         expected=expected,
         measured=measured,
         hint="; ".join(dict.fromkeys(slip.fix for slip in slips)),
         citations=tuple(dict.fromkeys(places)),
     )
+    return lost.by("file-missing", slips[0].missing) if len(slips) == 1 and slips[0].missing else lost
 
 
 def _slips(package: PackageFacts, params: LayoutParams) -> Iterator[Slip]:
@@ -141,8 +144,9 @@ def _lost_file(package: PackageFacts, name: str) -> Slip:
         if path.parent == wanted.parent and near_names(wanted.name, [path.name])
     ]
     other = next(iter([*near, *same]), "")
-    seen, fix = (f", but {other}", f"git mv {other} {name}") if other else ("", add_hint(package, name))
-    return Slip(f"there is no {name}{seen}", fix, other, explained=True)
+    if other:
+        return Slip(f"there is no {name}, but {other}", f"git mv {other} {name}", other, explained=True)
+    return Slip(f"there is no {name}", add_hint(package, name), explained=True, missing=name)
 
 
 RUNTIME_KINDS = ("depend", "exec_depend", "run_depend")

@@ -66,6 +66,7 @@ from grader.rubric.scenario import Scenario
 from grader.wording import join_words, significant
 
 POINTS_MAX = 3
+NOT_THERE = ("file-missing", "file-elsewhere")
 NAMES_SHOWN = 3
 OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_TOPICS = ("hears", "topic-type")
@@ -138,8 +139,8 @@ def _is_told(place: FileCitation, text: str, results: Sequence[CriterionResult])
     Without a line it is the whole file."""
     words = place.file if place.line is None else f"{place.file}, line {place.line}"
     lost = [c for c in results if c.status.is_lost]
-    absent = (found[1] for c in lost if (found := re.search(r"([\w.-]+) is not in the package", c.message)))
-    missing = any(f"there is no {name} " in text for name in absent)
+    absent = (c.mistake.name for c in lost if c.mistake and c.mistake.kind in NOT_THERE)
+    missing = any(f"there is no {PurePosixPath(name).name} " in text for name in absent)
     return missing or any(words in c.hint for c in results) or any(_cites(c, place) for c in lost)
 
 

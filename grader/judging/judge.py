@@ -380,6 +380,7 @@ def result_of(
         reproduce=_compile_command(verdict) or criterion.reproduce,
         citations=verdict.citations,
         blocked_by=verdict.blocked_by,
+        mistake=verdict.mistake if verdict.status.is_lost else None,
         repaired=repaired,
         made_up=dict(made_up),
     )

@@ -12,7 +12,7 @@ from pydantic import AliasChoices, AwareDatetime, Field, SerializerFunctionWrapH
 
 from grader.model.record import Record
 from grader.model.repair import Repair
-from grader.model.verdict import EvidenceCitation, FileCitation, Status
+from grader.model.verdict import EvidenceCitation, FileCitation, Mistake, Status
 
 Day = date | datetime
 COMMENT_CHARS = 2000
@@ -233,6 +233,8 @@ class CriterionResult(Record):
     """The lines of files and the parts of the evidence that the verdict rests on."""
     blocked_by: str = Field(default="", exclude_if=lambda value: not value)
     """The `id` of the criterion that keeps this one from being judged. Only there if it is `blocked`."""
+    mistake: Mistake | None = Field(default=None, exclude_if=lambda value: value is None)
+    """What it is lost by. Only there for the mistakes that `Mistake` lists."""
     repaired: Repaired | None = Field(default=None, exclude_if=lambda value: value is None)
     """What a repaired copy of the package shows of it. Only there if one was run and changes something."""
     made_up: dict[str, bool | int | float | str] = Field(default={}, exclude_if=lambda value: not value)

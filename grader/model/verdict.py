@@ -5,6 +5,7 @@ from __future__ import annotations
 import posixpath
 from collections.abc import Sequence
 from enum import Enum
+from typing import Literal
 
 from pydantic import Field
 
@@ -75,6 +76,19 @@ Citation = FileCitation | EvidenceCitation
 Citations = tuple[Citation, ...]
 
 
+MistakeKind = Literal["file-missing", "file-elsewhere", "not-executable", "cannot-be-run"]
+
+
+class Mistake(Record):
+    """What a mark is lost by, for those who need not read the sentence: `name` is the file that it is about."""
+
+    kind: MistakeKind
+    """A file is not in the package, or only under another path; a script has no executable bit, or its first line keeps
+    the system from running it."""
+    name: str
+    """The file that the lab asks for, or the script, from the package's root."""
+
+
 class Verdict(Record):
     """One check's judgement.
 
@@ -84,7 +98,7 @@ class Verdict(Record):
     `timing` marks a loss that one run's timing could have made: it counts only if it is seen twice. `of_machine`: it is
     open until the machine has what it lacks, and grading again before changes nothing. `cause` is what a
     process ended of, in words that are the same in every verdict that rests on it. `blocked_by` is the criterion that
-    explains the absence, `right` what earned a part of the points.
+    explains the absence, `right` what earned a part of the points, `mistake` the kind of what was done wrong.
     """
 
     status: Status
@@ -102,6 +116,7 @@ class Verdict(Record):
     cause: str = ""
     blocked_by: str = ""
     right: str = ""
+    mistake: Mistake | None = None
 
     def about(
         self, *, expected: str | None = None, measured: str | None = None, citations: Citations | None = None
@@ -123,6 +138,10 @@ class Verdict(Record):
         if self.status is not Status.FAIL or self.unjudged or share <= 0:
             return self
         return self.model_copy(update={"status": Status.PARTIAL, "score": share, "right": right})
+
+    def by(self, kind: MistakeKind, name: str) -> Verdict:
+        """Return the verdict with the kind of mistake that it is lost by."""
+        return self.model_copy(update={"mistake": Mistake(kind=kind, name=name)})
 
     def once(self) -> Verdict:
         """Return the verdict marked as a loss that one run's timing could have made."""

@@ -95,25 +95,25 @@ def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
 
 
 INSTALL = "cmake-install"
-NOT_STARTED = re.compile(r"(?P<path>\S+) (?P<bit>is not executable|cannot be run: )")
-"""What is said of a script that the build would make executable if CMakeLists.txt installed it."""
+NOT_STARTED = ("not-executable", "cannot-be-run")
+"""The mistakes in a script that the build would make up for if CMakeLists.txt installed it."""
 
 
 def _fold_one_edit(losses: Sequence[Loss]) -> Iterator[Loss]:
     """Yield one entry for scripts that one `chmod` makes executable, or that the build does once they are installed."""
     scripts = {
-        loss.criterion.id: found
+        loss.criterion.id: loss.criterion.mistake
         for loss in losses
-        if loss.criterion.check == "executable" and (found := NOT_STARTED.match(loss.criterion.message))
+        if loss.criterion.mistake and loss.criterion.mistake.kind in NOT_STARTED
     }
     install = next((loss for loss in losses if loss.criterion.check == INSTALL), None)
-    installed = [i for i, found in scripts.items() if install and found["path"] in install.criterion.message]
-    bits = [i for i, found in scripts.items() if i not in installed and found["bit"] == "is not executable"]
+    installed = [i for i, found in scripts.items() if install and found.name in install.criterion.message]
+    bits = [i for i, found in scripts.items() if i not in installed and found.kind == "not-executable"]
     for first, names in ((install.criterion.id if install else "", installed), ("".join(bits[:1]), bits[1:])):
         folded = next((loss for loss in losses if loss.criterion.id == first), None)
         others = [loss for loss in losses if loss.criterion.id in names]
         if folded is not None and others:
-            paths = [scripts[name]["path"] for name in names]
+            paths = [scripts[name].name for name in names]
             criterion = _joined(folded.criterion, paths)
             alike = tuple(c for loss in others for c in (loss.criterion, *loss.alike))
             blocked = tuple(c for loss in (folded, *others) for c in loss.blocked)
@@ -152,14 +152,10 @@ def _mistake(loss: Loss, charged: Mapping[Repair, tuple[Repair, ...]]) -> Hashab
     return criterion.hint, lines or (criterion.check, said)
 
 
-WRITE_FILE = re.compile(r"write (?P<path>[\w./-]+\.\w+)(?P<then>, then git add, commit and push it)?")
-"""The hint of a criterion for which a file is missing (`checks.support.scripts.add_hint`)."""
-
-
 def missing_file(criterion: CriterionResult) -> str:
     """Return the path of the file that has to be written for the criterion; empty where that is not its fault."""
-    found = WRITE_FILE.fullmatch(criterion.hint)
-    return found["path"] if found and criterion.status.is_lost else ""
+    found = criterion.mistake
+    return found.name if found is not None and found.kind == "file-missing" else ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,9 +181,9 @@ def missing_files(loss: Loss) -> list[MissingFile]:
 
 
 def write_files_hint(files: Sequence[MissingFile]) -> str:
-    """Return what to do about several missing files."""
-    found = WRITE_FILE.fullmatch(files[0].criterion.hint)
-    return "write these files" + (found["then"].replace(" it", " them") if found and found["then"] else "")
+    """Return what to do about several missing files: what follows the first one's path goes for all."""
+    _, _, then = files[0].criterion.hint.partition(files[0].path)
+    return f"write these files{then.replace(' it', ' them')}"
 
 
 def _open_alike(loss: Loss) -> Hashable:

@@ -15,7 +15,7 @@ from grader.files import atomic_write, check_writable
 from grader.integrations.ci_results import REPORT_NAMES
 from grader.model.repair import Repair
 from grader.model.result import ErrorInfo, Repaired
-from grader.model.verdict import Status
+from grader.model.verdict import Mistake, Status
 from grader.report.files import result_bytes, write_reports
 from grader.report.forms import FORMS
 from grader.report.sentences import repair_words
@@ -141,7 +141,8 @@ def test_one_mistake_is_told_once(messages, mistakes):
 
 def not_executable(name, path):
     message, hint = f"{path} is not executable; rosrun answers: no", f"chmod +x {path}, then git add it"
-    return criterion(name, Status.FAIL, 0, 5, check="executable", message=message, hint=hint)
+    mistake = Mistake(kind="not-executable", name=path)
+    return criterion(name, Status.FAIL, 0, 5, check="executable", message=message, hint=hint, mistake=mistake)
 
 
 BITS = (not_executable("talker-executable", "src/a.py"), not_executable("listener-executable", "src/b.py"))

@@ -133,7 +133,8 @@ def _unreadable(
         movable += full[:1] if len(full) == 1 else []
         hint = f"git mv {movable[0]} launch/{launch}" if movable else add_hint(package, f"launch/{launch}")
         place = movable[0] if movable else f"launch/{launch}"
-        return failed(message, hint=hint, citations=(FileCitation(file=place),))
+        verdict = failed(message, hint=hint, citations=(FileCitation(file=place),))
+        return verdict.by("file-elsewhere" if movable else "file-missing", f"launch/{launch}")
     if file.fault is None:
         return None
     line = f", line {file.fault.line}" if file.fault.line else ""

@@ -18,7 +18,7 @@ from grader.checks import CHECKS
 from grader.errors import GraderError
 from grader.model.figure import Figures
 from grader.model.result import ErrorInfo, GradingResult, Lateness, Note
-from grader.model.verdict import FileCitation, Status
+from grader.model.verdict import FileCitation, Mistake, Status
 from grader.report.html.page import BYTES_MAX, render_html
 from grader.report.html.shell import policy, script
 from grader.report.sentences import FAULTS, MINUS, blame
@@ -147,6 +147,7 @@ def test_files_that_have_to_be_written_are_one_card_which_says_what_they_hold():
             message=f"{path} is not in the package",
             expected=holds,
             hint=f"write {path}",
+            mistake=Mistake(kind="file-missing", name=path),
         )
         for i, (path, holds) in enumerate(asked.items())
     )
