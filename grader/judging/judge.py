@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Collection, Mapping
 from graphlib import TopologicalSorter
@@ -265,8 +266,10 @@ class Requirements:
         same = [r for r in lost if _cause(self.verdicts[r]) == _cause(verdict)]
         same = same or [r for r in lost if _cause(self.verdicts[r]) in verdict.message]
         if lost:
-            # what is not there at all explains most
-            blocking = min(same or lost, key=lambda r: not self.verdicts[r].unjudged)
+            # what is not there at all explains most, then what is said of the same topics and nodes
+            names = _graph_names(verdict)
+            shared = {r: len(names & _graph_names(self.verdicts[r])) for r in lost}
+            blocking = min(same or lost, key=lambda r: (not self.verdicts[r].unjudged, -shared[r]))
             root = self._roots[criterion.id] = self._roots.get(blocking, blocking)
             message = f"blocked by {root}: {self.verdicts[root].message}"
             if verdict.message not in message:
@@ -293,29 +296,36 @@ class Requirements:
         What else was wrong with a node, or with a file, is no reason for its process, or for the build, to end; unless
         it was at the same line, or what is absent is named.
         """
-        verdict, check = self.verdicts[required], self._checks.get(self._criteria[required].check)
-        repaired = check is not None and check.run_anyway and criterion.scenario is not None
-        if (
-            repaired
-            and check is not None
-            and check.name == "build"
-            and (found.unbuilt or self._is_compiled(criterion))
-        ):
-            repaired = False
-        if _lines(verdict) & _lines(found):
-            repaired = False  # the arena repairs bits and first lines, and this is another line
-        beside = (
-            found.cause not in {"", verdict.cause} and self._criteria[required].scenario == criterion.scenario
-        )
+        verdict, same_line = self.verdicts[required], bool(_lines(self.verdicts[required]) & _lines(found))
+        same_run = self._criteria[required].scenario == criterion.scenario
+        if not verdict.status.is_lost:
+            return False
         named = verdict.unjudged and any(text in found.message for text in _paths(self._criteria[required]))
-        if beside and not named and not _lines(verdict) & _lines(found):
+        if same_run and found.cause not in {"", verdict.cause} and not named and not same_line:
+            return False  # its process ended of something else
+        if verdict.unjudged:
+            return True
+        if self._is_repaired(required, criterion, found) and not same_line:
             return False
-        there = (found.silent and self._criteria[required].scenario == criterion.scenario) or (
-            check is not None and check.of_lives and not self._is_below(required, criterion)
-        )
-        if there and not verdict.unjudged and not verdict.cause and _cause(verdict) not in found.message:
+        was_there = (found.silent and same_run) or self._leaves_it_there(required, criterion)
+        return not was_there or bool(verdict.cause) or _cause(verdict) in found.message
+
+    def _is_repaired(self, required: str, criterion: Criterion, found: Verdict) -> bool:
+        """Return whether the arena puts right what the required criterion asks for, bits and first lines, before it
+        runs anything."""
+        check = self._checks.get(self._criteria[required].check)
+        if check is None or not check.run_anyway or criterion.scenario is None:
             return False
-        return verdict.status.is_lost and (verdict.unjudged or not repaired)
+        return check.name != "build" or not (found.unbuilt or self._is_compiled(criterion))
+
+    def _leaves_it_there(self, required: str, criterion: Criterion) -> bool:
+        """Return whether what the required criterion judges can be wrong of a node that is there and connected."""
+        one = self._criteria[required]
+        check = self._checks.get(one.check)
+        if check is None:
+            return False
+        rate = one.scenario != criterion.scenario and check.rate_bounds(one.parameters) is not None
+        return rate or (check.of_lives and not self._is_below(required, criterion))
 
     def _is_below(self, required: str, criterion: Criterion) -> bool:
         """Return whether the criterion asks for a private name of the node that the required one names."""
@@ -329,6 +339,11 @@ class Requirements:
         process = str(criterion.parameters.get("process")).partition("/")[0]
         about = [start for start in starts if start.name == process and not start.is_rostest] or starts
         return any(start.built or (start.script and not PurePath(start.script).suffix) for start in about)
+
+
+def _graph_names(verdict: Verdict) -> set[str]:
+    """Return the topics, services and nodes that the message names."""
+    return set(re.findall(r"(?<!\S)/[\w/]+", verdict.message))
 
 
 def _lines(verdict: Verdict) -> set[Citation]:

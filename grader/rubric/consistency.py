@@ -205,10 +205,13 @@ def _names(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
         if isinstance(name, str) and first.setdefault(name, index) != index:
             yield ("criteria", index, "id"), f'"{name}" is the id of criteria[{first[name]}] already'
     for index, criterion in criteria:
-        for position, name in as_texts(criterion.get("requires")):
+        required = as_texts(criterion.get("requires"))
+        for position, name in required:
+            path = ("criteria", index, "requires", position)
             if name not in first:
-                path = ("criteria", index, "requires", position)
                 yield path, f'there is no criterion "{name}"{did_you_mean(name, first)}'
+            elif any(name == other for earlier, other in required if earlier < position):
+                yield path, f'"{name}" stands there already'
 
 
 def _circles(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:

@@ -183,6 +183,11 @@ def test_a_circle_is_named_once(tmp_path):
     ]
 
 
+def test_a_criterion_that_requires_another_twice(tmp_path):
+    path = spoiled(tmp_path, ("[talker-node]", "[talker-node, talker-node]"))
+    assert faults(path) == ['lab.yaml:27: criteria[1].requires[1]: "talker-node" stands there already']
+
+
 def test_a_criterion_that_requires_itself(tmp_path):
     path = spoiled(tmp_path, ("[talker-node]", "[chatter-rate]"))
     assert faults(path) == [
