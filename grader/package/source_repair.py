@@ -219,21 +219,30 @@ def _with_modules(text: str, types: list[str]) -> Iterator[Step]:
 
 
 def _with_classes(text: str, types: list[str]) -> Iterator[Step]:
-    """`from std_msgs.msg import Sting` where the script uses `String`, which nothing imports."""
-    tree = ast.parse(text)
-    bound = _bound(tree)
-    known = {name for names in MESSAGES.values() for name in names.split()} | {
-        t.partition("/")[2] for t in types
-    }
-    used = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)} & known - bound
+    """`from std_msgs.msg import Sting` where the script uses `String`, which nothing imports; or where it uses `Sting`
+    too, and the lab's own type is meant, or the same word in other letters."""
+    tree, lines = ast.parse(text), text.split("\n")
+    uses = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
+    known = {name for names in MESSAGES.values() for name in names.split()}
+    of_lab = {kind.partition("/")[2] for kind in types}
+    unbound = {n.id for n in uses} & (known | of_lab) - _bound(tree)
     for node in ast.walk(tree):
         if not isinstance(node, ast.ImportFrom) or not (node.module or "").endswith(".msg"):
             continue
+        same = {name.lower(): name for name in (known | of_lab)}
         for alias in node.names:
-            near = get_close_matches(alias.name, used, 1, 0.8) if alias.name not in known else []
-            span = _span(text.split("\n"), alias)  # type: ignore[arg-type] # an alias has a place too
-            if near and span is not None and alias.asname is None:
-                yield from _step("name", span[0] + 1, text, _edit(text, [(*span, near[0])]), alias.name)
+            if alias.name in known | of_lab or alias.asname is not None:
+                continue
+            near = get_close_matches(alias.name, unbound or of_lab, 1, 0.8 if unbound else 0.75)
+            alike = same.get(alias.name.lower(), "")
+            meant = (
+                near[0] if near else "" if alike in unbound else alike
+            )  # else it is an import that is missing
+            places = [alias, *(n for n in uses if n.id == alias.name and meant not in unbound)]
+            spans = [_span(lines, place) for place in places]  # type: ignore[arg-type] # an alias has a place too
+            edits = [(*span, meant) for span in spans if span is not None]
+            if meant and edits:
+                yield from _step("name", edits[0][0] + 1, text, _edit(text, edits), alias.name)
                 return
 
 

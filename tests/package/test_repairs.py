@@ -195,6 +195,8 @@ CASES = {
         {"src/a.cpp": 'advertise<std_msgs::Int8>("/mean", 1);'},
     ),
     "import-capitals": Case(swapped(TALKER, ("import Int8", "import int8")), ["missing-import"], "talker.py uses Int8"),
+    "class-in-other-letters": Case(swapped(TALKER, ("Int8", "int8")), ["missing-call"], "int8"),
+    "class-misspelt-throughout": Case(swapped(TALKER, ("Int8", "Imt8")), ["missing-call"], "Imt8"),
     "import-ros": Case(swapped(TALKER, ("import rospy\n", "import ros\n")), ["missing-import"], "import rospy"),
     "no-rospy": Case(swapped(TALKER, ("import rospy\n", "")), ["missing-import"], "uses rospy"),
     "attribute": Case(swapped(TALKER, ("rospy.Publisher", "rospy.publisher")), ["missing-call"],
