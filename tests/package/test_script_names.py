@@ -16,6 +16,8 @@ UNDEFINED = {
     "value": ("x = 3 * gain\n", "above line 2, write `gain = …`, with the value that it is to have"),
     "method": ("class A:\n    def go(self):\n        turn()\n    def turn(self):\n        pass\n",
                "`turn` belongs to the class A: in line 4, write `self.turn` for `turn`"),
+    "method-from-outside": ("class A:\n    def go(self):\n        pass\ngo()\n",
+                            "`go` belongs to the class A: in line 5, write `A().go` for `go`"),
     "other-function": ("def a():\n    total = 1\ndef b():\n    return total\n",
                        "`total` has a value only in `a(…)`: below line 2, write `global total`"),
     "argument": ("def a(msg):\n    pass\ndef b():\n    return msg\n",

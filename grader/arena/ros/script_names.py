@@ -244,7 +244,8 @@ def known_elsewhere(node, tree):
     name = node.id
     for one in ast.walk(tree):
         if isinstance(one, ast.ClassDef) and name in bound_names(one):
-            fix = "in line %d, write `self.%s` for `%s`" % (node.lineno, name, name)
+            owner = "self" if any(n is node for n in ast.walk(one)) else "%s()" % one.name
+            fix = "in line %d, write `%s.%s` for `%s`" % (node.lineno, owner, name, name)
             return "`%s` belongs to the class %s" % (name, one.name), fix
     for one in ast.walk(tree):
         if isinstance(one, ast.FunctionDef) and name in bound_names(one):

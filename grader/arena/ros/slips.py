@@ -67,6 +67,9 @@ def slips(tree):
         message = message or sends_no_time(tree)
         if message:
             found.append(slip(published.lineno, "no-clock", message))
+    calls = {called_name(n): n.lineno for n in ast.walk(tree) if isinstance(n, ast.Call)}
+    if "init_node" not in calls and ("Publisher" in calls or "Subscriber" in calls):
+        found.append(slip(1, "no-init", "nothing in the script calls `rospy.init_node(…)`"))
     return sorted(found, key=lambda one: one["line"])[:SLIPS_LIMIT]
 
 
@@ -193,11 +196,12 @@ def stopped_loops(tree):
             yield slip(left.lineno, "loop-left", message, fix=fix)
 
 
+PAUSES = ("rospy.sleep", "time.sleep")
 WAITS = ("sleep", "spin", "spin_once", "wait_for_message", "wait_for_service", "wait", "join", "input")
 
 
 def sleepless_loops(tree):
-    """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them: after them, or around them."""
+    """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them."""
     loops = [n for n in ast.walk(tree) if isinstance(n, (ast.While, ast.For))]
     sleeps = [n for n in ast.walk(tree) if is_call(n, "sleep") and isinstance(n.func, ast.Attribute)]
     for loop in loops:
@@ -208,7 +212,8 @@ def sleepless_loops(tree):
             for n in inside
             if n is not loop and n in loops and any(is_call(m, "publish") for m in ast.walk(n))
         ]
-        outside = [n for n in sleeps if n.lineno > loop.lineno and n.func.attr == "sleep"]
+        before = [n for n in sleeps if n.lineno < loop.lineno and dotted(n.func) not in PAUSES]
+        outside = [n for n in sleeps if n.lineno > loop.lineno] or before
         if waits or inner or not outside or not any(is_call(n, "publish") for n in inside):
             continue
         name = dotted(outside[0].func) or "sleep"

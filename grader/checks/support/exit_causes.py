@@ -286,7 +286,8 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
         return next(((s.message, s.fix) for s in here if re.search(rf"\b{s.name}\b", found.message)), None)
     if found.kind == "SerializationError" and _NUMBER_WANTED.search(found.message):
         return _no_number(found, place, package)
-    return _late_init(place, package) if found.kind == "ROSInitException" else None
+    late = found.kind in {"ROSInitException", "ROSException"} and "init_node" in found.message
+    return _late_init(place, package) if late else None
 
 
 def _no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
@@ -305,6 +306,8 @@ def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | 
     slips = [s for s in package.slips if s.file == place.file]
     if astray := next((s for s in slips if (s.kind, s.name) == ("object", "__init__")), None):
         return astray.message, astray.fix
+    if never := next((s for s in slips if s.kind == "no-init"), None):
+        return never.message, f"call `rospy.init_node(…)`, with the node's name, above line {place.line}"
     below = [s.line for s in slips if s.kind == "node-name" and place.line and s.line > place.line]
     move = f"move `rospy.init_node(…)` from line {below[0]} up, above line {place.line}" if below else ""
     return (CAUSES["ROSInitException"][0], move) if move else None
