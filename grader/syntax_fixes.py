@@ -328,7 +328,8 @@ def _ends_earlier_lines(line: str) -> bool:
 
 
 def _with_quote(line: str, message: str, column: int | None) -> Iterator[str]:
-    """Yield the line with the quote that ends its text: behind a name, at the end, or in place of another quote."""
+    """Yield the line with the quote that ends its text: in place of another quote, behind a name, before the values of
+    its placeholders, or at the end."""
     if column is None or not re.search("unterminated|EOL while", message):
         return
     at = column - 1
@@ -341,6 +342,9 @@ def _with_quote(line: str, message: str, column: int | None) -> Iterator[str]:
         yield line[: begin + found.start()] + quote + line[begin + found.end() :]
     if name := re.match(r"[\w/~]+(?=\s*[,)\]])", line[begin:]):
         yield line[: begin + name.end()] + quote + line[begin + name.end() :]
+    for values in (r"(.*%[-\d.]*[a-z][^%]*?)(?= *%( +\w| *\())", r"(.*%[-\d.]*[a-z])(?= *, *\w)"):
+        if text := re.match(values, line[begin:]):
+            yield line[: begin + text.end()] + quote + line[begin + text.end() :]
     end = re.search(r"[)\]}:,\s]*$", line)
     cut = end.start() if end else len(line)
     yield line[:cut] + quote + line[cut:]
