@@ -266,9 +266,9 @@ def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
         return
     packages = {name: package for package, names in MESSAGES.items() for name in names.split()}
     packages |= {name: package for package, _, name in (kind.partition("/") for kind in types)}
-    modules = {
-        n.value.id for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)
-    }
+    parts = [n for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)]
+    modules = {_last(n.value) for n in parts}
+    of_messages = {_last(n.value): f"{_last(n.value)}.{n.attr}" for n in parts if n.attr in ("msg", "srv")}
     loaded = [n for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)]
     missing = {n.id: n.lineno for n in sorted(loaded, key=lambda n: -n.lineno) if n.id not in bound}
     for name in sorted(missing, key=lambda name: (missing[name], name)):
@@ -276,6 +276,8 @@ def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
             continue
         if name in MODULES and name in modules:
             after = _import_meant(text, name) or _add_import(text, f"import {name}", "", "")
+        elif name in of_messages:
+            after = _add_import(text, f"import {of_messages[name]}", "", "")
         elif name in packages:
             after = _add_import(
                 text, f"from {packages[name]}.msg import {name}", f"{packages[name]}.msg", name

@@ -219,6 +219,12 @@ def test_what_never_runs_is_known(tmp_path, text, found):
     )
 
 
+@pytest.mark.parametrize(("end", "name"), [("A()\n", "A().go"), ("a = A()\n", "a.go")])
+def test_a_method_that_nothing_calls_is_called_on_its_object(tmp_path, end, name):
+    (tmp_path / "a.py").write_text("class A:\n    def go(self):\n        self.p.publish(1)\n" + end)
+    assert [s.name for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-called"] == [name]
+
+
 def test_where_names_of_the_graph_are_written_is_known(tmp_path):
     (tmp_path / "a.py").write_text(
         "rospy.init_node('talker')\nrospy.Publisher(\n    name='/chatter', data_class=String)\n"

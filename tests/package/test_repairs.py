@@ -198,6 +198,8 @@ CASES = {
     "class-in-other-letters": Case(swapped(TALKER, ("Int8", "int8")), ["missing-call"], "int8"),
     "class-misspelt-throughout": Case(swapped(TALKER, ("Int8", "Imt8")), ["missing-call"], "Imt8"),
     "import-ros": Case(swapped(TALKER, ("import rospy\n", "import ros\n")), ["missing-import"], "import rospy"),
+    "module-of-messages": Case(swapped(TALKER, ("chatter', Int8", "chatter', geometry_msgs.msg.Twist")),
+                               ["missing-import"], "uses geometry_msgs"),
     "no-rospy": Case(swapped(TALKER, ("import rospy\n", "")), ["missing-import"], "uses rospy"),
     "attribute": Case(swapped(TALKER, ("rospy.Publisher", "rospy.publisher")), ["missing-call"],
                   "there is no rospy.publisher"),

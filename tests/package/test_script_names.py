@@ -10,6 +10,7 @@ UNDEFINED = {
     "message": ("p = rospy.Publisher('a', Int32)\nfor i in range(3):\n    number.data = i\n    p.publish(number)\n",
                 "nothing in the file gives `number` a value: above line 4, create the message: `number = Int32()`"),
     "module": ("x = math.sin(1)\n", "`math` is not imported: write `import math` at the top"),
+    "module-of-messages": ("p = rospy.Publisher('a', std_msgs.msg.Int8)\n", "write `import std_msgs.msg` at the top"),
     "alias": ("x = np.zeros(3)\n", "`np` is not imported: write `import numpy as np` at the top"),
     "class": ("x = Robot()\n", "nothing in the file gives `Robot` a value: above line 2, define Robot or import it"),
     "function": ("steer(1)\n", "above line 2, define it with `def steer(…):`, or import it"),

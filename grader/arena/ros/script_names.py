@@ -209,8 +209,6 @@ MODULES = {
     "copy", "cv2", "datetime", "json", "math", "numpy", "os", "queue", "random", "re", "rosbag", "roslib", "rospy",
     "signal", "socket", "string", "struct", "subprocess", "sys", "tf", "threading", "time", "traceback", "yaml",
 }  # fmt: skip
-
-
 GIVEN_BY_NAME = {"queue_size": "10", "anonymous": "True", "latch": "True"}
 """Arguments of rospy's functions that are written with their name, and a value that most labs give them."""
 
@@ -224,8 +222,10 @@ def undefined(node, tree):
     calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and node in n.args]
     if name in GIVEN_BY_NAME and calls:
         return "`%s` stands here without its value" % name, "write `%s=%s`" % (name, GIVEN_BY_NAME[name])
-    if name in ALIASES or (name in MODULES and isinstance(used, ast.Attribute)):
-        return "`%s` is not imported" % name, "write `import %s` at the top" % ALIASES.get(name, name)
+    inner = used.attr if isinstance(used, ast.Attribute) else ""
+    module = "%s.%s" % (name, inner) if inner in ("msg", "srv") else ALIASES.get(name, name)
+    if module != name or (name in MODULES and inner):
+        return "`%s` is not imported" % name, "write `import %s` at the top" % module
     if name[:1].isupper():
         how = "above line %d, define %s or import it (a message: `from <package>.msg import %s`)"
         return why, how % (line, name, name)

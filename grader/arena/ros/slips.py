@@ -115,20 +115,21 @@ def never_run(tree):
     """
     named = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
     named |= {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
+    objects = {
+        called_name(n.value): dotted(n.targets[0]) for n in ast.walk(tree) if isinstance(n, ast.Assign)
+    }
+    of_class = {id(f): c.name for c in ast.walk(tree) if isinstance(c, ast.ClassDef) for f in c.body}
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
             works = any(is_call(inner, work) for inner in ast.walk(node) for work in WORKS)
             if works and not node.name.startswith("__"):
-                message = "nothing calls `%s()`" % node.name
-                yield slip(node.lineno, "never-called", message, name=node.name)
-        elif isinstance(node, ast.Compare) and isinstance(node.left, ast.Name) and node.left.id == "__name__":
-            word = node.comparators[0]
-            if (
-                isinstance(word, ast.Constant)
-                and isinstance(node.ops[0], (ast.Eq, ast.Is))
-                and word.value != "__main__"
-            ):
-                yield slip(node.lineno, "main-guard", "`__name__` is never %r" % (word.value,))
+                message, owner = "nothing calls `%s()`" % node.name, of_class.get(id(node), "")
+                owner = owner and (objects.get(owner) or owner + "()") + "."
+                yield slip(node.lineno, "never-called", message, name=owner + node.name)
+        elif isinstance(node, ast.Compare) and getattr(node.left, "id", "") == "__name__":
+            word = getattr(node.comparators[0], "value", "__main__")
+            if word != "__main__" and isinstance(node.ops[0], (ast.Eq, ast.Is)):
+                yield slip(node.lineno, "main-guard", "`__name__` is never %r" % (word,))
 
 
 MAKES = ("Publisher", "Subscriber", "Service")
