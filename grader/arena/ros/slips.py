@@ -115,9 +115,8 @@ def never_run(tree):
     """
     named = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
     named |= {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
-    objects = {
-        called_name(n.value): dotted(n.targets[0]) for n in ast.walk(tree) if isinstance(n, ast.Assign)
-    }
+    made = [n for n in ast.walk(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
+    objects = {dotted(n.value.func): dotted(n.targets[0]) for n in made}
     of_class = {id(f): c.name for c in ast.walk(tree) if isinstance(c, ast.ClassDef) for f in c.body}
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
