@@ -331,7 +331,8 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
     places += dict.fromkeys(
         f'pkg="{name}" in {node.file or file.path}, line {node.line}' for file, node in nodes
     )
-    return f"write {join_words(places[:PLACES_SHOWN])}" + (" and so on" if places[PLACES_SHOWN:] else "")
+    search = f"`grep -rnw {found.name} .` shows whether it stands anywhere else, as in $(find {found.name})"
+    return f"write {join_words(places[:PLACES_SHOWN])}; {search}"
 
 
 def _declared_text(found: Manifest) -> str:

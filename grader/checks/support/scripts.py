@@ -29,7 +29,7 @@ _HERE = tuple(
 )
 LINE_CHARS_MAX = 200
 """Of a line of CMake, to see which call begins in it."""
-BACKUPS = ("~", ".bak", ".orig", ".save", ".swp")
+BACKUPS = ("~", ".bak", ".orig", ".save", *(f".save.{number}" for number in range(1, 10)), ".swp")
 _BIN = ("${CATKIN_PACKAGE_BIN_DESTINATION}", "lib/${PROJECT_NAME}")
 
 
