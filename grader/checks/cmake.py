@@ -316,6 +316,11 @@ def _without_call(package: PackageFacts, all_named: Sequence[Installed], path: s
         other = "install(DIRECTORY …)"
         why = f"line {folder.call.line}: {other} names {{}}, where catkin_install_python(PROGRAMS …) should"
         return Lack(why, f"{fix} below it", _line(folder), path)
+    if of_programs := next(
+        (one for one in all_named if one.kind == "PROGRAMS" and one.path.endswith(".py")), None
+    ):
+        why = f"line {of_programs.call.line}: install(PROGRAMS …) does not name {{}}"
+        return Lack(why, "write {} into it, after PROGRAMS", _line(of_programs), path)
     above = _first(package.cmake, "catkin_package") if package.cmake else None
     below = _below(above) or " below catkin_package()"
     return Lack(f"{NOT_CALLED}, so nothing installs {{}}", f"{fix}{below}", None, path)
