@@ -6,8 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from grader.model.record import Record
-from grader.model.version import EVIDENCE
+from grader.model.record import EVIDENCE, Record
 
 EVIDENCE_VERSION = str(EVIDENCE.version)
 METADATA_NAME = "grader.evidence"

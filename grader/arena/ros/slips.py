@@ -10,6 +10,7 @@ import sys
 
 # `-I` leaves this folder out
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
+from script_classes import object_slips
 from script_names import (
     TEXT_LIMIT,
     called_name,
@@ -19,7 +20,6 @@ from script_names import (
     is_call,
     is_increment,
     misspelt,
-    object_slips,
     resets,
     said_texts,
     slip,

@@ -86,7 +86,7 @@ _ARITY = re.compile(r"([\w.]+)\(\) (?:takes|missing) ")
 _ADDED = re.compile(
     r"can only concatenate str \(not \"(\w+)\"\) to str|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'"
 )
-_NAME = re.compile(r"name '(\w+)' is not defined")
+_NAME = re.compile(r"(?:name|local variable) '(\w+)' (?:is not defined|where it is not|referenced before)")
 _BY_PYTHON = re.compile(r"\. Did you mean: '(\w+)'\?$")
 
 
@@ -275,7 +275,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
 
 def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint of an error that other lines of the file explain."""
-    if found.kind == "NameError":
+    if found.kind in {"NameError", "UnboundLocalError"}:
         return _misspelt(found, place, package)
     if found.kind == "AttributeError" or "missing 1 required positional argument: 'self'" in found.message:
         here = (

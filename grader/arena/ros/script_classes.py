@@ -1,0 +1,128 @@
+"""Finds attributes that a class in a student's Python gives no object, and classes used as objects, for `slips.py`.
+
+Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+import difflib
+
+from script_names import bound_names, called_name, dotted, slip
+
+
+def object_slips(tree):
+    """Attributes that a class of this file gives no object, and classes that are used in place of an object."""
+    classes = [n for n in ast.walk(tree) if isinstance(n, ast.ClassDef)]
+    if any(called_name(n) == "setattr" for n in ast.walk(tree)):
+        return
+    for one in classes:
+        if all(dotted(base) == "object" for base in one.bases):
+            yield from lacking_attributes(Members(one, tree))
+    yield from classes_as_objects({one.name: one for one in classes}, tree)
+
+
+class Members:
+    """A class and its `methods`. `stores` has for each attribute where it is given a value, and in which method."""
+
+    def __init__(self, node, tree):
+        self.name, self.tree = node.name, tree
+        self.methods = {n.name: n for n in node.body if isinstance(n, ast.FunctionDef)}
+        self.fixed = bound_names(node)
+        owner = {id(n): m for m in self.methods.values() for n in ast.walk(m)}
+        self.stores, self.reads = {}, []
+        for n in ast.walk(tree):
+            if not isinstance(n, ast.Attribute):
+                continue
+            method = owner.get(id(n))
+            given = method.args.args[:1] if method is not None else []
+            if not isinstance(n.ctx, ast.Load):
+                self.stores.setdefault(n.attr, []).append((n, method))
+            elif given and dotted(n.value) == given[0].arg and not n.attr.startswith("__"):
+                self.reads.append((n, method))
+        self.called = {called_name(n) for n in ast.walk(tree)}
+
+    def astray(self):
+        """Return the method that is meant to be `__init__`, with why it is not and what to do; None for none."""
+        if "__init__" in self.methods:
+            return None
+        for name, method in self.methods.items():
+            if name not in self.called and name.replace("_", "").lower() in ("init", "int", "inti", "ini"):
+                why = "`%s` in line %d is not the name of the method that Python calls" % (
+                    name,
+                    method.lineno,
+                )
+                return method, why, "in line %d, write `__init__` for `%s`" % (method.lineno, name)
+        for n in ast.walk(self.tree):
+            if isinstance(n, ast.FunctionDef) and n.name == "__init__" and n not in all_methods(self.tree):
+                why = "`__init__` in line %d is not in the class %s" % (n.lineno, self.name)
+                fix = "indent `def __init__` in line %d like the other methods of %s, and its lines below it"
+                return n, why, fix % (n.lineno, self.name)
+        return None
+
+
+def all_methods(tree):
+    return {m for n in ast.walk(tree) if isinstance(n, ast.ClassDef) for m in n.body}
+
+
+def lacking_attributes(own):
+    """Yield the attributes that the methods of a class read and that its objects need not have by then."""
+    astray = own.astray()
+    if astray:
+        yield slip(astray[0].lineno, "object", astray[1], fix=astray[2], name="__init__")
+    inside = set(ast.walk(astray[0])) if astray else set()
+    for node, method in own.reads:
+        name, stores = node.attr, own.stores.get(node.attr, [])
+        givers = [m.name if m is not None else "__init__" for _, m in stores]
+        if name in own.fixed or node in inside:
+            continue
+        if stores and inside.issuperset(n for n, _ in stores):
+            yield slip(node.lineno, "object", astray[1], fix=astray[2], name=name)
+        elif not stores:
+            message, fix = never_given(own, name, node.lineno)
+            yield slip(node.lineno, "object", message, fix=fix, name=name)
+        elif not own.called.union(["__init__", method.name]).intersection(givers):
+            message = "only `%s(…)` gives `self.%s` a value, and it was not called before" % (givers[0], name)
+            fix = "give `self.%s` its value in `__init__`, or call `self.%s(…)` there" % (name, givers[0])
+            yield slip(node.lineno, "object", message, fix=fix, name=name)
+
+
+def never_given(own, name, line):
+    """Return why an attribute is not there that nothing gives a value, and what to do."""
+    for method in own.methods.values():
+        for n in ast.walk(method):
+            if isinstance(n, ast.Name) and n.id == name and isinstance(n.ctx, ast.Store):
+                why = "line %d gives a value to `%s`, and not to `self.%s`" % (n.lineno, name, name)
+                return why, "in line %d, write `self.%s` for `%s`" % (n.lineno, name, name)
+    near = difflib.get_close_matches(name, sorted(own.fixed | set(own.stores)), 1, 0.75)
+    near = near or [
+        n for n in sorted(own.fixed | set(own.stores)) if n.startswith(name) or name.startswith(n)
+    ]
+    if near:
+        fix = "in line %d, write `self.%s` for `self.%s`" % (line, near[0], name)
+        return "did you mean self.%s?" % near[0], fix
+    why = "nothing in the file gives `self.%s` a value" % name
+    return why, "in `__init__`, write `self.%s = …`, with the value that it is to have" % name
+
+
+def classes_as_objects(classes, tree):
+    """Yield where a method is called of a class, or of a name that was given the class, in place of an object."""
+    values = {}
+    for n in ast.walk(tree):
+        for target in n.targets if isinstance(n, ast.Assign) else ():
+            values.setdefault(dotted(target), []).append(n)
+    for n in ast.walk(tree):
+        if not isinstance(n, ast.Call) or not isinstance(n.func, ast.Attribute) or n.args:
+            continue
+        owner, given = dotted(n.func.value), values.get(dotted(n.func.value), [])
+        name = dotted(given[0].value) if len(given) == 1 else owner
+        own = {m.name: m for m in getattr(classes.get(name), "body", ()) if isinstance(m, ast.FunctionDef)}
+        method = own.get(n.func.attr)
+        if method is None or method.decorator_list or not method.args.args:
+            continue
+        init = own.get("__init__")
+        made = "%s(%s)" % (name, "…" if init is not None and len(init.args.args) > 1 else "")
+        right = "%s = %s" % (owner, made) if given else "%s.%s()" % (made, method.name)
+        line = given[0].lineno if given else n.lineno
+        message = "`%s` is the class itself, and no object of it" % owner
+        yield slip(
+            n.lineno, "object", message, fix="in line %d, write `%s`" % (line, right), name=method.name
+        )
