@@ -41,7 +41,7 @@ from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
 from grader.wording import join_words, significant
 
 SUMMARY = re.compile(r"\s*\*\s+/")  # roslaunch's list of parameters
-OUTSIDE = 'write <rosparam file="$(find <package>)/{}"/> outside the <node>, without ns'
+OUTSIDE = 'write <rosparam file="$(find {})/{}"/> outside the <node>, without ns'
 Wanted = Mapping[str, int | float | str]
 
 
@@ -122,7 +122,7 @@ def _judge_loaded(
         or _of_another_name(package, file, params)
     ):
         message = f"{file.path} sets the parameters, but does not load {params.file}"
-        return failed(message, hint=OUTSIDE.format(params.file))
+        return failed(message, hint=OUTSIDE.format(package.name, params.file))
     return _not_running(package, run, node)
 
 
@@ -190,28 +190,30 @@ def _not_loaded(
         return unjudged(message, hint=add_hint(package, params.file)).by("file-missing", params.file)
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
-    if absence := refusal(run):
+    if absence := refusal(run, package):
         slip = _misplaced(package, file, params) if "does not exist" in absence.why else None
         return slip.verdict(quoted(run)) if slip else _refusal_verdict(file, params, absence)
     loads = [load for load in file.loads if _is_of(load, params)]
     if not loads:
         message = f"{file.path} has no <rosparam> that loads {params.file}"
-        return failed(message, hint=OUTSIDE.format(params.file))
-    other = _loaded_otherwise(run, params, loads, missing[0])
+        return failed(message, hint=OUTSIDE.format(package.name, params.file))
+    other = _loaded_otherwise(package, run, params, loads, missing[0])
     return other.model_copy(update={"unjudged": other.unjudged and not judged})
 
 
-def _loaded_otherwise(run: Run, params: LaunchLoadsParams, loads: list[LaunchLoad], missing: str) -> Verdict:
+def _loaded_otherwise(
+    package: PackageFacts, run: Run, params: LaunchLoadsParams, loads: list[LaunchLoad], missing: str
+) -> Verdict:
     """The launch file loads the file: into a namespace, too late, or with other names in it."""
     found = params_on_server(run)
     for load in loads:
         moved = load.namespace.rstrip("/") + missing
         if moved in found and moved != missing:
             why = f"the file is loaded into {load.namespace}, where {missing} becomes {moved}"
-            return Slip(load.file, load.line, why, OUTSIDE.format(params.file)).verdict()
+            return Slip(load.file, load.line, why, OUTSIDE.format(package.name, params.file)).verdict()
     if missing in found:
         message = f"{missing} is set only after the node has started"
-        return failed(message, hint=OUTSIDE.format(params.file))
+        return failed(message, hint=OUTSIDE.format(package.name, params.file))
     message = f"{params.file} is loaded, but {describe_missing(found, missing)}"
     return unjudged(message, hint=f"fix the names in {params.file}")
 

@@ -177,7 +177,10 @@ def _missing(
     shallow = f"{above.rpartition('/')[0]}/{last}"
     moved = _column(name, shallow, keys)
     hint = f"write it so that rosparam list shows exactly {name}"
-    if shallow in found:
+    root = name.split("/")[1]
+    if all(one.removeprefix(f"/{root}") in found for one in missing):
+        hint = f"write `{root}:` above them, and indent them all by two spaces more"
+    elif shallow in found:
         readers = join_words(_readers(package, build, shallow, above))
         hint = f"{moved}; then read it there in {readers} too" if readers else moved
     return failed(f"{path} loads, but {describe_missing(found, name)}{more}", hint=hint)

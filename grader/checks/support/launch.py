@@ -57,7 +57,7 @@ _REFUSALS = (
      'write name="…" without a slash; a namespace goes into ns="…"'),
     (r"missing required attribute: '?(\w+)", "a tag has no {0}", "add the attribute"),
     (r"file does not exist \[([^\[\]\n]+)\]", "the file {0} that <rosparam> loads does not exist",
-     "write $(find <package>)/config/<file>, and push the file"),
+     "write $(find <package>)/config/{0}, and push the file"),
     (r"Resource not found: (\S+)", "there is no package {0}",
      "$(find …) and pkg need the package's exact name"),
     (r"requires the '(\w+)' arg to be set", 'its <arg name="{0}"> has no default',
@@ -358,7 +358,9 @@ def refusal(run: Run, package: PackageFacts | None = None) -> Absence | None:
     for pattern, why, hint in _REFUSALS:
         if match := re.search(pattern, text):
             words = [shown(PurePosixPath(g).name if "/" in g.strip("/") else g) for g in match.groups()]
-            return Absence(f"roslaunch starts nothing: {why.format(*words)}", hint.format(*words))
+            fix = hint.format(*words)
+            fix = fix.replace("<package>", package.name) if package is not None else fix
+            return Absence(f"roslaunch starts nothing: {why.format(*words)}", fix)
     return None
 
 
