@@ -28,7 +28,7 @@ from grader.checks.support.text import (
     shown,
     subscriber,
 )
-from grader.checks.support.topics import cite, misfit, refused_type, run_slip, topics_with
+from grader.checks.support.topics import call_in_comment, cite, misfit, refused_type, run_slip, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -157,6 +157,9 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     elif verdict is None and (slip := run_slip(package, run, "never-reached")):
         message = f"the node never subscribes to {topic}: {slip.message}"
         verdict = failed(message, hint=f"in {slip.file}, {slip.fix}", citations=(slip.place,))
+    elif verdict is None and not subscribed and (slip := call_in_comment(package, run, "Subscriber")):
+        message = f"the node never subscribes to {topic}: in {slip.file}, line {slip.line}, {slip.message}"
+        verdict = failed(message, hint=slip.fix, citations=(slip.place,))
     elif verdict is None:
         near = near_names(topic, subscribed)
         other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""

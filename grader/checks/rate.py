@@ -16,7 +16,14 @@ from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
 from grader.checks.support.processes import PublishedTopic, life_of, observed_until_ns, slips_of
 from grader.checks.support.text import LOOP, both, loop_rate
-from grader.checks.support.topics import Sender, cite, nothing_sent, sent_by, whole_until_ns
+from grader.checks.support.topics import (
+    Sender,
+    call_in_comment,
+    cite,
+    nothing_sent,
+    sent_by,
+    whole_until_ns,
+)
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import LaunchParam, PackageFacts, PythonSlip
@@ -171,6 +178,8 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     scripts = {life.start.script for life in own if life is not None and life.start.script}
     told = [s for s in package.slips if s.kind in SLEEPLESS and "sleep" in s.name + s.fix]
     slips = [s for s in told if not scripts or s.file in scripts]
+    if not slips and (found.mean_hz >= FLOOD_HZ or not found.is_even):
+        slips = [s for s in (call_in_comment(package, run, "sleep"),) if s is not None]
     if not slips and found.mean_hz < FLOOD_HZ and found.is_even:
         return None
     if not slips and (slip := _asked_flood(found, run, package, params)):
@@ -180,7 +189,7 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     about = f"{float(f'{found.mean_hz:.2g}'):,.0f}"
     made = both(f"rate = rospy.Rate({hz})", f"ros::Rate rate({hz})")
     hint = f"call rate.sleep(), with parentheses, in every iteration; {made}"
-    if slips and slips[0].kind == "sleep-outside":
+    if slips and slips[0].kind in {"sleep-outside", "commented-out"}:
         hint = slips[0].fix
     return failed(
         f"{params.topic} runs at about {about} Hz instead of {hz} Hz: the loop does not sleep{where}",

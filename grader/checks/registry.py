@@ -91,8 +91,8 @@ class Check:
     What a check of `run_anyway` finds wrong with files is repaired before anything is run, so it explains no empty
     run, unless the file is not there at all. `of_callbacks` checks judge what a node does upon what it hears: an
     exception in a callback explains what they miss. `of_lives` checks judge how a node is called, lives and ends:
-    where it was there, its name or its end on Ctrl-C explains nothing that did not come; nor does a rate that is wrong
-    explain what is absent in another run. `source` is the file of an instructor's own check.
+    where it was there, its name or its end on Ctrl-C explains nothing that did not come. `source` is the file of an
+    instructor's own check.
     """
 
     name: str

@@ -248,7 +248,7 @@ class Later:
         for slip in self._of("misspelt", "undefined"):
             lines = self._build.file_lines(slip.file) if self._build is not None else []
             caught = slip.line <= len(lines) and lines[slip.line - 1].lstrip().startswith("except")
-            if (one := name_slip(slip)) is not None and not caught:
+            if (one := name_slip(slip, self._slips)) is not None and not caught:
                 yield one.fix
 
     def _rate(self) -> Iterator[str]:

@@ -245,6 +245,10 @@ def _verdict_of_crash(check: Check, error: Exception) -> Verdict:
     return Verdict(status=Status.ERROR, score=0.0, message=message, hint=hint)
 
 
+OF_CONNECTIONS = ("connected", "launch-connects", "launch-runs")
+"""Checks of which nodes are connected, at whatever rate messages come."""
+
+
 class Requirements:
     """Applies `requires`: give it each criterion's verdict after those of the criteria that it requires."""
 
@@ -324,7 +328,7 @@ class Requirements:
         check = self._checks.get(one.check)
         if check is None:
             return False
-        rate = one.scenario != criterion.scenario and check.rate_bounds(one.parameters) is not None
+        rate = criterion.check in OF_CONNECTIONS and check.rate_bounds(one.parameters) is not None
         return rate or (check.of_lives and not self._is_below(required, criterion))
 
     def _is_below(self, required: str, criterion: Criterion) -> bool:

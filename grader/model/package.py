@@ -270,6 +270,7 @@ SlipKind = Literal[
     "deaf",
     "node-name",
     "no-init",
+    "commented-out",
     "publisher",
     "publisher-type",
     "subscriber",
@@ -308,12 +309,13 @@ class PythonSlip(Record):
     are read from a clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C. `outside-method`: a call
     in a class that stands in none of its methods and uses a name that is not there. `object`: why an object of a
     class lacks an attribute where it is read, or that the class stands in its place. `undefined`: why a name has no
-    value where it is read. `no-effect` and `compared`: a statement such as `++i`, or `i == 0`. `no-init`: a script
-    with topics that never calls `init_node`. `publishes` and `prints`: no slips, but a text that is published or
-    printed, `{}` for a value in it and `{data}` for that of a message. `node-name`, `publisher` and `subscriber`: no
-    slips, but where the script names its node, or a topic; `name` is the variable that is given the publisher, or
-    `anonymous`. `publisher-type` and `subscriber-type`: the message type in that line. `argument-text`: no slip, but
-    where an argument of the command line is kept as a text; `fix` is the line with a number in its place.
+    value where it is read. `commented-out`: a call of ROS in a comment; `name` is `sleep`, or `pub = Publisher`.
+    `no-effect` and `compared`: a statement such as `++i`, or `i == 0`. `no-init`: a script with topics that never
+    calls `init_node`. `publishes` and `prints`: no slips, but a text that is published or printed, `{}` for a value in
+    it and `{data}` for that of a message. `node-name`, `publisher` and `subscriber`: no slips, but where the script
+    names its node, or a topic; `name` is the variable that is given the publisher, or `anonymous`. `publisher-type`
+    and `subscriber-type`: the message type in that line. `argument-text`: no slip, but where an argument of the
+    command line is kept as a text; `fix` is the line with a number in its place.
     """
 
     file: str

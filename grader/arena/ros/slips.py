@@ -10,9 +10,7 @@ import sys
 
 # `-I` leaves this folder out
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
-from script_classes import object_slips
 from script_names import (
-    TEXT_LIMIT,
     called_name,
     counter_slips,
     dotted,
@@ -24,6 +22,7 @@ from script_names import (
     said_texts,
     slip,
 )
+from script_objects import callbacks, object_slips, queue_sizes
 
 SLIPS_LIMIT = 100
 """Of a file."""
@@ -174,6 +173,7 @@ def stopped_loops(tree):
     `if` in place of `while`.
     """
     turned = dict(turns(tree))
+    at_most = [loop for loop in ast.walk(tree) if is_counted(loop) and not turned[loop][1]]
     for loop in ast.walk(tree):
         once = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
         if once and not turned[loop][1] and any(is_call(n, "publish") for n in ast.walk(loop)):
@@ -188,12 +188,32 @@ def stopped_loops(tree):
             message = "the loop stops at the spin() in line %d, which waits until the node ends" % spin.lineno
             fix = "remove spin(): the loop keeps the node alive"
             yield slip(spin.lineno, "spin-in-loop", message, fix=fix)
+        if loop in at_most:
+            message = "the loop of line %d ends after a number of rounds" % loop.lineno
+            counts = isinstance(loop, ast.For) and any(
+                getattr(n, "id", "") == dotted(loop.target) for n in inside[2:]
+            )
+            fix = "put it inside a `while not rospy.is_shutdown():`" if counts else ENDLESS % loop.lineno
+            yield slip(loop.lineno, "loop-left", message, fix=fix)
         left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None)
         if left is not None:
             word = "break" if isinstance(left, ast.Break) else "return"
             message = "the loop ends the first time around, at the %s in line %d" % (word, left.lineno)
             fix = "remove it from line %d, or put it inside an `if`" % left.lineno
             yield slip(left.lineno, "loop-left", message, fix=fix)
+
+
+ENDLESS = "write `while not rospy.is_shutdown():` in line %d"
+
+
+def is_counted(loop):
+    """Whether it is `for … in range(…)`, or `while … and count < 10:`."""
+    if isinstance(loop, ast.For):
+        return called_name(loop.iter) == "range"
+    asked = loop.test if isinstance(loop, ast.While) else None
+    parts = asked.values if isinstance(asked, ast.BoolOp) and isinstance(asked.op, ast.And) else [asked]
+    orders = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.NotEq)
+    return any(isinstance(one, ast.Compare) and isinstance(one.ops[0], orders) for one in parts)
 
 
 PAUSES = ("rospy.sleep", "time.sleep")
@@ -249,98 +269,6 @@ def is_endless(loop):
         inverted and is_call(test.operand, "is_shutdown")
     )
     return asks and not any(isinstance(n, (ast.Break, ast.Return, ast.Raise)) for n in ast.walk(loop))
-
-
-CALLBACKS = {
-    "Subscriber": ("callback", 2, 1),
-    "Timer": ("callback", 1, 1),
-    "Service": ("handler", 2, 1),
-    "on_shutdown": ("h", 0, 0),
-    "signal": ("handler", 1, 2),
-}
-"""What takes a function: the argument's name, its place, and with how many values ROS calls it."""
-
-
-def callbacks(tree):
-    """Functions that ROS calls with another number of values than they take, and those that are called where the
-    function itself is meant.
-    """
-    functions = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
-    for node in ast.walk(tree):
-        name = called_name(node)
-        if name not in CALLBACKS:
-            continue
-        keyword, place, values = CALLBACKS[name]
-        given = [k.value for k in node.keywords if k.arg == keyword] + node.args[place : place + 1]
-        if (
-            not given
-            and dotted(node.func) == "rospy.Subscriber"
-            and len(node.args) == place
-            and all(k.arg for k in node.keywords)
-        ):
-            fix = "write the function's name as its third value"
-            yield slip(node.lineno, "callback-missing", "`Subscriber(…)` gets no callback", fix=fix)
-        values += any(k.arg == "callback_args" for k in node.keywords) or len(node.args) > place + 1
-        for one in given[:1]:
-            called = isinstance(one, ast.Call)
-            meant = one.func if called else one
-            own = functions.get(dotted(meant).rpartition(".")[2])
-            least, most = takes(own, isinstance(meant, ast.Attribute)) if own else (values, values)
-            if own and called and (least or not gives_value(own)):
-                message, fix = "`%s()` is called here", "write `%s`, without brackets"
-                name = dotted(meant)
-                yield slip(one.lineno, "callback-called", message % name, fix=fix % name, name=name)
-            elif own and not called and not least <= values <= most:
-                what = {
-                    "Service": "the request",
-                    "Timer": "the event",
-                    "on_shutdown": "nothing",
-                    "signal": "the signal's number and a frame",
-                }.get(name, "the message")
-                message, fix = wrong_callback(own, node, functions, isinstance(meant, ast.Attribute), values)
-                message = message or "`%s` takes %d arguments, but ROS passes it %s" % (own.name, least, what)
-                yield slip(own.lineno, "callback-values", message, fix=fix, name=own.name)
-
-
-def wrong_callback(own, call, functions, bound, values):
-    """Return why a function does not fit as a callback, "" where only its arguments do not, and what to write."""
-    given = [one.arg for one in own.args.args]
-    if any(inner is call for inner in ast.walk(own)):
-        others = [f for f in functions.values() if f is not own and takes(f, bound)[0] == values]
-        message = "`%s` is the function that makes this call, not its callback" % own.name
-        meant = others[0].name if len(others) == 1 else "the name of the function that prints the message"
-        return message, "in line %d, write %s for %s" % (call.lineno, meant, own.name)
-    if bound and len(given) == values and "self" not in given:
-        message = "`%s` is called on an object, and takes no `self`" % own.name
-        return message, "write `def %s(%s):`" % (own.name, ", ".join(["self", *given]))
-    return "", "write `def {0}({1}msg):`".format(own.name, "self, " if bound else "")
-
-
-def gives_value(function):
-    return any(isinstance(n, (ast.Return, ast.Yield)) and n.value is not None for n in ast.walk(function))
-
-
-def queue_sizes(tree):
-    """Publishers whose `queue_size` is a text: rospy takes it, and sends nothing."""
-    for node in ast.walk(tree):
-        for one in node.keywords if is_call(node, "Publisher") else ():
-            if (
-                one.arg == "queue_size"
-                and isinstance(one.value, ast.Constant)
-                and isinstance(one.value.value, str)
-            ):
-                size = one.value.value[:TEXT_LIMIT]
-                fix = "write `queue_size=%s`, without quotes" % (size or "10")
-                yield slip(one.value.lineno, "queue-size", "`queue_size` is a text", fix=fix)
-
-
-def takes(function, bound):
-    """Return with how many values a function can be called at least and at most; of a method without `self`."""
-    given = function.args.posonlyargs + function.args.args
-    of_class = any(getattr(d, "id", "") == "staticmethod" for d in function.decorator_list)
-    own = 1 if bound and not of_class else 0
-    least = len(given) - len(function.args.defaults) - own
-    return least, 99 if function.args.vararg else len(given) - own
 
 
 def constant(node, given, depth=4):

@@ -100,7 +100,8 @@ def check(root, name):
         if error is not None:
             report["faults"].append(syntax_fault(error, data))
             return report
-        report["slips"] = [*slips(tree), *argument_texts(data.decode("utf-8", "replace"))]
+        text = data.decode("utf-8", "replace")
+        report["slips"] = [*slips(tree), *argument_texts(text), *commented_calls(text)]
     return report
 
 
@@ -117,6 +118,26 @@ def argument_texts(text):
             several = ":" in found.group(2).rpartition("[")[2]
             fix = ("%s = map(int, %s)" if several else "%s = int(%s)") % found.groups()
             yield slip(number, "argument-text", "an argument is a text", fix=fix, name=found.group(1))
+
+
+COMMENTED_CALL = re.compile(
+    r"\s*#[#\s]*((?:([\w.]+) *= *)?[\w.]*\b(Publisher|Subscriber|Service|init_node|publish|sleep|spin)\(.*\))"
+    r"\s*(?:#.*)?"
+)
+
+
+def commented_calls(text):
+    """Yield calls of ROS that are commented out; `name` is the call, behind what it is given to: `pub = Publisher`."""
+    for number, line in enumerate(text.splitlines(), 1):
+        found = COMMENTED_CALL.fullmatch(line[:TEXT_LIMIT])
+        code, target, call = found.groups() if found else ("", "", "")
+        with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+            if code and ast.parse(code):
+                name = "%s = %s" % (target, call) if target else call
+                message = "`%s(…)` is commented out" % call
+                yield slip(
+                    number, "commented-out", message, fix="remove the `#` from line %d" % number, name=name
+                )
 
 
 def bare_except(tree, name):

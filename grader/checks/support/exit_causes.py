@@ -172,10 +172,11 @@ def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     if script is not None and script.shebang_fault == "empty-file":
         return Ending("its file is empty", f"write the node in {script.path}", by_itself=True)
     kinds = ("main-guard", "never-called", "loop-left")
-    slips = [s for s in package.slips if s.file == life.start.script and s.kind in kinds]
+    own = [s for s in package.slips if s.file == life.start.script]
+    slips = [s for s in own if s.kind in kinds or (s.kind, s.name) == ("commented-out", "spin")]
     if not slips:
         return None
-    slip = min(slips, key=lambda one: kinds.index(one.kind))
+    slip = min(slips, key=lambda one: [*kinds, "commented-out"].index(one.kind))
     called = f"call {slip.name}() at the end of the script, below {MAIN}" if slip.name else f"write {MAIN}"
     cause = f"its script ran to the end: {slip.message} ({slip.file}, line {slip.line})"
     return Ending(cause, slip.fix or called, (slip.place,), by_itself=True)
@@ -349,7 +350,7 @@ def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> t
     slips = [s for s in package.slips if s.file == place.file]
     if outside := next((s for s in slips if (s.line, s.kind) == (place.line, "outside-method")), None):
         return outside.message, outside.fix
-    meant = [one for one in map(name_slip, slips) if one is not None]
+    meant = [one for s in slips if (one := name_slip(s, slips)) is not None]
     here = next((one for one in meant if name and (one.line, one.name) == (place.line, name[1])), None)
     if here is None:
         return None
@@ -367,9 +368,13 @@ class NameSlip(NamedTuple):
     fix: str
 
 
-def name_slip(slip: PythonSlip) -> NameSlip | None:
-    """Return what a slip says of a name that is not there; None of any other slip."""
+def name_slip(slip: PythonSlip, others: Sequence[PythonSlip]) -> NameSlip | None:
+    """Return what a slip says of a name that is not there; None of any other slip. `others` are those of its file."""
     name, why, fix = slip.name, slip.message, slip.fix
+    gone = [s for s in others if s.kind == "commented-out" and s.name.startswith(f"{name} = ")]
+    if gone and slip.kind in {"misspelt", "undefined"}:
+        why = f"line {gone[0].line}, which gives it its value, is commented out"
+        return NameSlip(name, slip.line, why, gone[0].fix)
     if slip.kind == "misspelt":
         return NameSlip(name, slip.line, why, f"in line {slip.line}, {fix}")
     if slip.kind != "undefined":

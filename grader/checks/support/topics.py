@@ -147,6 +147,8 @@ def _not_advertised(package: PackageFacts, run: Run, topic: str, of_node: Callab
         verdict = of_node(f"{what}: {slip.message}", measured=measured, hint=_reach_hint(slip))
         return verdict.about(citations=(slip.place,))
     hint = f"add {publisher(topic)} and publish in the loop"
+    if slip := call_in_comment(package, run, "Publisher"):
+        return _commented_out(what, slip, of_node).about(measured=measured)
     if not published:
         return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
     hint += f", or rename {join_words(published, 'or')} if that is meant to be it"
@@ -170,6 +172,8 @@ def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Calla
     if deaf := unheard(run):
         verdict = of_node(f"{message}: {deaf.message}", measured="no message", hint=deaf.hint)
         return verdict.model_copy(update={"cause": deaf.message})
+    if slip := call_in_comment(package, run, "publish"):
+        return _commented_out(message, slip, of_node)
     if heard := _heard_topics(run):
         answering = f"publish in the callback of {join_words(heard)}, or in the loop"
         hint = both(
@@ -246,6 +250,18 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
     """Return the first slip of one of these kinds in a script that runs."""
     scripts = {one.start.script for one in lives(run)}
     return next((s for s in package.slips if s.file in scripts and s.kind in kinds), None)
+
+
+def call_in_comment(package: PackageFacts, run: Run, call: str) -> PythonSlip | None:
+    """Return where a script that runs has such a call in a comment: `Subscriber`."""
+    scripts = {one.start.script for one in lives(run)}
+    found = (s for s in package.slips if s.kind == "commented-out" and s.file in scripts)
+    return next((s for s in found if s.name.rpartition(" ")[2] == call), None)
+
+
+def _commented_out(what: str, slip: PythonSlip, of_node: Callable[..., Verdict]) -> Verdict:
+    message = f"{what}: in {slip.file}, line {slip.line}, {slip.message}"
+    return of_node(message, measured="no message", hint=slip.fix).about(citations=(slip.place,))
 
 
 def _reach_hint(slip: PythonSlip) -> str:
