@@ -21,8 +21,6 @@ import os
 import pickle
 import select
 import signal
-import socket
-import struct
 import subprocess
 import sys
 import threading
@@ -32,7 +30,6 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from queue import LifoQueue
@@ -44,21 +41,15 @@ from pydantic import TypeAdapter
 from grader import errors
 from grader.errors import GraderError, RubricError
 from grader.host_programs import module_command, with_absolute_paths
+from grader.limited_child import CAN_COPY, COLLECT_AFTER, Template, TemplateCopy, stand_by
 
 HEAD_BYTES = 8
 ANSWER_BYTES_MAX = 256 << 20
 LEAVE_S = 30.0
 """How long a worker may take to clean up once it is told to stop."""
 IDLE_CODE = 75
-COPY, STATUS = b"c", b"s"
-REQUEST_BYTES = 16
-COLLECT_AFTER = 50_000
-"""So many new objects until Python looks for cycles: evidence is many small objects without any."""
 QUICK = {"OPENBLAS_NUM_THREADS": "1", "PYDANTIC_DISABLE_PLUGINS": "__all__"}
 """As in `grader/__main__.py`."""
-NUMBER = struct.Struct("<q")
-TEMPLATE_S = 60.0
-"""How long a template may take to answer: it begins by importing."""
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
@@ -85,100 +76,20 @@ class WorkerLimits:
     idle_s: float | None = None
 
 
-class Template:
-    """A process that imports modules and does no job: workers begin as copies of it (Linux only).
+class _Copy(TemplateCopy):
+    """A copy of a template that is a worker, with its ends of the pipes that a `subprocess.Popen` has too."""
 
-    `warm_up` is a function without arguments, as `module:name`, that it calls before the first copy is made. It ends
-    with this object's socket, at the latest with its parent; its copies live on.
-    """
-
-    def __init__(self, warm_up: str, env: Mapping[str, str] | None = None) -> None:
-        self._lock = threading.Lock()
-        self._sock, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._sock.settimeout(TEMPLATE_S)
-        with theirs:
-            self._popen = subprocess.Popen(
-                [*module_command("grader.workers"), warm_up],
-                env=_environment(env),
-                stdin=theirs.fileno(),
-                stdout=subprocess.DEVNULL,
-                start_new_session=True,
-            )
-
-    def copy(self) -> _Copy:
-        """Return a new worker process. Raises OSError where the template has ended, or the kernel is too old."""
-        jobs_r, jobs_w = os.pipe()
-        answers_r, answers_w = os.pipe()
-        stdin, stdout = os.fdopen(jobs_w, "wb"), os.fdopen(answers_r, "rb")
+    def __init__(self, template: Template) -> None:
+        (jobs_r, jobs_w), (answers_r, answers_w) = os.pipe(), os.pipe()
+        self.stdin, self.stdout = os.fdopen(jobs_w, "wb"), os.fdopen(answers_r, "rb")
         try:
-            pid = self._ask(COPY, [jobs_r, answers_w])
-            return _Copy(self, pid, os.pidfd_open(pid), stdin, stdout)
+            super().__init__(template, jobs_r, answers_w)
         except OSError:
-            for stream in (stdin, stdout):
-                stream.close()
+            _close(self)
             raise
         finally:
             os.close(jobs_r)
             os.close(answers_w)
-
-    def status(self, pid: int) -> int:
-        """Return the exit code of a copy that has ended, as `subprocess` has it."""
-        try:
-            return os.waitstatus_to_exitcode(self._ask(STATUS + NUMBER.pack(pid)))
-        except OSError:  # the template was ended, and nobody else may ask
-            return -signal.SIGKILL
-
-    def close(self) -> None:
-        """End the template."""
-        self._sock.close()
-        self._popen.wait()
-
-    def _ask(self, request: bytes, descriptors: Iterable[int] = ()) -> int:
-        with self._lock:
-            try:
-                socket.send_fds(self._sock, [request], list(descriptors))
-                (answer,) = NUMBER.unpack(self._sock.recv(NUMBER.size))
-            except (OSError, struct.error) as error:
-                self._sock.close()  # a late answer would be taken for that to the next request
-                raise ConnectionResetError("the template has ended") from error
-        return int(answer)
-
-
-class _Copy:
-    """A copy of a template. Nothing but `status` waits for it, so its process id stays its own until then."""
-
-    def __init__(
-        self, template: Template, pid: int, handle: int, stdin: IO[bytes], stdout: IO[bytes]
-    ) -> None:
-        self._template, self._pid, self._handle = template, pid, handle
-        self.stdin, self.stdout = stdin, stdout
-        self._code: int | None = None
-        self._lock = threading.Lock()
-
-    def poll(self) -> int | None:
-        with suppress(subprocess.TimeoutExpired):
-            return self.wait(0)
-        return None
-
-    def wait(self, timeout: float | None = None) -> int:
-        poll = select.poll()
-        poll.register(self._handle, select.POLLIN)
-        if not poll.poll(None if timeout is None else timeout * 1000):
-            raise subprocess.TimeoutExpired(str(self._pid), timeout or 0.0)
-        with self._lock:
-            if self._code is None:
-                self._code = self._template.status(self._pid)
-            return self._code
-
-    def __del__(self) -> None:
-        os.close(self._handle)
-
-    def kill(self) -> None:
-        self.send_signal(signal.SIGKILL)
-
-    def send_signal(self, number: int) -> None:
-        with suppress(ProcessLookupError):
-            signal.pidfd_send_signal(self._handle, number)
 
 
 class Worker:
@@ -267,7 +178,7 @@ class Worker:
             _close(self._process)
         if self._template is not None:
             with suppress(OSError):  # then without a template
-                self._process = self._template.copy()
+                self._process = _Copy(self._template)
                 return self._process
         self._process = subprocess.Popen(
             module_command("grader.workers"),
@@ -347,7 +258,9 @@ def run_each(
 
 def _template(count: int, warm_up: str, env: Mapping[str, str] | None) -> Template | None:
     """Return a template for so many workers, where they need one and this system can have one."""
-    return Template(warm_up, env) if count > 1 and hasattr(os, "pidfd_open") else None
+    if count == 1 or not CAN_COPY:
+        return None
+    return Template([*module_command("grader.workers"), warm_up], _environment(env))
 
 
 def _end(workers: Iterable[Worker], template: Template | None) -> None:
@@ -442,43 +355,9 @@ class _State:
 def main() -> None:
     """Do the jobs that come on stdin until it ends; as a template (its argument is what that warms up with), first
     stand by, until this is a copy that is to do jobs."""
-    if len(sys.argv) == 1 or _stand_by(sys.argv[1]):
+    if len(sys.argv) == 1 or stand_by(sys.argv[1]):
         _work()
     gc.freeze()  # as in `grader/__main__.py`
-
-
-def _stand_by(warm_up: str) -> bool:
-    """Answer `Template`'s requests; False at their end, True in each copy."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it ends with its socket
-    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-    gc.disable()  # until all is imported, to be looked through once
-    module, _, name = warm_up.partition(":")
-    with suppress(Exception):  # then a job says what is wrong
-        found = import_module(module)
-        if name:
-            getattr(found, name)()
-    gc.collect()
-    gc.freeze()  # what is here is shared with every copy for as long as no one touches it
-    gc.enable()
-    with socket.socket(fileno=os.dup(0)) as sock:
-        while True:
-            request, descriptors, _, _ = socket.recv_fds(sock, REQUEST_BYTES, 2)
-            if not request:
-                return False
-            if request[:1] == STATUS:
-                _, answer = os.waitpid(NUMBER.unpack(request[1:])[0], 0)
-            else:
-                answer = os.fork()
-            if answer == 0 and request == COPY:
-                break
-            for number in descriptors:
-                os.close(number)
-            sock.send(NUMBER.pack(answer))
-    os.setsid()
-    for target, number in enumerate(descriptors):
-        os.dup2(number, target)
-        os.close(number)
-    return True
 
 
 def _work() -> None:

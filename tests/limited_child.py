@@ -48,3 +48,11 @@ def look_around() -> Iterator[object]:
 
 def repeat(*values: object) -> Iterator[object]:
     yield from values
+
+
+REMEMBERED: list[int] = []
+
+
+def remember() -> Iterator[dict[str, int]]:
+    REMEMBERED.append(1)
+    yield {"own": os.getpid(), "parent": os.getppid(), "remembered": len(REMEMBERED)}

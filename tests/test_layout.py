@@ -41,7 +41,7 @@ ALLOWED = {
     "ros_packages": {"errors", "host_programs", "installable", "ros_env", "wording"},
     "host_programs": set[str](),
     "limited_child": {"host_programs"},
-    "workers": {"errors", "host_programs"},
+    "workers": {"errors", "host_programs", "limited_child"},
     "files": {"errors", "portable"},
     "results": BASE | {"files"},
     "verification": BASE | {

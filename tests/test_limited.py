@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 
 import pytest
 
+from grader import limited_child
 from grader.limited_child import Answer, ChildLimits, run_limited
 
 LIMITS = ChildLimits(memory_bytes=256 << 20, cpu_s=1, wall_s=30.0, file_bytes=1 << 20)
@@ -46,3 +48,24 @@ def test_nothing_is_inherited_but_what_loading_takes(monkeypatch) -> None:
     names, folder, packages = (json.loads(line) for line in ask("look_around").lines.splitlines())
     assert not {"PYTHONPATH", "GRADER_GIT_TOKEN", "HOME"} & set(names)
     assert (folder, packages) == (os.sep, [])
+
+
+@pytest.mark.skipif(not limited_child.CAN_COPY, reason="Linux only")
+def test_children_are_copies_of_one_template_and_leave_nothing_to_each_other() -> None:
+    first, second = (json.loads(ask("remember").lines) for _ in range(2))
+    assert first["parent"] == second["parent"] != os.getpid()
+    assert first["own"] != second["own"]
+    assert first["remembered"] == second["remembered"] == 1
+
+
+@pytest.mark.skipif(not limited_child.CAN_COPY, reason="Linux only")
+def test_a_template_that_was_killed_costs_no_answer() -> None:
+    before = json.loads(ask("remember").lines)
+    os.kill(before["parent"], signal.SIGKILL)
+    assert [ask("repeat", 1).lines, ask("repeat", 2).lines] == [b"1\n", b"2\n"]
+    assert json.loads(ask("remember").lines)["parent"] not in {before["parent"], os.getpid()}
+
+
+def test_without_templates_each_child_is_a_process_of_its_own(monkeypatch) -> None:
+    monkeypatch.setattr(limited_child, "CAN_COPY", False)
+    assert json.loads(ask("remember").lines)["parent"] == os.getpid()

@@ -63,12 +63,12 @@ STARTS = {
         "'/'",
         "nothing: the address of the course's own server",
     ),
-    "limited_child.py:run_limited": Start(
-        "loading_environment(os.environ)",
+    "limited_child.py:_run": Start(
+        "env",  # the variables that loading takes: tests/test_limited.py
         "'/'",
         "its archive, and its source files, which are parsed and not run",
     ),
-    "workers.py:__init__": Start("_environment(env)", None, "nothing: it does no job"),
+    "limited_child.py:__init__": Start("env", "cwd", "nothing: a template does no job"),
     "workers.py:_start": Start(
         "_environment(self._env)",
         None,
@@ -83,7 +83,7 @@ STARTS = {
 }
 REPLACED = {
     "arena/ros/namespaces.py:<module>": "becomes the program of the probe: arena/sandbox.py",
-    "workers.py:_stand_by": "a copy of the template does the jobs of a worker, as one that `_start` started",
+    "limited_child.py:stand_by": "a copy of the template does what a process of its own would",
 }
 MAKERS = {"Popen", "run", "call", "check_call", "check_output", "getoutput", "getstatusoutput"}
 STARTER = re.compile(
