@@ -9,12 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.batch.folder import write_run
+from grader.classes.batch.folder import RUN, open_batch, write_run
 from grader.classes.gradebook import FORMS, GradebookRow
 from grader.classes.gradebook.table import header
 from grader.cli.main import build_parser, run
 from grader.model.batch import BatchRun, RosterFault
 from grader.report.files import result_bytes
+from grader.untrusted_text import json_text
 from tests.gradebook.made import BOOK, row
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "gradebooks.md"
@@ -46,6 +47,16 @@ def batch_run(rows: list[GradebookRow]) -> BatchRun:
         entries=tuple(one.entry for one in rows),
         faults=(RosterFault(where="roster.csv:4", id="cem", text="no source"),),
     )
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_entries_are_written_one_by_one_as_all_at_once(tmp_path: Path, count: int) -> None:
+    odd = ROWS[0].entry.model_copy(update={"extra": {"a\n[]": "\u2028\udce9 ##[error]", "entries": "[]"}})
+    run_ = batch_run(ROWS).model_copy(update={"entries": (odd,) * count})
+    write_run(tmp_path, run_)
+    whole = json_text(run_.model_dump(mode="json", by_alias=True))
+    assert (tmp_path / RUN).read_bytes() == whole.encode()
+    assert len(open_batch(tmp_path).run.entries) == count
 
 
 @pytest.mark.parametrize("form", FORMS)

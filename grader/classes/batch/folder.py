@@ -9,7 +9,7 @@ from pathlib import Path
 from grader import __version__
 from grader.classes.gradebook import Book, GradebookRow
 from grader.errors import UsageError
-from grader.files import atomic_write
+from grader.files import whole_file
 from grader.intake import safe_name
 from grader.model.batch import MISSING, ROSTER, UNPUBLISHED, BatchRun, CriterionInfo, Entry
 from grader.model.record import RUN as RUN_FORMAT
@@ -129,8 +129,15 @@ def _not_judged(criterion: CriterionInfo) -> CriterionResult:
 
 
 def write_run(folder: Path, run: BatchRun) -> None:
-    """Write `run.json`. Raises OutputError."""
-    atomic_write(folder / RUN, json_text(run.model_dump(mode="json", by_alias=True)).encode())
+    """Write `run.json`, one entry after the other: a class may have thousands. Raises OutputError."""
+    whole = json_text(run.model_copy(update={"entries": ()}).model_dump(mode="json", by_alias=True))
+    before, _, after = whole.rpartition("[]")  # the entries come last
+    with whole_file(folder / RUN) as part, part.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(f"{before}[")
+        for number, entry in enumerate(run.entries):
+            row = json_text(entry.model_dump(mode="json", by_alias=True)).rstrip()
+            file.write((",\n" if number else "\n") + f"    {row}".replace("\n", "\n    "))
+        file.write(("\n  ]" if run.entries else "]") + after)
 
 
 def open_batch(folder: Path) -> BatchFolder:
