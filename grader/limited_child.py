@@ -2,8 +2,8 @@
 
 The arguments, and each value that the function yields, travel as JSON. The child is this Python without site-packages,
 and inherits none of the user's variables but those that a program needs to be loaded. To start it takes as long as most
-of what it is started for, so where the system can, it is a copy of a template: a process that has imported the function
-and has never seen any data. A process for many jobs is not its business (`workers.py`, whose workers are such copies
+of what it is started for, so where the system can, each but a process's first is a copy of a template: a process that has
+imported the function and has never seen any data. A process for many jobs is not its business (`workers.py`, whose workers are such copies
 too), and neither are students' programs (`arena/`).
 """
 
@@ -82,7 +82,9 @@ def _run(function: str, stdin: int, stdout: int, wall_s: float) -> int | None:
     from grader.host_programs import loading_environment  # noqa: PLC0415 - as above
 
     env = loading_environment(os.environ)
-    if CAN_COPY:
+    is_first = os.getpid() not in _have_had_one
+    _have_had_one.add(os.getpid())
+    if CAN_COPY and not is_first:  # a template is worth its own start from the second child on
         with contextlib.suppress(OSError):  # the kernel is too old, or the template was ended
             copy = TemplateCopy(_own_template(env), stdin, stdout, function.partition(":")[0])
             try:
@@ -106,12 +108,14 @@ def _run(function: str, stdin: int, stdout: int, wall_s: float) -> int | None:
     return None
 
 
+_have_had_one: set[int] = set()
 _templates: dict[int, Template] = {}
+"""Both by process: a copy of the process that made a template makes its own."""
 
 
 def _own_template(env: Mapping[str, str]) -> Template:
     """Return this process's template, which ends with it. Raises OSError."""
-    known = _templates.get(os.getpid())  # a copy of the process that made one makes its own
+    known = _templates.get(os.getpid())
     if known is None or known.ended:
         known = _templates[os.getpid()] = Template([*COMMAND, STAND_BY], env, cwd="/", quiet=True)
         atexit.register(known.close)
@@ -217,7 +221,7 @@ def main() -> None:
     """Answer the request on standard input, as the child; as its template, first stand by until this is a copy."""
     gc.set_threshold(COLLECT_AFTER)
     if STAND_BY in sys.argv and not stand_by():
-        return
+        os._exit(0)  # as below
     request = json.load(sys.stdin)
     _set_limits(ChildLimits(**request["limits"]))
     module, _, name = request["function"].partition(":")
