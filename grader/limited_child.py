@@ -2,9 +2,9 @@
 
 The arguments, and each value that the function yields, travel as JSON. The child is this Python without site-packages,
 and inherits none of the user's variables but those that a program needs to be loaded. To start it takes as long as most
-of what it is started for, so where the system can, each but a process's first is a copy of a template: a process that has
-imported the function and has never seen any data. A process for many jobs is not its business (`workers.py`, whose workers are such copies
-too), and neither are students' programs (`arena/`).
+of what it is started for, so where the system can, each but a process's first is a copy of a template: a process that
+has imported the function and has never seen any data. A process for many jobs is not its business (`workers.py`, whose
+workers are such copies too), and neither are students' programs (`arena/`).
 """
 
 from __future__ import annotations
