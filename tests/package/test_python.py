@@ -178,7 +178,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node("    for i in range(9):\n        p.publish(i)\n") + CALLED, [("loop-left", 4, "put it inside a `while")]),
         (node("    while not rospy.is_shutdown() and n < 9:\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "the loop of line 4 ends after a number of rounds")]),
-        (node(LOOP + "        p.publish(1)\n        # p.publish(2)\n        #rate.sleep()  # wait\n        # sleep( a\n")
+        (node(LOOP + "        p.publish(1)\n        # p.publish(2)\n        #rate.sleep()  # b\n        # sleep( a\n")
          + CALLED,
          [("commented-out", 6, "remove the `#` from line 6"), ("commented-out", 7, "`sleep(…)` is commented out")]),
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, 'f')\n", [("callback-called", 3, "write `f`, without quotes")]),
