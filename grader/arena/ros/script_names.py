@@ -16,6 +16,13 @@ FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
 
+def walk(tree):
+    """Return all the nodes of a module, as `ast.walk` yields them: kept, since each finder asks for them."""
+    if not hasattr(tree, "all_nodes"):
+        tree.all_nodes = list(ast.walk(tree))
+    return tree.all_nodes
+
+
 def is_call(node, name):
     return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == name
 
@@ -52,8 +59,8 @@ NAMED = {"init_node": "node-name", "Publisher": "publisher", "Subscriber": "subs
 def graph_names(tree):
     """Where a script names its node, and the topics that it publishes and subscribes to, as written; and the types that
     it publishes."""
-    owners = {id(n.value): dotted(n.targets[0]) for n in ast.walk(tree) if isinstance(n, ast.Assign)}
-    for node in ast.walk(tree):
+    owners = {id(n.value): dotted(n.targets[0]) for n in walk(tree) if isinstance(n, ast.Assign)}
+    for node in walk(tree):
         kind = NAMED.get(called_name(node))
         if not kind:
             continue
@@ -79,12 +86,12 @@ def published_type(call):
 def misspelt(tree):
     """Names that are read where nothing has given them a value: `misspelt` where one that is bound is spelt alike, or
     `self` has one of that name, else `undefined`."""
-    names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
+    names = [n for n in walk(tree) if isinstance(n, ast.Name)]
     own = given_names(tree, names)
     if "*" in own or len(own) > NAMES_LIMIT:
         return
     attributes = {
-        dotted(n) for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)
+        dotted(n) for n in walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)
     }
     known = own | set(dir(builtins)) | MODULE_NAMES | imported_otherwise(tree, {n.id for n in names})
     outside = {id(n) for n in outside_methods(tree)}
@@ -111,7 +118,7 @@ def misspelt(tree):
 def given_names(tree, names):
     """Return what anything in the file gives a value, imports or declares."""
     own = {n.id for n in names if not isinstance(n.ctx, ast.Load)}
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if not isinstance(node, ast.keyword):
             bound = [getattr(node, key, None) for key in ("name", "asname", "arg", "rest")]
             own.update(part for text in bound if isinstance(text, str) for part in text.split("."))
@@ -124,10 +131,10 @@ def without_quotes(tree, known):
     """Return for each name that stands for a key, and that nothing in the file has but the line that is given its
     value, by its id: the value as it is written with quotes. Only where a script reads parameters, or has other keys in
     quotes."""
-    stores = [n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    stores = [n.id for n in walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
     given = {
         (t.id, t.lineno)
-        for n in ast.walk(tree)
+        for n in walk(tree)
         if isinstance(n, ast.Assign)
         for t in n.targets
         if isinstance(t, ast.Name)
@@ -137,9 +144,9 @@ def without_quotes(tree, known):
         here = (node.id, node.lineno) in given and stores.count(node.id) == 1
         return (here or node.id not in known) and len(node.id) > 1
 
-    values = [n for n in ast.walk(tree) if isinstance(n, ast.Subscript)]
+    values = [n for n in walk(tree) if isinstance(n, ast.Subscript)]
     keyed = any(isinstance(key_of(n), ast.Constant) and isinstance(key_of(n).value, str) for n in values)
-    reads = any(called_name(n) in ("get_param", "get_param_cached") for n in ast.walk(tree))
+    reads = any(called_name(n) in ("get_param", "get_param_cached") for n in walk(tree))
     found = {}
     for value in values if keyed or reads else ():
         text, node = "", value
@@ -163,7 +170,7 @@ def key_of(subscript):
 def imported_otherwise(tree, names):
     """Return those of the names that are classes of messages or services, and are imported with other capitals: it is
     the import that fails."""
-    froms = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)]
+    froms = [n for n in walk(tree) if isinstance(n, ast.ImportFrom)]
     modules = [n for n in froms if (n.module or "").endswith((".msg", ".srv"))]
     imported = {alias.name.lower() for n in modules for alias in n.names}
     return {name for name in names if name.lower() in imported}
@@ -181,7 +188,7 @@ def spelt_alike(name, own, attributes):
 
 def outside_methods(tree):
     """Yield the nodes of statements that stand in a class and call something, in none of its methods."""
-    for node in ast.walk(tree):
+    for node in walk(tree):
         for statement in node.body if isinstance(node, ast.ClassDef) else ():
             if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call):
                 yield from ast.walk(statement)
@@ -192,9 +199,9 @@ def unbound_names(tree, known):
 
     A script that binds names as it runs has none, and neither has a `try:` that catches what such a name raises.
     """
-    if any(called_name(n) in ("exec", "globals", "locals", "setattr") for n in ast.walk(tree)):
+    if any(called_name(n) in ("exec", "globals", "locals", "setattr") for n in walk(tree)):
         return set()
-    shared = {name for n in ast.walk(tree) if isinstance(n, ast.Global) for name in n.names}
+    shared = {name for n in walk(tree) if isinstance(n, ast.Global) for name in n.names}
     builtin = (set(dir(builtins)) | MODULE_NAMES) & known
     found, left = set(), [(tree, bound_names(tree) | shared | builtin)]
     while left:
@@ -268,9 +275,9 @@ def undefined(node, tree):
     """Return why a name is not there that the file gives no value anywhere, and what to do."""
     name, line = node.id, node.lineno
     why = "nothing in the file gives `%s` a value" % name
-    uses = [n for n in ast.walk(tree) if node in (getattr(n, "value", None), getattr(n, "func", None))]
+    uses = [n for n in walk(tree) if node in (getattr(n, "value", None), getattr(n, "func", None))]
     used = uses[0] if uses else None
-    calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and node in n.args]
+    calls = [n for n in walk(tree) if isinstance(n, ast.Call) and node in n.args]
     if name in GIVEN_BY_NAME and calls:
         return "`%s` stands here without its value" % name, "write `%s=%s`" % (name, GIVEN_BY_NAME[name])
     inner = used.attr if isinstance(used, ast.Attribute) else ""
@@ -282,8 +289,8 @@ def undefined(node, tree):
         return why, how % (line, name, name)
     if isinstance(used, ast.Call):
         return why, "above line %d, define it with `def %s(…):`, or import it" % (line, name)
-    types = {published_type(n) for n in ast.walk(tree) if called_name(n) == "Publisher"} - {""}
-    sent = [n for n in ast.walk(tree) if is_call(n, "publish") and node in n.args]
+    types = {published_type(n) for n in walk(tree) if called_name(n) == "Publisher"} - {""}
+    sent = [n for n in walk(tree) if is_call(n, "publish") and node in n.args]
     if sent or (isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)):
         kind = types.pop() if len(types) == 1 else "<Type>"
         return why, "above line %d, create the message: `%s = %s()`" % (line, name, kind)
@@ -293,12 +300,12 @@ def undefined(node, tree):
 def known_elsewhere(node, tree):
     """Return why a name is not there that only a function or a class has, and what to do; "" where none has it."""
     name = node.id
-    for one in ast.walk(tree):
+    for one in walk(tree):
         if isinstance(one, ast.ClassDef) and name in bound_names(one):
             owner = "self" if any(n is node for n in ast.walk(one)) else "%s()" % one.name
             fix = "in line %d, write `%s.%s` for `%s`" % (node.lineno, owner, name, name)
             return "`%s` belongs to the class %s" % (name, one.name), fix
-    for one in ast.walk(tree):
+    for one in walk(tree):
         if isinstance(one, ast.FunctionDef) and name in bound_names(one):
             imports = [n for n in ast.walk(one) if isinstance(n, (ast.Import, ast.ImportFrom))]
             where = "`%s` has a value only in `%s(…)`" % (name, one.name)
@@ -317,7 +324,7 @@ def resets(tree):
     """Where a counter goes back: the number that it is set to in an `if` that asks for it, and the number in that `if`,
     or behind a `%`.
     """
-    for node in ast.walk(tree):
+    for node in walk(tree):
         value, done, asked = None, (), []
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
             asked = [node.right]
@@ -358,7 +365,7 @@ def counter_slips(tree):
     not count: `n =+ 1`, or the line below the loop.
     """
     yield from uncounted(tree)
-    for loop in ast.walk(tree):
+    for loop in walk(tree):
         body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
         inside = [n for one in body for n in ast.walk(one)]
         sent = [i for i, one in enumerate(body) if any(is_call(n, "publish") for n in ast.walk(one))]
@@ -382,7 +389,7 @@ def counter_slips(tree):
 
 
 def uncounted(tree):
-    for node in ast.walk(tree):
+    for node in walk(tree):
         value = node.value if isinstance(node, ast.Assign) else None
         if isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.UAdd):
             name = dotted(node.targets[0])
@@ -439,7 +446,7 @@ def said_texts(tree):
     """The texts that a script publishes and prints, as far as its source has them: `{}` is a value, `{data}` that of a
     message."""
     given, kinds = {}, set()
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if isinstance(node, (ast.Assign, ast.AugAssign)):
             for target in getattr(node, "targets", None) or [node.target]:
                 plain = node.value if isinstance(node, ast.Assign) else None
@@ -447,7 +454,7 @@ def said_texts(tree):
         if isinstance(node, FUNCTIONS):
             kinds.update(arg.arg for arg in ast.walk(node.args) if isinstance(arg, ast.arg))
     read = Texts({name: values[0] for name, values in given.items() if len(values) == 1 and values[0]}, kinds)
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if is_call(node, "publish") and len(node.args) == 1:
             place, text = read.message(node.args[0])
             yield from said("publishes", place, text)

@@ -7,13 +7,13 @@ Nothing is executed. Python 3.8, standard library only.
 import ast
 import difflib
 
-from script_names import TEXT_LIMIT, bound_names, called_name, dotted, is_call, slip
+from script_names import TEXT_LIMIT, bound_names, called_name, dotted, is_call, slip, walk
 
 
 def object_slips(tree):
     """Attributes that a class of this file gives no object, and classes that are used in place of an object."""
-    classes = [n for n in ast.walk(tree) if isinstance(n, ast.ClassDef)]
-    if any(called_name(n) == "setattr" for n in ast.walk(tree)):
+    classes = [n for n in walk(tree) if isinstance(n, ast.ClassDef)]
+    if any(called_name(n) == "setattr" for n in walk(tree)):
         return
     for one in classes:
         if all(dotted(base) == "object" for base in one.bases):
@@ -30,7 +30,7 @@ class Members:
         self.fixed = bound_names(node)
         owner = {id(n): m for m in self.methods.values() for n in ast.walk(m)}
         self.stores, self.reads = {}, []
-        for n in ast.walk(tree):
+        for n in walk(tree):
             if not isinstance(n, ast.Attribute):
                 continue
             method = owner.get(id(n))
@@ -39,7 +39,7 @@ class Members:
                 self.stores.setdefault(n.attr, []).append((n, method))
             elif given and dotted(n.value) == given[0].arg and not n.attr.startswith("__"):
                 self.reads.append((n, method))
-        self.called = {called_name(n) for n in ast.walk(tree)}
+        self.called = {called_name(n) for n in walk(tree)}
 
     def astray(self):
         """Return the method that is meant to be `__init__`, with why it is not and what to do; None for none."""
@@ -52,7 +52,7 @@ class Members:
                     method.lineno,
                 )
                 return method, why, "in line %d, write `__init__` for `%s`" % (method.lineno, name)
-        for n in ast.walk(self.tree):
+        for n in walk(self.tree):
             if isinstance(n, ast.FunctionDef) and n.name == "__init__" and n not in all_methods(self.tree):
                 why = "`__init__` in line %d is not in the class %s" % (n.lineno, self.name)
                 fix = "indent `def __init__` in line %d like the other methods of %s, and its lines below it"
@@ -61,7 +61,7 @@ class Members:
 
 
 def all_methods(tree):
-    return {m for n in ast.walk(tree) if isinstance(n, ast.ClassDef) for m in n.body}
+    return {m for n in walk(tree) if isinstance(n, ast.ClassDef) for m in n.body}
 
 
 def lacking_attributes(own):
@@ -107,10 +107,10 @@ def never_given(own, name, line):
 def classes_as_objects(classes, tree):
     """Yield where a method is called of a class, or of a name that was given the class, in place of an object."""
     values = {}
-    for n in ast.walk(tree):
+    for n in walk(tree):
         for target in n.targets if isinstance(n, ast.Assign) else ():
             values.setdefault(dotted(target), []).append(n)
-    for n in ast.walk(tree):
+    for n in walk(tree):
         if not isinstance(n, ast.Call) or not isinstance(n.func, ast.Attribute) or n.args:
             continue
         owner, given = dotted(n.func.value), values.get(dotted(n.func.value), [])
@@ -145,8 +145,8 @@ def callbacks(tree):
     """Functions that ROS calls with another number of values than they take, and those that are called where the
     function itself is meant.
     """
-    functions = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
-    for node in ast.walk(tree):
+    functions = {n.name: n for n in walk(tree) if isinstance(n, ast.FunctionDef)}
+    for node in walk(tree):
         name = called_name(node)
         if name not in CALLBACKS:
             continue
@@ -206,7 +206,7 @@ def gives_value(function):
 
 def queue_sizes(tree):
     """Publishers whose `queue_size` is a text: rospy takes it, and sends nothing."""
-    for node in ast.walk(tree):
+    for node in walk(tree):
         for one in node.keywords if is_call(node, "Publisher") else ():
             if (
                 one.arg == "queue_size"

@@ -21,6 +21,7 @@ from script_names import (
     resets,
     said_texts,
     slip,
+    walk,
 )
 from script_objects import callbacks, object_slips, queue_sizes
 
@@ -43,9 +44,9 @@ PLAIN_MODULES = {
 
 def slips(tree):
     """What compiles and is not meant: names that are not called or not there, questions that wait for a keyboard."""
-    functions = {n.name for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
+    functions = {n.name for n in walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
     found = []
-    for node in ast.walk(tree):
+    for node in walk(tree):
         name = uncalled(node, functions)
         if name:
             message, fix = "`%s` is named but not called" % name, "write `%s()`" % name
@@ -60,13 +61,13 @@ def slips(tree):
     )  # fmt: skip
     for find in finders:
         found += find(tree)
-    published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
+    published = next((n for n in walk(tree) if is_call(n, "publish")), None)
     if published is not None and counts(tree):
         message = "" if knows_time(tree) else "the script counts, and reads no clock"
         message = message or sends_no_time(tree)
         if message:
             found.append(slip(published.lineno, "no-clock", message))
-    calls = {called_name(n): n.lineno for n in ast.walk(tree) if isinstance(n, ast.Call)}
+    calls = {called_name(n): n.lineno for n in walk(tree) if isinstance(n, ast.Call)}
     if "init_node" not in calls and ("Publisher" in calls or "Subscriber" in calls):
         found.append(slip(1, "no-init", "nothing in the script calls `rospy.init_node(…)`"))
     return sorted(found, key=lambda one: one["line"])[:SLIPS_LIMIT]
@@ -78,7 +79,7 @@ def loop_rates(tree):
     Either may have been given to a name once.
     """
     bound, looped = {}, set()
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
             bound.setdefault(ast.dump(node.targets[0]).replace("Store()", "Load()"), []).append(node.value)
 
@@ -89,7 +90,7 @@ def loop_rates(tree):
         values = bound.get(ast.dump(node), [node])
         return values[0] if len(values) == 1 else node
 
-    for node in ast.walk(tree):
+    for node in walk(tree):
         timed = next((name for name in ("Rate", "sleep", "Timer") if is_call(node, name)), None)
         if timed is None or not node.args or (timed == "sleep" and id(node) not in looped):
             continue
@@ -112,12 +113,12 @@ def never_run(tree):
     """Functions that make a node, publish or wait, and that nothing names; and `__name__` beside another word than
     `__main__`.
     """
-    named = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
-    named |= {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
-    made = [n for n in ast.walk(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
+    named = {n.id for n in walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+    named |= {n.attr for n in walk(tree) if isinstance(n, ast.Attribute)}
+    made = [n for n in walk(tree) if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)]
     objects = {dotted(n.value.func): dotted(n.targets[0]) for n in made}
-    of_class = {id(f): c.name for c in ast.walk(tree) if isinstance(c, ast.ClassDef) for f in c.body}
-    for node in ast.walk(tree):
+    of_class = {id(f): c.name for c in walk(tree) if isinstance(c, ast.ClassDef) for f in c.body}
+    for node in walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
             works = any(is_call(inner, work) for inner in ast.walk(node) for work in WORKS)
             if works and not node.name.startswith("__"):
@@ -139,7 +140,7 @@ def never_reached(tree):
     """
     own = {
         n.name
-        for n in ast.walk(tree)
+        for n in walk(tree)
         if isinstance(n, (ast.FunctionDef, ast.ClassDef))
         and any(is_call(inner, name) for inner in ast.walk(n) for name in MAKES)
     }
@@ -148,7 +149,7 @@ def never_reached(tree):
         name = called_name(node)
         return name if name in own or (is_call(node, name) and name in ("publish", *MAKES)) else None
 
-    for node in ast.walk(tree):
+    for node in walk(tree):
         for block in (getattr(node, "body", None), getattr(node, "orelse", None)):
             for index, loop in enumerate(block if isinstance(block, list) else ()):
                 spins = isinstance(loop, ast.Expr) and is_call(loop.value, "spin")
@@ -173,8 +174,8 @@ def stopped_loops(tree):
     `if` in place of `while`.
     """
     turned = dict(turns(tree))
-    at_most = [loop for loop in ast.walk(tree) if is_counted(loop) and not turned[loop][1]]
-    for loop in ast.walk(tree):
+    at_most = [loop for loop in walk(tree) if is_counted(loop) and not turned[loop][1]]
+    for loop in walk(tree):
         once = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
         if once and not turned[loop][1] and any(is_call(n, "publish") for n in ast.walk(loop)):
             message = "the `if` in line %d runs what follows it once" % loop.lineno
@@ -222,8 +223,8 @@ WAITS = ("sleep", "spin", "spin_once", "wait_for_message", "wait_for_service", "
 
 def sleepless_loops(tree):
     """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them."""
-    loops = [n for n in ast.walk(tree) if isinstance(n, (ast.While, ast.For))]
-    sleeps = [n for n in ast.walk(tree) if is_call(n, "sleep") and isinstance(n.func, ast.Attribute)]
+    loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For))]
+    sleeps = [n for n in walk(tree) if is_call(n, "sleep") and isinstance(n.func, ast.Attribute)]
     for loop in loops:
         inside = list(ast.walk(loop))
         waits = any(is_call(n, name) for n in inside for name in WAITS)
@@ -246,7 +247,7 @@ def sleepless_loops(tree):
 
 def sleeps_twice(tree):
     """Loops that wait twice in each of their turns, and publish once."""
-    for loop in ast.walk(tree):
+    for loop in walk(tree):
         body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
         at = [i for i, n in enumerate(body) if isinstance(n, ast.Expr) and called_name(n.value) == "sleep"]
         if len(at) != 2:
@@ -297,13 +298,13 @@ def counts(tree):
         (isinstance(n, (ast.AugAssign, ast.BinOp)) and isinstance(n.op, ast.Add))
         or (isinstance(n, ast.Call) and getattr(n.func, "id", "") in ("next", "range", "count"))
         or is_call(n, "count")
-        for n in ast.walk(tree)
+        for n in walk(tree)
     )
 
 
 def knows_time(tree):
     """Whether a script may read a clock: by name, or in a module that is not the standard one."""
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if isinstance(node, ast.Import):
             if not all(is_plain(alias.name) and alias.asname is None for alias in node.names):
                 return True
@@ -330,7 +331,7 @@ def sends_no_time(tree):
     """Return what is to be said where what is published comes from counting alone, though the script may read a clock
     for something else, or for the value that it counts on from; "" otherwise."""
     source = Source(tree)
-    found = source.reached([arg for n in ast.walk(tree) if is_call(n, "publish") for arg in n.args])
+    found = source.reached([arg for n in walk(tree) if is_call(n, "publish") for arg in n.args])
     if found.clock or found.unknown or not found.counts:
         return ""
     if source.reached(source.starts).clock:
@@ -341,7 +342,7 @@ def sends_no_time(tree):
 def clock_values(tree):
     """Topics whose values are read from a clock in each turn, and not counted."""
     source = Source(tree)
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if not is_call(node, "publish"):
             continue
         makers = source.bound.get(dotted(node.func.value), [])
@@ -359,10 +360,10 @@ class Source:
 
     def __init__(self, tree):
         self.bound, self.starts = {}, []
-        self.functions = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+        self.functions = {n.name: n for n in walk(tree) if isinstance(n, ast.FunctionDef)}
         places = dict(turns(tree))
         given = []
-        for node in ast.walk(tree):
+        for node in walk(tree):
             targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
             value = getattr(node, "iter", None) or getattr(node, "value", None)
             given += [(node, t, value) for t in targets if value is not None and t is not None]
@@ -431,7 +432,7 @@ ENDS = (ast.Break, ast.Return, ast.Raise)
 def deaf_loops(tree):
     """Why a node goes on after Ctrl-C: loops that do not ask for it, an `except` within them, signals put off."""
     catching, endless, others = [], [], []
-    for loop in ast.walk(tree):
+    for loop in walk(tree):
         inside = list(ast.walk(loop)) if isinstance(loop, ast.While) or is_counted_for(loop) else []
         if not inside or any(map(is_shutdown, inside)):
             continue
@@ -446,7 +447,7 @@ def deaf_loops(tree):
             known = isinstance(loop, ast.While) and isinstance(loop.test, ast.Constant)
             message = "the loop in line %d never asks whether the node is to end" % loop.lineno
             (endless if known else others).append(slip(loop.lineno, "deaf", message, fix=asks))
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if is_call(node, "init_node") and any(k.arg == "disable_signals" for k in node.keywords):
             message = "`disable_signals=True` in line %d keeps Ctrl-C from rospy" % node.lineno
             yield slip(node.lineno, "deaf", message, fix="leave it out")
@@ -499,7 +500,7 @@ def asked(node, functions):
 
 def without_effect(tree):
     """Statements that compute something and keep nothing of it: `++i`, `i + 1`, `i == 0`; and `i = i`."""
-    for node in ast.walk(tree):
+    for node in walk(tree):
         if isinstance(node, ast.Assign) and [dotted(t) for t in node.targets] == [dotted(node.value)] != [
             "..."
         ]:
