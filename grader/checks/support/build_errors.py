@@ -214,7 +214,9 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
         what = (
             "there is no package of that name" if len(slips) == 1 else "there are no packages of these names"
         )
-        return Explained(f"find_package(…) names {wrong}, and {what}", f"{right}; in package.xml too")
+        declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
+        too = "; in package.xml too" if declared.intersection(slips) else ""
+        return Explained(f"find_package(…) names {wrong}, and {what}", f"{right}{too}")
     if explained := _of_submission(name, (package, *package.also)):
         return explained
     if name in ROS_2:
