@@ -207,8 +207,7 @@ def _judge_counting(
     if slip is None:
         return None
     message = f"the number in the messages counts them ({told[0]:.0f}, {told[1]:.0f}, …) and is not a time"
-    why = "reads no clock but once" if "once" in slip.message else "reads no clock"
-    return failed(f"{message}: {slip.file} {why}", hint=ASK_AGAIN, citations=(slip.place,))
+    return failed(f"{message}: in {slip.file}, {slip.message}", hint=ASK_AGAIN, citations=(slip.place,))
 
 
 def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:
