@@ -223,27 +223,27 @@ def _with_classes(text: str, types: list[str]) -> Iterator[Step]:
     too, and the lab's own type is meant, or the same word in other letters."""
     tree, lines = ast.parse(text), text.split("\n")
     uses = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
-    known = {name for names in MESSAGES.values() for name in names.split()}
-    of_lab = {kind.partition("/")[2] for kind in types}
-    unbound = {n.id for n in uses} & (known | of_lab) - _bound(tree)
+    known = {name for names in MESSAGES.values() for name in names.split()} | {
+        t.partition("/")[2] for t in types
+    }
+    unbound = {n.id for n in uses} & known - _bound(tree)
     for node in ast.walk(tree):
-        if not isinstance(node, ast.ImportFrom) or not (node.module or "").endswith(".msg"):
+        package, _, module = (getattr(node, "module", "") or "").partition(".")
+        if not isinstance(node, ast.ImportFrom) or module != "msg":
             continue
-        same = {name.lower(): name for name in (known | of_lab)}
-        for alias in node.names:
-            if alias.name in known | of_lab or alias.asname is not None:
-                continue
-            near = get_close_matches(alias.name, unbound or of_lab, 1, 0.8 if unbound else 0.75)
-            alike = same.get(alias.name.lower(), "")
-            meant = (
-                near[0] if near else "" if alike in unbound else alike
-            )  # else it is an import that is missing
-            places = [alias, *(n for n in uses if n.id == alias.name and meant not in unbound)]
-            spans = [_span(lines, place) for place in places]  # type: ignore[arg-type] # an alias has a place too
+        of_lab = {name for own, _, name in (t.partition("/") for t in types) if own == package}
+        same = {name.lower(): name for name in {*MESSAGES.get(package, "").split(), *of_lab}}
+        for alias in (one for one in node.names if one.name not in known and one.asname is None):
+            used = [n for n in uses if n.id == alias.name]
+            right = get_close_matches(alias.name, unbound, 1, 0.8) if not used else []
+            near = get_close_matches(alias.name, of_lab, 1, 0.75) if package == "std_msgs" else []
+            meant = next(iter(right or near), same.get(alias.name.lower(), ""))
+            if not meant or (not right and meant in unbound):
+                continue  # of other packages not all names are known; what is used is an import that is missing
+            spans = [_span(lines, place) for place in (alias, *used)]  # type: ignore[arg-type] # it has a place too
             edits = [(*span, meant) for span in spans if span is not None]
-            if meant and edits:
-                yield from _step("name", edits[0][0] + 1, text, _edit(text, edits), alias.name)
-                return
+            yield from _step("name", alias.lineno, text, _edit(text, edits), alias.name)
+            return
 
 
 def _with_class_imported(text: str, node: ast.Import, known: dict[str, set[str]]) -> Iterator[Step]:
