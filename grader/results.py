@@ -22,9 +22,9 @@ from typing_extensions import Self
 
 from grader.errors import Busy, EvidenceError
 from grader.files import lock, make_folder, sync, sync_tree, try_lock, unwritable
-from grader.model.record import RESULT as FORMAT
-from grader.model.record import UPDATE
 from grader.model.result import GradingResult
+from grader.model.version import RESULT as FORMAT
+from grader.model.version import UPDATE
 from grader.portable import close, open_folder
 
 NEW, READY = ".grader-new", ".grader-ready"

@@ -6,7 +6,8 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from grader.model.record import EVIDENCE, Record
+from grader.model.record import Record
+from grader.model.version import EVIDENCE
 
 EVIDENCE_VERSION = str(EVIDENCE.version)
 METADATA_NAME = "grader.evidence"

@@ -33,7 +33,7 @@ from grader.evidence.run import (
     merge_channels,
 )
 from grader.model.package import PackageFacts
-from grader.model.record import EVIDENCE, UPDATE
+from grader.model.version import EVIDENCE, UPDATE
 
 MAX_CHANNELS = 4_096
 NAMES_SHOWN = 5

@@ -1,6 +1,6 @@
 """The files that the grader writes or reads: `FORMATS` with their versions, `schema_of` for their JSON Schemas.
 
-A format's version is in `grader/model/record.py`. It is raised when a reader that does not know of a change would take
+A format's version is in `grader/model/version.py`. It is raised when a reader that does not know of a change would take
 a status or a point for another than it is, or could not read the file: a key is gone, means something else, has another
 type, or one of a fixed set of words is new. What a reader may pass over is listed here as an `Addition`: an optional
 key, with a default that says what a file without it means. A test compares the records with the schemas in
@@ -17,13 +17,13 @@ from typing import Any, Literal
 
 from grader.evidence import events
 from grader.evidence.events import PACKAGE_TOPIC, TOPICS
-from grader.model import batch, result, verdict
-from grader.model import record as versions
+from grader.model import batch, result, verdict, version
 from grader.model.batch import BatchRun, Publication, Sent, Similarity
 from grader.model.mutants import MutantsFile, RubricTest
 from grader.model.package import PackageFacts
-from grader.model.record import Record, Versioned, field_docstrings
+from grader.model.record import Record, field_docstrings
 from grader.model.result import BankComment, GradingResult, WrittenOverride
+from grader.model.version import Versioned
 from grader.rubric import course
 from grader.rubric.course import Course
 from grader.rubric.model import Rubric
@@ -67,7 +67,7 @@ FORMATS: dict[str, Format] = {
     one.name: one
     for one in (
         Format(
-            is_=versions.RESULT,
+            is_=version.RESULT,
             title="Result",
             where="`<out>/<submission>/result.json`, and each line of `results.jsonl` (with `roster` beside it)",
             by="grader",
@@ -79,7 +79,7 @@ FORMATS: dict[str, Format] = {
             ),
         ),
         Format(
-            is_=versions.EVIDENCE,
+            is_=version.EVIDENCE,
             title="Evidence",
             where="`<out>/<submission>/evidence/*.mcap`",
             by="grader",
@@ -87,7 +87,7 @@ FORMATS: dict[str, Format] = {
             newer=_UNREADABLE,
         ),
         Format(
-            is_=versions.RUBRIC,
+            is_=version.RUBRIC,
             title="Rubric",
             where="`rubrics/<lab>.yaml`, and every file that is given with `--rubric`",
             by="person",
@@ -95,7 +95,7 @@ FORMATS: dict[str, Format] = {
             newer=_FAULT,
         ),
         Format(
-            is_=versions.OVERRIDES,
+            is_=version.OVERRIDES,
             title="Overrides",
             where="`<out>/overrides.yaml`",
             by="person",
@@ -103,7 +103,7 @@ FORMATS: dict[str, Format] = {
             newer=_FAULT,
         ),
         Format(
-            is_=versions.COMMENTS,
+            is_=version.COMMENTS,
             title="Comments",
             where="`<out>/comments.yaml`",
             by="person",
@@ -111,7 +111,7 @@ FORMATS: dict[str, Format] = {
             newer=_FAULT,
         ),
         Format(
-            is_=versions.RUN,
+            is_=version.RUN,
             title="Run of a class",
             where="`<out>/run.json`",
             by="grader",
@@ -119,7 +119,7 @@ FORMATS: dict[str, Format] = {
             newer="exit code 2",
         ),
         Format(
-            is_=versions.PUBLISHED,
+            is_=version.PUBLISHED,
             title="Published results",
             where="each line of `<out>/published.jsonl`",
             by="grader",
@@ -127,7 +127,7 @@ FORMATS: dict[str, Format] = {
             newer="exit code 2",
         ),
         Format(
-            is_=versions.SENT,
+            is_=version.SENT,
             title="Sent feedback",
             where="each line of `<out>/sent.jsonl`",
             by="grader",
@@ -135,7 +135,7 @@ FORMATS: dict[str, Format] = {
             newer="exit code 2",
         ),
         Format(
-            is_=versions.COURSE,
+            is_=version.COURSE,
             title="Course",
             where="`course.yaml`",
             by="person",
@@ -143,7 +143,7 @@ FORMATS: dict[str, Format] = {
             newer=_FAULT,
         ),
         Format(
-            is_=versions.SIMILARITY,
+            is_=version.SIMILARITY,
             title="Similarity",
             where="`<out>/similarity.json`",
             by="grader",
@@ -151,7 +151,7 @@ FORMATS: dict[str, Format] = {
             newer="the grader does not read it again",
         ),
         Format(
-            is_=versions.MUTANTS,
+            is_=version.MUTANTS,
             title="Mutants of a lab",
             where="`fixtures/<lab>.yaml`, and `mutants/<lab>.yaml` beside a rubric of your own",
             by="person",
@@ -159,7 +159,7 @@ FORMATS: dict[str, Format] = {
             newer=_FAULT,
         ),
         Format(
-            is_=versions.RUBRIC_TEST,
+            is_=version.RUBRIC_TEST,
             title="Test of a rubric",
             where="what `grader rubric test --json` prints",
             by="grader",

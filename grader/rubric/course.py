@@ -15,7 +15,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from grader.errors import RubricError, UsageError
-from grader.model.record import COURSE, Record
+from grader.model.record import Record
+from grader.model.version import COURSE
 from grader.rubric.fault_words import model_faults
 from grader.rubric.find import SUFFIXES
 from grader.rubric.model import Deadline, Late

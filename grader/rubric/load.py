@@ -12,8 +12,9 @@ from pathlib import Path, PurePosixPath
 from grader.checks import CHECKS, Check
 from grader.errors import RubricError, UsageError
 from grader.model.message_rate import RateBounds
-from grader.model.record import RUBRIC, UPDATE, Record, Versioned
+from grader.model.record import Record
 from grader.model.result import RubricOrigin
+from grader.model.version import RUBRIC, UPDATE, Versioned
 from grader.rubric.consistency import cross_faults, doubtful_names
 from grader.rubric.course import load_course, split_name
 from grader.rubric.fault_words import model_faults

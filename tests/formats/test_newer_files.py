@@ -16,7 +16,7 @@ from grader.cli.main import run
 from grader.evidence.events import TOPICS, ConsoleLine
 from grader.evidence.reader import load_run
 from grader.evidence.writer import EvidenceWriter
-from grader.model import record as versions
+from grader.model import version
 from grader.model.result import FileCitation
 from grader.report.files import result_text
 from tests.formats.kept import FOLDER, ROOT
@@ -227,7 +227,7 @@ def test_files_without_a_schema_are_version_1(course: Path, capsys) -> None:
         lines = path.read_text().splitlines(keepends=True)
         assert lines[0].startswith("schema: ")
         path.write_text("".join(lines[1:]))
-    assert load_rubric(rubric).rubric.schema_ == str(versions.RUBRIC)
+    assert load_rubric(rubric).rubric.schema_ == str(version.RUBRIC)
     assert run(["regrade", "class", "--rubric", "class.yaml"]) == 3
     assert json.loads((course / "bob" / "result.json").read_bytes())["points"] == 65.7
 

@@ -20,7 +20,7 @@ from mcap.reader import make_reader
 from grader.cli.main import run
 from grader.evidence.events import METADATA_NAME, PACKAGE_TOPIC, TOPICS
 from grader.evidence.reader import load_run
-from grader.model import record as versions
+from grader.model import version
 from grader.report.file_formats import FORMATS, ROOTS, Addition, records_in, schema_of
 from grader.results import RESULT
 from scripts.reference.formats import METADATA, PAGE, SCHEMAS, format_pages
@@ -57,7 +57,7 @@ def test_it_is_a_schema_that_says_what_it_is(name: str) -> None:
 
 
 def test_every_format_is_in_the_list() -> None:
-    assert [about.is_ for about in FORMATS.values()] == list(versions.ALL)
+    assert [about.is_ for about in FORMATS.values()] == list(version.ALL)
 
 
 @pytest.mark.parametrize("name", [name for name in ROOTS if name not in {"course", "mutants", "rubric"}])
@@ -128,7 +128,7 @@ FITS: dict[str, Draft202012Validator] = {}
 def test_every_metadata_key_is_described() -> None:
     found = {key for path in EVIDENCE for key in load_run(path).metadata}
     assert found <= METADATA.keys()
-    assert versions.EVIDENCE.name == METADATA_NAME
+    assert version.EVIDENCE.name == METADATA_NAME
 
 
 @pytest.mark.full

@@ -33,7 +33,8 @@ from grader.model.mutants import (
     SymbolicLink,
     WriteFile,
 )
-from grader.model.record import MUTANTS, Record
+from grader.model.record import Record
+from grader.model.version import MUTANTS
 from grader.rubric.fault_words import model_faults
 from grader.rubric.find import rubrics_folder, short_path
 from grader.rubric.load import LoadedRubric, refuse_newer

@@ -25,9 +25,9 @@ from grader.errors import EvidenceError, GraderError, UsageError
 from grader.files import atomic_write, make_folder
 from grader.intake import safe_name
 from grader.model.batch import UNPUBLISHED, Entry, Publication
-from grader.model.record import PUBLISHED as FORMAT
-from grader.model.record import UPDATE
 from grader.model.result import AppliedOverride, GradingResult
+from grader.model.version import PUBLISHED as FORMAT
+from grader.model.version import UPDATE
 from grader.report.files import result_bytes
 from grader.report.forms import FORMS, ReportInput
 from grader.report.view import for_student, is_students_fault, not_graded

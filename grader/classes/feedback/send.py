@@ -39,7 +39,7 @@ from grader.files import FILE as PRIVATE
 from grader.files import temporary_folder, unwritable
 from grader.intake import safe_name
 from grader.model.batch import Entry, Publication, Sent, SentState
-from grader.model.record import SENT, UPDATE
+from grader.model.version import SENT, UPDATE
 from grader.portable import BINARY, CLOEXEC, NOFOLLOW
 from grader.report.view import hidden_ids
 from grader.results import read_result

@@ -18,8 +18,8 @@ from typing import TypeAlias
 
 from grader.errors import RubricError
 from grader.intake.names import safe_name
-from grader.model.record import COMMENTS, OVERRIDES
 from grader.model.result import COMMENT_CHARS, BankComment, CommentId, Override, WrittenOverride
+from grader.model.version import COMMENTS, OVERRIDES
 from grader.rubric.fault_words import model_faults, shown
 from grader.rubric.load import refuse_newer
 from grader.rubric.model import Criterion, Rubric

@@ -21,8 +21,8 @@ import yaml
 from grader.classes.overrides import SCHEMA_KEY, folder_key, parse
 from grader.errors import Busy, RubricError, UsageError
 from grader.files import atomic_write, lock, open_lock, unwritable
-from grader.model.record import COMMENTS, OVERRIDES
 from grader.model.result import BankComment, Override, WrittenOverride
+from grader.model.version import COMMENTS, OVERRIDES
 from grader.rubric.yaml_lines import as_map, compose
 
 WAIT_S, LOOK_S = 30.0, 0.02

@@ -17,7 +17,7 @@ from grader.cli.declare import (
     minutes,
 )
 from grader.errors import ExitCode
-from grader.model.record import ALL
+from grader.model.version import ALL
 
 Shell = Literal["bash", "zsh", "fish"]
 FORMATS = tuple(one.short for one in ALL)
