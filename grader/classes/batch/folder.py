@@ -12,8 +12,6 @@ from grader.errors import UsageError
 from grader.files import whole_file
 from grader.intake import safe_name
 from grader.model.batch import MISSING, ROSTER, UNPUBLISHED, BatchRun, CriterionInfo, Entry
-from grader.model.record import RUN as RUN_FORMAT
-from grader.model.record import UPDATE
 from grader.model.result import (
     NO_TIME,
     CriterionResult,
@@ -23,6 +21,8 @@ from grader.model.result import (
     SubmissionInfo,
 )
 from grader.model.verdict import Status
+from grader.model.version import RUN as RUN_FORMAT
+from grader.model.version import UPDATE
 from grader.results import EVIDENCE, finish_killed
 from grader.results import read_result as read_result  # noqa: PLC0414 - for code that has a batch's folder
 from grader.untrusted_text import json_text
