@@ -451,7 +451,7 @@ def _of(nodes: list[str], topics: Mapping[str, list[str]]) -> dict[str, set[str]
 
 
 class LeftFiles:
-    """The files that a run's processes left, as `ros/left_files.py` reads them.
+    """The files that a run's processes left, as `ros/processes.py` reads them.
 
     Each is an event, and what is kept of it an attachment, within the run's limits. A file of the package that is as it
     was handed in is not left by the run.

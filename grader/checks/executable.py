@@ -113,7 +113,7 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
         message = f"{found.path} {why}{_rosrun_answer(build, found.path)}"
         kind: MistakeKind = "cannot-be-run" if of_first_line else "not-executable"
         verdict = failed(message, hint="; ".join(o.fix for o in obstacles))
-        verdict = verdict if found.shebang_fault == "empty-file" else verdict.by(kind, found.path)
+        verdict = verdict if found.shebang_fault == "empty-file" else verdict.lost_by(kind, found.path)
     else:
         message = f"whether {found.path} is executable cannot be seen: the submission carries no file modes"
         verdict = inconclusive(
@@ -193,7 +193,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
         measured=f"scripts: {join_words(sorted(scripts))}" if scripts else "no Python script in the package",
         hint=hint,
         citations=tuple(FileCitation(file=p) for p in near[:3]),
-    ).by(kind, path)
+    ).lost_by(kind, path)
 
 
 def _mode_obstacles(file: SourceFile, remarks: tuple[str, ...]) -> Iterator[Obstacle]:

@@ -133,7 +133,7 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
         return None
     if not _exists(package, name) and not any(name in {one.target, one.name} for one in programs(package)):
         message = f"there is no {name} in the package that a <node> could start"
-        return unjudged(message, hint=add_hint(package, script)).by("file-missing", script)
+        return unjudged(message, hint=add_hint(package, script)).lost_by("file-missing", script)
     meant = (_slip_for(package, node, name) for node in file.brings if _is_meant(node, name))
     slip = next(filter(None, meant), None)
     return slip.verdict() if slip else _no_node(file, package.name, name)

@@ -187,7 +187,7 @@ def _not_loaded(
 ) -> Verdict:
     if find_script(package, params.file) is None:
         message = f"there is no {PurePosixPath(params.file).name} in the package to load"
-        return unjudged(message, hint=add_hint(package, params.file)).by("file-missing", params.file)
+        return unjudged(message, hint=add_hint(package, params.file)).lost_by("file-missing", params.file)
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
     if absence := refusal(run, package):

@@ -166,7 +166,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         hint = f"add {subscriber(topic, '…, callback')}"
         if len(subscribed) == 1 and not near:
             hint = f"{hint}, or rename {subscribed[0]} if that is meant to be it"
-        meant = near or subscribed if len(near or subscribed) == 1 else near
+        meant = near or (subscribed if len(subscribed) == 1 else [])
         cited = named_at(package, run, "subscriber", meant[0]) if meant else ()
         verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint, citations=cited)
     return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))

@@ -83,7 +83,7 @@ def layout(package: PackageFacts, params: LayoutParams) -> Verdict:
         hint="; ".join(dict.fromkeys(slip.fix for slip in slips)),
         citations=tuple(dict.fromkeys(places)),
     )
-    return lost.by("file-missing", slips[0].missing) if len(slips) == 1 and slips[0].missing else lost
+    return lost.lost_by("file-missing", slips[0].missing) if len(slips) == 1 and slips[0].missing else lost
 
 
 def _slips(package: PackageFacts, params: LayoutParams) -> Iterator[Slip]:

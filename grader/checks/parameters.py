@@ -127,7 +127,7 @@ def _no_file(package: PackageFacts, build: Run, path: str, wanted: list[str]) ->
     movable = [p for p in near if can_be_moved(p, path)]
     hint = f"git mv {movable[0]} {path}" if movable else add_hint(package, path)
     verdict = failed(f"{path} is not in the package{seen}", hint=hint)
-    return verdict.by("file-elsewhere" if movable else "file-missing", path)
+    return verdict.lost_by("file-elsewhere" if movable else "file-missing", path)
 
 
 def _error(run: Run, one: Life, path: str, build: Run) -> Verdict | None:

@@ -179,7 +179,8 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     told = [s for s in package.slips if s.kind in SLEEPLESS and "sleep" in s.name + s.fix]
     slips = [s for s in told if not scripts or s.file in scripts]
     if not slips and (found.mean_hz >= FLOOD_HZ or not found.is_even):
-        slips = [s for s in (call_in_comment(package, run, "sleep"),) if s is not None]
+        slip = call_in_comment(package, run, "sleep")
+        slips = [slip] if slip is not None else []
     if not slips and found.mean_hz < FLOOD_HZ and found.is_even:
         return None
     if not slips and (slip := _asked_flood(found, run, package, params)):

@@ -30,7 +30,6 @@ from grader.checks.support.scripts import (
     SourceLine,
     commented_call,
     commented_calls,
-    find_script,
     installed,
     is_product,
     lines_text,
@@ -38,14 +37,12 @@ from grader.checks.support.scripts import (
     lines_that_say,
     lines_that_set,
     names_script,
-    programs,
 )
 from grader.checks.support.text import (
     SAID_DATA,
     SAID_VALUE,
     SECONDS,
     VALUE,
-    Language,
     could_say,
     in_language,
     in_source,
@@ -57,12 +54,11 @@ from grader.checks.support.text import (
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO
-from grader.judging.facts import SOURCES, Facts, scripts_of, sources_of
+from grader.judging.facts import SOURCES, Facts, language_of, scripts_of, sources_of
 from grader.model.package import LaunchFile, PackageFacts, PythonSlip
 from grader.model.result import CriterionResult
 from grader.model.verdict import Citation, FileCitation, Status, Verdict
 from grader.rubric.model import Criterion, Rubric
-from grader.rubric.scenario import Scenario
 from grader.wording import join_words, significant
 
 POINTS_MAX = 3
@@ -367,61 +363,8 @@ def choose_hint_language(verdict: Verdict, criterion: Criterion, facts: Facts) -
     """Return the verdict with its hint in the language of the node that it judges."""
     if in_language(verdict.hint, "python") == verdict.hint:
         return verdict
-    hint = in_language(verdict.hint, _language_of(verdict, criterion, facts))
+    hint = in_language(verdict.hint, language_of(verdict, criterion, facts))
     return verdict.model_copy(update={"hint": hint})
-
-
-def _language_of(verdict: Verdict, criterion: Criterion, facts: Facts) -> Language | None:
-    """Return the language of the nodes that the message names, that the criterion names, that publish on its topic, or
-    of all.
-
-    None where the scenario runs nodes of both and nothing tells which is meant.
-    """
-    name = criterion.scenario or ""
-    scenario, run = facts.rubric.scenarios.get(name), facts.runs.get(name)
-    if scenario is None or facts.package is None:
-        return "python"
-    asked = set(texts_in(criterion.parameters))
-    known = _languages(facts, scenario, run)
-    graph = run.graph if run else ()
-    publishing = {node for _, event in graph for topic in asked for node in event.publishers.get(topic, ())}
-    for nodes in (set(re.findall(r"[\w/-]+", verdict.message)), asked, publishing, known):
-        found = {known[one] for one in nodes if one in known}
-        if len(found) == 1:
-            return found.pop()
-    return None if known else "python"
-
-
-def _languages(facts: Facts, scenario: Scenario, run: Run | None) -> dict[str, Language]:
-    """Return what each process and each node of the scenario is written in, by its name."""
-    found: dict[str, Language] = {}
-    for start in scenario.start:
-        package = facts.package_of(start)
-        if package is None:
-            continue
-        if start.built:
-            found[start.name] = "cpp"
-        elif start.script:
-            found[start.name] = _written_in(package, start.script)
-        for launch in package.launch_files:
-            own = [n for n in launch.brings if PurePosixPath(launch.path).name == start.launch and n.type]
-            packages = {one.name: one for one in (*package.also, package)}
-            found |= {
-                n.full_name: _written_in(packages[n.pkg], str(n.type)) for n in own if n.pkg in packages
-            }
-    for _, event in run.graph if run else ():
-        for node, process in event.processes.items():
-            name = process.partition("/")[0]
-            found |= {node: found[name]} if name in found else {}
-    return found
-
-
-def _written_in(package: PackageFacts, path: str) -> Language:
-    file, name = find_script(package, path), PurePosixPath(path)
-    if file is not None and file.python:
-        return "python"
-    built = any(name.stem == one.target or one.is_called(name.name) for one in programs(package))
-    return "cpp" if built or name.suffix in SOURCES else "python"
 
 
 def fill_input_hint(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:

@@ -1,7 +1,9 @@
-"""The facts that checks ask for by name, from the grader's own runs or from recordings of other tools."""
+"""The facts that checks ask for by name, from the grader's own runs or from recordings of other tools; and in which
+language the nodes are written that a verdict is about."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -15,6 +17,7 @@ from grader.checks.support.exit_causes import SYNTAX, syntax_hint
 from grader.checks.support.launch import own_script, read_launch
 from grader.checks.support.processes import failed_program
 from grader.checks.support.scripts import find_script, programs
+from grader.checks.support.text import Language, texts_in
 from grader.evidence.events import PACKAGE_RUN, RECORDING_MISSING, RECORDING_PROBLEM
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, PackageFacts
@@ -272,3 +275,56 @@ def sources_of(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> s
     words = {word.rpartition("/")[2] for one in made for word in one.call.args}
     paths = [PurePosixPath(file.path) for file in package.files]
     return {str(path) for path in paths if path.suffix in SOURCES and path.name in words}
+
+
+def language_of(verdict: Verdict, criterion: Criterion, facts: Facts) -> Language | None:
+    """Return the language of the nodes that the message names, that the criterion names, that publish on its topic, or
+    of all.
+
+    None where the scenario runs nodes of both and nothing tells which is meant.
+    """
+    name = criterion.scenario or ""
+    scenario, run = facts.rubric.scenarios.get(name), facts.runs.get(name)
+    if scenario is None or facts.package is None:
+        return "python"
+    asked = set(texts_in(criterion.parameters))
+    known = _languages(facts, scenario, run)
+    graph = run.graph if run else ()
+    publishing = {node for _, event in graph for topic in asked for node in event.publishers.get(topic, ())}
+    for nodes in (set(re.findall(r"[\w/-]+", verdict.message)), asked, publishing, known):
+        found = {known[one] for one in nodes if one in known}
+        if len(found) == 1:
+            return found.pop()
+    return None if known else "python"
+
+
+def _languages(facts: Facts, scenario: Scenario, run: Run | None) -> dict[str, Language]:
+    """Return what each process and each node of the scenario is written in, by its name."""
+    found: dict[str, Language] = {}
+    for start in scenario.start:
+        package = facts.package_of(start)
+        if package is None:
+            continue
+        if start.built:
+            found[start.name] = "cpp"
+        elif start.script:
+            found[start.name] = _written_in(package, start.script)
+        for launch in package.launch_files:
+            own = [n for n in launch.brings if PurePosixPath(launch.path).name == start.launch and n.type]
+            packages = {one.name: one for one in (*package.also, package)}
+            found |= {
+                n.full_name: _written_in(packages[n.pkg], str(n.type)) for n in own if n.pkg in packages
+            }
+    for _, event in run.graph if run else ():
+        for node, process in event.processes.items():
+            name = process.partition("/")[0]
+            found |= {node: found[name]} if name in found else {}
+    return found
+
+
+def _written_in(package: PackageFacts, path: str) -> Language:
+    file, name = find_script(package, path), PurePosixPath(path)
+    if file is not None and file.python:
+        return "python"
+    built = any(name.stem == one.target or one.is_called(name.name) for one in programs(package))
+    return "cpp" if built or name.suffix in SOURCES else "python"

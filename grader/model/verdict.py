@@ -80,7 +80,7 @@ MistakeKind = Literal["file-missing", "file-elsewhere", "not-executable", "canno
 
 
 class Mistake(Record):
-    """What a mark is lost by, for those who need not read the sentence: `name` is the file that it is about."""
+    """What a mark is lost by, for programs, which need not read the sentence. `name` is the file that it is about."""
 
     kind: MistakeKind
     """A file is not in the package, or only under another path; a script has no executable bit, or its first line keeps
@@ -139,7 +139,7 @@ class Verdict(Record):
             return self
         return self.model_copy(update={"status": Status.PARTIAL, "score": share, "right": right})
 
-    def by(self, kind: MistakeKind, name: str) -> Verdict:
+    def lost_by(self, kind: MistakeKind, name: str) -> Verdict:
         """Return the verdict with the kind of mistake that it is lost by."""
         return self.model_copy(update={"mistake": Mistake(kind=kind, name=name)})
 

@@ -236,10 +236,11 @@ def _with_classes(text: str, types: list[str]) -> Iterator[Step]:
         for alias in (one for one in node.names if one.name not in known and one.asname is None):
             used = [n for n in uses if n.id == alias.name]
             right = get_close_matches(alias.name, unbound, 1, 0.8) if not used else []
+            # of other packages not all classes are known: Pose may be there beside Pose2D
             near = get_close_matches(alias.name, of_lab, 1, 0.75) if package == "std_msgs" else []
             meant = next(iter(right or near), same.get(alias.name.lower(), ""))
             if not meant or (not right and meant in unbound):
-                continue  # of other packages not all names are known; what is used is an import that is missing
+                continue  # the import of what is used is missing
             spans = [_span(lines, place) for place in (alias, *used)]  # type: ignore[arg-type] # it has a place too
             edits = [(*span, meant) for span in spans if span is not None]
             yield from _step("name", alias.lineno, text, _edit(text, edits), alias.name)

@@ -127,7 +127,7 @@ def _joined(criterion: CriterionResult, paths: Sequence[str]) -> CriterionResult
     if criterion.check == INSTALL:
         told = f"{criterion.hint}; the build then makes {join_words(paths)} executable"
         return criterion.model_copy(update={"hint": told})
-    own = criterion.message.partition(" ")[0]
+    own = criterion.mistake.name if criterion.mistake else ""
     message = f"{join_words([own, *paths])} are not executable"
     return criterion.model_copy(
         update={"message": message, "hint": criterion.hint.replace(own, " ".join([own, *paths]))}

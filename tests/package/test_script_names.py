@@ -21,6 +21,7 @@ UNDEFINED = {
             "the key `name` stands here without quotes: in line 3, write `d['name']['first']`"),
     "key-of-its-own": ("def f():\n    d = rospy.get_param('d')\ndef g(d):\n    phone = d[phone]\n",
                        "in line 5, write `d['phone']`"),
+    "key-of-an-argument": ("d = rospy.get_param('d')\ndef f(key):\n    key = d[key]\n", ""),
     "index": ("rows = [1]\nx = rows[at]\n", "nothing in the file gives `at` a value"),
     "method-from-outside": ("class A:\n    def go(self):\n        pass\ngo()\n",
                             "`go` belongs to the class A: in line 5, write `A().go` for `go`"),

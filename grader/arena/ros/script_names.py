@@ -128,21 +128,20 @@ def given_names(tree, names):
 
 
 def without_quotes(tree, known):
-    """Return for each name that stands for a key, and that nothing in the file has but the line that is given its
-    value, by its id: the value as it is written with quotes. Only where a script reads parameters, or has other keys in
-    quotes."""
-    stores = [n.id for n in walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
-    given = {
-        (t.id, t.lineno)
-        for n in walk(tree)
-        if isinstance(n, ast.Assign)
-        for t in n.targets
-        if isinstance(t, ast.Name)
-    }
+    """Return the names that stand for keys, by their ids, with the value as it is written with quotes:
+    `d['name']['first']` for `d[name][first]`.
+
+    Nothing gives such a name a value, or only the line that it stands in does (`phone = d[phone]`). Only where a script
+    reads parameters, or has other keys in quotes.
+    """
+    arguments, lines = {n.arg for n in walk(tree) if isinstance(n, ast.arg)}, {}
+    for node in walk(tree):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            lines.setdefault(node.id, []).append(node.lineno)
 
     def is_key(node):
-        here = (node.id, node.lineno) in given and stores.count(node.id) == 1
-        return (here or node.id not in known) and len(node.id) > 1
+        own = lines.get(node.id) == [node.lineno] and node.id not in arguments
+        return (own or node.id not in known) and len(node.id) > 1
 
     values = [n for n in walk(tree) if isinstance(n, ast.Subscript)]
     keyed = any(isinstance(key_of(n), ast.Constant) and isinstance(key_of(n).value, str) for n in values)

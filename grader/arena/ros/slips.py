@@ -170,11 +170,10 @@ def never_reached(tree):
 
 
 def stopped_loops(tree):
-    """`spin()` in a loop that publishes: the loop does not come round. `break` or `return` in each of its turns. And
-    `if` in place of `while`.
+    """`spin()` in a loop that publishes: the loop does not come round. `break` or `return` in each of its turns, or so
+    many turns and no more. And `if` in place of `while`.
     """
     turned = dict(turns(tree))
-    at_most = [loop for loop in walk(tree) if is_counted(loop) and not turned[loop][1]]
     for loop in walk(tree):
         once = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
         if once and not turned[loop][1] and any(is_call(n, "publish") for n in ast.walk(loop)):
@@ -189,12 +188,12 @@ def stopped_loops(tree):
             message = "the loop stops at the spin() in line %d, which waits until the node ends" % spin.lineno
             fix = "remove spin(): the loop keeps the node alive"
             yield slip(spin.lineno, "spin-in-loop", message, fix=fix)
-        if loop in at_most:
+        if is_counted(loop) and not turned[loop][1]:
             message = "the loop of line %d ends after a number of rounds" % loop.lineno
-            counts = isinstance(loop, ast.For) and any(
-                getattr(n, "id", "") == dotted(loop.target) for n in inside[2:]
-            )
-            fix = "put it inside a `while not rospy.is_shutdown():`" if counts else ENDLESS % loop.lineno
+            used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
+            fix = "write `while not rospy.is_shutdown():` in line %d" % loop.lineno
+            if isinstance(loop, ast.For) and dotted(loop.target) in used:
+                fix = "put it inside a `while not rospy.is_shutdown():`"
             yield slip(loop.lineno, "loop-left", message, fix=fix)
         left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None)
         if left is not None:
@@ -202,9 +201,6 @@ def stopped_loops(tree):
             message = "the loop ends the first time around, at the %s in line %d" % (word, left.lineno)
             fix = "remove it from line %d, or put it inside an `if`" % left.lineno
             yield slip(left.lineno, "loop-left", message, fix=fix)
-
-
-ENDLESS = "write `while not rospy.is_shutdown():` in line %d"
 
 
 def is_counted(loop):

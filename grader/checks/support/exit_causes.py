@@ -171,12 +171,12 @@ def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     script = next((f for f in package.files if f.path == life.start.script), None)
     if script is not None and script.shebang_fault == "empty-file":
         return Ending("its file is empty", f"write the node in {script.path}", by_itself=True)
-    kinds = ("main-guard", "never-called", "loop-left")
-    own = [s for s in package.slips if s.file == life.start.script]
-    slips = [s for s in own if s.kind in kinds or (s.kind, s.name) == ("commented-out", "spin")]
+    kinds = ("main-guard", "never-called", "loop-left", "commented-out")
+    own = [s for s in package.slips if s.file == life.start.script and s.kind in kinds]
+    slips = [s for s in own if s.kind != "commented-out" or s.name == "spin"]
     if not slips:
         return None
-    slip = min(slips, key=lambda one: [*kinds, "commented-out"].index(one.kind))
+    slip = min(slips, key=lambda one: kinds.index(one.kind))
     called = f"call {slip.name}() at the end of the script, below {MAIN}" if slip.name else f"write {MAIN}"
     cause = f"its script ran to the end: {slip.message} ({slip.file}, line {slip.line})"
     return Ending(cause, slip.fix or called, (slip.place,), by_itself=True)

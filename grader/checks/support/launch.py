@@ -134,7 +134,7 @@ def _unreadable(
         hint = f"git mv {movable[0]} launch/{launch}" if movable else add_hint(package, f"launch/{launch}")
         place = movable[0] if movable else f"launch/{launch}"
         verdict = failed(message, hint=hint, citations=(FileCitation(file=place),))
-        return verdict.by("file-elsewhere" if movable else "file-missing", f"launch/{launch}")
+        return verdict.lost_by("file-elsewhere" if movable else "file-missing", f"launch/{launch}")
     if file.fault is None:
         return None
     line = f", line {file.fault.line}" if file.fault.line else ""

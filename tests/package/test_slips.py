@@ -1,0 +1,351 @@
+"""What compiles in a student's Python and is not meant: the slips that show only when the node runs."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.package.python import check_syntax
+
+pytestmark = pytest.mark.usefixtures("without_processes")
+
+
+def test_slips_are_found_and_named(tmp_path):
+    text = (
+        "import rospy, sys\ndef main():\n    rate = rospy.Rate(10)\n    while not rospy.is_shutdown:\n"
+        "        rate.sleep\n        x = input('?')\n        y = raw_input()\n    z = sys.stdin.readline()\n"
+        "    rate.sleep()\n    main.note = 1\n'text'\nif __name__ == '__main__':\n    main\n    f().g\n"
+    )
+    (tmp_path / "a.py").write_text(text)
+    (tmp_path / "own.py").write_text("def input():\n    pass\ninput()\n")
+    slips = check_syntax(tmp_path, ["a.py", "own.py"]).slips
+    slips = [s for s in slips if s.kind != "undefined"]
+    assert [(s.file, s.line, s.kind) for s in slips] == [
+        ("a.py", 3, "rate-number"),
+        ("a.py", 4, "not-called"),
+        ("a.py", 5, "not-called"),
+        ("a.py", 6, "input"),
+        ("a.py", 7, "input"),
+        ("a.py", 8, "input"),
+        ("a.py", 13, "not-called"),
+        ("a.py", 14, "not-called"),
+    ]
+    assert (slips[2].name, slips[2].fix) == ("rate.sleep", "write `rate.sleep()`")
+
+
+def node(body: str) -> str:
+    """A script whose function makes a node, with these lines in it."""
+    return f"import rospy\ndef main():\n    rospy.init_node('a')\n{body}"
+
+
+LOOP = "    while not rospy.is_shutdown():\n"
+CALLED = "if __name__ == '__main__':\n    main()\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (node(LOOP + "        p.publish(1)\n") + CALLED, []),
+        (node(LOOP + "        p.publish(1)\n"), [("never-called", 2, "nothing calls `main()`")]),
+        (node("    rospy.spin()\n") + "if __name__ == 'main':\n    main()\n",
+         [("main-guard", 5, "`__name__` is never 'main'")]),
+        (node("    rospy.spin()\n") + "if __name__ != '__main__':\n    pass\nmain()\n", []),
+        (node("    rospy.spin()\n") + "threading.Thread(target=main)\n", []),
+        ("class A:\n    def __init__(self):\n        self.p = 1\n    def go(self):\n        self.p.publish(1)\nA()\n",
+         [("never-called", 4, "nothing calls `go()`")]),
+        (node("    while True:\n        pass\n    p.publish(1)\n") + CALLED,
+         [("never-reached", 4, "the loop in line 4 never ends")]),
+        (node(LOOP + "        rate.sleep()\n    p.publish(1)\n") + CALLED,
+         [("never-reached", 4, "the publish(…) in line 6")]),
+        (node("    rospy.spin()\n    p.publish(1)\n") + CALLED, [("never-reached", 4, "the spin() in line 4")]),
+        (node("    while True:\n        pass\n    p = rospy.Publisher('a', A)\n    p.publish(1)\n") + CALLED,
+         [("never-reached", 4, "the Publisher(…) in line 6")]),
+        ("class Node:\n    def __init__(self):\n        rospy.Subscriber('a', A, f)\nrospy.spin()\nNode()\n",
+         [("never-reached", 4, "the spin() in line 4 never ends, so the Node(…) in line 5")]),
+        ("def stop():\n    print(1)\nrospy.spin()\nstop()\n", []),
+        (node("    while True:\n        break\n    p.publish(1)\n") + CALLED, []),
+        (node("    while not done:\n        pass\n    p.publish(1)\n") + CALLED, []),
+        (node(LOOP + "        p.publish(1)\n        rospy.spin()\n") + CALLED,
+         [("spin-in-loop", 6, "stops at the spin()")]),
+        (node(LOOP + "        p.publish(1)\n        break\n") + CALLED, [("loop-left", 6, "at the break in line 6")]),
+        (node("    for i in range(9):\n        p.publish(1)\n") + CALLED,
+         [("loop-left", 4, "write `while not rospy.is_shutdown():` in line 4")]),
+        (node("    for i in range(9):\n        p.publish(i)\n") + CALLED, [("loop-left", 4, "put it inside a `while")]),
+        (node("    while not rospy.is_shutdown() and n < 9:\n        p.publish(1)\n") + CALLED,
+         [("loop-left", 4, "the loop of line 4 ends after a number of rounds")]),
+        (node(LOOP + "        p.publish(1)\n        # p.publish(2)\n        #rate.sleep()  # b\n        # sleep( a\n")
+         + CALLED,
+         [("commented-out", 6, "remove the `#` from line 6"), ("commented-out", 7, "`sleep(…)` is commented out")]),
+        ("def f(m):\n    pass\nrospy.Subscriber('a', A, 'f')\n", [("callback-called", 3, "write `f`, without quotes")]),
+        (node("    if not rospy.is_shutdown():\n        p.publish(1)\n") + CALLED,
+         [("loop-left", 4, "write `while` for `if` in line 4")]),
+        (node("    while go:\n        if not rospy.is_shutdown():\n            p.publish(1)\n") + CALLED, []),
+        (node(LOOP + "        p.publish(1)\n        if x:\n            return\n") + CALLED, []),
+        (node(LOOP + "        p.publish(1)\n    rate.sleep()\n") + CALLED,
+         [("sleep-outside", 6, "loop of line 4: move it into that loop, below line 5, with the same spaces")]),
+        (node(LOOP + "        for n in range(9):\n            p.publish(n)\n        rate.sleep()\n") + CALLED,
+         [("sleep-outside", 7, "outside the loop of line 5")]),
+        (node("    rate.sleep()\n" + LOOP + "        p.publish(1)\n") + CALLED,
+         [("sleep-outside", 4, "outside the loop of line 5: move it into that loop, below line 6")]),
+        (node("    rospy.sleep(1)\n" + LOOP + "        p.publish(1)\n") + CALLED, []),
+        (node(LOOP + "        rate.sleep()\n        p.publish(1)\n    rospy.sleep(1)\n") + CALLED, []),
+        ("def f(m):\n    pass\nrospy.Subscriber('a', A, f())\n",
+         [("callback-called", 3, "write `f`, without brackets")]),
+        ("def f(m):\n    pass\nrospy.Subscriber('a', A)\n",
+         [("callback-missing", 3, "write the function's name as its third value")]),
+        ("rospy.Subscriber('a', A, **more)\nmessage_filters.Subscriber('a', A)\n", []),
+        (node("    p = rospy.Publisher('a', A, queue_size='5')\n    rospy.spin()\n") + CALLED,
+         [("queue-size", 4, "write `queue_size=5`, without quotes")]),
+        ("def f():\n    pass\nrospy.Subscriber('a', A, callback=f)\n",
+         [("callback-values", 1, "`f` takes 0 arguments")]),
+        ("def f(m):\n    pass\nrospy.Subscriber('a', A, f)\n", []),
+        ("def f(m, a):\n    pass\nrospy.Subscriber('a', A, f, 3)\n", []),
+        ("def f(*a):\n    pass\nrospy.Timer(d, f)\n", []),
+        ("def f():\n    return lambda m: 0\nrospy.Subscriber('a', A, f())\n", []),
+        ("class A:\n    def f(m):\n        pass\n    def g(self):\n        rospy.Service('a', T, self.f)\n",
+         [("callback-values", 2, "takes no `self`: write `def f(self, m):`")]),
+        ("class A:\n    def f():\n        pass\n    def g(self):\n        rospy.Service('a', T, self.f)\n",
+         [("callback-values", 2, "write `def f(self, msg):`")]),
+        ("def hear(m):\n    print(m)\ndef run():\n    rospy.Subscriber('a', A, run)\n    rospy.spin()\nrun()\n",
+         [("callback-values", 3, "is the function that makes this call, not its callback: in line 4, write hear")]),
+    ],
+)  # fmt: skip
+def test_what_never_runs_is_known(tmp_path, text, found):
+    (tmp_path / "a.py").write_text(text)
+    others = {
+        "deaf", "rate-number", "no-clock", "misspelt", "undefined", "publishes", "prints", "not-called", "node-name",
+        "no-init", "publisher", "publisher-type", "subscriber", "subscriber-type",
+    }  # fmt: skip
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind not in others]
+    assert [(s.kind, s.line) for s in slips] == [one[:2] for one in found]
+    assert all(
+        words in f"{slip.message}: {slip.fix}" for slip, (_, _, words) in zip(slips, found, strict=True)
+    )
+
+
+@pytest.mark.parametrize(("end", "name"), [("A()\n", "A().go"), ("a = A()\n", "a.go")])
+def test_a_method_that_nothing_calls_is_called_on_its_object(tmp_path, end, name):
+    (tmp_path / "a.py").write_text("class A:\n    def go(self):\n        self.p.publish(1)\n" + end)
+    assert [s.name for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-called"] == [name]
+
+
+def test_where_names_of_the_graph_are_written_is_known(tmp_path):
+    (tmp_path / "a.py").write_text(
+        "rospy.init_node('talker')\nrospy.Publisher(\n    name='/chatter', data_class=String)\n"
+        "from rospy import Subscriber\nSubscriber('~scan', LaserScan)\nrospy.Publisher(TOPIC, String)\n"
+    )
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind != "undefined"]
+    assert [(s.kind, s.line, s.message) for s in slips] == [
+        ("node-name", 1, "talker"),
+        ("publisher", 3, "/chatter"),
+        ("publisher-type", 3, "String"),
+        ("subscriber", 5, "~scan"),
+        ("subscriber-type", 5, "LaserScan"),
+        ("publisher-type", 6, "String"),
+    ]
+
+
+def test_letters_in_another_order_are_a_slip(tmp_path):
+    (tmp_path / "a.py").write_text("def f(msg):\n    print(mgs.data)\n")
+    slip, _ = check_syntax(tmp_path, ["a.py"]).slips
+    assert (slip.kind, slip.line) == ("misspelt", 2)
+    assert (slip.name, slip.message) == ("mgs", "did you mean msg?")
+
+
+@pytest.mark.parametrize(
+    ("rate", "found"),
+    [
+        ("rospy.Rate(rospy.get_param('~rate', 5))", [("~rate", 3)]),
+        ("rospy.Rate(float(rospy.get_param('/hz')))", [("/hz", 3)]),
+        ("rospy.Rate(hz)", [("hz", 2)]),
+        ("rospy.Rate(10)", []),
+        ("rospy.Rate(rospy.get_param(name))", []),
+        ("rospy.Rate(other)", []),
+    ],
+)
+def test_a_rate_that_is_a_parameter_is_known(tmp_path, rate, found):
+    text = (
+        f"import rospy\nhz = rospy.get_param('hz')\nrate = {rate}\nother = rospy.get_param('a')\nother = 3\n"
+    )
+    (tmp_path / "a.py").write_text(text)
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [(s.message, s.line) for s in slips if s.kind == "rate-parameter"] == found
+
+
+@pytest.mark.parametrize(
+    ("code", "found"),
+    [
+        ("r = rospy.Rate(5)", [("5", 2)]),
+        ("r = rospy.Rate(HZ)", [("7.5", 1)]),
+        ("r = rospy.Rate(1 / 0.4)", [("2.5", 2)]),
+        ("while True:\n    rospy.sleep(0.2)", [("5", 3)]),
+        ("while True:\n    time.sleep(2)", [("0.5", 3)]),
+        ("while True:\n    rospy.sleep(rospy.Duration(1.0 / HZ))", [("7.5", 3)]),
+        ("rospy.Timer(rospy.Duration(0.1), tell)", [("10", 2)]),
+        ("rospy.sleep(0.2)", []),
+        ("r = rospy.Rate(0)", []),
+        ("r = rospy.Rate(1 / 0)", []),
+        ("r = rospy.Rate(-3)", []),
+        ("r = rospy.Rate(True)", []),
+        ("r = rospy.Rate(a)", []),
+    ],
+)
+def test_a_rate_that_is_a_number_is_known(tmp_path, code, found):
+    (tmp_path / "a.py").write_text(f"HZ = 7.5; a = b; b = a\n{code}\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [(s.message, s.line) for s in slips if s.kind == "rate-number"] == found
+
+
+@pytest.mark.parametrize(
+    ("code", "found"),
+    [
+        ("n = (n + 1) % 128", [("128", "reset-limit", 1)]),
+        (
+            "if n > 127:\n    n = 1",
+            [("127", "reset-limit", 1), ("1", "reset-value", 2)],
+        ),
+        (
+            "if 100 <= self.n:\n    self.n = 0",
+            [("100", "reset-limit", 1), ("0", "reset-value", 2)],
+        ),
+        ("if n > 127:\n    m = 1", []),
+        ("if n > 127:\n    n = m", []),
+        ("'%d' % n", []),
+        ("n %= 128", [("128", "reset-limit", 1)]),
+        ("n = n + 1 if n < 127 else 0", [("127", "reset-limit", 1), ("0", "reset-value", 1)]),
+    ],
+)
+def test_where_a_counter_goes_back_is_known(tmp_path, code, found):
+    (tmp_path / "a.py").write_text(code + "\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [(s.message, s.kind, s.line) for s in slips if s.kind.startswith("reset")] == found
+
+
+@pytest.mark.parametrize(
+    ("value", "imported", "told"),
+    [
+        ("next(n)", "import itertools\nn = itertools.count()\n", True),
+        ("n + 1", "import time\ntime.sleep(1)\n", True),
+        ("n + rospy.get_time()", "", False),
+        ("n + 1", "from helper import n\n", False),
+        ("n + 1", "import time as t\nn = t.time()\n", False),
+        ("n + 1", "from time import time\nn = time()\n", False),
+        ("n", "", False),
+    ],
+)
+def test_a_script_that_counts_and_reads_no_clock(tmp_path, value, imported, told):
+    (tmp_path / "a.py").write_text(f"import rospy\n{imported}pub.publish('%s' % ({value}))\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind not in ("undefined", "publishes")]
+    assert [s.kind for s in slips] == ["no-clock"] * told
+
+
+IN_A_CLASS = """\
+class A:
+    def %s(self):
+        self.n = int(rospy.get_time())
+    def turn(self):
+        self.n += 1
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "value", "told"),
+    [
+        ("c = itertools.count()\n", "next(c)", True),
+        (
+            "def gen():\n    n = 0\n    while True:\n        yield n\n        n += 1\nc = gen()\n",
+            "str(next(c))",
+            True,
+        ),
+        ("c = itertools.count()\nmessage = String()\nmessage.data = str(next(c))\n", "message.data", True),
+        ("self.began = rospy.get_time()\nself.c = itertools.count()\n", "next(self.c)", True),
+        ("c = itertools.count(int(rospy.get_time()))\n", "next(c)", True),
+        ("c = itertools.count()\nt = int(rospy.get_time())\n", "t if next(c) else t", False),
+        ("def now():\n    return rospy.get_time()\nc = itertools.count()\nnext(c)\n", "now()", False),
+        ("from clocks import tick\nc = itertools.count()\nnext(c)\n", "tick()", False),
+        ("n = int(rospy.get_time())\nwhile True:\n    n += 1\n", "n", True),
+        ("n = int(rospy.get_time())\nwhile True:\n    n = n + 1\n", "n", True),
+        ("while True:\n    n = int(rospy.get_time())\n    n += 1\n", "n", False),
+        ("def turn():\n    n = int(rospy.get_time())\n    n += 1\n", "n", False),
+        ("n = 0\nwhile True:\n    n += rospy.get_time() - n\n", "n", False),
+        (IN_A_CLASS % "__init__", "self.n", True),
+        (IN_A_CLASS % "now", "self.n", False),
+        ("while True:\n    c = itertools.count(int(rospy.get_time()))\n", "next(c)", False),
+    ],
+)
+def test_a_script_that_reads_a_clock_and_sends_what_it_counts(tmp_path, before, value, told):
+    text = f"import itertools, rospy\n{before}print(rospy.get_time())\npub.publish('%s' % ({value}))\n"
+    (tmp_path / "a.py").write_text(text)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "no-clock"]
+    assert len(slips) == told
+
+
+NUMBERS = "pub = rospy.Publisher('numbers', Int8)\nsaid = rospy.Publisher('said', String)\n"
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        ("    pub.publish(int(rospy.get_time()) % 128)\n", True),
+        ("    n = int(time.time() * 10) % 128\n    pub.publish(n)\n", True),
+        ("    msg = Int8()\n    msg.data = rospy.Time.now().secs % 128\n    pub.publish(msg)\n", True),
+        ("    pub.publish(n % 128)\n    n += 1\n    said.publish(str(rospy.get_time()))\n", False),
+        ("    n = (n + 1) % 128\n    pub.publish(n)\n", False),
+        ("    if rospy.get_time() > last:\n        n = n + 1\n    pub.publish(n)\n", False),
+        ("    pub.publish(helper(rospy.get_time()))\n", False),
+        ("    pub.publish(next(c))\n", False),
+        ("    t = int(rospy.get_time())\n    pub.publish(len(seen))\n", False),
+    ],
+)
+def test_values_that_a_clock_gives_are_not_counted(tmp_path, code, told):
+    (tmp_path / "a.py").write_text(f"import rospy, time\n{NUMBERS}while not rospy.is_shutdown():\n{code}")
+    slips = [s.message for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "clock-value"]
+    assert ("numbers" in slips) == told
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        ("while True:\n    time.sleep(1)\n", "the loop in line 1 never asks"),
+        ("while not rospy.is_shutdown():\n    time.sleep(1)\n", ""),
+        ("while True:\n    rate.sleep()\n", ""),
+        ("while True:\n    try:\n        rate.sleep()\n    except rospy.ROSInterruptException:\n        pass\n",
+         "the `except` in line 4 catches what Ctrl-C raises, and the loop in line 1 goes on"),
+        ("while True:\n    try:\n        rate.sleep()\n    except:\n        break\n", ""),
+        ("while n < 9:\n    n = 0\n", "the loop in line 1"),
+        ("while n < 9:\n    n += 1\nwhile True:\n    n = 0\n", "the loop in line 3"),
+        ("for n in itertools.count():\n    time.sleep(1)\n", "the loop in line 1"),
+        ("for n in range(9):\n    time.sleep(1)\n", ""),
+        ("rospy.init_node('a', disable_signals=True)\n", "`disable_signals=True` in line 1"),
+        ("signal.signal(signal.SIGINT, signal.SIG_IGN)\n", "line 1 gives Ctrl-C another meaning"),
+    ],
+)  # fmt: skip
+def test_why_a_node_goes_on_after_ctrl_c(tmp_path, code, told):
+    (tmp_path / "a.py").write_text(code)
+    deaf = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "deaf"]
+    assert len(deaf) == bool(told)
+    assert all(told in one.message and one.fix for one in deaf)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("counter = 0\nprint(conter)\n", ["write counter instead of conter"]),
+        ("def run(speed):\n    return sped\n", ["write speed instead of sped"]),
+        (
+            "class A:\n    def go(self):\n        self.rate = 1\n        rate.sleep()\n",
+            ["write self.rate instead of rate"],
+        ),
+        (
+            "class A:\n    def go(self):\n        pass\n    self.go()\n",
+            ["indent line 4 like the lines of the method above it, or delete it"],
+        ),
+        ("class A:\n    print('made')\n", []),
+        ("from a import *\ncounter = 0\nprint(conter)\n", []),
+        ("counter = 0\nprint(unlike)\n", []),
+        ("try:\n    pass\nexcept Exception as error:\n    print(error, __file__)\n", []),
+    ],
+)
+def test_a_name_that_is_not_there_and_one_that_is_spelt_alike(tmp_path, text, told):
+    (tmp_path / "a.py").write_text(text)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in ("misspelt", "outside-method")]
+    assert [s.fix for s in slips] == told
