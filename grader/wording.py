@@ -85,3 +85,8 @@ def is_one_edit(one: str, other: str) -> bool:
     one, other = one[start:], other[start:]
     swapped = one[:2] == other[1::-1] and one[2:] == other[2:]
     return swapped or one[1:] == other[1:] or one[1:] == other or one == other[1:]
+
+
+def lines_text(first: int, last: int) -> str:
+    """Return `line 3`, or `lines 3 to 5`, of lines from 0."""
+    return f"line {first + 1}" if last == first else f"lines {first + 1} to {last + 1}"

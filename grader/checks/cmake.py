@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import Annotated, NamedTuple
@@ -10,7 +9,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import PackageName, check
-from grader.checks.support.build_errors import misspelt_cmake_lists
+from grader.checks.support.build_errors import misspelt_cmake_lists, repair_of_file
 from grader.checks.support.scripts import PYTHON, Installed, copies_of, installed, is_bin, names_script
 from grader.checks.support.text import near_names, shown
 from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts, meant_command
@@ -79,7 +78,7 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         f"{facts.file}: {'; '.join([*_fault(fault), *(message for message, _, _ in wrong)])}",
         expected=expected,
         measured=measured,
-        hint="; ".join([*_repair_of(fault), *(hint for _, hint, _ in wrong)]),
+        hint="; ".join([*([repair_of_file(fault)] if fault else []), *(hint for _, hint, _ in wrong)]),
         citations=tuple(dict.fromkeys(lines)),
     )
 
@@ -88,12 +87,6 @@ def _fault(fault: Fault | None) -> Iterator[str]:
     if fault is not None:
         line = f"line {fault.line}: " if fault.line else ""
         yield f"{line}CMake cannot read it: {fault.cause or fault.message}"
-
-
-def _repair_of(fault: Fault | None) -> Iterator[str]:
-    if fault is not None:
-        unclosed = re.search(r": write it (at the end of line \d+)$", fault.cause)
-        yield f"write `)` {unclosed[1]}" if unclosed else fault.fix or "fix that line, then run catkin_make"
 
 
 def _misspelt(facts: CMakeFacts, name: str) -> CMakeCall | None:

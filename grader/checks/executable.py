@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 
 from grader.checks.build import judge_build
 from grader.checks.registry import check
-from grader.checks.support.exit_causes import SYNTAX, syntax_hint
+from grader.checks.support.exit_causes import syntax_fault, syntax_hint
 from grader.checks.support.scripts import (
     PYTHON,
     RIGHT_SHEBANG,
@@ -34,8 +34,6 @@ from grader.wording import join_words
 TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
 HOME = "/home/student"
 """Of the sandbox: to a student it is their own."""
-UNPARSED = (*SYNTAX, "ValueError")
-"""What Python says of a file that it cannot parse; other faults are of the reading."""
 
 
 class ExecutableParams(Record):
@@ -72,7 +70,7 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
     """
     found = find_script(package, params.path)
     verdict = _missing(package, params.path) if found is None else _judge_file(package, build, found, params)
-    whole = ", all of it valid Python" if found is not None and _syntax_fault(found) else ""
+    whole = ", all of it valid Python" if found is not None and syntax_fault(found) else ""
     return verdict.about(
         expected=f"{params.path}, executable, beginning with {_asked_first_line(found)}{whole}"
     )
@@ -90,7 +88,7 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
     obstacles = [*of_first_line, *_mode_obstacles(found, remarks)]
     moved = f"the handout puts it at {params.path}; move it there" if found.path != params.path else ""
     hint = moved or "; ".join(remarks)
-    fault = _syntax_fault(found)
+    fault = syntax_fault(found)
     if fault is not None:
         verdict = _syntax_verdict(found, fault, [] if has_wrapper(package, build, found.path) else obstacles)
     elif found.executable and not obstacles:
@@ -123,13 +121,6 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
     only_mode = bool(obstacles) and not of_first_line
     place = FileCitation(file=found.path) if only_mode else _cite_shebang(found)
     return verdict.about(measured=measured, citations=verdict.citations or (place,))
-
-
-def _syntax_fault(file: SourceFile) -> Fault | None:
-    """Return why Python cannot parse the script; None for one that an old Python, which is there, is to run."""
-    old = file.shebang is not None and file.shebang.found and file.shebang.interpreter.startswith("python2")
-    fault = file.python_fault
-    return fault if fault is not None and fault.kind in UNPARSED and not old else None
 
 
 def _syntax_verdict(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -> Verdict:

@@ -32,7 +32,6 @@ from grader.checks.support.scripts import (
     commented_calls,
     installed,
     is_product,
-    lines_text,
     lines_that_publish,
     lines_that_say,
     lines_that_set,
@@ -59,7 +58,7 @@ from grader.model.package import LaunchFile, PackageFacts, PythonSlip
 from grader.model.result import CriterionResult
 from grader.model.verdict import Citation, FileCitation, Status, Verdict
 from grader.rubric.model import Criterion, Rubric
-from grader.wording import join_words, significant
+from grader.wording import join_words, lines_text, significant
 
 POINTS_MAX = 3
 NOT_THERE = ("file-missing", "file-elsewhere")
@@ -429,6 +428,8 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
     in which it is commented out."""
     if not verdict.status.is_lost or package is None or package.cmake is None:
         return verdict
+    if f"{CMAKE} line" in verdict.hint or f"{CMAKE}: " in verdict.hint:
+        return verdict  # how the line is repaired is told
     lines = build.file_lines(CMAKE)[:_LINES_READ]
     if (below := _BELOW.search(verdict.hint)) and verdict.citations == (FileCitation(file=CMAKE),):
         return _cite_install(verdict, lines, int(below[1] or 0) or None)

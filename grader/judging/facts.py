@@ -4,7 +4,7 @@ language the nodes are written that a verdict is about."""
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
@@ -13,7 +13,8 @@ from pydantic import ValidationError
 
 from grader.checks.build import run_hint
 from grader.checks.registry import Check, Evidence
-from grader.checks.support.exit_causes import SYNTAX, syntax_hint
+from grader.checks.support.build_errors import unreadable_file
+from grader.checks.support.exit_causes import SYNTAX, syntax_fault, syntax_hint
 from grader.checks.support.launch import own_script, read_launch
 from grader.checks.support.processes import failed_program
 from grader.checks.support.scripts import find_script, programs
@@ -28,6 +29,8 @@ from grader.rubric.scenario import Scenario, Start
 from grader.wording import join_words
 
 NOT_RUN = "not_run"
+OF_BUILDS, OF_BUILD_FILES = {"build", "build-and-run"}, {"manifest", "cmake"}
+"""Checks of what the build makes, and of the files that say how."""
 NO_PACKAGE = PackageFacts(
     name="", path=".", manifest=None, manifest_fault=None, cmake=None, files=(), launch_files=()
 )
@@ -51,6 +54,8 @@ class Facts:
     def of(self, check: Check, criterion: Criterion, params: Record) -> dict[str, object] | Verdict:
         """Return the facts by the names that the check asks for, or the verdict where one of them is not there."""
         found: dict[str, object] = {"params": params}
+        if unreadable := self.unreadable(check, criterion):
+            return unreadable
         if check.needs_run:
             run = self._run(criterion.scenario or "")
             if isinstance(run, Verdict):
@@ -100,8 +105,8 @@ class Facts:
         run = self.runs.get(scenario)
         if run is None and self._lacks_files(scenario):
             return self._nothing_started(scenario)
-        if run is None and (unreadable := self.unreadable_launch(scenario)):
-            return unreadable
+        if run is None and (launch := self.unreadable_launch(scenario)):
+            return launch
         if run is None:
             recorded = self.runs.get(PACKAGE_RUN)
             reason = recorded.metadata.get(NOT_RUN, "") if recorded else ""
@@ -135,6 +140,42 @@ class Facts:
         message = f"a program of the grader's failed in the run {scenario!r}: {failure}"
         hint = "`grader doctor --rubric RUBRIC` shows what this machine lacks for it; then grade again"
         return inconclusive(message, hint=hint)
+
+    def unreadable(self, check: Check, criterion: Criterion) -> Verdict | None:
+        """Return why what is still to be built or run for the criterion cannot be: that shows in files which nothing
+        can read. None where another criterion is about these."""
+        scenario, package = criterion.scenario or "", self.package_of(criterion)
+        if package is None or scenario in self.runs or self._lacks_files(scenario):
+            return None
+        if check.name in OF_BUILDS and not self.runs[PACKAGE_RUN].processes:
+            file = None if self._judges(OF_BUILD_FILES) else unreadable_file(package)
+            cited = (file.place,) if file and file.place else ()
+            return unjudged(file.why, hint=file.hint, citations=cited) if file else None
+        return self.unreadable_launch(scenario) or self._unparsed_scripts(criterion)
+
+    def _judges(self, checks: Collection[str], file: str = "") -> bool:
+        """Return whether the rubric has a criterion with one of the checks, for the file if it is given."""
+        asking = (c.parameters for c in self.rubric.criteria if c.check in checks)
+        return any(not file or file in {PurePosixPath(t).name for t in texts_in(asked)} for asked in asking)
+
+    def _unparsed_scripts(self, criterion: Criterion) -> Verdict | None:
+        """Return why Python parses none of the scripts that the criterion names, or, where it names none, that its run
+        starts."""
+        known = self.rubric.scenarios.get(criterion.scenario or "")
+        required = (one for one in self.rubric.criteria if one.id in criterion.requires)
+        if known is None or any(one.scenario == criterion.scenario for one in required):
+            return None
+        starts = [start for start in known.start if not start.program]
+        texts = texts_in(criterion.parameters)
+        starts = [start for start in starts if start.name in texts] or starts
+        packages = [(start.script, self.package_of(start)) for start in starts]
+        found = [find_script(package, script) if package and script else None for script, package in packages]
+        faults = [syntax_fault(file) if file is not None else None for file in found]
+        first = faults[0] if faults and all(faults) else None
+        if first is None or self._judges({"executable"}, PurePosixPath(first.file).name):
+            return None
+        why = f"{first.file} line {first.line}: {first.kind}: {first.cause or first.message}"
+        return unjudged(why, hint=syntax_hint(first), citations=(first.place,))
 
     def unreadable_launch(self, scenario: str) -> Verdict | None:
         """Return why roslaunch cannot read what the scenario launches: that shows without a run."""

@@ -477,7 +477,7 @@ class _Judging:
         asked: set[str] = set()
         facts = self._facts(asked)
         from_files = FROM_FILES.issuperset(check.facts)
-        if not from_files and not facts.unreadable_launch(criterion.scenario or ""):
+        if not from_files and not facts.unreadable(check, criterion):
             return
         verdict = verdict_of(criterion, facts, self._checks)
         final = not asked

@@ -37,6 +37,8 @@ DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark",
 """The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 OF_PACKAGES = {"package.xml", "CMakeLists.txt"}
+GENERATION = re.compile(r"generate_messages|message_generation|add_(message|service|action)_files")
+"""Without these in CMakeLists.txt, a build can succeed that makes nothing of the package's own definitions."""
 NUMBER = re.compile(r"\d+(\.\d+)?")
 
 Runs = dict[str, Run]
@@ -187,7 +189,8 @@ def is_used_by(
     if repair.kind in DONE_BEFORE_RUNS:
         return launches and not known
     if repair.kind in OF_BUILDS:
-        return not built or any(start.built for start in scenario.start)
+        made = GENERATION.search(repair.message) is not None
+        return made or not built or any(start.built for start in scenario.start)
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         return True
     if name in _started_files(scenario):
@@ -305,7 +308,8 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
     hints = clauses + advice_on(one for one in repairs if one not in told)
     said = verdict.message
     words = [said, *(one.message for one in repairs if one.file not in said and one.message not in said)]
-    if is_next:
+    is_new = not copy.hint or not set(copy.hint.split("; ")) <= set(hints)
+    if is_next and is_new:
         untold = [clause for clause in copy.message.split("; ") if clause not in said]
         words += [f"with that repaired, {'; '.join(untold)}"] if untold else []
         hints += [f"then {_at_its_line(copy)}"] if copy.hint else []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import PurePosixPath
 
@@ -147,3 +147,23 @@ def _own_fields(type_: str, text: str) -> list[str]:
             full = FULL_NAMES.get(kind, kind.removeprefix(f"{package}/"))
             found.append(f"{full}{bracket}{length} {field.name}")
     return found
+
+
+def meant_type(type_: str, own: Collection[str], known: Mapping[str, Collection[str]]) -> str:
+    """Return the type of a field that is meant by one that there is none of; the type itself where there is one. `own`
+    are types of the same package, `known` those of others."""
+    base, bracket, size = type_.partition("[")
+    if base in {*BUILT_IN, *FULL_NAMES, *own} or "/" in base:
+        return type_
+    near = get_close_matches(base.lower(), sorted(map(str.lower, own)), 1)
+    plain = OTHER_TYPES.get(base.lower(), base.lower())
+    having = [package for package, types in known.items() if base in types]
+    right = (
+        plain
+        if plain in BUILT_IN
+        else f"{having[0]}/{base}"
+        if having
+        else next((one for one in own if near == [one.lower()]), "")
+    )
+    right = right or next(iter(get_close_matches(plain, sorted(BUILT_IN), 1)), base)
+    return f"{right}{bracket}{size}"

@@ -120,7 +120,7 @@ def advice_of(repair: Repair) -> str:
     new, added = repair.after.split("\n"), _added(repair.before, repair.after)
     if repair.fix != "; ".join(added):
         below = len(new) > 1 and new[0] == repair.before and repair.line is not None
-        named = re.match(r"(delete|start|indent) lines? \d", repair.fix)
+        named = re.match(r"(delete|start|indent|remove the `#` of|in place of) lines? \d", repair.fix)
         place = repair.file if named else place_of(repair)
         where = f"{repair.file}: below line {repair.line}," if below and not named else f"{place}:"
         return f"{where} {repair.fix}"

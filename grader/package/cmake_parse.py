@@ -8,8 +8,9 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Iterable, Iterator
-from itertools import takewhile
+from itertools import islice, takewhile
 from pathlib import Path
+from typing import NamedTuple
 
 from cmake_parser import CMakeError, Token, parse_raw, parse_tree, resolve_args, tokenize
 from cmake_parser import ast as nodes
@@ -17,6 +18,7 @@ from cmake_parser.interpreter import Context
 
 from grader.model.package import CMakeCall, CMakeFacts, Fault
 from grader.package.reading import printable, read_markup
+from grader.wording import lines_text
 
 _CMAKE_FILE = "CMakeLists.txt"
 _CALLS_MAX = 5_000
@@ -44,6 +46,8 @@ _NESTING_MAX = 50
 _WORK_MAX = 20_000_000
 _BLOCKS = ("if", "foreach", "while", "function", "macro", "block")
 _MIDDLE = ("else", "elseif")
+_HALVES_MAX = 20
+_HALF_LINES_MAX = 40
 _LINK_CHARS_MAX = 4_095
 _LINK_TEXT = re.compile(r"\s*(\.{0,2}/)?[\w./-]+/[\w./-]+\s*")
 
@@ -274,6 +278,9 @@ def _explain_fault(text: str, end: int, file: str, message: str) -> Fault:
     first = tokens[0] if tokens else Token("RAW", "", slice(end, end), text.count("\n") + 1, 1)
     unparsed = next((t for t in tokens if t.kind == "UNPARSEABLE"), None)
     line, cause = first.line, f"`{_word(first)}` is not a command: CMake expects name(...)"
+    half = join_half_comment(text)
+    if half is not None:
+        return _fault(file, half.line, message, half.cause)
     if unparsed is not None and text[unparsed.span].startswith('"'):
         line, cause = unparsed.line, 'a quote `"` is opened here and never closed'
     elif first.kind == "RPAREN":
@@ -284,6 +291,59 @@ def _explain_fault(text: str, end: int, file: str, message: str) -> Fault:
     elif end == 0 and len(text) <= _LINK_CHARS_MAX and _LINK_TEXT.fullmatch(text):
         cause = "the file holds only the path that a link should lead to, no CMake commands"
     return _fault(file, line, message, cause)
+
+
+class HalfComment(NamedTuple):
+    """A call that is partly in comments, from `line` to `last`, and the text without these."""
+
+    line: int
+    last: int
+    name: str
+    text: str
+
+    @property
+    def cause(self) -> str:
+        """What is wrong, and what to do."""
+        return f"only a part of `{self.name}(…)` is commented out: {self.fix}"
+
+    @property
+    def fix(self) -> str:
+        """Which comments to take away."""
+        return f"remove the `#` of {lines_text(self.line - 1, self.last - 1)}"
+
+
+def join_half_comment(text: str) -> HalfComment | None:
+    """Return the call of which a part is in comments, where the text is right without the `#` of these."""
+    lines = text.split("\n")
+    found = (half for at in range(len(lines)) if (half := _half_comment(lines, at)) is not None)
+    for name, first, end in islice(found, _HALVES_MAX):
+        plain = [re.sub(r"#+ ?", "", line, count=1) for line in lines[first:end]]
+        changed = "\n".join([*lines[:first], *plain, *lines[end:]])
+        try:
+            parse_raw(changed, skip_comments=True)
+        except (CMakeError, RecursionError):
+            continue
+        return HalfComment(line=first + 1, last=end, name=name, text=changed)
+    return None
+
+
+def _half_comment(lines: list[str], at: int) -> tuple[str, int, int] | None:
+    """Return the name of the call that begins in the line `at`, and the first and the end of its lines that are
+    comments, where either its first line is one, or its last."""
+    begun = _BEGUN.match(lines[at])
+    below = lines[at + 1 : at + 1 + _HALF_LINES_MAX] if begun else []
+    closing = next((i for i, line in enumerate(below) if not _ARGUMENTS.match(line)), None)
+    if begun is None or closing is None or not _CLOSING.match(below[closing]):
+        return None
+    numbers = range(at, at + closing + 2)
+    commented = [number for number in numbers if lines[number].lstrip().startswith("#")]
+    is_half = (numbers[0] in commented) != (numbers[-1] in commented)
+    return (begun[1], commented[0], commented[-1] + 1) if is_half else None
+
+
+_BEGUN = re.compile(r"\s*#*\s?(\w+)\s*\([^()]*$")
+_ARGUMENTS = re.compile(r"\s*#*\s*[^\s()#][^()#]*$")
+_CLOSING = re.compile(r"\s*#*[^()#]*\)")
 
 
 def _last_line(text: str, line: int) -> int:

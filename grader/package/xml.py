@@ -209,7 +209,8 @@ def _mismatch(opened: str, line: str, closed: str, root: str) -> str:
     if get_close_matches(closed, [opened], cutoff=0.7):
         return f"`<{opened}>` of line {line} is closed by `</{closed}>`: write `</{opened}>`"
     if opened == root:
-        return f"`</{closed}>` closes nothing, since only `<{opened}>` of line {line} is open here: delete it"
+        only = f"only `<{opened}>` of line {line} is open here"
+        return f"`</{closed}>` closes nothing, since {only}: delete `</{closed}>`"
     return (
         f"`<{opened}>` of line {line} is still open where `</{closed}>` comes: "
         f"end it with `/>` or with `</{opened}>`"

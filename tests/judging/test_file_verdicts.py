@@ -180,3 +180,40 @@ def test_nothing_that_needs_a_run_or_a_person_or_a_mended_check_is_decided(tmp_p
     manual = {"id": "style", "check": "manual"}
     unknown = {"id": "unknown", "check": "no-such-check"}
     assert judge_files(rubric(NODE | {"requires": []}, manual, unknown), facts_of(tmp_path)) == ()
+
+
+BROKEN = {
+    "build": ({"package.xml": "<package>"}, "build", "package.xml, line 1 cannot be read"),
+    "cmake": ({"CMakeLists.txt": "project(lab1"}, "build", "CMakeLists.txt, line 1 cannot be read"),
+    "script": (
+        {"src/numeric_talker.py": "import rospy\nif True\n"},
+        "node",
+        "numeric_talker.py line 2: SyntaxError",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_lab_without_criteria_of_files_hears_at_once_which_cannot_be_read(name, tmp_path) -> None:
+    files, lost, says = BROKEN[name]
+    facts = facts_of(tmp_path, **files)
+    later = {**NODE, "id": "later", "requires": ["node"]}
+    found = judge_files(rubric({"id": "build", "check": "build"}, {**NODE, "requires": []}, later), facts)
+    assert [(one.criterion.id, one.criterion.status) for one in found] == [(lost, Status.FAIL)]
+    assert says in found[0].criterion.message
+    assert found[0].criterion.hint
+    assert found[0].criterion.citations[0].file == next(iter(files))
+
+
+@pytest.mark.parametrize(
+    ("files", "other"),
+    [
+        ({"package.xml": "<package>"}, MANIFEST_CHECK),
+        ({"CMakeLists.txt": "project(lab1"}, CMAKE_CHECK),
+        ({"src/numeric_talker.py": "import rospy\nif True\n"}, EXECUTABLE),
+    ],
+)
+def test_what_another_criterion_says_of_a_file_is_said_once(files, other, tmp_path) -> None:
+    criteria = ({"id": "build", "check": "build"}, {**NODE, "requires": []}, other)
+    found = judge_files(rubric(*criteria), facts_of(tmp_path, **files))
+    assert [one.criterion.id for one in found] == [other["id"]]

@@ -150,6 +150,29 @@ def test_what_a_blocked_criterion_is_lost_by_next_is_named_with_its_line() -> No
     )
 
 
+def test_what_is_wrong_besides_in_the_same_file_is_said_once() -> None:
+    check = {"id": "manifest", "check": "manifest", "with": {"name": "lab1", "dependencies": ["std_msgs"]}}
+    renamed = TABS.model_copy(
+        update={
+            "kind": "package-name",
+            "file": "package.xml",
+            "line": 3,
+            "before": "  <name>lab_1</name>",
+            "after": "  <name>lab1</name>",
+            "message": "line 3 of package.xml: the package is called lab_1, not lab1",
+            "fix": "write lab1 for lab_1 in package.xml, in project(…) and in every pkg=",
+        }
+    )
+    runs = build_runs({"runs": {"talker": GOOD_RUN}, "package": {**PACKAGE, "manifest": {"name": "lab_1"}}})
+    about = {"repairs": json.dumps([renamed.model_dump()])}
+    copy = build_runs({"runs": {"talker": GOOD_RUN}, "package": {**PACKAGE, "manifest": {"name": "lab1"}}})
+    for key, run in copy.items():
+        runs[f"repaired-1/{key}"] = replace(run, metadata={**run.metadata, **about})
+    found = {c.id: c for c in judge(rubric(check), runs)}["manifest"]
+    assert found.repaired is not None
+    assert found.message.count("std_msgs") == found.hint.count("<exec_depend>std_msgs</exec_depend>") == 1
+
+
 def test_two_faults_are_two_losses() -> None:
     found = judged(DIED, GOOD_RUN, TABS, TOPIC)
     assert (found["node"].points, found["chatter"].points, found["rate"].points) == (0, 0, 5)

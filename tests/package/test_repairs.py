@@ -53,6 +53,17 @@ def listen():
 if __name__ == '__main__':
     listen()
 """
+OWN = {"msg/Level.msg": "float64 level\n", "src/level.py": "from lab.msg import Level\n"}
+OWN_CMAKE = CMAKE.replace("rospy)\n", "message_generation rospy)\nadd_message_files(FILES Level.msg)\n")
+TEMPLATE = """\
+# add_message_files(
+#   FILES
+#   Message1.msg
+# )
+# generate_messages(
+#   DEPENDENCIES
+#   std_msgs
+# )"""
 LEVELS = "a:\n  b:\n    x: 1\n  y: 2\n  c:\n    z: 3\n"
 
 
@@ -323,6 +334,41 @@ CASES = {
         ["file-name", "package-name"], 'write pkg="lab" for pkg="laab"', asking(launch_files=("lab.launch",)),
         {LAUNCHED: TWO_NODES},
     ),
+    "half-a-comment": Case(
+        {CMAKELISTS: CMAKE.replace("catkin_package()", "# catkin_package(\n)")}, ["build-line"],
+        "remove the `#` of line 4", after={CMAKELISTS: "\ncatkin_package(\n)"},
+    ),
+    "run-dependency": Case(
+        {CMAKELISTS: CMAKE.replace("package()", "package(CATKIN_DEPENDS rospy message_runtime)")}, ["manifest-line"],
+        "names message_runtime", after={XML: "  <exec_depend>message_runtime</exec_depend>"},
+    ),
+    "own-message": Case(
+        {**OWN, CMAKELISTS: CMAKE}, ["build-line"] * 3, "write message_generation after COMPONENTS",
+        after={CMAKELISTS: OWN_CMAKE.replace("\ncatkin_p", "\ngenerate_messages()\ncatkin_p")},
+    ),
+    "own-message-of-the-template": Case(
+        {**OWN, CMAKELISTS: CMAKE.replace("catkin_p", f"{TEMPLATE}\ncatkin_p")}, ["build-line"] * 3,
+        "lines 8 to 11; CMakeLists.txt: in place of lines 4 to 7 write add_message_files(FILES Level.msg)",
+    ),
+    "own-message-after-package": Case(
+        {**OWN, CMAKELISTS: OWN_CMAKE + "generate_messages(\n)\n"}, ["build-line"],
+        "move generate_messages(…), from line 6, above catkin_package(…)",
+    ),
+    "own-message-named-otherwise": Case(
+        {**OWN, CMAKELISTS: OWN_CMAKE.replace("Level", "level").replace("catkin_p", "generate_messages()\ncatkin_p")},
+        ["build-line"], "write Level.msg for level.msg",
+    ),
+    "own-message-of-another": Case(
+        {**OWN, "msg/Level.msg": "Header header\ngeometry_msgs/Point at\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")},
+        ["build-line"], "write geometry_msgs after DEPENDENCIES", after={CMAKELISTS: "DEPENDENCIES geometry_msgs std"},
+    ),
+    "own-message-of-no-type": Case(
+        {**OWN, "msg/Level.msg": "Float64 level\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")},
+        ["build-line"], "write `float64 level`",
+    ),
+    "own-message-of-no-use": Case({"msg/Level.msg": "float64 level\n"}, []),
     "another-topic": Case(swapped(TALKER, ("'numeric_chatter'", "'numbers'")), []),
     "another-node": Case(swapped(TALKER, ("'talker'", "'my_node'")), []),
     "import-of-everything": Case(swapped(TALKER, ("import Int8", "import *")), []),

@@ -147,6 +147,11 @@ def _indent(file: Path, line: int, more: int = 4, *, to: int | None = None) -> N
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def _uncomment(file: Path, first: int, last: int) -> None:
+    for line in range(first, last + 1):
+        _replace(file, line, r"#+ ?", "")
+
+
 def _below_call(file: Path, line: int, code: str) -> None:
     lines = file.read_text(encoding="utf-8").splitlines()
     last = next(number for number, text in enumerate(lines, 1) if number >= line and ")" in text)
@@ -170,8 +175,11 @@ _DEEDS: tuple[tuple[str, Callable[[Path, Path, re.Match[str], int | None], objec
      lambda _t, f, m, _l: _edit(f, int(m[2]), re.findall(_TAG, m[1]), below=True)),
     (r"^(?:add|write) (.+) below the \w+\(…\) of line (\d+)$",
      lambda _t, f, m, _l: _below_call(f, int(m[2]), m[1])),
-    (r"^in place of lines? (\d+).* write (.+), without # before it$",
+    (r"^in place of lines? (\d+).* write (.+?)(?:, without # before it)?$",
      lambda _t, f, m, _l: _edit(f, int(m[1]), [m[2]])),
+    (r"remove the `#` of lines? (\d+)(?: to (\d+))?$",
+     lambda _t, f, m, _l: _uncomment(f, int(m[1]), int(m[2] or m[1]))),
+    (r"^line (\d+): delete `(</\w+>)`$", lambda _t, f, m, _l: _replace(f, int(m[1]), m[2], "")),
     (r"^write <name>([\w-]+)</name> in (package\.xml)",
      lambda top, _f, m, at: _replace(top / m[2], at or 1, _NAME, f"<name>{m[1]}</name>")),
     (r"^write (\w+) for (\w+)$", lambda _t, f, m, at: _replace(f, at or 1, rf"\b{m[2]}\b", m[1])),

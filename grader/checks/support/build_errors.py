@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from typing import NamedTuple
 
-from grader.checks.support.missing_names import meant_type
 from grader.checks.support.scripts import cmake_calls, installed, path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
@@ -19,7 +18,8 @@ from grader.installable import (
     known_packages,
     noetic_messages,
 )
-from grader.model.package import PackageFacts, meant_command
+from grader.model.message_definitions import meant_type
+from grader.model.package import Fault, PackageFacts, meant_command
 from grader.model.verdict import FileCitation
 from grader.wording import join_words
 
@@ -31,7 +31,7 @@ SLIP = 0.8
 UNKNOWN_COMMAND = "Unknown CMake command"
 FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error that it prints"
 _CMAKE_ERROR = re.compile(
-    r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+) \((?P<call>\w+)\))?:?\s*(?P<text>.*)"
+    r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+)(?: \((?P<call>\w+)\))?)?:?\s*(?P<text>.*)"
 )
 _COMPILER_ERROR = re.compile(r"^(?P<file>[^:\s][^:]*):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: (?P<text>.*)")
 _OTHER_ERROR = re.compile(
@@ -132,6 +132,28 @@ def explain_error_of_build(error: BuildError, package: PackageFacts, lines: Sequ
         if found := re.search(pattern, text):
             return explain(found, package, lines)
     return Explained(error.text, FIRST_ERROR_HINT)
+
+
+def unreadable_file(package: PackageFacts) -> Explained | None:
+    """Return what is wrong with `package.xml`, else `CMakeLists.txt`, where it cannot be read, so that nothing is
+    built."""
+    of_cmake = package.cmake.fault if package.cmake is not None else None
+    fault = next((f for f in (package.manifest_fault, of_cmake) if f and f.kind != "Missing"), None)
+    if fault is None:
+        return None
+    line = f", line {fault.line}" if fault.line else ""
+    why = f"{fault.file}{line} cannot be read: {fault.cause or fault.message}"
+    return Explained(why, repair_of_file(fault), place=fault.place)
+
+
+def repair_of_file(fault: Fault) -> str:
+    """Return what to do where `package.xml` or `CMakeLists.txt` cannot be read."""
+    unclosed = re.search(r": write it (at the end of line \d+)$", fault.cause)
+    return f"write `)` {unclosed[1]}" if unclosed else fault.fix or "correct that line, then run catkin_make"
+
+
+def _unreadable(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    return unreadable_file(package) or Explained(found.string, FIRST_ERROR_HINT)
 
 
 def _callers(lines: Sequence[str]) -> list[tuple[str, int]]:
@@ -285,7 +307,7 @@ def no_types(package: PackageFacts) -> Explained | None:
         (FileCitation(file=one.path, line=field.line), field, right)
         for one in package.interfaces
         for field in one.fields
-        if (right := meant_type(field.type, own)) != field.type
+        if (right := meant_type(field.type, own, noetic_messages())) != field.type
     ]
     if faults:
         why, _, fix = faults[0].cause.partition(": ")
@@ -570,6 +592,7 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"(Invalid declaration|is not a legal message|InvalidMsgSpec|MsgNotFound)", _no_definition),
     (r"(generate_messages)\(\) must be called before catkin_package\(\)", _before_catkin_package),
     (UNKNOWN_COMMAND + r' "(\w+)"', _unknown_command),
+    (r"Parse error\.|Error\(s\) in package", _unreadable),
     (r"does not contain a CMakeLists\.txt", _no_cmake_lists),
     (r"contains non-catkin packages", _not_catkin),
     (r'dependency target "([^"]+)" of target "([^"]+)" does not exist', _missing_dependency),

@@ -37,12 +37,14 @@ from grader.checks.support.text import LOOP, SPIN, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
 from grader.installable import ON_THE_MACHINE, exists_somewhere, install_hint, known_packages, noetic_messages
-from grader.model.package import Fault, PackageFacts, PythonSlip
+from grader.model.package import Fault, PackageFacts, PythonSlip, SourceFile
 from grader.model.verdict import Citations, FileCitation, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
 from grader.wording import join_words, seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
+UNPARSED = (*SYNTAX, "ValueError")
+"""What Python says of a file that it cannot parse; other faults are of the reading."""
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
 MAIN = "`if __name__ == '__main__':`"
@@ -88,6 +90,13 @@ _ADDED = re.compile(
 )
 _NAME = re.compile(r"(?:name|local variable) '(\w+)' (?:is not defined|where it is not|referenced before)")
 _BY_PYTHON = re.compile(r"\. Did you mean: '(\w+)'\?$")
+
+
+def syntax_fault(file: SourceFile) -> Fault | None:
+    """Return why Python cannot parse the script; None for one that an old Python, which is there, is to run."""
+    old = file.shebang is not None and file.shebang.found and file.shebang.interpreter.startswith("python2")
+    fault = file.python_fault
+    return fault if fault is not None and fault.kind in UNPARSED and not old else None
 
 
 def syntax_hint(fault: Fault) -> str:

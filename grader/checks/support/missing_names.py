@@ -7,13 +7,11 @@ import ast
 import re
 from collections.abc import Collection
 from contextlib import suppress
-from difflib import get_close_matches
 
 from grader.checks.support.console_output import Traceback
 from grader.checks.support.scripts import cmake_calls
 from grader.checks.support.text import near_names, shown
 from grader.installable import PYTHON_2, ROS_2, TUTORIALS, known_packages, nearest_module, noetic_messages
-from grader.model.message_definitions import BUILT_IN, FULL_NAMES, OTHER_TYPES
 from grader.model.package import PackageFacts
 from grader.wording import join_words
 
@@ -239,16 +237,3 @@ def fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
             if name.startswith(stem) and fields:
                 return fields
     return next((fields for types in noetic_messages().values() if (fields := types.get(name, ()))), ())
-
-
-def meant_type(type_: str, own: Collection[str]) -> str:
-    """Return the type of a field that is meant by one that there is none of; the type itself where there is one."""
-    base, bracket, size = type_.partition("[")
-    if base in {*BUILT_IN, *FULL_NAMES, *own} or "/" in base:
-        return type_
-    near = near_names(base, own)
-    plain = OTHER_TYPES.get(base.lower(), base.lower())
-    having = [package for package, types in noetic_messages().items() if base in types]
-    right = plain if plain in BUILT_IN else f"{having[0]}/{base}" if having else next(iter(near), "")
-    right = right or next(iter(get_close_matches(plain, sorted(BUILT_IN), 1)), base)
-    return f"{right}{bracket}{size}"

@@ -289,8 +289,3 @@ def commented_call(lines: Sequence[str], name: str) -> tuple[int, int] | None:
     while ")" not in lines[last] and last + 1 < len(lines) and lines[last + 1].lstrip().startswith("#"):
         last += 1
     return first, last
-
-
-def lines_text(first: int, last: int) -> str:
-    """Return `line 3`, or `lines 3 to 5`, of lines from 0."""
-    return f"line {first + 1}" if last == first else f"lines {first + 1} to {last + 1}"

@@ -9,19 +9,26 @@ from pathlib import PurePosixPath
 
 from cmake_parser.ast import Command, Token
 
+from grader.installable import noetic_messages
+from grader.model.message_definitions import meant_type
 from grader.model.package import PackageFacts, meant_command
 from grader.model.repair import RepairKind
-from grader.package.cmake_parse import commands_of
+from grader.package.cmake_parse import commands_of, join_half_comment
 from grader.package.manifest import parse_manifest
 from grader.package.repairs.editing import CMAKE, MANIFEST, Files, naming_files, rename_word, repair_xml
 from grader.package.repairs.files import is_own
-from grader.package.repairs.names import Wanted, is_near
+from grader.package.repairs.names import CPP, Wanted, is_near
 from grader.package.xml import parse_xml
-from grader.wording import join_words
+from grader.wording import join_words, lines_text
 
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 INSTALL = "catkin_install_python"
 CALL_LINES_MAX = 30
+INTERFACES = {"add_message_files": "msg", "add_service_files": "srv", "add_action_files": "action"}
+"""Calls that name definitions, and the folders of these."""
+GENERATE, GENERATION = "generate_messages", "message_generation"
+FORMAT_1 = r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>"
+RUN_NEEDS = re.compile(r"<(?:depend|run_depend|exec_depend|build_export_depend)>\s*([\w-]+)\s*<")
 ALL_NEEDS = re.compile(r"<(build_depend|depend|run_depend|exec_depend)>\s*([\w-]+)\s*<")
 
 
@@ -85,7 +92,7 @@ def _add_dependency(files: Files, name: str) -> None:
     given = {match[2] for match in ALL_NEEDS.finditer(_without_comments(text))}
     if name in given or not _parses(text):
         return
-    old = re.search(r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>", text) is not None
+    old = re.search(FORMAT_1, text) is not None
     lines = [f"<build_depend>{name}</build_depend>", f"<run_depend>{name}</run_depend>"]
     message = f"{MANIFEST} does not name {name}, which the lab needs"
     _insert(files, "\n".join(lines) if old else f"<depend>{name}</depend>", message)
@@ -128,12 +135,14 @@ def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted)
     needs = " ".join(wanted.dependencies or ("rospy", "std_msgs"))
     if not _calls_catkin(files, package):
         line = f"find_package(catkin REQUIRED COMPONENTS {needs})"
-        _add_call(files, "find_package(catkin …)", r"find_package\s*\(\s*catkin\b", line, ("project",))
+        _add_call(files, "find_package(catkin …)", line, ("project",))
     if not _has(files, package, "catkin_package"):
-        below = ("find_package", "project")
-        _add_call(files, "catkin_package()", r"catkin_package\s*\(", "catkin_package()", below)
+        below = (GENERATE, "find_package", "project")
+        _add_call(files, "catkin_package()", "catkin_package()", below)
+    _make_interfaces(files, package, name)
     _install(files, package, wanted)
     _correct_include(files)
+    _declare_exported(files)
     _name_project(files, package, name, wanted.package)
 
 
@@ -167,9 +176,13 @@ def _replace_token(text: str, token: Token, new: str) -> str:
 
 
 def _close_bracket(files: Files) -> None:
-    """Close the bracket at the end of the last line that is no comment, or in a line of its own."""
+    """Take a call wholly out of its comment, or close the bracket at the end of the last line that is no comment, or in
+    a line of its own."""
     text = _cmake(files)
     if commands_of(text.encode()) is not None:
+        return
+    if half := join_half_comment(text):
+        files.change("build-line", CMAKE, half.text, f"line {half.line} of {CMAKE}: {half.cause}", half.fix)
         return
     lines = text.rstrip().split("\n")
     last = max((i for i, line in enumerate(lines) if line.split("#", maxsplit=1)[0].strip()), default=0)
@@ -217,6 +230,124 @@ def _correct_include(files: Files) -> None:
         return
 
 
+def _declare_exported(files: Files) -> None:
+    """Declare in `package.xml` what `catkin_package(CATKIN_DEPENDS …)` names, as catkin asks for."""
+    for call in _commands(files, "catkin_package"):
+        for name in _values_of(call, "CATKIN_DEPENDS"):
+            text = _without_comments(files.text(MANIFEST) or "")
+            if re.fullmatch(r"\w+", name) and name not in RUN_NEEDS.findall(text):
+                tag = "run_depend" if re.search(FORMAT_1, text) else "exec_depend"
+                message = (
+                    f"line {call.line} of {CMAKE}: catkin_package(…) names {name}, and {MANIFEST} does not"
+                )
+                _insert(files, f"<{tag}>{name}</{tag}>", message)
+
+
+# ---- messages, services and actions of the package's own
+
+
+def _make_interfaces(files: Files, package: PackageFacts, name: str) -> None:
+    """Find what CMakeLists.txt lacks to make the package's own messages, services and actions, where code uses them."""
+    made = {call: _definitions(package, folder) for call, folder in INTERFACES.items()}
+    if not any(made.values()) or not _uses_own(files, package, name):
+        return
+    _correct_types(files, package)
+    _generate(files, package)  # from below, so that the lines above stay where they are
+    for call, names in reversed(made.items()):
+        _name_definitions(files, call, names)
+    of_catkin = [
+        c for c in _commands(files, "find_package") if [t.value for t in _words(c)][:1] == ["catkin"]
+    ]
+    named = [token.value for call in of_catkin for token in _words(call)]
+    if of_catkin and GENERATION not in named and not any("$" in word for word in named):
+        words = _words(of_catkin[0])
+        listed = next((t for t in words if t.value == "COMPONENTS"), None)
+        token, new = (listed, GENERATION) if listed else (words[-1], f"COMPONENTS {GENERATION}")
+        changed = _replace_token(_cmake(files), token, f"{token.value} {new}")
+        message = f"line {of_catkin[0].line} of {CMAKE}: find_package(catkin …) does not name {GENERATION}"
+        files.change("build-line", CMAKE, changed, message, f"write {new} after {token.value}")
+
+
+def _correct_types(files: Files, package: PackageFacts) -> None:
+    """Give fields of which there is no type the one that is meant."""
+    own = {PurePosixPath(one.path).stem for one in package.interfaces}
+    for one in package.interfaces:
+        for field in one.fields:
+            right, lines = (
+                meant_type(field.type, own, noetic_messages()),
+                (files.text(one.path) or "").split("\n"),
+            )
+            if right != field.type and field.line <= len(lines):
+                lines[field.line - 1] = lines[field.line - 1].replace(field.type, right, 1)
+                message = f"line {field.line} of {one.path}: there is no type `{field.type}` of a field"
+                files.change("build-line", one.path, "\n".join(lines), message)
+
+
+def _definitions(package: PackageFacts, folder: str) -> list[str]:
+    paths = (PurePosixPath(file.path) for file in package.files)
+    return sorted(p.name for p in paths if str(p.parent) == folder and p.suffix == f".{folder}")
+
+
+def _uses_own(files: Files, package: PackageFacts, name: str) -> bool:
+    """Return whether the package's code imports, or includes, what is made of its definitions."""
+    used = re.compile(rf"\b{re.escape(name)}(\.(msg|srv)\b|/\w+\.h\b)")
+    sources = (f.path for f in package.files if is_own(f.path) and (f.python or f.path.endswith(CPP)))
+    return any(used.search(files.text(path) or "") for path in sources)
+
+
+def _values_of(call: Command, keyword: str) -> list[str]:
+    words = [token.value for token in _words(call)]
+    behind = words[words.index(keyword) + 1 :] if keyword in words else []
+    return list(takewhile(lambda word: not word.isupper(), behind))
+
+
+def _name_definitions(files: Files, name: str, made: Sequence[str]) -> None:
+    """Name them all in the call, in place of files that do not exist and have nearly their names, or beside others."""
+    if made and not _commands(files, name):
+        line, below = f"{name}(FILES {' '.join(made)})", ("find_package", "project")
+        _add_call(files, f"{name}(…)", line, below, made)
+    for file in made:
+        call = _commands(files, name)[0]
+        named = {word for one in _commands(files, name) for word in _values_of(one, "FILES")}
+        if file in named or any("$" in word for word in named):
+            continue
+        stray = next((word for word in sorted(named - {*made}) if is_near(word, file)), "FILES")
+        token = next((t for one in _commands(files, name) for t in _words(one) if t.value == stray), None)
+        if token is not None:
+            new, place = (f"FILES {file}", "after") if stray == "FILES" else (file, "for")
+            message = f"line {call.line} of {CMAKE}: {name}(…) does not name {file}"
+            changed = _replace_token(_cmake(files), token, new)
+            files.change("build-line", CMAKE, changed, message, f"write {file} {place} {stray}")
+
+
+def _generate(files: Files, package: PackageFacts) -> None:
+    """Call generate_messages(…) where nothing does, with the packages whose types are used, above catkin_package(…)."""
+    calls, of_catkin = _commands(files, GENERATE), _commands(files, "catkin_package")
+    types = {field.type for one in package.interfaces for field in one.fields}
+    needed = {"std_msgs"} if types & {"Header", "Header[]"} else set[str]()
+    needed |= {name.partition("/")[0] for name in types if "/" in name} - {package.name}
+    if not calls:
+        line = f"{GENERATE}({' '.join(['DEPENDENCIES', *sorted(needed)] if needed else [])})"
+        _add_call(files, f"{GENERATE}(…)", line, (*INTERFACES, "find_package"), sorted(needed))
+        return
+    if of_catkin and calls[0].line > of_catkin[0].line:
+        text, call, at = _cmake(files), calls[0].span, of_catkin[0].span.start
+        changed = f"{text[:at]}{text[call]}\n\n{text[at : call.start].rstrip()}\n{text[call.stop :].lstrip()}"
+        message = f"line {calls[0].line} of {CMAKE}: {GENERATE}(…) is called after catkin_package(…)"
+        fix = f"move {GENERATE}(…), from line {calls[0].line}, above catkin_package(…)"
+        files.change("build-line", CMAKE, changed, message, fix)
+    call = _commands(files, GENERATE)[0]
+    missing = sorted(needed - {token.value for token in _words(call)})
+    if missing and not any("$" in token.value for token in _words(call)):
+        text, listed = _cmake(files), " ".join(missing)
+        token = next((t for t in _words(call) if t.value == "DEPENDENCIES"), None)
+        at = token.span.stop if token else text.index("(", call.span.start) + 1
+        added = f" {listed}" if token else f"DEPENDENCIES {listed}"
+        message = f"line {call.line} of {CMAKE}: {GENERATE}(…) does not name {join_words(missing)}"
+        fix = f"write {listed} after DEPENDENCIES" if token else f"write {GENERATE}({added})"
+        files.change("build-line", CMAKE, text[:at] + added + text[at:], message, fix)
+
+
 def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -> None:
     """Name the project. A manifest in whose name the lab's is meant gets that name later."""
     right = wanted if _is_meant(files, package, name, wanted) else name
@@ -229,20 +360,31 @@ def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -
             files.change(kind, CMAKE, _replace_token(_cmake(files), words[0], name), message)
 
 
-def _add_call(files: Files, what: str, pattern: str, line: str, below: Sequence[str]) -> None:
-    """Take the call out of its comment, or write it below the first of these commands that is there."""
+def _add_call(files: Files, what: str, line: str, below: Sequence[str], names: Sequence[str] = ()) -> None:
+    """Take the call out of its comment, write it in place of a comment that has not the `names`, or write it below the
+    first of these commands that is there."""
     text = _cmake(files)
-    changed = _uncomment(text, pattern)
-    if changed is None:
-        lines = text.split("\n")
+    lines = text.split("\n")
+    name, _, first = line.partition("(")
+    commented = _commented(text, rf"{name}\s*\(" + (r"\s*catkin\b" if first.startswith("catkin ") else ""))
+    fix = ""
+    if commented is not None:
+        at, call = commented
+        places = lines_text(at, at + len(call) - 1)
+        fix, new = f"remove the `#` of {places}", call
+        if not set(names) <= set(re.findall(r"[^\s()]+", "\n".join(call))):
+            fix, new = f"in place of {places} write {line}", [line]
+        changed = "\n".join([*lines[:at], *new, *lines[at + len(call) :]])
+    else:
         above = next((found[0] for name in below if (found := _commands(files, name))), None)
         at = text.count("\n", 0, above.span.stop) + 1 if above is not None else len(lines)
         changed = "\n".join([*lines[:at], line, *lines[at:]])
-    files.change("build-line", CMAKE, changed, f"{CMAKE} does not call {what}")
+    files.change("build-line", CMAKE, changed, f"{CMAKE} does not call {what}", fix)
 
 
-def _uncomment(text: str, pattern: str) -> str | None:
-    """The text with the first such call taken out of its comment, up to its closing bracket; None without one."""
+def _commented(text: str, pattern: str) -> tuple[int, list[str]] | None:
+    """Return the first such call that is commented out, up to its closing bracket: its first line, from 0, and its
+    lines without `#`."""
     lines = text.split("\n")
     for first, line in enumerate(lines):
         if not re.match(rf"\s*#+\s?{pattern}", line, re.IGNORECASE):
@@ -251,7 +393,7 @@ def _uncomment(text: str, pattern: str) -> str | None:
         for line_of_call in lines[first : first + CALL_LINES_MAX]:
             call.append(re.sub(r"^(\s*)#+ ?", r"\1", line_of_call, count=1))
             if commands_of("\n".join(call).encode()):
-                return "\n".join([*lines[:first], *call, *lines[first + len(call) :]])
+                return first, call
     return None
 
 
@@ -265,8 +407,11 @@ def _install(files: Files, package: PackageFacts, wanted: Wanted) -> None:
     missing = sorted(there - named)
     if missing and not calls:
         line = f"{INSTALL}(PROGRAMS {' '.join(missing)}\n  DESTINATION {BIN}\n)"
-        changed = _uncomment(_cmake(files), rf"{INSTALL}\s*\(")
-        if changed is None or not all(path in changed for path in missing):
+        at, call = _commented(_cmake(files), rf"{INSTALL}\s*\(") or (0, [])
+        if all(path in "\n".join(call) for path in missing):
+            lines = _cmake(files).split("\n")
+            changed = "\n".join([*lines[:at], *call, *lines[at + len(call) :]])
+        else:
             changed = f"{_cmake(files).rstrip()}\n\n{line}\n"
         fix = f"write {' '.join(line.split())}"
         files.change("build-line", CMAKE, changed, f"{CMAKE} does not install {join_words(missing)}", fix)
