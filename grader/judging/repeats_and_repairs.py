@@ -299,7 +299,9 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         verdict = failed(
             message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
         )
-    if copy.status.is_lost and not is_next and verdict.hint:
+    paths = re.findall(r"[\w-]+(?:/[\w.-]+)+", copy.hint)
+    told_at_once = paths != [] and all(path in verdict.hint for path in paths)
+    if copy.status.is_lost and verdict.hint and (told_at_once or not is_next):
         return verdict  # the repair brings up what its own advice is about
     told = [one for one in repairs if _is_told(one, verdict.hint)]
     clauses = verdict.hint.split("; ") if told else []

@@ -36,6 +36,8 @@ _VAGUE = (
     "Did you mean to use 'from",
 )
 """Messages that say less than the line itself."""
+_EMPTY_BLOCK = re.compile(r"expected an indented block after .* on line (\d+)")
+_NEXT_BLOCK = re.compile(r"\s*(?:@|(?:def|async def|class|if __name__)\b)")
 _NEVER_CLOSED = "a bracket that is opened in line {} is never closed"
 _COPIED = "copied from a PDF or a web page"
 
@@ -257,6 +259,8 @@ def cause_of(
         return _character(message, text)
     if "unindent does not match" in message and mixed:
         return "tabs and spaces are mixed in the indentation of this file: use four spaces everywhere"
+    if (empty := _EMPTY_BLOCK.match(message)) and _NEXT_BLOCK.match(text) and "class" not in message:
+        return f"nothing but comments stands in the block of line {empty[1]}: write below it what it is to do"
     if vague and (told := cause_of_line(text)):
         return told
     if opened is not None and vague:

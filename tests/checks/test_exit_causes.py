@@ -254,6 +254,52 @@ def test_a_class_that_the_build_makes_is_imported_from_its_module(tmp_path, sour
 
 
 @pytest.mark.parametrize(
+    ("files", "made", "cause", "hint"),
+    [
+        (["src/talker.py", "src/texts.py"], True, "does not look beside it",
+         "write `import os, sys; sys.path.insert(0, os.path.dirname(__file__))` above the import"),
+        (["src/talker.py", "scripts/texts.py"], False, "scripts/texts.py is in another folder",
+         "os.path.join(os.path.dirname(__file__), '../scripts')"),
+        (["src/talker.py", "src/texts.py"], False, "", "check the spelling of the import"),
+        (["src/talker.py", "build/texts.py"], True, "", "a module of the student's own has to be pushed"),
+    ],
+)  # fmt: skip
+def test_a_module_of_the_students_own_is_told_from_one_that_is_not_there(tmp_path, files, made, cause, hint):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    for file in files:
+        (tmp_path / file).parent.mkdir(exist_ok=True)
+        (tmp_path / file).write_text(SCRIPT)
+    package = facts_of(tmp_path)
+    frames = [("/home/student/catkin_ws/devel/lib/lab/talker.py", 15, "exec(…)")] if made else []
+    error = "ModuleNotFoundError: No module named 'texts'"
+    end = explain_traceback(
+        said(package, *frames, ("src/talker.py", 4, "import texts"), error=error), package
+    )
+    assert cause in end.cause
+    assert hint in end.hint
+
+
+@pytest.mark.parametrize(
+    ("setup", "calls", "hint"),
+    [
+        (False, "", "write setup.py as http"),
+        (True, "", "call catkin_python_setup() above catkin_package(…)"),
+        (True, "catkin_python_setup()\n", "check the spelling of the import"),
+    ],
+)
+def test_a_python_package_that_the_build_does_not_make_known_is_told(tmp_path, setup, calls, hint):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "CMakeLists.txt").write_text(f"project(lab)\n{calls}catkin_package()\n")
+    for file in ("src/lab/__init__.py", "scripts/talker.py", *(["setup.py"] if setup else [])):
+        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / file).write_text(SCRIPT)
+    package = facts_of(tmp_path)
+    error = "ModuleNotFoundError: No module named 'lab'"
+    line = ("scripts/talker.py", 4, "from lab.texts import hello")
+    assert hint in explain_traceback(said(package, line, error=error), package).hint
+
+
+@pytest.mark.parametrize(
     ("files", "frames", "error", "of_machine"),
     [
         ((), (IMPORTS, INSIDE), "ImportError: cannot import name 'spin' from 'rospy.client'", True),

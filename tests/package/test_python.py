@@ -89,6 +89,27 @@ def assert_cases(report):
         assert line in {None, fault.line}, (name, fault)
 
 
+@pytest.mark.parametrize(
+    ("text", "cause"),
+    [
+        (
+            "def f():\n    # to do\n\nif __name__ == '__main__':\n    f()\n",
+            "in the block of line 1: write below it",
+        ),
+        (
+            "class A:\n    def f(self):\n    def g(self):\n        pass\n",
+            "in the block of line 2: write below it",
+        ),
+        ("class A:\ndef f(self):\n    pass\n", "must be indented"),
+        ("def f():\nx = 1\n", "must be indented"),
+    ],
+)
+def test_a_block_without_a_line_is_told_from_one_that_is_not_indented(tmp_path, text, cause):
+    (tmp_path / "x.py").write_text(text)
+    fault = check_syntax(tmp_path, ["x.py"]).faults["x.py"]
+    assert cause in fault.cause
+
+
 def test_faults_have_line_and_plain_cause(tmp_path):
     paths = write(tmp_path, {name: text for name, (text, _, _) in CASES.items()}) + write(tmp_path, GOOD)
     report = check_syntax(tmp_path, paths)

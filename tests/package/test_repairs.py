@@ -334,6 +334,10 @@ CASES = {
         ["file-name", "package-name"], 'write pkg="lab" for pkg="laab"', asking(launch_files=("lab.launch",)),
         {LAUNCHED: TWO_NODES},
     ),
+    "two-nodes-of-nearly-one-name": Case(
+        {LAUNCHED: TWO_NODES.replace('"talker"', '"talker1"').replace('"listener"', '"talker2"')},
+        ["node-name"], 'name="talker1" should be name="talker"', after={LAUNCHED: 'name="talker2"'},
+    ),
     "half-a-comment": Case(
         {CMAKELISTS: CMAKE.replace("catkin_package()", "# catkin_package(\n)")}, ["build-line"],
         "remove the `#` of line 4", after={CMAKELISTS: "\ncatkin_package(\n)"},

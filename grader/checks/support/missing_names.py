@@ -4,17 +4,20 @@ what is meant by them."""
 from __future__ import annotations
 
 import ast
+import posixpath
 import re
 from collections.abc import Collection
 from contextlib import suppress
+from pathlib import PurePosixPath
 
 from grader.checks.support.console_output import Traceback
-from grader.checks.support.scripts import cmake_calls
+from grader.checks.support.scripts import cmake_calls, is_product, path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.installable import PYTHON_2, ROS_2, TUTORIALS, known_packages, nearest_module, noetic_messages
 from grader.model.package import PackageFacts
 from grader.wording import join_words
 
+SETUP_PAGE = "http://docs.ros.org/en/noetic/api/catkin/html/howto/format2/installing_python.html"
 IMPORT_ERRORS = ("ImportError", "ModuleNotFoundError")
 ATTRIBUTES_SHOWN = 8
 _NO_ATTRIBUTE = re.compile(r"(?:module|type object)? ?'([\w.]+)'(?: object)? has no attribute '(\w+)'")
@@ -73,7 +76,9 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
     if wrong := _KEYWORD.search(found.message):
         near = near_names(wrong[1], KEYWORDS)
         return (f"it is called {near[0]}", f"write {near[0]}= for {wrong[1]}=") if near else None
-    return _other_module(found, package) if found.kind in IMPORT_ERRORS else None
+    return (
+        _own_module(found, package) or _other_module(found, package) if found.kind in IMPORT_ERRORS else None
+    )
 
 
 def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
@@ -180,6 +185,35 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
         return f"messages come from {near[0]}.msg", f"write `from {near[0]}.msg import …`"
     meant = meant or (nearest_module(asked[1], own_modules(package)) if asked else "")
     return (f"did you mean {meant}?", f"write {meant} for {asked[1]}") if asked and meant else None
+
+
+def _own_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """Return why Python does not find a file of the package's own, and what lets it."""
+    asked = NO_MODULE.search(found.message)
+    name = asked[1] if asked else ""
+    script = path_in_package(package, found.own_frames[-1].file) if found.own_frames else None
+    paths = [PurePosixPath(file.path) for file in package.files if not is_product(file.path)]
+    folder = PurePosixPath(script or "").parent
+    file = next((path for path in paths if path.name == f"{name}.py"), None)
+    if name == package.name and PurePosixPath(f"src/{name}/__init__.py") in paths:
+        call = "catkin_python_setup()"
+        if PurePosixPath("setup.py") not in paths:
+            fix = f"write setup.py as {SETUP_PAGE} says, and call {call} above catkin_package(…)"
+            return f"src/{name}/ is there, and no setup.py makes it known", fix
+        makes = bool(cmake_calls(package, "catkin_python_setup"))
+        cause = f"src/{name}/ is there, and CMakeLists.txt does not call {call}"
+        return None if makes else (cause, f"call {call} above catkin_package(…)")
+    if script is None or file is None:
+        return None
+    path = "os.path.dirname(__file__)"
+    if file.parent != folder:
+        cause = f"{file} is in another folder, and Python looks beside {script}"
+        path = f"os.path.join({path}, '{posixpath.relpath(str(file.parent), str(folder))}')"
+    elif any("/devel/lib/" in frame.file for frame in found.frames):
+        cause = f"{file} is there, and the program that catkin_install_python makes of {script} does not look beside it"
+    else:
+        return None
+    return cause, f"write `import os, sys; sys.path.insert(0, {path})` above the import"
 
 
 def own_modules(package: PackageFacts) -> set[str]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import Any, Literal
 
-from grader.model.package import LaunchFile, LaunchNode, PackageFacts
+from grader.model.package import LaunchFile, PackageFacts
 from grader.model.record import Record
 from grader.model.repair import RepairKind
 from grader.package.launch import parse_launch
@@ -415,8 +415,7 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
             )
             for right in near[:1]:
                 _set_attribute(files, launch.path, node.line, ("type", kind, right), kind="launch-type")
-    for launch, node in nodes:
-        _repair_node(files, launch, node, wanted)
+    _repair_nodes(files, package, wanted)
     for launch in package.launch_files:
         _repair_params(files, launch, wanted)
 
@@ -452,12 +451,17 @@ def _programs(package: PackageFacts) -> set[str]:
     return {one.name for one in package.cmake.executables} if package.cmake is not None else set()
 
 
-def _repair_node(files: Files, launch: LaunchFile, node: LaunchNode, wanted: Wanted) -> None:
-    name = node.name or ""
-    others = {one.name for one in launch.nodes}
-    right = next((w for w in wanted.nodes if w.strip("/") not in others and is_near(name, w.strip("/"))), "")
-    if right and name not in {w.strip("/") for w in wanted.nodes}:
-        _set_attribute(files, launch.path, node.line, ("name", name, right.strip("/")), kind="node-name")
+def _repair_nodes(files: Files, package: PackageFacts, wanted: Wanted) -> None:
+    """Give each of the lab's names to one node of a launch file: roslaunch refuses two of the same name."""
+    names = [name.strip("/") for name in wanted.nodes]
+    for launch in package.launch_files:
+        taken = {node.name for node in launch.nodes}
+        for node in launch.nodes:
+            name = node.name or ""
+            right = next((one for one in names if one not in taken and is_near(name, one)), "")
+            if right and name not in names:
+                _set_attribute(files, launch.path, node.line, ("name", name, right), kind="node-name")
+                taken.add(right)
 
 
 def _set_attribute(
