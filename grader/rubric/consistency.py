@@ -14,8 +14,9 @@ from typing import Any
 from grader.checks.registry import Check
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.rubric.fault_words import model_faults
+from grader.rubric.message_fields import types_of
 from grader.rubric.model import ManualParams
-from grader.rubric.references import reference_faults, types_of
+from grader.rubric.references import reference_faults
 from grader.rubric.scenario import ROSTEST_ENDING
 from grader.rubric.step_faults import given_steps, of_type, served_faults, slash, step_faults
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import lru_cache
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -17,16 +16,13 @@ from pydantic import ValidationError
 from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
 from grader.ros_packages import TypeKind, ros_packages
+from grader.rubric.message_fields import field_faults, services_in
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Scenario, Step, Until
+from grader.rubric.standins import asked_faults, only_publisher, parameter_faults
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import closest, did_you_mean, join_words
 
-PUBLISHED_BY = {
-    "turtlesim/turtlesim_node": re.compile(r"/turtle\d+/(pose|color_sensor)"),
-    "robot_world/robot_world": re.compile(r"/(scan|base_scan|odom|base_pose_ground_truth|collision)"),
-}
-"""Topics on which a program of the grader's publishes, and no one else would."""
 LAUNCH_ENDINGS = (".launch", ".xml")
 OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended", "quiet_s")
 """Conditions of `until` that say nothing of how long a run lasts."""
@@ -42,13 +38,19 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     for name, scenario in scenarios.items():
         yield from _outside_faults(("scenarios", name), scenario, rubric)
-    for index, criterion in as_maps(rubric.get("criteria")):
+        yield from ((("scenarios", name, *at), fault) for at, fault in parameter_faults(scenario))
+    criteria = list(as_maps(rubric.get("criteria")))
+    for index, criterion in criteria:
         check = checks.get(str(criterion.get("check")))
         if check is not None:
             judged = scenarios.get(str(criterion.get("scenario")))
             yield from _criterion_faults(("criteria", index), criterion, check, judged, rubric)
-            yield from _unknown_fields(("criteria", index, "with"), as_map(criterion.get("with")), rubric)
-            yield from _unknown_expected(("criteria", index), criterion, judged or {})
+            others = {t for n, one in criteria if n != index for t in _topics_in(one.get("with"))}
+            asked = asked_faults(
+                as_map(criterion.get("with")), judged or {}, others | set(_topics_in(judged))
+            )
+            yield from ((("criteria", index, "with", *at), fault) for at, fault in asked)
+    yield from field_faults(rubric)
     yield from _unused_faults(rubric, scenarios, checks)
     yield from _unknown_topics(rubric, scenarios, checks)
     yield from _too_many(rubric, scenarios, checks)
@@ -76,17 +78,8 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
                 yield (*path, "start", index, key), fault
         yield from _of_machine((*path, "start", index, "program"), "program", start.get("program"), rubric)
         yield from _arguments((*path, "start", index, "args"), start)
-    for at, one in _services_in(scenario):
+    for at, _, one in services_in(scenario):
         yield from _of_machine((*path, *at, "type"), "service", one.get("type"), rubric)
-
-
-def _services_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
-    """Yield the services that a scenario calls or offers, and where it says so."""
-    for key in ("calls", "serves"):
-        yield from (((key, n), one) for n, one in as_maps(scenario.get(key)) if one.get("action") is None)
-    for index, step in as_maps(scenario.get("steps")):
-        if "call" in step:
-            yield ("steps", index, "call"), as_map(step["call"])
 
 
 def _arguments(path: KeyPath, start: dict[str, Any]) -> Iterator[Fault]:
@@ -162,15 +155,15 @@ def _misfits(
         of_process = [start for start in starts if start.get("name") == process or not process]
         yield from _named_otherwise(value, of_process if len(of_process) == 1 else [])
     elif one.to == "published":
-        yield from _wrong_sender(value, as_map(criterion.get("with")).get("of", "student"), check, starts)
+        yield from _wrong_sender(value, as_map(criterion.get("with")).get("of", "student"), check, scenario)
 
 
-def _wrong_sender(topic: str, of: object, check: Check, starts: list[dict[str, Any]]) -> Iterator[str]:
+def _wrong_sender(topic: str, of: object, check: Check, scenario: dict[str, Any]) -> Iterator[str]:
     """Yield why nobody whose messages are judged sends any."""
-    program = _only_publisher(topic, starts)
+    program = only_publisher(topic, scenario)
     if of == "student" and program:
         yield f"{program} publishes on {topic}, and {check.name} judges the student's messages: give it of: program"
-    if of == "program" and not any(start.get("program") for start in starts):
+    if of == "program" and not any(start.get("program") for start in _starts(scenario)):
         yield f"the scenario starts no program, and {check.name} judges the messages of one (of: program)"
 
 
@@ -200,12 +193,6 @@ def _is_set(name: str, scenario: dict[str, Any]) -> bool:
     params = [param for _, param in as_maps(scenario.get("params"))]
     names = {"/" + str(param.get("name")).strip("/") for param in params}
     return name in names or any(param.get("file") is not None for param in params) or "steps" in scenario
-
-
-def _only_publisher(topic: str, starts: list[dict[str, Any]]) -> str:
-    """Return the program of the grader's that publishes there. Arguments may give its topics other names."""
-    programs = {str(start.get("program")) for start in starts if not start.get("args")}
-    return next((p for p, topics in PUBLISHED_BY.items() if p in programs and topics.fullmatch(topic)), "")
 
 
 def _too_short(one: Reference, check: Check, scenario: dict[str, Any]) -> Iterator[str]:
@@ -343,81 +330,6 @@ def _unknown_causes(
                 yield ("criteria", index, "with", *one.path, "topic"), fault
 
 
-def _unknown_fields(path: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
-    """Yield fields that the topic's type does not have, where the rubric says the type and it is one of ROS's."""
-    topic, field = given.get("topic"), given.get("field")
-    if isinstance(topic, str) and isinstance(field, str):
-        types = {kind for kind in types_of(topic, rubric) if isinstance(kind, str)}
-        value = given.get("value")
-        is_one = value is not None and not isinstance(value, list | dict)
-        faults = [_no_such_field(kind, field, is_one) for kind in sorted(types)]
-        if faults and all(faults):
-            yield (*path, "field"), faults[0]
-    for key, inner in given.items():
-        if isinstance(inner, dict):
-            yield from _unknown_fields((*path, key), inner, rubric)
-
-
-def types_of(topic: str, rubric: dict[str, Any]) -> Iterator[object]:
-    """Yield the types that the rubric gives a topic: those that it sends there, or asks for."""
-    yield from ("tf2_msgs/TFMessage",) if topic in {"/tf", "/tf_static"} else ()
-    for _, criterion in as_maps(rubric.get("criteria")):
-        given = as_map(criterion.get("with"))
-        if criterion.get("check") == "topic-type" and given.get("topic") == topic:
-            yield given.get("type")
-    for scenario in as_map(rubric.get("scenarios")).values():
-        sent = [probe for _, probe in as_maps(as_map(scenario).get("probes"))]
-        sent += [as_map(step.get("publish")) for _, step in as_maps(as_map(scenario).get("steps"))]
-        yield from (one.get("type") for one in sent if one.get("topic") == topic)
-
-
-def _unknown_expected(path: KeyPath, criterion: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
-    """Yield fields of requests and answers that the service's type does not have, where its text is known here."""
-    given, kind = as_map(criterion.get("with")), criterion.get("check")
-    part = {"calls": "request", "service-answers": "response"}.get(str(kind))
-    steps = [as_map(step.get("call")) for _, step in as_maps(scenario.get("steps"))]
-    asked = [one for key in ("serves", "calls") for _, one in as_maps(scenario.get(key))] + steps
-    about = next((one for one in asked if one.get("service") == given.get("service")), None)
-    expected = given.get("expect")
-    if part is None or about is None or not about.get("service"):
-        return
-    text = about.get("definition") or ros_packages().text(str(about.get("type")), "srv")
-    each = [((), expected)] if isinstance(expected, dict) else [((n,), one) for n, one in as_maps(expected)]
-    for at, one in each if isinstance(text, str) else ():
-        fault = _no_such_values(str(about.get("type")), str(text), part, one)
-        if fault:
-            yield (*path, "with", "expect", *at), fault
-
-
-def _no_such_values(type_: str, text: str, part: str, expected: dict[str, Any]) -> str:
-    from grader.evidence.message_values import ServiceTypes  # noqa: PLC0415 - slow to load, and few rubrics need it
-
-    try:
-        kind = getattr(ServiceTypes(type_, text), part)
-        there = kind.decode(kind.encode({}))
-    except ValueError:
-        return ""
-    return _other_shape(there, expected, f"the {part} of {type_}")
-
-
-def _other_shape(there: object, expected: object, what: str) -> str:
-    """Return which name is not in a message, or which text is no number; empty where the value may be there."""
-    if isinstance(there, dict) and isinstance(expected, dict):
-        unknown = next((name for name in expected if name not in there), None)
-        if unknown is not None:
-            return f"{what} has no field {unknown}{_instead(str(unknown), list(there))}"
-        found = (_other_shape(there[name], value, f"{name} of {what}") for name, value in expected.items())
-        return next(filter(None, found), "")
-    kinds = {str: "a text", int: "a number", float: "a number", bool: "true or false"}
-    if (
-        type(there) in kinds
-        and type(expected) in kinds
-        and isinstance(there, str) != isinstance(expected, str)
-    ):
-        return f"{what} is {kinds[type(there)]}, not {expected!r}"
-    return ""
-
-
 def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield types of the student's package that are all but one whose file a criterion asks for."""
     criteria = list(as_maps(rubric.get("criteria")))
@@ -467,28 +379,11 @@ def _other_goals_and_types(rubric: dict[str, Any], scenarios: dict[str, dict[str
         if singly and isinstance(number, int) and number > len(sent) and not scenario.get("probes"):
             yield (*path, "number"), f"{name} sends {len(sent)} messages on {asked_on}"
         service, kind = given.get("service", ""), given.get("type")
-        called = {str(one.get("type")) for _, one in _services_in(scenario) if one.get("service") == service}
+        called = {
+            str(one.get("type")) for _, _, one in services_in(scenario) if one.get("service") == service
+        }
         if isinstance(kind, str) and called and not closest(kind, called, cutoff=SURE):
             yield (*path, "type"), f"{name} has {service} as {join_words(sorted(called))}, not as {kind}"
-
-
-@lru_cache(maxsize=256)
-def _no_such_field(type_: str, field: str, is_one: bool = False) -> str:
-    """Return why a type has no such field, or a list for one value; empty where it has, or where its definition is not
-    known here."""
-    from grader.checks.support.fields import NoField, values_at  # noqa: PLC0415 - as below
-    from grader.evidence.message_values import MessageType  # noqa: PLC0415 - slow to load, and few rubrics need it
-
-    try:
-        kind = MessageType(type_)
-        found = values_at(kind.decode(kind.encode({})), field.partition("[")[0])
-        if is_one and "[" not in field and any(isinstance(one, list) for one in found):
-            return f"{type_}: {field} is a list: give all its values, or name {field}[0] or {field}[*]"
-    except NoField as error:
-        return f"{type_}: {error}"
-    except ValueError:
-        return ""
-    return ""
 
 
 def _misspelt_nodes(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
