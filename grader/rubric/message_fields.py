@@ -14,11 +14,19 @@ from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
 from grader.evidence.definitions import Field, Types, parse
-from grader.model.message_definitions import DIVIDER, PARTS, parse_definition
+from grader.installable import noetic_messages
+from grader.model.message_definitions import (
+    BUILT_IN,
+    DIVIDER,
+    FULL_NAMES,
+    PARTS,
+    parse_definition,
+    parse_interface,
+)
 from grader.model.package import InterfaceField
 from grader.ros_packages import ros_packages
 from grader.rubric.standins import topics_of_programs
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, packages_in
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import closest, did_you_mean, is_one_edit, join_words
 
 ALMOST = 0.87
@@ -26,12 +34,15 @@ ALMOST = 0.87
 SUFFIXES = {part: suffix for suffix, parts in PARTS.items() for part in parts}
 """The ending of the file in which a part is defined."""
 KINDS = {"string": "a text", "bool": "true or false"}
+USUAL_PACKAGES = ("std_msgs", "geometry_msgs", "sensor_msgs", "nav_msgs")
 USUAL_TYPES = {
     "cmd_vel": "geometry_msgs/Twist",
     "odom": "nav_msgs/Odometry",
     "scan": "sensor_msgs/LaserScan",
 }
 """Of topics whose type a rubric does not say, most often: a name that is all but one of a field's is a slip."""
+COUNTED = frozenset({"minimum", "maximum", "start"})
+"""Of counters, the values that their field has."""
 STAMPED = "is_stamp"
 """Beside what a criterion says: its field has to be a stamp."""
 _STEPS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
@@ -170,7 +181,7 @@ class Definitions:
 
     def __init__(self, rubric: dict[str, Any]) -> None:
         self._own: dict[tuple[str, str], OwnText] = {}
-        for type_, suffix, own in _own_texts(rubric):
+        for _, type_, suffix, own in own_texts(rubric):
             known = self._own.get((type_, suffix))
             if known is None or (own.whole and not known.whole):
                 self._own[type_, suffix] = own
@@ -185,6 +196,11 @@ class Definitions:
     def text(self, type_: str, suffix: str) -> OwnText | None:
         """Return what the rubric says of the students' own type."""
         return self._own.get((type_, suffix))
+
+    def messages_of(self, package: str) -> set[str]:
+        """Return the names of a package's messages whose definitions the rubric has."""
+        types = (type_.partition("/") for type_, suffix in self._own if suffix == ".msg")
+        return {name for owner, _, name in types if owner == package}
 
     def _shape(self, type_: str, part: str) -> Shape | None:
         from grader.evidence.decode import full_definition  # noqa: PLC0415 - slow to load, and few rubrics need it
@@ -216,23 +232,26 @@ class Definitions:
         return own.text if own else None
 
 
-def _own_texts(rubric: dict[str, Any]) -> Iterator[tuple[str, str, OwnText]]:
-    """Yield each definition of a type that the rubric has, with the ending of its file."""
-    for _, criterion in as_maps(rubric.get("criteria")):
+def own_texts(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str, str, OwnText]]:
+    """Yield each definition of a type that the rubric has: where, its type, the ending of its file."""
+    for index, criterion in as_maps(rubric.get("criteria")):
         given = as_map(criterion.get("with"))
         if criterion.get("check") == "topic-type" and isinstance(given.get("definition"), str):
-            yield str(given.get("type")), ".msg", OwnText(given["definition"], whole=True)
+            path: KeyPath = ("criteria", index, "with", "definition")
+            yield path, str(given.get("type")), ".msg", OwnText(given["definition"], whole=True)
         if criterion.get("check") == "definition":
             file = PurePosixPath(str(given.get("file")))
             package = criterion.get("package") or next(iter(packages_in(rubric)), "")
             text = given.get("text")
             own = OwnText(text, whole=True) if isinstance(text, str) and text else _of_fields(file, given)
             if file.suffix in PARTS:
-                yield f"{package}/{file.stem}", file.suffix, own
-    for scenario in as_map(rubric.get("scenarios")).values():
-        for _, _, one in services_in(as_map(scenario)):
+                path = ("criteria", index, "with", "text" if own.whole else "fields")
+                yield path, f"{package}/{file.stem}", file.suffix, own
+    for name, scenario in as_map(rubric.get("scenarios")).items():
+        for at, _, one in services_in(as_map(scenario)):
             if isinstance(one.get("definition"), str):
-                yield str(one.get("type")), ".srv", OwnText(one["definition"], whole=True)
+                path = ("scenarios", name, *at, "definition")
+                yield path, str(one.get("type")), ".srv", OwnText(one["definition"], whole=True)
 
 
 def _of_fields(file: PurePosixPath, given: dict[str, Any]) -> OwnText:
@@ -257,6 +276,7 @@ def services_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str, dict[s
 def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield fields that are not there, and values that they can never have."""
     known = Definitions(rubric)
+    yield from _no_types(rubric, known)
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     for index, criterion in as_maps(rubric.get("criteria")):
         scenario = scenarios.get(str(criterion.get("scenario")), {})
@@ -264,11 +284,41 @@ def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
         if criterion.get("check") == "stamps":
             given = {"field": "header", STAMPED: True, **given}
         yield from _judged_fields(path, given, known, rubric, scenario)
+        if criterion.get("check") == "topic-type":
+            yield from _other_type(path, given, rubric)
         yield from _expected(path, criterion, known, scenario)
         yield from _other_definitions(path, criterion, known, rubric)
     for name, scenario in scenarios.items():
         for at, fault in _sent_fields(scenario, known):
             yield ("scenarios", name, *at), fault
+
+
+def _no_types(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
+    """Yield types of fields in the rubric's definitions that there are not, or not without their package."""
+    own_packages = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+    for path, type_, suffix, own in own_texts(rubric):
+        package = type_.partition("/")[0]
+        messages = known.messages_of(package)
+        for one in parse_interface(own.text.encode(), f"definition{suffix}").fields:
+            kind = one.type.partition("[")[0]
+            at = path if own.whole else (*path, _name(one))
+            if "/" in kind:
+                fault = ros_packages().type_fault(kind, "msg", own_packages) if own.whole else ""
+            elif kind.islower() or kind in {*BUILT_IN, *FULL_NAMES, *messages}:
+                fault = ""  # one that is none is said where it stands
+            else:
+                fault = _no_type(kind, package, messages)
+            if fault:
+                yield at, fault
+
+
+def _no_type(kind: str, package: str, messages: set[str]) -> str:
+    """Return why a type without a package is none of the package's own; empty where it may be."""
+    if near := slip_of(kind, [*FULL_NAMES, *messages, *sorted(BUILT_IN)]):
+        return f'there is no type "{kind}" (did you mean "{near}"?)'
+    owner = next((name for name in USUAL_PACKAGES if kind in noetic_messages().get(name, ())), "")
+    instead = f"write {owner}/{kind}, or {package}/{kind} for the package's own"
+    return f'"{kind}" without a package is one of {package}: {instead}' if owner else ""
 
 
 def _judged_fields(
@@ -288,9 +338,24 @@ def _judged_fields(
                 faults = [_no_such(shape._replace(partial=frozenset(shape.types)), field, {})]
             if isinstance(field, str) and faults and all(faults):
                 yield (*path, *at), faults[0]
+        for key in COUNTED & given.keys():
+            faults = [_no_such(shape, "data", {"value": given[key]}) if shape else "" for shape in shapes]
+            if faults and all(faults):
+                yield (*path, key), faults[0]
     for key, inner in given.items():
         if isinstance(inner, dict):
             yield from _judged_fields((*path, key), inner, known, rubric, scenario)
+
+
+def _other_type(path: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield a type that a topic has not elsewhere in the rubric: two types on one topic are never connected."""
+    topic, kind = given.get("topic"), str(given.get("type"))
+    own = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+    there = {str(one) for one in (kind, *types_of(str(topic), rubric))}
+    there = {one for one in there if not ros_packages().type_fault(one, "msg", own)}
+    others = sorted(there - {kind})
+    if isinstance(topic, str) and kind in there and others:
+        yield (*path, "type"), f"elsewhere in the rubric {topic} carries {join_words(others)}, not {kind}"
 
 
 def _no_such(shape: Shape, path: object, given: dict[str, Any]) -> str:
@@ -410,7 +475,7 @@ def _other_definitions(
     package = criterion.get("package") or next(iter(packages_in(rubric)), "")
     type_ = f"{package}/{file.stem}"
     own = known.text(type_, file.suffix)
-    if own is None or not own.whole:
+    if own is None or not own.whole or not all(known.shape(type_, part) for part in PARTS[file.suffix]):
         return
     try:
         found = {_name(one): one.type for one in parse_definition(own.text, file.suffix)}

@@ -9,19 +9,21 @@ import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import PurePosixPath
-from typing import Any
+from typing import Any, TypeGuard
 
 from pydantic import ValidationError
 
 from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
 from grader.ros_packages import TypeKind, ros_packages
+from grader.rubric.arguments import argument_faults
+from grader.rubric.frames import frame_faults
 from grader.rubric.message_fields import field_faults, services_in
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Scenario, Step, Until
 from grader.rubric.standins import asked_faults, only_publisher, parameter_faults
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
-from grader.wording import closest, did_you_mean, join_words
+from grader.wording import closest, did_you_mean, join_words, plural
 
 LAUNCH_ENDINGS = (".launch", ".xml")
 OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended", "quiet_s")
@@ -29,6 +31,12 @@ OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended"
 TYPES: Mapping[str, TypeKind] = {"message": "msg", "field": "msg", "service": "srv"}
 LIKELY, SURE = 0.6, 0.85
 """How alike two names have to be: to be suggested, and to be taken for one with a slip."""
+WRAPS = {"minimum": 0, "maximum": 127, "wraps": 2}
+"""Of `counter-wrap`, with their defaults."""
+MANY = 3
+"""A recording may hold so many times the messages that a scenario waits for, as it is closed a little later."""
+FEWEST = 2
+"""Of fewer messages than these, nobody sees a rate."""
 _DIGITS = re.compile(r"\d+")
 _TOPIC = re.compile(r"(?:^|:=)(/[\w/]*\w)")
 
@@ -38,7 +46,8 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     for name, scenario in scenarios.items():
         yield from _outside_faults(("scenarios", name), scenario, rubric)
-        yield from ((("scenarios", name, *at), fault) for at, fault in parameter_faults(scenario))
+        found = (*parameter_faults(scenario), *argument_faults(scenario, rubric))
+        yield from ((("scenarios", name, *at), fault) for at, fault in found)
     criteria = list(as_maps(rubric.get("criteria")))
     for index, criterion in criteria:
         check = checks.get(str(criterion.get("check")))
@@ -51,9 +60,11 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
             )
             yield from ((("criteria", index, "with", *at), fault) for at, fault in asked)
     yield from field_faults(rubric)
+    yield from frame_faults(rubric)
     yield from _unused_faults(rubric, scenarios, checks)
     yield from _unknown_topics(rubric, scenarios, checks)
     yield from _too_many(rubric, scenarios, checks)
+    yield from _too_few(rubric, scenarios)
     yield from _unknown_causes(rubric, scenarios, checks)
     yield from _misspelt_nodes(rubric, scenarios)
     yield from _own_types(rubric)
@@ -77,18 +88,8 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
                 fault = f"is a path in the student's package, from its folder: scripts/{name}, not {file}"
                 yield (*path, "start", index, key), fault
         yield from _of_machine((*path, "start", index, "program"), "program", start.get("program"), rubric)
-        yield from _arguments((*path, "start", index, "args"), start)
     for at, _, one in services_in(scenario):
         yield from _of_machine((*path, *at, "type"), "service", one.get("type"), rubric)
-
-
-def _arguments(path: KeyPath, start: dict[str, Any]) -> Iterator[Fault]:
-    """Yield arguments that ROS would take for others: `_rate=5` sets no parameter, `gui=false` no argument."""
-    launches = start.get("launch") is not None
-    for index, text in as_texts(start.get("args")):
-        name, mark, value = text.partition("=")
-        if mark and re.fullmatch(r"\w+", name) and (launches or name.startswith("_")):
-            yield (*path, index), f"ROS reads {name}:={value}, with a colon, and not {text}"
 
 
 def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -263,8 +264,8 @@ def _unknown_topics(
     criteria = [criterion for _, criterion in as_maps(rubric.get("criteria"))]
     named = {topic for criterion in criteria for topic in _topics_in(criterion.get("with"))}
     named |= {topic for criterion in criteria for topic in READ_TOO.get(str(criterion.get("check")), ())}
-    own = any(c.get("check") not in checks or checks[c["check"]].source or "evidence" in checks[c["check"]].facts
-              for c in criteria)  # fmt: skip
+    found = [checks.get(str(criterion.get("check"))) for criterion in criteria]
+    own = any(check is None or check.source or "evidence" in check.facts for check in found)
     for name, scenario in scenarios.items():
         until = as_map(scenario.get("until"))
         known = {*named, *SYSTEM_TOPICS}
@@ -308,6 +309,38 @@ def _too_many(
                 yield ("scenarios", name, "until", "messages", topic), fault
 
 
+def _too_few(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield wraps, recordings and rates that a scenario with so few messages cannot show."""
+    for index, criterion in as_maps(rubric.get("criteria")):
+        name, path = str(criterion.get("scenario")), ("criteria", index, "with")
+        given, until = as_map(criterion.get("with")), as_map(scenarios.get(name, {}).get("until"))
+        counts = {} if {"window_s", "alive_s", "quiet_s"} & until.keys() else as_map(until.get("messages"))
+        if criterion.get("check") == "counter-wrap":
+            least, most, wraps = (given.get(key, default) for key, default in WRAPS.items())
+            count = counts.get(str(given.get("topic")))
+            numbers = all(isinstance(n, int) for n in (least, most, wraps, count))
+            if numbers and count < (needed := wraps * (most - least + 1) + 1):
+                fault = f"{name} ends after {count} messages, and {plural(wraps, 'wrap')} take {needed}"
+                yield (*path, "wraps"), fault
+        for topic, left in as_map(given.get("topics")).items():
+            count, least = counts.get(topic), as_map(left).get("at_least")
+            if isinstance(count, int) and isinstance(least, int) and least > MANY * count:
+                yield (*path, "topics", topic, "at_least"), f"{name} ends after {count} messages on {topic}"
+        window_s, rate_hz = until.get("window_s"), given.get("rate_hz")
+        if criterion.get("check") == "rate" and _is_number(window_s) and _is_number(rate_hz):
+            yield from (((*path, "rate_hz"), fault) for fault in _seldom(rate_hz, window_s))
+
+
+def _seldom(rate_hz: float, window_s: float) -> Iterator[str]:
+    if 0 < window_s * rate_hz < FEWEST:
+        each = f"at {rate_hz:g} Hz a message comes each {1 / rate_hz:g} s, and window_s is {window_s:g} s"
+        yield f"{each}: it is messages a second"
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float)
+
+
 def _unknown_causes(
     rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
 ) -> Iterator[Fault]:
@@ -320,14 +353,15 @@ def _unknown_causes(
         sent = {*SYSTEM_TOPICS, *_topics_in(scenario)}
         open_ = any(start.get("script") is None for start in _starts(scenario)) or "recording" in scenario
         for one in check.references(as_map(criterion.get("with"))) if check else ():
-            topic = as_map(one.value).get("topic")
+            at = one.path if isinstance(one.value, str) else (*one.path, "topic")
+            topic = one.value if isinstance(one.value, str) else as_map(one.value).get("topic")
             if one.to != "cause" or not isinstance(topic, str) or topic in sent | others:
                 continue
             near = _near(topic, sent, cutoff=SURE if open_ else LIKELY)
             if near or not open_:
                 meant = f' (did you mean "{near}"?)' if near else ""
                 fault = f"nothing in {name} sends on {topic}, and no other criterion names it{meant}"
-                yield ("criteria", index, "with", *one.path, "topic"), fault
+                yield ("criteria", index, "with", *at), fault
 
 
 def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -371,6 +405,11 @@ def _other_goals_and_types(rubric: dict[str, Any], scenarios: dict[str, dict[str
         goals, goal = [a for a in steps if a.get("name") == given.get("action", "")], given.get("goal")
         if isinstance(goal, int) and 0 < len(goals) < goal:
             yield (*path, "goal"), f"{name} sends {len(goals)} goals to {given['action']}"
+        place = goal - 1 if isinstance(goal, int) else 0
+        asked = goals[place] if 0 <= place < len(goals) else None
+        if given.get("status") == "PREEMPTED" and asked is not None and not _is_given_up(asked, scenario):
+            fault = f"no step cancels goal {place + 1} of {given['action']}: give its step cancel_after_s"
+            yield (*path, "status"), fault
         number, asked_on = given.get("number"), given.get("asked_on")
         sent = [s for s in given_steps(scenario, "publish") if s.get("topic") == asked_on]
         singly = bool(sent) and not any(
@@ -384,6 +423,12 @@ def _other_goals_and_types(rubric: dict[str, Any], scenarios: dict[str, dict[str
         }
         if isinstance(kind, str) and called and not closest(kind, called, cutoff=SURE):
             yield (*path, "type"), f"{name} has {service} as {join_words(sorted(called))}, not as {kind}"
+
+
+def _is_given_up(goal: dict[str, Any], scenario: dict[str, Any]) -> bool:
+    """Return whether a goal is cancelled, or something else is done meanwhile upon which a server may give it up."""
+    steps = [as_map(one) for _, step in as_maps(scenario.get("steps")) for one in step.values()]
+    return goal.get("cancel_after_s") is not None or any(one.get("background") is True for one in steps)
 
 
 def _misspelt_nodes(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:

@@ -125,7 +125,7 @@ def _are_all(value: object, is_one: Callable[[object], bool], at_least: int = 0)
 
 
 FORMS: Mapping[str, tuple[str, Callable[[object], bool]]] = {
-    "robot": ("turtlebot3 or stage", lambda value: value in {"turtlebot3", "stage"}),
+    "robot": ("turtlebot3 or stage", lambda value: value in ["turtlebot3", "stage"]),
     "start": ("[x, y, heading], in metres and radians", lambda value: _are_numbers(value, 3)),
     "boxes": ("[[x0, y0, x1, y1], …]", lambda value: _are_all(value, lambda box: _are_numbers(box, 4))),
     "walls": (

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import ast
+import random
 import re
 import shutil
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
+from grader.errors import RubricError
 from grader.ros_packages import STANDINS
 from grader.rubric.find import rubrics_folder
 from grader.rubric.load import load_rubric
@@ -101,11 +107,131 @@ PROGRAMS = [
       '(did you mean "background_r"?)')),
 ]  # fmt: skip
 """Parameters and topics that the grader's programs do not have."""
+DEFINITIONS = [
+    ("own-message", "header: Header,", "header: Headr,",
+     '28: criteria[1].with.fields.header: there is no type "Headr" (did you mean "Header"?)'),
+    ("own-message", "temperature: float64", "temperature: Float64",
+     '28: criteria[1].with.fields.temperature: there is no type "Float64" (did you mean "float64"?)'),
+    ("own-message", "temperature: float64", "temperature: Pose",
+     ('28: criteria[1].with.fields.temperature: "Pose" without a package is one of thermometer: write '
+      "geometry_msgs/Pose, or thermometer/Pose for the package's own")),
+    ("own-message", "state: uint8}", "state: uint8, OK: uint8}",
+     "26: criteria[1].with: OK is a field and a constant"),
+    ("own-message", "type: thermometer/Reading}", "type: thermometer/Reading, definition: 'Headr header'}",
+     '33: criteria[3].with.definition: there is no type "Headr" (did you mean "Header"?)'),
+    ("own-message", "type: thermometer/Reading}", "type: thermometer/Reading, definition: geometry_msgs/Pos at}",
+     ('33: criteria[3].with.definition: geometry_msgs has no message type "Pos" '
+      '(did you mean "Pose"?)')),
+    ("two-packages", "topic: /reading, type: weather_msgs/Reading}, scenario",
+     "topic: /reading, type: std_msgs/Float64}, scenario",
+     ("40: criteria[4].with.type: elsewhere in the rubric /reading carries weather_msgs/Reading, "
+      "not std_msgs/Float64")),
+]  # fmt: skip
+"""Types that there are not."""
+FRAMES = [
+    ("tf-broadcaster", "with: {parent: base_link", "with: {parent: /base_link",
+     ("45: criteria[3].with.parent: must be a frame without blanks or a slash before it, as tf2 has them, like "
+      'base_link, not "/base_link"')),
+    ("tf-broadcaster", "transform: {parent: base_link", "transform: {parent: /base_link",
+     ("34: scenarios.distance.steps[0].transform.parent: tf2 has no frame that begins with a slash: "
+      "write base_link")),
+    ("tf-broadcaster", "frame_id: odom}", "frame_id: /odom}",
+     ("25: scenarios.frames.steps[0].publish.value.header.frame_id: tf2 has no frame that begins with a slash: "
+      "write odom")),
+    ("own-message", "frame_id: thermometer}", "frame_id: /thermometer}",
+     "37: criteria[5].with.frame_id: tf2 has no frame that begins with a slash: write thermometer"),
+    ("tf-broadcaster", "topic: /distance, field: data, value: 5, tolerance: 0.01",
+     'topic: /tf, field: "transforms[0].child_frame_id", value: /laser',
+     "51: criteria[6].with.value: tf2 has no frame that begins with a slash: write laser"),
+    ("tf-broadcaster", "with: {parent: odom, child: base_link", "with: {parent: base_link, child: odom",
+     ("43: criteria[2].with.parent: odom is the parent elsewhere in the rubric, and base_link the child: a frame has "
+      "one parent")),
+    ("tf-broadcaster", "rotation_deg: [0, 0, 90]", "rotation_deg: [0, 0, 1.5708]",
+     ("35: scenarios.distance.steps[1].transform.rotation_deg: 1.5708 is 90 degrees in radians: "
+      "write 90")),
+    ("tf-broadcaster", "from: 0, to: 90", "from: 0, to: -3.14",
+     ("27: scenarios.frames.steps[0].publish.value.pose.pose.orientation.rpy_deg: -3.14 is -180 degrees in radians: "
+      "write -180")),
+    ("tf-broadcaster", "pose_of: /odom, static: false", "pose_of: /odom, static: true",
+     "43: criteria[2].with: pose_of is not for a static transform: it is sent once, and stays"),
+    ("tf-broadcaster", "pose_of: /odom", "pose_of: /odm",
+     ("43: criteria[2].with.pose_of: nothing in frames sends on /odm, and no other criterion names it "
+      '(did you mean "/odom"?)')),
+]  # fmt: skip
+"""Frames that tf does not have, and angles in another unit."""
+SCENARIOS = [
+    ("action-server", "cancel_after_s: 1", "cancel_after_s: 15",
+     ("22: scenarios.goals.steps[1].action.cancel_after_s: 15 s is not before limit_s, 15 s, after which the run goes "
+      "on: nothing is cancelled")),
+    ("action-server", "cancel_after_s: 1, ", "",
+     "37: criteria[5].with.status: no step cancels goal 2 of /count: give its step cancel_after_s"),
+    ("record-and-replay", "at_least: 15", "at_least: 150",
+     "38: criteria[3].with.topics./steps.at_least: record ends after 30 messages on /steps"),
+    ("own-message", "rate_hz: 20", "rate_hz: 0.05",
+     ("35: criteria[4].with.rate_hz: at 0.05 Hz a message comes each 20 s, and window_s is 6 s: it is messages a "
+      "second")),
+    ("latched-map", "/mapper/width", "~width",
+     "19: scenarios.map.params[0].name: ~width is private to the grader: write /, the node's name, and /width"),
+    ("scan-to-cmd-vel", '"ranges[*]", max: 0.5', '"ranges[*]", min: 0.5, max: 0.1',
+     "40: criteria[3].with.cause: min, 0.5, is more than max, 0.1"),
+    ("scan-to-cmd-vel", "{number} m", "{nubmer} m",
+     "54: criteria[5].with.text: {nubmer} stands for nothing here: write {number}"),
+    ("scan-to-cmd-vel", "{number} m", "{value} m",
+     "54: criteria[5].with.text: {value} stands for nothing here: write {number}"),
+]  # fmt: skip
+"""Scenarios that cannot show what a criterion asks for, and texts without a place for it."""
+REMAPS = [
+    ("params-and-namespaces", "state:=light", "stat:=light",
+     '30: scenarios.garage.start[0].args[1]: nothing else in the rubric names stat (did you mean "state:=light"?)'),
+    ("params-and-namespaces", "state:=light", "state:=lihgt",
+     ("30: scenarios.garage.start[0].args[1]: nothing else in the rubric names /garage/lihgt "
+      '(did you mean "state:=/garage/light"?)')),
+    ("params-and-namespaces", "state:=light", "state:=/light",
+     ("30: scenarios.garage.start[0].args[1]: nothing else in the rubric names /light "
+      '(did you mean "state:=/garage/light"?)')),
+    ("params-and-namespaces", "_color:=", "color:=",
+     ("30: scenarios.garage.start[0].args[2]: color is a parameter, and this remaps a topic: write _color:=bbbbbbb "
+      "(made up: other)")),
+    ("params-and-namespaces", "__ns:=", "__nss:=",
+     '30: scenarios.garage.start[0].args[0]: ROS has no __nss (did you mean "__ns"?)'),
+    ("params-and-namespaces", "__ns:=", "_ns:=",
+     "30: scenarios.garage.start[0].args[0]: ROS reads __ns:=garage, with two underscores"),
+    ("service-client", '"20000000000"', '"operands:=terms"',
+     "27: scenarios.slow.start[0].args[0]: nothing else in the rubric names operands or terms"),
+    ("avoid-obstacles", "robot_world/robot_world}", 'robot_world/robot_world, args: ["laser:=/front"]}',
+     ("23: scenarios.room.start[0].args[0]: robot_world has no topic laser: it has base_pose_ground_truth, base_scan, "
+      "cmd_vel, collision, odom and scan")),
+]  # fmt: skip
+"""Arguments that remap nothing of which the rubric speaks."""
+NAMES = [
+    ("record-and-replay", "topics: {/steps", "topics: {/step", "38: criteria[3].with.topics./step", "/step", "/steps"),
+    ("turtle-square", "publisher: square", "publisher: sqare", "75: criteria[2].with.publisher", "sqare", "square"),
+    ("turtle-square", "with: {name: /square/side", "with: {name: /sqare/side", "111: criteria[6].with.name",
+     "/sqare/side", "/square/side"),
+    ("turtle-square", "topic: /square/status", "topic: /square/statu", "121: criteria[7].with.topic",
+     "/square/statu", "status"),
+    ("cpp-and-python", "script: average", "script: averge", "22: scenarios.tests.start[0].script", "averge", "average"),
+    ("service-client", "file: srv/Add.srv", "file: srv/Adds.srv", "38: criteria[1].with.file", "srv/Adds.srv", "Add"),
+]  # fmt: skip
+"""Names that one line alone has, and that are a letter off."""
 
 
-@pytest.mark.parametrize(("name", "old", "new", "fault"), [*FIELDS, *PROGRAMS])
+@pytest.mark.parametrize(
+    ("name", "old", "new", "fault"), [*FIELDS, *PROGRAMS, *DEFINITIONS, *FRAMES, *SCENARIOS, *REMAPS]
+)
 def test_a_slip_is_refused(examples: Path, name: str, old: str, new: str, fault: str) -> None:
     assert faults(_spoiled(examples, name, old, new)) == [f"spoiled.yaml:{fault}"]
+
+
+@pytest.mark.parametrize("slip", NAMES, ids=lambda slip: slip[4])
+def test_a_name_that_is_a_letter_off_is_refused(examples: Path, slip: tuple[str, ...]) -> None:
+    name, old, new, where, word, meant = slip
+    fault = f'nothing else in the rubric names {word} (did you mean "{meant}"?): if it is right, say it in the handout'
+    path = _spoiled(examples, name, old, new)
+    assert faults(path) == [f"spoiled.yaml:{where}: {fault} too"]
+    text = path.read_text(encoding="utf-8").replace("handout: >\n", f"handout: >\n  It is called `{word}`.\n")
+    path.write_text(text, encoding="utf-8")
+    assert load_rubric(str(path)).rubric.id == name, "the handout names it"
 
 
 @pytest.mark.parametrize(
@@ -116,6 +242,10 @@ def test_a_slip_is_refused(examples: Path, name: str, old: str, new: str, fault:
         ("scan-to-cmd-vel", "field: linear.x, value: 0.2", "field: twist.linear.x, value: 0.2"),
         ("tf-broadcaster", "transforms[*].header", "transforms[*].header.stamp"),
         ("action-server", "result: {total: 5}", "result: {total: 5, seconds: 1}"),
+        ("own-message", "temperature: float64", "temperature: thermometer/Pose"),
+        ("own-message", "temperature: float64", "temperature: Celsius"),
+        ("tf-broadcaster", "rotation_deg: [0, 0, 90]", "rotation_deg: [0, 0, 1.5]"),
+        ("params-and-namespaces", '"state:=light"', '"state:=light", "~color:=red"'),
         ("avoid-obstacles", "start, value: [0.6, 0.6, 0.0]", "map, value: package://rooms/room.yaml"),
         ("turtle-square", "/square/side, value: 1.0", "/turtlesim/holonomic, value: true"),
     ],
@@ -140,3 +270,54 @@ def test_the_parameters_of_the_robot_world_are_known() -> None:
     table = documented[documented.index("| parameter |") :]
     rows = "".join(line.split("|")[1] for line in table.splitlines() if line.startswith("| `"))
     assert program.params == set(re.findall(r"`(\w+)`", rows))
+
+
+def test_a_bag_with_a_topic_that_is_a_letter_off_is_refused(examples: Path) -> None:
+    text = (examples / "record-and-replay.yaml").read_text(encoding="utf-8")
+    path = examples / "spoiled.yaml"
+    path.write_text(text.replace("/steps", "/stepss"), encoding="utf-8")
+    (fault,) = faults(path)
+    assert fault.startswith(
+        "spoiled.yaml:24: scenarios.replay.steps[0].play.bag: walk.bag has /steps, and the rubric"
+    )
+
+
+ODD = [
+    None,
+    [],
+    {},
+    [[1]],
+    {"a": {}},
+    "",
+    "/",
+    0,
+    1e300,
+    True,
+    ":=",
+    "{number}",
+    "a/b",
+    [None],
+    {"field": [1]},
+]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_no_value_of_its_key_is_refused_and_ends_nothing(examples: Path, seed: int) -> None:
+    choice = random.Random(seed).choice  # noqa: S311 - no secret
+    files = sorted(path for path in examples.glob("*.yaml") if path.name != "spoiled.yaml")
+    for _ in range(20):
+        data = yaml.safe_load(choice(files).read_text(encoding="utf-8"))
+        part, key = choice(list(_places(data)))
+        part[key] = choice(ODD)
+        path = examples / "spoiled.yaml"
+        path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
+        with suppress(RubricError):
+            assert load_rubric(str(path)).rubric.criteria
+
+
+def _places(value: object) -> Iterator[tuple[Any, Any]]:
+    for key in (
+        range(len(value)) if isinstance(value, list) else list(value) if isinstance(value, dict) else ()
+    ):
+        yield value, key
+        yield from _places(value[key])
