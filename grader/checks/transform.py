@@ -47,7 +47,7 @@ class TransformParams(Record):
     """x, y and z, in metres."""
     rotation_deg: Vector | None = None
     """Roll, pitch and yaw, in degrees."""
-    pose_of: Annotated[GlobalName, Refers("cause")] | None = None
+    pose_of: Annotated[GlobalName, Refers("heard")] | None = None
     """A topic with poses that the transform follows: `geometry_msgs/Pose` (also in PoseStamped or Odometry), or a
     message with x, y and theta (`turtlesim/Pose`).
     """

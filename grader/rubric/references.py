@@ -355,7 +355,7 @@ def _unknown_causes(
         for one in check.references(as_map(criterion.get("with"))) if check else ():
             at = one.path if isinstance(one.value, str) else (*one.path, "topic")
             topic = one.value if isinstance(one.value, str) else as_map(one.value).get("topic")
-            if one.to != "cause" or not isinstance(topic, str) or topic in sent | others:
+            if one.to not in {"cause", "heard"} or not isinstance(topic, str) or topic in sent | others:
                 continue
             near = _near(topic, sent, cutoff=SURE if open_ else LIKELY)
             if near or not open_:
