@@ -328,20 +328,20 @@ def _judged_fields(
     topic = given.get("topic")
     if isinstance(topic, str):
         types = sorted({kind for kind in types_of(topic, rubric, scenario) if isinstance(kind, str)})
-        shapes = [known.shape(kind) for kind in types]
-        usual = USUAL_TYPES.get(topic.rpartition("/")[2])
         named: list[tuple[KeyPath, object]] = [(("field",), given["field"])] if "field" in given else []
         named += [(("fields", key), one) for key, one in as_map(given.get("fields")).items()]
         for at, field in named:
-            faults = [_no_such(shape, field, given) if shape else "" for shape in shapes]
+            faults = [_no_such(shape, field, given) if (shape := known.shape(kind)) else "" for kind in types]
+            usual = USUAL_TYPES.get(topic.rpartition("/")[2])
             if not faults and usual and (shape := known.shape(usual)):
                 faults = [_no_such(shape._replace(partial=frozenset(shape.types)), field, {})]
             if isinstance(field, str) and faults and all(faults):
                 yield (*path, *at), faults[0]
         for key in COUNTED & given.keys():
-            faults = [_no_such(shape, "data", {"value": given[key]}) if shape else "" for shape in shapes]
-            if faults and all(faults):
-                yield (*path, key), faults[0]
+            kinds = [kind.partition("/")[2].lower() for kind in types if kind.startswith("std_msgs/")]
+            wrong = [_no_value(kind, given[key]) if limits_of(kind) else "" for kind in kinds]
+            if wrong and all(wrong) and len(wrong) == len(types):
+                yield (*path, key), f"data of {types[0]} {wrong[0]}"
     for key, inner in given.items():
         if isinstance(inner, dict):
             yield from _judged_fields((*path, key), inner, known, rubric, scenario)

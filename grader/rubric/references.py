@@ -20,6 +20,7 @@ from grader.rubric.arguments import argument_faults
 from grader.rubric.frames import frame_faults
 from grader.rubric.message_fields import field_faults, services_in
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Scenario, Step, Until
+from grader.rubric.spelling import texts_in
 from grader.rubric.standins import asked_faults, only_publisher, parameter_faults
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
@@ -87,9 +88,22 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
                 name = PurePosixPath(file).name
                 fault = f"is a path in the student's package, from its folder: scripts/{name}, not {file}"
                 yield (*path, "start", index, key), fault
+            elif isinstance(file, str) and (whole := _with_ending(file, rubric)):
+                yield (
+                    (*path, "start", index, key),
+                    f"the rubric names {whole} elsewhere: write it with its ending",
+                )
         yield from _of_machine((*path, "start", index, "program"), "program", start.get("program"), rubric)
     for at, _, one in services_in(scenario):
         yield from _of_machine((*path, *at, "type"), "service", one.get("type"), rubric)
+
+
+def _with_ending(file: str, rubric: dict[str, Any]) -> str:
+    """Return the name of a Python or YAML file that the rubric names with its ending, where this one has none."""
+    path = PurePosixPath(file)
+    whole = re.compile(rf"(?<![\w.]){re.escape(path.name)}\.(?:py|ya?ml)(?!\w)")
+    texts = [text for _, text in texts_in((), rubric)] if path.name and not path.suffix else []
+    return next((match[0] for text in texts if (match := whole.search(text))), "")
 
 
 def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -> Iterator[Fault]:

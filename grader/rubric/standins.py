@@ -146,6 +146,16 @@ def asked_faults(
     for at, topic in _topics(given):
         if topic not in named and (near := _near_topic(topic, scenario)):
             yield at, f'no program of the scenario has {topic} (did you mean "{near}"?)'
+    nodes = {program.node: program for program in PROGRAMS.values()}
+    topic = str(given.get("topic"))
+    for key, is_publisher in (("publisher", True), ("subscriber", False)):
+        node = nodes.get(str(given.get(key)))
+        if node and topic in node.topics and bool(node.published.fullmatch(topic)) != is_publisher:
+            does = "hears what comes" if is_publisher else "publishes"
+            yield (
+                (key,),
+                f"{node.node} {does} on {topic}, and {'sends' if is_publisher else 'hears'} nothing there",
+            )
     for name in as_map(given.get("params")):
         for _, program in as_texts(given.get("programs")):
             known = PROGRAMS[program].params if program in PROGRAMS else ()
@@ -158,6 +168,7 @@ def asked_faults(
 def _topics(given: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     if isinstance(given.get("topic"), str):
         yield ("topic",), given["topic"]
+    yield from ((("topics", index), topic) for index, topic in as_texts(given.get("topics")))
     for key, inner in given.items():
         yield from (((key, *at), topic) for at, topic in _topics(as_map(inner)))
 
@@ -166,7 +177,8 @@ def _near_topic(topic: str, scenario: dict[str, Any]) -> str:
     """Return the topic of one of the scenario's programs for which this one stands; "" where it is none of theirs."""
     topics = topics_of_programs(scenario)
     if topic not in topics:
-        return closest(topic, topics, cutoff=SURE)
+        others = [one for one in topics if re.sub(r"\d+", "1", topic) != one]  # /turtle2/pose is another's
+        return closest(topic, others, cutoff=SURE)
     values = {str(one.get("name")).strip("/"): one.get("value") for _, one in set_in(scenario)}
     robot = str(values.get("robot_world/robot", "turtlebot3"))
     renamed = "robot_world/scan_topic" in values

@@ -6,6 +6,8 @@ import ast
 import random
 import re
 import shutil
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -99,6 +101,11 @@ PROGRAMS = [
       '(did you mean "/base_pose_ground_truth"?)')),
     ("turtle-square", "/square/side, value: 1.0", "/turtlesim/backgroud_r, value: 9",
      '28: scenarios.restart.params[0].name: turtlesim has no parameter backgroud_r (did you mean "background_r"?)'),
+    ("turtle-square", "publisher: square, subscriber: turtlesim", "publisher: turtlesim, subscriber: square",
+     "75: criteria[2].with.publisher: turtlesim hears what comes on /turtle1/cmd_vel, and sends nothing there"),
+    ("turtle-square", '[/turtle1/cmd_vel, "/square/*"]', '[/turtle/cmd_vel, "/square/*"]',
+     ("130: criteria[8].with.topics[0]: no program of the scenario has /turtle/cmd_vel "
+      '(did you mean "/turtle1/cmd_vel"?)')),
     ("turtle-square",
      "check: path\n    with: {topic: /turtle1/pose, points: [[0, 0], [2, 0], [2, 1]], tolerance_m: 0.3}",
      ("check: launch-runs\n    "
@@ -170,6 +177,8 @@ SCENARIOS = [
     ("own-message", "rate_hz: 20", "rate_hz: 0.05",
      ("35: criteria[4].with.rate_hz: at 0.05 Hz a message comes each 20 s, and window_s is 6 s: it is messages a "
       "second")),
+    ("latched-map", "start: [{name: mapper, script: scripts/mapper.py}]", "start: [{name: mapper, script: mapper}]",
+     "22: scenarios.map.start[0].script: the rubric names mapper.py elsewhere: write it with its ending"),
     ("latched-map", "/mapper/width", "~width",
      "19: scenarios.map.params[0].name: ~width is private to the grader: write /, the node's name, and /width"),
     ("scan-to-cmd-vel", '"ranges[*]", max: 0.5', '"ranges[*]", min: 0.5, max: 0.1',
@@ -180,6 +189,15 @@ SCENARIOS = [
      "54: criteria[5].with.text: {value} stands for nothing here: write {number}"),
 ]  # fmt: skip
 """Scenarios that cannot show what a criterion asks for, and texts without a place for it."""
+COUNTERS = [
+    ("maximum: 127, wraps: 2", "maximum: 300, wraps: 2",
+     "151: criteria[12].with.maximum: data of std_msgs/Int8 is int8, -128 to 127, and never 300"),
+    ("minimum: 0, maximum: 127", "minimum: 127, maximum: 0",
+     "151: criteria[12].with: minimum, 127, is not less than maximum, 0"),
+    ("wraps: 2", "wraps: 5", "151: criteria[12].with.wraps: wraps ends after 258 messages, and 5 wraps take 641"),
+    ("258", "100", "151: criteria[12].with.wraps: wraps ends after 100 messages, and 2 wraps take 257"),
+]  # fmt: skip
+"""Slips in the rubric of a lab with a counter."""
 REMAPS = [
     ("params-and-namespaces", "state:=light", "stat:=light",
      '30: scenarios.garage.start[0].args[1]: nothing else in the rubric names stat (did you mean "state:=light"?)'),
@@ -223,6 +241,23 @@ def test_a_slip_is_refused(examples: Path, name: str, old: str, new: str, fault:
     assert faults(_spoiled(examples, name, old, new)) == [f"spoiled.yaml:{fault}"]
 
 
+@pytest.mark.parametrize(("old", "new", "fault"), COUNTERS)
+def test_a_counter_that_no_message_shows_is_refused(old: str, new: str, fault: str, tmp_path: Path) -> None:
+    text = (rubrics_folder() / "leeds-comp3631-lab1.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "lab.yaml"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    assert faults(path)[0] == f"lab.yaml:{fault}"
+
+
+def test_a_rubric_that_names_no_fields_loads_no_definitions() -> None:
+    """They take a quarter of a second, of the second within which a student sees the first verdict."""
+    load = "import sys; from grader.rubric.load import load_rubric; load_rubric(sys.argv[1])"
+    command = f"{load}; print('numpy' in sys.modules)"
+    lab = str(rubrics_folder() / "leeds-comp3631-lab1.yaml")
+    done = subprocess.run([sys.executable, "-c", command, lab], capture_output=True, check=True, text=True)
+    assert done.stdout == "False\n"
+
+
 @pytest.mark.parametrize("slip", NAMES, ids=lambda slip: slip[4])
 def test_a_name_that_is_a_letter_off_is_refused(examples: Path, slip: tuple[str, ...]) -> None:
     name, old, new, where, word, meant = slip
@@ -246,6 +281,7 @@ def test_a_name_that_is_a_letter_off_is_refused(examples: Path, slip: tuple[str,
         ("own-message", "temperature: float64", "temperature: Celsius"),
         ("tf-broadcaster", "rotation_deg: [0, 0, 90]", "rotation_deg: [0, 0, 1.5]"),
         ("params-and-namespaces", '"state:=light"', '"state:=light", "~color:=red"'),
+        ("turtle-square", "topic: /turtle1/pose, points", "topic: /turtle2/pose, points"),
         ("avoid-obstacles", "start, value: [0.6, 0.6, 0.0]", "map, value: package://rooms/room.yaml"),
         ("turtle-square", "/square/side, value: 1.0", "/turtlesim/holonomic, value: true"),
     ],
