@@ -17,6 +17,7 @@ TIMES = 3
 NS = 1_000_000_000
 GRADER = (sys.executable, "-m", "grader")
 ASKED = 1.5
+LOCKED = "    lock = __import__('threading').Lock()\n    lock.acquire()\n    lock.acquire()\n"
 ENDLESS = "    while True:\n        pass\n"
 
 
@@ -67,6 +68,7 @@ FAULTS = (
         "    rospy.loginfo",
         f"{ENDLESS}    rospy.loginfo",
     ),
+    Fault("a lock that is taken twice", YORK, "sender", SENDER, "    rate =", f"{LOCKED}    rate ="),
     Fault("a node that dies", YORK, "sender", SENDER, "        rate.sleep()", "        raise KeyError"),
     Fault("a topic of the goal's", "go-to-goal", "goals", DRIVER, "'/goal'", "'/target'"),
     Fault("an action of another name", "action-server", "goals", COUNT, "'/count'", "'/counter'"),

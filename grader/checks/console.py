@@ -21,7 +21,17 @@ from grader.checks.support.exit_causes import (
     process_tracebacks,
 )
 from grader.checks.support.processes import Life, early_end, life, lives, nodes_of, not_started
-from grader.checks.support.text import INIT, NUMBER, OTHER_WORDS_SHARE, both, log, shown, words_pattern
+from grader.checks.support.text import (
+    INIT,
+    NUMBER,
+    OTHER_WORDS_SHARE,
+    PLACE,
+    both,
+    log,
+    refuse_others,
+    shown,
+    words_pattern,
+)
 from grader.checks.support.topics import cite
 from grader.evidence.events import ConsoleLine
 from grader.evidence.run import Run
@@ -30,7 +40,6 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
 
-PLACE = "{number}"
 LINES_MAX, LINE_CHARS_MAX = 20_000, 1_000
 """A text is looked for in so much of each stream."""
 ROUNDING = 1e-9
@@ -41,7 +50,7 @@ class PrintsParams(Record):
 
     process: ProcessName
     """The scenario's name for the process."""
-    text: Annotated[str, Field(min_length=1)]
+    text: Annotated[str, Field(min_length=1), refuse_others(PLACE)]
     """Part of a line; `{number}` in it stands for any number."""
     numbers: tuple[float, ...] = ()
     """The numbers that have to stand in place of `{number}`, in this order."""

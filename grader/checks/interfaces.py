@@ -44,6 +44,8 @@ class DefinitionParams(Record):
     def _is_whole(self) -> DefinitionParams:
         if bool(self.text) == bool(self.fields or self.constants):
             raise ValueError("give fields, constants or both, or text alone")
+        if both := sorted(self.fields.keys() & self.constants.keys()):
+            raise ValueError(f"{both[0]} is a field and a constant")
         self.wanted()
         return self
 

@@ -25,6 +25,7 @@ from grader.checks.support.text import (
     both,
     in_words,
     near_names,
+    refuse_others,
     shown,
     subscriber,
 )
@@ -46,7 +47,7 @@ class HearsParams(Record):
 
     topic: Annotated[GlobalName, Refers("sent")]
     """A topic on which a probe or a step of the scenario sends, with its slash."""
-    template: str = VALUE
+    template: Annotated[str, refuse_others(VALUE)] = VALUE
     """What a line has to say of a message, `{value}` being its text: `I heard {value}`. Capitals in the template's own
     words do not matter."""
 

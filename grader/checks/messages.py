@@ -32,6 +32,7 @@ from grader.checks.support.text import (
     in_one_line,
     in_words,
     message_pattern,
+    refuse_others,
     shown,
 )
 from grader.checks.support.topics import Sender, cite, losses, no_message, nothing_sent, sent_by
@@ -55,7 +56,7 @@ class MessageParams(Record):
 
     topic: PublishedTopic
     """The topic, with its slash: `/chatter`."""
-    template: Annotated[str, Field(min_length=1)]
+    template: Annotated[str, Field(min_length=1), refuse_others(SECONDS)]
     """The whole text, `{seconds}` in it being a time that grows: `hello world {seconds}`."""
 
 

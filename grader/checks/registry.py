@@ -40,8 +40,8 @@ class Refers:
     scenario sets. `action`: an action to which its steps send goals. `kept`: a file that it keeps. `served`: a service
     that the grader offers in it. `rostest`: a start of a `.test` file in it. `watched_s`: so long the scenario has to
     last. `dependency`: a ROS package, or another key of rosdep's. `package`: one that students hand in. `node`: a
-    node's name, in the namespace in which the scenario starts it. `cause`: a condition on a topic that something has to
-    send on.
+    node's name, in the namespace in which the scenario starts it. `heard`: a topic that something has to send on.
+    `cause`: a condition on one.
     """
 
     to: Literal[
@@ -63,6 +63,7 @@ class Refers:
         "package",
         "node",
         "cause",
+        "heard",
     ]
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
-from grader.checks.registry import check
+from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import excused, run_seconds, why_late
 from grader.checks.support.processes import GlobalName, observed_until_ns
 from grader.checks.support.text import RATE, near_names, shown
@@ -32,7 +32,8 @@ TRANSPORT_S = 0.02
 """With a fast clock, a step of it, and what the wall takes from node to recorder."""
 FEW = 3
 """So many transforms may be the same for the machine's sake; more were never changed."""
-Frame = Annotated[str, Field(pattern=r"^[^/\s]\S*$")]
+FRAME_PATTERN = r"^[^/\s]\S*$"
+Frame = Annotated[str, Field(pattern=FRAME_PATTERN)]
 
 
 class TransformParams(Record):
@@ -46,7 +47,7 @@ class TransformParams(Record):
     """x, y and z, in metres."""
     rotation_deg: Vector | None = None
     """Roll, pitch and yaw, in degrees."""
-    pose_of: GlobalName | None = None
+    pose_of: Annotated[GlobalName, Refers("heard")] | None = None
     """A topic with poses that the transform follows: `geometry_msgs/Pose` (also in PoseStamped or Odometry), or a
     message with x, y and theta (`turtlesim/Pose`).
     """
@@ -69,6 +70,9 @@ class TransformParams(Record):
             raise ValueError("give pose_of, or translation and rotation_deg")
         if self.parent == self.child:
             raise ValueError(f"parent and child are both {self.child}")
+        if self.static and (self.pose_of is not None or self.min_hz is not None):
+            key = "pose_of" if self.pose_of is not None else "min_hz"
+            raise ValueError(f"{key} is not for a static transform: it is sent once, and stays")
         return self
 
     @property

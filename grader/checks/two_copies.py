@@ -26,7 +26,7 @@ from grader.checks.support.processes import (
     named_at,
     nodes_of,
 )
-from grader.checks.support.text import GET_TIME, INIT, LOOP, SPIN, VALUE, in_words, init
+from grader.checks.support.text import GET_TIME, INIT, LOOP, SPIN, VALUE, in_words, init, refuse_others
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -50,7 +50,7 @@ class CopiesParams(Record):
     """The process that has to print the messages of both."""
     topic: GlobalName
     """The topic, with its slash: `/chatter`."""
-    template: str = VALUE
+    template: Annotated[str, refuse_others(VALUE)] = VALUE
     """What the listener has to say of each message, `{value}` being its text."""
     taken_over_score: Annotated[float, Field(ge=0, le=1)] = 0.3333
     """The share that is earned where the second copy takes the name over and the first is shut down."""

@@ -231,8 +231,12 @@ def _field(store: Typestore, desc: Value, value: Value) -> Value:
     if kind == Nodetype.BASE:
         return _zero(detail[0]) if value is None else _check_value(detail[0], value)
     if kind == Nodetype.NAME:
+        if value is not None and not isinstance(value, Mapping):
+            raise ValueError(f"a map of fields is asked for, not {value!r}")
         return _message(store, detail, value or {})
     inner, size = detail
+    if value is not None and not isinstance(value, list | tuple | bytes):
+        raise ValueError(f"a list is asked for, not {value!r}")
     items = list(value) if value is not None else [None] * (size if kind == Nodetype.ARRAY else 0)
     converted = [_field(store, inner, item) for item in items]
     if inner[0] == Nodetype.BASE and inner[1][0] != "string":

@@ -6,18 +6,15 @@ Works on the data as read, so that a fault in one place hides none elsewhere.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterator, Mapping
-from pathlib import Path, PurePosixPath
 from typing import Any
 
 from grader.checks.registry import Check
-from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.rubric.fault_words import model_faults
 from grader.rubric.model import ManualParams
-from grader.rubric.references import reference_faults, types_of
+from grader.rubric.references import reference_faults
 from grader.rubric.scenario import ROSTEST_ENDING
-from grader.rubric.step_faults import given_steps, of_type, served_faults, slash, step_faults
+from grader.rubric.step_faults import given_steps, of_type, private, served_faults, slash, step_faults
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import did_you_mean, join_words
 
@@ -60,66 +57,6 @@ def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = 
     faults += _packages(rubric, scenarios, criteria)
     faults += reference_faults(rubric, checks)
     return faults
-
-
-ONE_NAME = re.compile(
-    r"/[A-Za-z][\w/]*|[\w./-]*\.(?:py|cpp|launch|ya?ml|csv|txt|bag|pgm|urdf|srv|msg|action)"
-)
-"""A topic, a service, a node or a parameter, and a file of the student's."""
-PLAIN_NAMES = {"script", "parent", "child"}
-"""Keys of names that have neither a slash nor an ending: programs in C++, and frames."""
-FIELDS = {"result", "expect", "request", "goal", "answer", "feedback"}
-"""Keys of maps from fields to values."""
-PROSE = {"title", "handout", "hint", "reproduce"}
-
-
-def doubtful_names(data: object, folder: Path) -> Iterator[Fault]:
-    """Yield the names that one line alone has, and no file in the rubric's folder. Such a name may be right, or a slip
-    that no other line shows."""
-    rubric, texts = as_map(data), list(_texts((), data))
-    programs = {text.rpartition("/")[2] for path, text in texts if path[-1] == "program"}
-    for path, text in texts:
-        last = _last_word(path, text, rubric)
-        if not last or PROSE & {*path} or text in SYSTEM_TOPICS or (folder / text).is_file():
-            continue
-        end = rf"{re.escape(last)}(?!\w)"
-        word = re.compile(rf"(?<!\w){end}")
-        in_prose = (
-            re.compile(rf"[/~`_]{end}") if text.startswith("/") else word
-        )  # steps is a word too, /steps is not
-        count = sum(len((in_prose if PROSE & {*at} else word).findall(one)) for at, one in texts)
-        if count == 1 and programs.isdisjoint(text.split("/")):
-            yield path, f"nothing else in the rubric names {text}: is it spelt as in the handout?"
-
-
-def _last_word(path: KeyPath, text: str, rubric: dict[str, Any]) -> str:
-    """Return the part of a name by which others would know it; "" for a text that is no name of the student's."""
-    if ONE_NAME.fullmatch(text) or (path[-1] in PLAIN_NAMES and text != path[-1]):
-        return PurePosixPath(text).stem
-    is_field = FIELDS & {*path[:-1]} and text == path[-1]
-    return text.rpartition(".")[2].partition("[")[0] if is_field or _is_own_field(path, rubric) else ""
-
-
-def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
-    """Return whether a field of a message type is meant that the student or the course defines."""
-    if len(path) != 4 or path[-2:] != ("with", "field"):
-        return False
-    own = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
-    criterion = next((one for index, one in as_maps(rubric.get("criteria")) if index == path[1]), {})
-    topic = as_map(criterion.get("with")).get("topic")
-    return any(str(kind).partition("/")[0] in own for kind in types_of(str(topic), rubric))
-
-
-def _texts(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, str]]:
-    if isinstance(value, str):
-        yield path, value
-    elif isinstance(value, dict):
-        for key, inner in value.items():
-            yield (*path, key), str(key)
-            yield from _texts((*path, key), inner)
-    elif isinstance(value, list):
-        for index, inner in enumerate(value):
-            yield from _texts((*path, index), inner)
 
 
 def _packages(
@@ -388,7 +325,7 @@ def _starts(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     names: list[str] = []
     for index, start in as_maps(scenario.get("start")):
         at = (*path, "start", index)
-        given = [key for key in KINDS_OF_START if start.get(key) not in {None, False}]
+        given = [key for key in KINDS_OF_START if start.get(key) not in (None, False)]
         if len(given) != 1:
             found = f"{' and '.join(given)} are there" if given else "none is there"
             yield at, f"give one of {', '.join(KINDS_OF_START[:-1])} and {KINDS_OF_START[-1]}: {found}"
@@ -412,6 +349,7 @@ def _params(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
                     yield (*at, key), "is for a parameter with a name, not for a file"
         elif named and (param.get("value") is None) == (param.get("made_up") is None):
             yield at, "give one of value and made_up"
+        yield from private((*at, "name"), param.get("name"))
         if named and not of_file and param.get("also"):
             yield (*at, "also"), "is for a file: names that it may lack"
 

@@ -11,6 +11,7 @@ from typing import Annotated, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from grader.checks.transform import FRAME_PATTERN
 from grader.rubric.scenario import NAME_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
 from grader.rubric.yaml_lines import Fault, KeyPath
 from grader.wording import did_you_mean, shorten
@@ -20,6 +21,7 @@ UNITS = {"hz": "Hz", "s": "seconds", "m": "metres", "deg": "degrees", "rad": "ra
 PATTERN_RULES = {
     NAME_PATTERN: "must be lower-case letters, digits and hyphens, beginning with a letter",
     TYPE_PATTERN: "must be a type like std_msgs/String",
+    FRAME_PATTERN: "must be a frame without blanks or a slash before it, as tf2 has them, like base_link",
     PROGRAM_PATTERN: "must be a program like turtlesim/turtlesim_node",
 }
 TIME = "a time with its zone, such as 2026-11-20T23:59:00+01:00"

@@ -15,13 +15,14 @@ from grader.model.message_rate import RateBounds
 from grader.model.record import Record
 from grader.model.result import RubricOrigin
 from grader.model.version import RUBRIC, UPDATE, Versioned
-from grader.rubric.consistency import cross_faults, doubtful_names
+from grader.rubric.consistency import cross_faults
 from grader.rubric.course import load_course, split_name
 from grader.rubric.fault_words import model_faults
 from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics_folder
 from grader.rubric.made_up import draw_values, faults_of_sample, made_up_faults, sample_data, with_values
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.own_checks import Beside, known_checks, read_instructor, run_checks_file
+from grader.rubric.spelling import doubtful_names, misspelt_names
 from grader.rubric.yaml_lines import Source, Value, as_map, read_source
 
 PIN = "#sha256:"
@@ -94,7 +95,7 @@ def _load_file(path: Path, name: str) -> LoadedRubric:
     refuse_newer(source, RUBRIC)
     samples = sample_data(source.data)
     beside = read_instructor(samples[0], path.parent)
-    faults = _faults(source, samples, beside)
+    faults = _faults(source, samples, beside, path.parent)
     if faults:
         raise RubricError(faults)
     rubric = share_points(Rubric.model_validate_json(json.dumps(samples[0]), strict=True))
@@ -229,7 +230,7 @@ def packages_of_labs() -> dict[str, str]:
     return {lab.id: lab.package for lab in known_labs()}
 
 
-def _faults(source: Source, samples: Sequence[Value], beside: Beside) -> list[str]:
+def _faults(source: Source, samples: Sequence[Value], beside: Beside, folder: Path) -> list[str]:
     if not isinstance(source.data, dict):
         return [
             source.fault((), "a rubric is a map of keys and values, beginning with schema: grader.rubric/1")
@@ -242,6 +243,12 @@ def _faults(source: Source, samples: Sequence[Value], beside: Beside) -> list[st
         ]
         known = {path for path, _ in found} if sample is not samples[0] else set()
         found += [one for one in faults_of_sample(faults, source.data, as_map(sample)) if one[0] not in known]
+    known = {path for path, _ in found}
+    found += [
+        (path, fault)
+        for path, fault in misspelt_names(source.data, folder)
+        if known.isdisjoint(path[:n] for n in range(1, len(path) + 1))
+    ]
     unique = dict.fromkeys(found)
     told = [source.fault(*fault) for fault in sorted(unique, key=lambda fault: source.line(fault[0]))]
     file = Path(source.name).parent / str(source.data.get("checks"))

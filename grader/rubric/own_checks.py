@@ -25,7 +25,7 @@ from grader.checks.registry import collecting
 from grader.model.verdict import Verdict
 from grader.rubric.course_packages import read_packages, read_starter
 from grader.rubric.pytest_check import BAG, PYTHON, FileFault, pytest_check, read_beside
-from grader.rubric.step_faults import bag_faults, played_bags
+from grader.rubric.step_faults import bag_faults, played_bags, topics_named
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
 from grader.untrusted_text import visible
 
@@ -78,7 +78,7 @@ def read_instructor(data: object, folder: Path) -> Beside:
             faults.append((path, str(fault)))
             continue
         if path in played:
-            faults += bag_faults(path, file, played[path])
+            faults += bag_faults(path, file, played[path], topics_named(rubric, path[:-1]))
         if path == ("checks",):
             own = run_checks_file(file, files[name])
     handed_out = frozenset(hashlib.sha256(content).hexdigest() for content in starter.values() if content)

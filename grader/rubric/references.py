@@ -8,31 +8,36 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import lru_cache
 from pathlib import PurePosixPath
-from typing import Any
+from typing import Any, TypeGuard
 
 from pydantic import ValidationError
 
 from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
 from grader.ros_packages import TypeKind, ros_packages
+from grader.rubric.arguments import argument_faults
+from grader.rubric.frames import frame_faults
+from grader.rubric.message_fields import field_faults, services_in
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Scenario, Step, Until
+from grader.rubric.spelling import texts_in
+from grader.rubric.standins import asked_faults, only_publisher, parameter_faults
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
-from grader.wording import closest, did_you_mean, join_words
+from grader.wording import closest, did_you_mean, join_words, plural
 
-PUBLISHED_BY = {
-    "turtlesim/turtlesim_node": re.compile(r"/turtle\d+/(pose|color_sensor)"),
-    "robot_world/robot_world": re.compile(r"/(scan|base_scan|odom|base_pose_ground_truth|collision)"),
-}
-"""Topics on which a program of the grader's publishes, and no one else would."""
 LAUNCH_ENDINGS = (".launch", ".xml")
 OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended", "quiet_s")
 """Conditions of `until` that say nothing of how long a run lasts."""
 TYPES: Mapping[str, TypeKind] = {"message": "msg", "field": "msg", "service": "srv"}
 LIKELY, SURE = 0.6, 0.85
 """How alike two names have to be: to be suggested, and to be taken for one with a slip."""
+WRAPS = {"minimum": 0, "maximum": 127, "wraps": 2}
+"""Of `counter-wrap`, with their defaults."""
+MANY = 3
+"""A recording may hold so many times the messages that a scenario waits for, as it is closed a little later."""
+FEWEST = 2
+"""Of fewer messages than these, nobody sees a rate."""
 _DIGITS = re.compile(r"\d+")
 _TOPIC = re.compile(r"(?:^|:=)(/[\w/]*\w)")
 
@@ -42,16 +47,25 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     for name, scenario in scenarios.items():
         yield from _outside_faults(("scenarios", name), scenario, rubric)
-    for index, criterion in as_maps(rubric.get("criteria")):
+        found = (*parameter_faults(scenario), *argument_faults(scenario, rubric))
+        yield from ((("scenarios", name, *at), fault) for at, fault in found)
+    criteria = list(as_maps(rubric.get("criteria")))
+    for index, criterion in criteria:
         check = checks.get(str(criterion.get("check")))
         if check is not None:
             judged = scenarios.get(str(criterion.get("scenario")))
             yield from _criterion_faults(("criteria", index), criterion, check, judged, rubric)
-            yield from _unknown_fields(("criteria", index, "with"), as_map(criterion.get("with")), rubric)
-            yield from _unknown_expected(("criteria", index), criterion, judged or {})
+            others = {t for n, one in criteria if n != index for t in _topics_in(one.get("with"))}
+            asked = asked_faults(
+                as_map(criterion.get("with")), judged or {}, others | set(_topics_in(judged))
+            )
+            yield from ((("criteria", index, "with", *at), fault) for at, fault in asked)
+    yield from field_faults(rubric)
+    yield from frame_faults(rubric)
     yield from _unused_faults(rubric, scenarios, checks)
     yield from _unknown_topics(rubric, scenarios, checks)
     yield from _too_many(rubric, scenarios, checks)
+    yield from _too_few(rubric, scenarios)
     yield from _unknown_causes(rubric, scenarios, checks)
     yield from _misspelt_nodes(rubric, scenarios)
     yield from _own_types(rubric)
@@ -74,28 +88,22 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
                 name = PurePosixPath(file).name
                 fault = f"is a path in the student's package, from its folder: scripts/{name}, not {file}"
                 yield (*path, "start", index, key), fault
+            elif isinstance(file, str) and (whole := _with_ending(file, rubric)):
+                yield (
+                    (*path, "start", index, key),
+                    f"the rubric names {whole} elsewhere: write it with its ending",
+                )
         yield from _of_machine((*path, "start", index, "program"), "program", start.get("program"), rubric)
-        yield from _arguments((*path, "start", index, "args"), start)
-    for at, one in _services_in(scenario):
+    for at, _, one in services_in(scenario):
         yield from _of_machine((*path, *at, "type"), "service", one.get("type"), rubric)
 
 
-def _services_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
-    """Yield the services that a scenario calls or offers, and where it says so."""
-    for key in ("calls", "serves"):
-        yield from (((key, n), one) for n, one in as_maps(scenario.get(key)) if one.get("action") is None)
-    for index, step in as_maps(scenario.get("steps")):
-        if "call" in step:
-            yield ("steps", index, "call"), as_map(step["call"])
-
-
-def _arguments(path: KeyPath, start: dict[str, Any]) -> Iterator[Fault]:
-    """Yield arguments that ROS would take for others: `_rate=5` sets no parameter, `gui=false` no argument."""
-    launches = start.get("launch") is not None
-    for index, text in as_texts(start.get("args")):
-        name, mark, value = text.partition("=")
-        if mark and re.fullmatch(r"\w+", name) and (launches or name.startswith("_")):
-            yield (*path, index), f"ROS reads {name}:={value}, with a colon, and not {text}"
+def _with_ending(file: str, rubric: dict[str, Any]) -> str:
+    """Return the name of a Python or YAML file that the rubric names with its ending, where this one has none."""
+    path = PurePosixPath(file)
+    whole = re.compile(rf"(?<![\w.]){re.escape(path.name)}\.(?:py|ya?ml)(?!\w)")
+    texts = [text for _, text in texts_in((), rubric)] if path.name and not path.suffix else []
+    return next((match[0] for text in texts if (match := whole.search(text))), "")
 
 
 def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -162,15 +170,15 @@ def _misfits(
         of_process = [start for start in starts if start.get("name") == process or not process]
         yield from _named_otherwise(value, of_process if len(of_process) == 1 else [])
     elif one.to == "published":
-        yield from _wrong_sender(value, as_map(criterion.get("with")).get("of", "student"), check, starts)
+        yield from _wrong_sender(value, as_map(criterion.get("with")).get("of", "student"), check, scenario)
 
 
-def _wrong_sender(topic: str, of: object, check: Check, starts: list[dict[str, Any]]) -> Iterator[str]:
+def _wrong_sender(topic: str, of: object, check: Check, scenario: dict[str, Any]) -> Iterator[str]:
     """Yield why nobody whose messages are judged sends any."""
-    program = _only_publisher(topic, starts)
+    program = only_publisher(topic, scenario)
     if of == "student" and program:
         yield f"{program} publishes on {topic}, and {check.name} judges the student's messages: give it of: program"
-    if of == "program" and not any(start.get("program") for start in starts):
+    if of == "program" and not any(start.get("program") for start in _starts(scenario)):
         yield f"the scenario starts no program, and {check.name} judges the messages of one (of: program)"
 
 
@@ -200,12 +208,6 @@ def _is_set(name: str, scenario: dict[str, Any]) -> bool:
     params = [param for _, param in as_maps(scenario.get("params"))]
     names = {"/" + str(param.get("name")).strip("/") for param in params}
     return name in names or any(param.get("file") is not None for param in params) or "steps" in scenario
-
-
-def _only_publisher(topic: str, starts: list[dict[str, Any]]) -> str:
-    """Return the program of the grader's that publishes there. Arguments may give its topics other names."""
-    programs = {str(start.get("program")) for start in starts if not start.get("args")}
-    return next((p for p, topics in PUBLISHED_BY.items() if p in programs and topics.fullmatch(topic)), "")
 
 
 def _too_short(one: Reference, check: Check, scenario: dict[str, Any]) -> Iterator[str]:
@@ -276,8 +278,8 @@ def _unknown_topics(
     criteria = [criterion for _, criterion in as_maps(rubric.get("criteria"))]
     named = {topic for criterion in criteria for topic in _topics_in(criterion.get("with"))}
     named |= {topic for criterion in criteria for topic in READ_TOO.get(str(criterion.get("check")), ())}
-    own = any(c.get("check") not in checks or checks[c["check"]].source or "evidence" in checks[c["check"]].facts
-              for c in criteria)  # fmt: skip
+    found = [checks.get(str(criterion.get("check"))) for criterion in criteria]
+    own = any(check is None or check.source or "evidence" in check.facts for check in found)
     for name, scenario in scenarios.items():
         until = as_map(scenario.get("until"))
         known = {*named, *SYSTEM_TOPICS}
@@ -321,6 +323,38 @@ def _too_many(
                 yield ("scenarios", name, "until", "messages", topic), fault
 
 
+def _too_few(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield wraps, recordings and rates that a scenario with so few messages cannot show."""
+    for index, criterion in as_maps(rubric.get("criteria")):
+        name, path = str(criterion.get("scenario")), ("criteria", index, "with")
+        given, until = as_map(criterion.get("with")), as_map(scenarios.get(name, {}).get("until"))
+        counts = {} if {"window_s", "alive_s", "quiet_s"} & until.keys() else as_map(until.get("messages"))
+        if criterion.get("check") == "counter-wrap":
+            least, most, wraps = (given.get(key, default) for key, default in WRAPS.items())
+            count = counts.get(str(given.get("topic")))
+            numbers = all(isinstance(n, int) for n in (least, most, wraps, count))
+            if numbers and count < (needed := wraps * (most - least + 1) + 1):
+                fault = f"{name} ends after {count} messages, and {plural(wraps, 'wrap')} take {needed}"
+                yield (*path, "wraps"), fault
+        for topic, left in as_map(given.get("topics")).items():
+            count, least = counts.get(topic), as_map(left).get("at_least")
+            if isinstance(count, int) and isinstance(least, int) and least > MANY * count:
+                yield (*path, "topics", topic, "at_least"), f"{name} ends after {count} messages on {topic}"
+        window_s, rate_hz = until.get("window_s"), given.get("rate_hz")
+        if criterion.get("check") == "rate" and _is_number(window_s) and _is_number(rate_hz):
+            yield from (((*path, "rate_hz"), fault) for fault in _seldom(rate_hz, window_s))
+
+
+def _seldom(rate_hz: float, window_s: float) -> Iterator[str]:
+    if 0 < window_s * rate_hz < FEWEST:
+        each = f"at {rate_hz:g} Hz a message comes each {1 / rate_hz:g} s, and window_s is {window_s:g} s"
+        yield f"{each}: it is messages a second"
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float)
+
+
 def _unknown_causes(
     rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
 ) -> Iterator[Fault]:
@@ -333,89 +367,15 @@ def _unknown_causes(
         sent = {*SYSTEM_TOPICS, *_topics_in(scenario)}
         open_ = any(start.get("script") is None for start in _starts(scenario)) or "recording" in scenario
         for one in check.references(as_map(criterion.get("with"))) if check else ():
-            topic = as_map(one.value).get("topic")
-            if one.to != "cause" or not isinstance(topic, str) or topic in sent | others:
+            at = one.path if isinstance(one.value, str) else (*one.path, "topic")
+            topic = one.value if isinstance(one.value, str) else as_map(one.value).get("topic")
+            if one.to not in {"cause", "heard"} or not isinstance(topic, str) or topic in sent | others:
                 continue
             near = _near(topic, sent, cutoff=SURE if open_ else LIKELY)
             if near or not open_:
                 meant = f' (did you mean "{near}"?)' if near else ""
                 fault = f"nothing in {name} sends on {topic}, and no other criterion names it{meant}"
-                yield ("criteria", index, "with", *one.path, "topic"), fault
-
-
-def _unknown_fields(path: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
-    """Yield fields that the topic's type does not have, where the rubric says the type and it is one of ROS's."""
-    topic, field = given.get("topic"), given.get("field")
-    if isinstance(topic, str) and isinstance(field, str):
-        types = {kind for kind in types_of(topic, rubric) if isinstance(kind, str)}
-        value = given.get("value")
-        is_one = value is not None and not isinstance(value, list | dict)
-        faults = [_no_such_field(kind, field, is_one) for kind in sorted(types)]
-        if faults and all(faults):
-            yield (*path, "field"), faults[0]
-    for key, inner in given.items():
-        if isinstance(inner, dict):
-            yield from _unknown_fields((*path, key), inner, rubric)
-
-
-def types_of(topic: str, rubric: dict[str, Any]) -> Iterator[object]:
-    """Yield the types that the rubric gives a topic: those that it sends there, or asks for."""
-    yield from ("tf2_msgs/TFMessage",) if topic in {"/tf", "/tf_static"} else ()
-    for _, criterion in as_maps(rubric.get("criteria")):
-        given = as_map(criterion.get("with"))
-        if criterion.get("check") == "topic-type" and given.get("topic") == topic:
-            yield given.get("type")
-    for scenario in as_map(rubric.get("scenarios")).values():
-        sent = [probe for _, probe in as_maps(as_map(scenario).get("probes"))]
-        sent += [as_map(step.get("publish")) for _, step in as_maps(as_map(scenario).get("steps"))]
-        yield from (one.get("type") for one in sent if one.get("topic") == topic)
-
-
-def _unknown_expected(path: KeyPath, criterion: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
-    """Yield fields of requests and answers that the service's type does not have, where its text is known here."""
-    given, kind = as_map(criterion.get("with")), criterion.get("check")
-    part = {"calls": "request", "service-answers": "response"}.get(str(kind))
-    steps = [as_map(step.get("call")) for _, step in as_maps(scenario.get("steps"))]
-    asked = [one for key in ("serves", "calls") for _, one in as_maps(scenario.get(key))] + steps
-    about = next((one for one in asked if one.get("service") == given.get("service")), None)
-    expected = given.get("expect")
-    if part is None or about is None or not about.get("service"):
-        return
-    text = about.get("definition") or ros_packages().text(str(about.get("type")), "srv")
-    each = [((), expected)] if isinstance(expected, dict) else [((n,), one) for n, one in as_maps(expected)]
-    for at, one in each if isinstance(text, str) else ():
-        fault = _no_such_values(str(about.get("type")), str(text), part, one)
-        if fault:
-            yield (*path, "with", "expect", *at), fault
-
-
-def _no_such_values(type_: str, text: str, part: str, expected: dict[str, Any]) -> str:
-    from grader.evidence.message_values import ServiceTypes  # noqa: PLC0415 - slow to load, and few rubrics need it
-
-    try:
-        kind = getattr(ServiceTypes(type_, text), part)
-        there = kind.decode(kind.encode({}))
-    except ValueError:
-        return ""
-    return _other_shape(there, expected, f"the {part} of {type_}")
-
-
-def _other_shape(there: object, expected: object, what: str) -> str:
-    """Return which name is not in a message, or which text is no number; empty where the value may be there."""
-    if isinstance(there, dict) and isinstance(expected, dict):
-        unknown = next((name for name in expected if name not in there), None)
-        if unknown is not None:
-            return f"{what} has no field {unknown}{_instead(str(unknown), list(there))}"
-        found = (_other_shape(there[name], value, f"{name} of {what}") for name, value in expected.items())
-        return next(filter(None, found), "")
-    kinds = {str: "a text", int: "a number", float: "a number", bool: "true or false"}
-    if (
-        type(there) in kinds
-        and type(expected) in kinds
-        and isinstance(there, str) != isinstance(expected, str)
-    ):
-        return f"{what} is {kinds[type(there)]}, not {expected!r}"
-    return ""
+                yield ("criteria", index, "with", *at), fault
 
 
 def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -459,6 +419,11 @@ def _other_goals_and_types(rubric: dict[str, Any], scenarios: dict[str, dict[str
         goals, goal = [a for a in steps if a.get("name") == given.get("action", "")], given.get("goal")
         if isinstance(goal, int) and 0 < len(goals) < goal:
             yield (*path, "goal"), f"{name} sends {len(goals)} goals to {given['action']}"
+        place = goal - 1 if isinstance(goal, int) else 0
+        asked = goals[place] if 0 <= place < len(goals) else None
+        if given.get("status") == "PREEMPTED" and asked is not None and not _is_given_up(asked, scenario):
+            fault = f"no step cancels goal {place + 1} of {given['action']}: give its step cancel_after_s"
+            yield (*path, "status"), fault
         number, asked_on = given.get("number"), given.get("asked_on")
         sent = [s for s in given_steps(scenario, "publish") if s.get("topic") == asked_on]
         singly = bool(sent) and not any(
@@ -467,28 +432,17 @@ def _other_goals_and_types(rubric: dict[str, Any], scenarios: dict[str, dict[str
         if singly and isinstance(number, int) and number > len(sent) and not scenario.get("probes"):
             yield (*path, "number"), f"{name} sends {len(sent)} messages on {asked_on}"
         service, kind = given.get("service", ""), given.get("type")
-        called = {str(one.get("type")) for _, one in _services_in(scenario) if one.get("service") == service}
+        called = {
+            str(one.get("type")) for _, _, one in services_in(scenario) if one.get("service") == service
+        }
         if isinstance(kind, str) and called and not closest(kind, called, cutoff=SURE):
             yield (*path, "type"), f"{name} has {service} as {join_words(sorted(called))}, not as {kind}"
 
 
-@lru_cache(maxsize=256)
-def _no_such_field(type_: str, field: str, is_one: bool = False) -> str:
-    """Return why a type has no such field, or a list for one value; empty where it has, or where its definition is not
-    known here."""
-    from grader.checks.support.fields import NoField, values_at  # noqa: PLC0415 - as below
-    from grader.evidence.message_values import MessageType  # noqa: PLC0415 - slow to load, and few rubrics need it
-
-    try:
-        kind = MessageType(type_)
-        found = values_at(kind.decode(kind.encode({})), field.partition("[")[0])
-        if is_one and "[" not in field and any(isinstance(one, list) for one in found):
-            return f"{type_}: {field} is a list: give all its values, or name {field}[0] or {field}[*]"
-    except NoField as error:
-        return f"{type_}: {error}"
-    except ValueError:
-        return ""
-    return ""
+def _is_given_up(goal: dict[str, Any], scenario: dict[str, Any]) -> bool:
+    """Return whether a goal is cancelled, or something else is done meanwhile upon which a server may give it up."""
+    steps = [as_map(one) for _, step in as_maps(scenario.get("steps")) for one in step.values()]
+    return goal.get("cancel_after_s") is not None or any(one.get("background") is True for one in steps)
 
 
 def _misspelt_nodes(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:

@@ -47,6 +47,7 @@ REFERRED = {
     "package": "package of the lab",
     "node": "text",
     "cause": "condition",
+    "heard": "topic of the scenario's",
 }
 REQUIRED = "required"
 

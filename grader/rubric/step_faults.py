@@ -5,15 +5,18 @@ What all belongs to a new kind of step is at the beginning of `scenario.py`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
+from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.errors import EvidenceError
 from grader.installable import noetic_messages
 from grader.ros_packages import ros_packages
 from grader.rubric.fault_words import model_faults
-from grader.rubric.scenario import STEP_S_MAX, Step, Transform
+from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform
+from grader.rubric.spelling import is_slip, texts_in
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts
 from grader.wording import did_you_mean
 
@@ -46,8 +49,15 @@ def played_bags(rubric: dict[str, Any]) -> dict[KeyPath, dict[str, Any]]:
     }
 
 
-def bag_faults(path: KeyPath, file: Path, play: dict[str, Any]) -> Iterator[Fault]:
-    """Yield what is wrong with a recording that a step plays. `path` is the place of its name."""
+def topics_named(rubric: dict[str, Any], but: KeyPath) -> set[str]:
+    """Return the names with a slash in a rubric, but for those in one of its parts."""
+    texts = [text for path, text in texts_in((), rubric) if path[: len(but)] != but]
+    return {name for text in texts for name in re.findall(r"(?<![\w.])/[A-Za-z][\w/]*\w", text)}
+
+
+def bag_faults(path: KeyPath, file: Path, play: dict[str, Any], named: Collection[str]) -> Iterator[Fault]:
+    """Yield what is wrong with a recording that a step plays. `path` is the place of its name; the rest of the rubric
+    names the topics in `named`."""
     from grader.evidence.reader import load_run  # noqa: PLC0415 - few rubrics play anything
 
     try:
@@ -58,6 +68,10 @@ def bag_faults(path: KeyPath, file: Path, play: dict[str, Any]) -> Iterator[Faul
     for number, topic in as_texts(play.get("topics")):
         if topic not in topics:
             yield (*path[:-1], "topics", number), f"{file.name} has no {topic}{did_you_mean(topic, topics)}"
+    for topic in sorted(topics - {*named} - SYSTEM_TOPICS):
+        near = next((one for one in sorted({*named} - topics) if is_slip(topic, one)), "")
+        if near:
+            yield path, f"{file.name} has {topic}, and the rubric names {near}: give the recording that topic"
 
 
 def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
@@ -79,13 +93,16 @@ def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
 def _faults_of(at: KeyPath, kind: str, given: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
     if kind in NAMED:
         key, what = NAMED[kind]
-        yield from slash((*at, key), given.get(key), what)
+        is_private = kind == "set_param" and str(given.get(key)).startswith("~")
+        found = private((*at, key), given.get(key)) if is_private else slash((*at, key), given.get(key), what)
+        yield from found
     if kind == "publish":
         yield from _publish(at, given, types)
     elif kind == "call":
         yield from of_type(at, given)
     elif kind == "action":
         yield from _action_name(at, given)
+        yield from _cancelled_late(at, given)
     elif kind == "wait":
         yield from _wait(at, given)
     elif kind == "set_param" and (given.get("value", "") is None or given.get("value") in NOT_FINITE):
@@ -102,6 +119,17 @@ def _action_name(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
     if kind.endswith("Action"):
         short = kind.removesuffix("Action")
         yield (*at, "type"), f"is named as its .action file, without Action: {short}"
+
+
+def _cancelled_late(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
+    after_s, limit_s = (
+        given.get("cancel_after_s"),
+        given.get("limit_s", Action.model_fields["limit_s"].default),
+    )
+    numbers = isinstance(after_s, int | float) and isinstance(limit_s, int | float)
+    if numbers and after_s >= limit_s:
+        fault = f"{after_s:g} s is not before limit_s, {limit_s:g} s, after which the run goes on: nothing is cancelled"
+        yield (*at, "cancel_after_s"), fault
 
 
 def _one_of(names: tuple[str, ...]) -> str:
@@ -223,6 +251,12 @@ def slash(path: KeyPath, name: object, what: str) -> Iterator[Fault]:
     """Yield a fault for a name that does not begin with a slash."""
     if isinstance(name, str) and not name.startswith("/"):
         yield path, f'{what} begins with a slash: "/{name}"'
+
+
+def private(path: KeyPath, name: object) -> Iterator[Fault]:
+    """Yield a fault for a parameter's private name, which would be the grader's own."""
+    if isinstance(name, str) and name.startswith("~"):
+        yield path, f"{name} is private to the grader: write /, the node's name, and /{name.strip('~/')}"
 
 
 ANSWERS = ("answer", "answers", "fails")

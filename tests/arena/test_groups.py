@@ -142,6 +142,45 @@ def test_a_compiled_program_rests_while_it_waits_for_its_threads(
             process.kill()
 
 
+TWICE = "lock = threading.Lock()\nlock.acquire()\nlock.acquire()"
+IN_TIME = "threading.Thread(target=lambda: threading.Event().wait(100), daemon=True).start()"
+
+
+@pytest.mark.parametrize(
+    ("program", "kind"),
+    [
+        (TWICE, "loops"),
+        (
+            f"threading.Thread(target=lambda: [threading.Event().wait(0.5) for _ in range(99)]).start()\n{TWICE}",
+            "loops",
+        ),
+        ("threading.Event().wait(100)", None),
+        (f"{IN_TIME}\n{TWICE}", None),
+        (f"import time\n{WAITS}\n{TWICE}", None),
+        (
+            f"threading.Thread(target=lambda: select.select([], [], [], 0.1), daemon=True).start()\n{TWICE}",
+            "loops",
+        ),
+        (
+            f"threading.Thread(target=lambda: select.select([], [], [], 99), daemon=True).start()\n{TWICE}",
+            None,
+        ),
+    ],
+)
+def test_a_program_rests_whose_threads_all_wait_for_each_other(program: str, kind: str | None) -> None:
+    """One that sets itself a limit may do anything after it."""
+    with subprocess.Popen([sys.executable, "-c", f"import select, threading\n{program}"]) as process:
+        try:
+            rest, begun_s = TreeRest(), time.monotonic()
+            found: list[str | None] = []
+            while time.monotonic() < begun_s + 60 and (len(found) < 20 or found[-5:] != [kind] * 5):
+                time.sleep(LOOK_S)
+                found.append(rest.look([process.pid], time.monotonic())[0])
+            assert found[-5:] == [kind] * 5, found
+        finally:
+            process.kill()
+
+
 NOT_WAITED_FOR = """
 import os, signal, sys, time
 if sys.argv[1] == "ignore":

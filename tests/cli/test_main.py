@@ -281,13 +281,13 @@ def test_doctor_says_what_a_rubric_needs_and_this_machine_lacks(tmp_path, capsys
     monkeypatch.setattr(doctor, "diagnose", lambda: ())
     monkeypatch.setattr(doctor, "is_shown", lambda folder, _: folder.parent.name == "share")
     rows = ("course_sim/Lap", "course_map/Lap", "gazebo_msgs/LinkState", "lab1/Own")
-    one = "  - {{id: c{}, title: x, points: 25, check: topic-type, scenario: real, with: {{topic: /c, type: {}}}}}\n"
+    one = "  - {{id: c{}, title: x, points: 25, check: topic-type, scenario: real, with: {{topic: /c{}, type: {}}}}}\n"
     turtle = "script: src/talker.py}\n      - {name: s, program: turtlesim/turtlesim_node}"
     head = (
-        SOUND.partition("criteria:\n")[0].replace("script: src/talker.py}", turtle).replace("/chatter", "/c")
+        SOUND.partition("criteria:\n")[0].replace("script: src/talker.py}", turtle).replace("/chatter", "/c0")
     )
     rubric = tmp_path / "lab.yaml"
-    rubric.write_text(f"{head}criteria:\n{''.join(one.format(n, row) for n, row in enumerate(rows))}")
+    rubric.write_text(f"{head}criteria:\n{''.join(one.format(n, n, row) for n, row in enumerate(rows))}")
     assert run(["doctor", "--rubric", str(rubric), "--json"]) == 3
     found = {row["name"]: row for row in json.loads(capsys.readouterr().out)}
     assert {name: row["state"] for name, row in found.items()} == {

@@ -217,7 +217,7 @@ def test_faulty_places(old: str, new: str, fault: str, tmp_path: Path) -> None:
     [
         ("{from: 0, to: 9}", "with.rate_hz: must be more than 0, not 0"),
         ("{one_of: [5, five, 7]}", 'with.rate_hz: must be a number, not "five"'),
-        ("{from: 1, to: 40}", "until.window_s: 40 s can never pass within limit_s, 30 s"),
+        ("{from: 6, to: 40}", "until.window_s: 40 s can never pass within limit_s, 30 s"),
     ],
 )
 def test_both_ends_and_every_choice_have_to_fit(declared: str, fault: str, tmp_path: Path) -> None:

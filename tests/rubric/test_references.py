@@ -10,8 +10,8 @@ from grader.checks import CHECKS
 from grader.ros_env import RosInstallation
 from grader.ros_packages import RosPackages
 from grader.rubric import references
-from grader.rubric.consistency import doubtful_names
 from grader.rubric.load import load_rubric
+from grader.rubric.spelling import doubtful_names
 from tests.rubric.samples import faults, spoiled
 
 LAB = """\
@@ -299,8 +299,14 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
             '32: criteria[2].with.type: this machine has no ROS package "lab" (did you mean "lab1"?)',
             id="package-of-type",
         ),
-        pytest.param("type: std_msgs/String}, scenario", "type: lab1/Count}, scenario", "", id="own-type"),
-        pytest.param("type: std_msgs/String}, scenario", "type: gazebo_msgs/LinkState}, scenario", "", id="not-here"),
+        pytest.param(
+            "type: std_msgs/String}, scenario",
+            "type: lab1/Count}, scenario",
+            "32: criteria[2].with.type: elsewhere in the rubric /chatter carries std_msgs/String, not lab1/Count",
+            id="two-types-on-one-topic",
+        ),
+        pytest.param("/chatter, type: std_msgs/String}, s", "/odd, type: lab1/Count}, s", "", id="own-type"),
+        pytest.param("/chatter, type: std_msgs/String}, s", "/odd, type: gazebo_msgs/LinkState}, s", "", id="not-here"),
         pytest.param(
             "type: std_srvs/Trigger}\n",
             "type: std_srvs/Triger}\n",
@@ -364,7 +370,7 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
             "check: logs, with: {text: a}, scenario: launch",
             "check: reacts, with: {cause: {topic: /chatter}, effect: {topic: /chatter, field: text, value: a}, "
             "within_s: 1}, scenario: listener",
-            "39: criteria[9].with.effect.field: std_msgs/String: the message has no field text, but data",
+            "39: criteria[9].with.effect.field: std_msgs/String has no field text: there is data",
             id="field-that-the-type-lacks",
         ),
         pytest.param(

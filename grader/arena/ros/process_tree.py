@@ -94,6 +94,29 @@ def waits_in(pid, thread):
         return ""
 
 
+def _call(pid, thread):
+    """Return the system call in which a thread waits, its number and its arguments; nothing where that is not shown."""
+    try:
+        return _read("/proc/{}/task/{}/syscall".format(pid, thread)).split()
+    except OSError:
+        return []
+
+
+def _waits_for_others(pid, thread):
+    """Return whether a thread waits for another one, a connection or what comes over one, and sets itself no limit:
+    without the others, it never does anything again (man 2 futex: the fourth argument is the limit)."""
+    where = waits_in(pid, thread)
+    if "futex" not in where:
+        return any(name in where for name in ("accept", "wait_woken", "sk_wait_data"))
+    return _call(pid, thread)[4:5] == [b"0x0"]
+
+
+def _naps(pid, thread):
+    """Return whether a thread sleeps for a time: in `nanosleep`, or in a `select` of no files, as Python 3.8 does."""
+    where = waits_in(pid, thread)
+    return "nanosleep" in where or ("poll" in where and _call(pid, thread)[1:2] == [b"0x0"])
+
+
 def _wakes(pid, thread):
     """Return how often a thread has waited for something so far."""
     try:
@@ -161,7 +184,8 @@ class Rest:
     """Whether a program has come to rest: it does little, and wakes again and again, as a loop or `spin()` does.
 
     A long sleep is no rest, since no one knows what comes after it; a compiled program whose main thread waits for its
-    others (`MultiThreadedSpinner`, `rosbag record`) rests as a loop does. `since_s` is when the rest began, or None. It
+    others (`MultiThreadedSpinner`, `rosbag record`) rests as a loop does, and so does any whose threads all wait for
+    each other, or for what comes (a lock that is taken twice). `since_s` is when the rest began, or None. It
     `spins` while its main thread wakes about twice a second (rospy), or waits for callbacks alone (roscpp).
     `computed_s` are the CPU seconds of its last stretch of work in the same memory, as `while True: pass` does.
     """
@@ -176,6 +200,7 @@ class Rest:
         self._late_s = {}
         self._used_s, self._pages = 0.0, 0
         self._naps = {}
+        self._awake = {}
 
     def look(self, now_s, used_s, pages):
         """`used_s` are the CPU seconds that the program has used so far, `pages` those of its memory that it
@@ -190,7 +215,7 @@ class Rest:
         work_s = used_s - self._used_s + waited_s
         working = self._late_s == {} or work_s > WORKING * (now_s - self._looked_s)
         sleeps, waits = now_s - self._woke_s > ASLEEP_S, "futex" in waits_in(self._pid, self._pid)
-        if working or asleep or (sleeps and not (waits and _is_compiled(self._pid))):
+        if working or asleep or (sleeps and not (waits and self._rests_asleep(threads, now_s))):
             self.since_s = None
         elif self.since_s is None:
             self.since_s, self._wakes_before = now_s, wakes
@@ -212,6 +237,22 @@ class Rest:
             return "spins" if self.spins else "loops"
         return (
             "stuck" if self.computed_s >= STUCK_S else "computes" if self.computed_s >= COMPUTES_S else None
+        )
+
+    def _rests_asleep(self, threads, now_s):
+        """Whether a program whose main thread waits for its others does nothing by itself: none of them sleeps."""
+        if _is_compiled(self._pid):
+            return True
+        awake = {}
+        for thread in threads:
+            if _naps(self._pid, thread):
+                return False
+            if not _waits_for_others(self._pid, thread):
+                wakes, before = _wakes(self._pid, thread), self._awake.get(thread)
+                awake[thread] = before if before and before[0] == wakes else (wakes, now_s)
+        self._awake = awake
+        return str(self._pid) not in awake and all(
+            now_s - since_s <= ASLEEP_S for _, since_s in awake.values()
         )
 
     def _others(self, threads, now_s):

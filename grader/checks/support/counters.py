@@ -9,7 +9,7 @@ from itertools import pairwise
 from statistics import median
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from grader.checks.support.exit_causes import explain_early_end, explain_traceback, process_tracebacks
 from grader.checks.support.processes import PublishedTopic, lives, observed_until_ns, slips_of
@@ -218,6 +218,12 @@ class WrapParams(Record):
     """How often the wrap has to be seen."""
     rate_hz: Annotated[float, Field(gt=0)] = 10.0
     """The nominal rate, to know a flood of messages from a counter."""
+
+    @model_validator(mode="after")
+    def _goes_up(self) -> WrapParams:
+        if self.minimum >= self.maximum:
+            raise ValueError(f"minimum, {self.minimum}, is not less than maximum, {self.maximum}")
+        return self
 
     @property
     def reset_hint(self) -> str:

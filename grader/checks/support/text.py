@@ -9,8 +9,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from typing import Literal
 
+from pydantic import AfterValidator
+
 from grader.untrusted_text import visible, without_colours
-from grader.wording import is_one_edit, shorten
+from grader.wording import closest, is_one_edit, shorten
 
 SIMILARITY = 0.8
 OTHER_WORDS_SHARE = 0.5
@@ -23,6 +25,9 @@ SHOWN_CHARS = 160
 SHOWN_BEFORE_CHARS = 10_000
 SECONDS = "{seconds}"
 VALUE = "{value}"
+PLACE = "{number}"
+PLACES = frozenset({SECONDS, VALUE, PLACE})
+"""What stands for a time, a message or a number in the texts that rubrics ask for."""
 NUMBER = r"[-+]?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?"
 
 
@@ -85,6 +90,18 @@ def in_one_line(text: str) -> str:
     """Return the same of a message: its colours are part of it."""
     line = visible(" ".join(text[:SHOWN_BEFORE_CHARS].split()))
     return shorten(line, SHOWN_CHARS)
+
+
+def refuse_others(place: str) -> AfterValidator:
+    """Return what refuses a text with another word in braces that is meant to be `place`."""
+
+    def checked(template: str) -> str:
+        for word in re.findall(r"\{\w*\}", template):
+            if word != place and (word in PLACES or closest(word, [place], cutoff=0.7)):
+                raise ValueError(f"{word} stands for nothing here: write {place}")
+        return template
+
+    return AfterValidator(checked)
 
 
 def words_pattern(words: str) -> str:

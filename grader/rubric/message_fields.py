@@ -1,0 +1,496 @@
+"""What a rubric says of the fields of messages, against the definitions of their types.
+
+Those of ROS are known, and those of the students' own whose text the rubric has. Where a criterion asks for some
+fields of a type, there may be others: then only a name that is all but one of these is a slip.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import PurePosixPath
+from typing import Any, NamedTuple
+
+from grader.evidence.definitions import Field, Types, parse
+from grader.installable import noetic_messages
+from grader.model.message_definitions import (
+    BUILT_IN,
+    DIVIDER,
+    FULL_NAMES,
+    PARTS,
+    parse_definition,
+    parse_interface,
+)
+from grader.model.package import InterfaceField
+from grader.ros_packages import ros_packages
+from grader.rubric.standins import topics_of_programs
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.wording import closest, did_you_mean, is_one_edit, join_words
+
+ALMOST = 0.87
+"""How alike two names have to be for one to be a slip."""
+SUFFIXES = {part: suffix for suffix, parts in PARTS.items() for part in parts}
+"""The ending of the file in which a part is defined."""
+KINDS = {"string": "a text", "bool": "true or false"}
+USUAL_PACKAGES = ("std_msgs", "geometry_msgs", "sensor_msgs", "nav_msgs")
+USUAL_TYPES = {
+    "cmd_vel": "geometry_msgs/Twist",
+    "odom": "nav_msgs/Odometry",
+    "scan": "sensor_msgs/LaserScan",
+}
+"""Of topics whose type a rubric does not say, most often: a name that is all but one of a field's is a slip."""
+COUNTED = frozenset({"minimum", "maximum", "start"})
+"""Of counters, the values that their field has."""
+STAMPED = "is_stamp"
+"""Beside what a criterion says: its field has to be a stamp."""
+_STEPS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
+
+
+def slip_of(name: str, there: Iterable[str]) -> str:
+    """Return the name that is meant, where this one is all but it; "" for none."""
+    names = [one for one in there if one != name]
+    same = (one for one in names if one.lower() == name.lower() or (len(name) > 3 and is_one_edit(one, name)))
+    return next(same, "") or closest(name, names, cutoff=ALMOST)
+
+
+def _instead(name: str, there: Iterable[str]) -> str:
+    names = list(there)
+    return did_you_mean(name, names) or (f": there is {join_words(names)}" if names else "")
+
+
+class Misfit(ValueError):
+    """Why a path leads to no field, or a value is none of its type."""
+
+
+class OwnText(NamedTuple):
+    """The definition of a type of the students' own; `whole` is False where it may have more fields."""
+
+    text: str
+    whole: bool
+
+
+class Shape(NamedTuple):
+    """A message, or one part of a service or an action. `what` is what a fault calls it; of the types in `partial` only
+    some fields are known."""
+
+    what: str
+    types: Types
+    partial: frozenset[str]
+
+    @property
+    def root(self) -> Field:
+        return Field(name="", attribute="", type=next(iter(self.types)), array=False, size=None)
+
+    def field_at(self, path: str) -> Field | None:
+        """Return the field to which a path leads; None where that is not known. Raises Misfit."""
+        field, done = self.root, ""
+        for part in _STEPS.findall(path):
+            found = self._item(field, part, done) if part[0] == "[" else self.inner(field, part, done)
+            if found is None:
+                return None
+            field, done = found, done + (part if part[0] == "[" or not done else f".{part}")
+        return field
+
+    def inner(self, field: Field, name: str, done: str) -> Field | None:
+        """Return a field of a field; None where that is not known. Raises Misfit."""
+        there = {one.name: one for one in self.types.get(field.type, ())}
+        if field.array and there:
+            raise Misfit(f"{self.what}: {done} is a list: write {done}[0].{name}, or {done}[*].{name}")
+        if name in there:
+            return there[name]
+        whole = f"{done} of {self.what}" if done else self.what
+        if near := slip_of(name, there):
+            raise Misfit(f'{whole} has no field {name} (did you mean "{near}"?)')
+        if field.type in self.partial:
+            return None
+        raise Misfit(f"{whole} has no field {name}{_instead(name, there)}")
+
+    def _item(self, field: Field, part: str, done: str) -> Field:
+        if not field.array:
+            raise Misfit(f"{self.what}: {done} is no list")
+        if part != "[*]" and field.size is not None and int(part[1:-1]) >= field.size:
+            raise Misfit(f"{self.what}: {done} has {field.size} items, counted from 0")
+        return replace(field, array=False)
+
+    def misfit(self, value: object) -> str:
+        """Return why no message has these fields with these values; empty where one may have."""
+        try:
+            self.compare(self.root, value, "")
+        except Misfit as error:
+            return str(error)
+        return ""
+
+    def compare(self, field: Field, value: object, done: str) -> None:
+        """Raise Misfit where the field can never have the value."""
+        from grader.evidence.message_values import ANGLES, FORMS  # noqa: PLC0415 - slow to load, and few rubrics need it
+
+        fields = {one.name for one in self.types.get(field.type, ())}
+        if (
+            isinstance(value, Mapping)
+            and value
+            and {*FORMS, ANGLES}.issuperset(value)
+            and fields.isdisjoint(value)
+        ):
+            return  # a value that changes: what is sent is looked at elsewhere
+        if field.array:
+            self._compare_items(field, value, done)
+        elif isinstance(value, Mapping) and not field.primitive:
+            for key, item in value.items():
+                inner = self.inner(field, str(key), done)
+                if inner is not None:
+                    self.compare(inner, item, f"{done}.{key}" if done else str(key))
+        elif field.primitive and (wrong := _no_value(field.type, value)):
+            raise Misfit(f"{done} of {self.what} {wrong}")
+
+    def _compare_items(self, field: Field, value: object, done: str) -> None:
+        if not isinstance(value, list | tuple):
+            raise Misfit(
+                f"{self.what}: {done} is a list: give all its values, or name {done}[0] or {done}[*]"
+            )
+        for number, item in enumerate(value):
+            self.compare(replace(field, array=False), item, f"{done}[{number}]")
+
+
+def _no_value(kind: str, value: object) -> str:
+    """Return why a field of a primitive type is never so."""
+    if isinstance(value, list | tuple | Mapping):
+        return f"is one value, not {value!r}"
+    wanted = KINDS.get(kind, "a number")
+    got = "a text" if isinstance(value, str) else "true or false" if isinstance(value, bool) else "a number"
+    if wanted != got and not (kind.startswith("float") and value in {".inf", "-.inf", "+.inf", ".nan"}):
+        return f"is {wanted}, not {value!r}"
+    low, high = limits_of(kind) or (0, 0)
+    if isinstance(value, int | float) and low < high and not low <= value <= high:
+        return f"is {kind}, {low} to {high}, and never {value:g}"
+    return ""
+
+
+def limits_of(kind: str) -> tuple[int, int] | None:
+    """Return the least and the greatest value of an integer type."""
+    match = re.fullmatch(r"(u?)int(\d+)", kind)
+    if match is None:
+        return None
+    bits = int(match[2])
+    return (0, 2**bits - 1) if match[1] else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+
+
+class Definitions:
+    """The definitions that are known before a run."""
+
+    def __init__(self, rubric: dict[str, Any]) -> None:
+        self._own: dict[tuple[str, str], OwnText] = {}
+        for _, type_, suffix, own in own_texts(rubric):
+            known = self._own.get((type_, suffix))
+            if known is None or (own.whole and not known.whole):
+                self._own[type_, suffix] = own
+        self._shapes: dict[tuple[str, str], Shape | None] = {}
+
+    def shape(self, type_: str, part: str = "") -> Shape | None:
+        """Return a type's fields; of a service or an action, those of a part. None where they are not known."""
+        if (type_, part) not in self._shapes:
+            self._shapes[type_, part] = self._shape(type_, part)
+        return self._shapes[type_, part]
+
+    def text(self, type_: str, suffix: str) -> OwnText | None:
+        """Return what the rubric says of the students' own type."""
+        return self._own.get((type_, suffix))
+
+    def messages_of(self, package: str) -> set[str]:
+        """Return the names of a package's messages whose definitions the rubric has."""
+        types = (type_.partition("/") for type_, suffix in self._own if suffix == ".msg")
+        return {name for owner, _, name in types if owner == package}
+
+    def _shape(self, type_: str, part: str) -> Shape | None:
+        from grader.evidence.decode import full_definition  # noqa: PLC0415 - slow to load, and few rubrics need it
+        from grader.evidence.message_values import MessageType  # noqa: PLC0415 - as above
+
+        suffix = SUFFIXES[part]
+        own = self._own.get((type_, suffix))
+        text = own.text if own else None
+        if part and text is None:
+            text = ros_packages().text(type_, "srv" if suffix == ".srv" else "action")
+            if text is None:
+                return None
+        try:
+            full = (
+                MessageType(type_).definition
+                if text is None
+                else full_definition(type_, DIVIDER.split(text)[PARTS[suffix].index(part)], self._find)
+            )
+            types = parse(type_, full)
+        except (ValueError, IndexError):
+            return None
+        partial = {name for name in types if (found := self._own.get((name, ".msg"))) and not found.whole}
+        partial |= {type_} if own and not own.whole else set()
+        what = f"the {part} of {type_}" if part else type_
+        return Shape(what, types, frozenset(partial))
+
+    def _find(self, type_: str) -> str | None:
+        own = self._own.get((type_, ".msg"))
+        return own.text if own else None
+
+
+def own_texts(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str, str, OwnText]]:
+    """Yield each definition of a type that the rubric has: where, its type, the ending of its file."""
+    for index, criterion in as_maps(rubric.get("criteria")):
+        given = as_map(criterion.get("with"))
+        if criterion.get("check") == "topic-type" and isinstance(given.get("definition"), str):
+            path: KeyPath = ("criteria", index, "with", "definition")
+            yield path, str(given.get("type")), ".msg", OwnText(given["definition"], whole=True)
+        if criterion.get("check") == "definition":
+            file = PurePosixPath(str(given.get("file")))
+            package = criterion.get("package") or next(iter(packages_in(rubric)), "")
+            text = given.get("text")
+            own = OwnText(text, whole=True) if isinstance(text, str) and text else _of_fields(file, given)
+            if file.suffix in PARTS:
+                path = ("criteria", index, "with", "text" if own.whole else "fields")
+                yield path, f"{package}/{file.stem}", file.suffix, own
+    for name, scenario in as_map(rubric.get("scenarios")).items():
+        for at, _, one in services_in(as_map(scenario)):
+            if isinstance(one.get("definition"), str):
+                path = ("scenarios", name, *at, "definition")
+                yield path, str(one.get("type")), ".srv", OwnText(one["definition"], whole=True)
+
+
+def _of_fields(file: PurePosixPath, given: dict[str, Any]) -> OwnText:
+    lines: dict[str, list[str]] = {part: [] for part in PARTS.get(file.suffix, ())}
+    for name, kind in as_map(given.get("fields")).items():
+        part, _, bare = str(name).rpartition(".")
+        lines.get(part, []).append(f"{kind} {bare}")
+    return OwnText("\n---\n".join("\n".join(part) for part in lines.values()), whole=False)
+
+
+def services_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str, dict[str, Any]]]:
+    """Yield the services that a scenario calls or offers, where it says so, and the key of what it fills in."""
+    for key, part in (("calls", "request"), ("serves", "response")):
+        yield from (
+            ((key, n), part, one) for n, one in as_maps(scenario.get(key)) if one.get("action") is None
+        )
+    for index, step in as_maps(scenario.get("steps")):
+        if "call" in step:
+            yield ("steps", index, "call"), "request", as_map(step["call"])
+
+
+def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield fields that are not there, and values that they can never have."""
+    known = Definitions(rubric)
+    yield from _no_types(rubric, known)
+    scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
+    for index, criterion in as_maps(rubric.get("criteria")):
+        scenario = scenarios.get(str(criterion.get("scenario")), {})
+        given, path = as_map(criterion.get("with")), ("criteria", index, "with")
+        if criterion.get("check") == "stamps":
+            given = {"field": "header", STAMPED: True, **given}
+        yield from _judged_fields(path, given, known, rubric, scenario)
+        if criterion.get("check") == "topic-type":
+            yield from _other_type(path, given, rubric)
+        yield from _expected(path, criterion, known, scenario)
+        yield from _other_definitions(path, criterion, known, rubric)
+    for name, scenario in scenarios.items():
+        for at, fault in _sent_fields(scenario, known):
+            yield ("scenarios", name, *at), fault
+
+
+def _no_types(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
+    """Yield types of fields in the rubric's definitions that there are not, or not without their package."""
+    own_packages = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+    for path, type_, suffix, own in own_texts(rubric):
+        package = type_.partition("/")[0]
+        messages = known.messages_of(package)
+        for one in parse_interface(own.text.encode(), f"definition{suffix}").fields:
+            kind = one.type.partition("[")[0]
+            at = path if own.whole else (*path, _name(one))
+            if "/" in kind:
+                fault = ros_packages().type_fault(kind, "msg", own_packages) if own.whole else ""
+            elif kind.islower() or kind in {*BUILT_IN, *FULL_NAMES, *messages}:
+                fault = ""  # one that is none is said where it stands
+            else:
+                fault = _no_type(kind, package, messages)
+            if fault:
+                yield at, fault
+
+
+def _no_type(kind: str, package: str, messages: set[str]) -> str:
+    """Return why a type without a package is none of the package's own; empty where it may be."""
+    if near := slip_of(kind, [*FULL_NAMES, *messages, *sorted(BUILT_IN)]):
+        return f'there is no type "{kind}" (did you mean "{near}"?)'
+    owner = next((name for name in USUAL_PACKAGES if kind in noetic_messages().get(name, ())), "")
+    instead = f"write {owner}/{kind}, or {package}/{kind} for the package's own"
+    return f'"{kind}" without a package is one of {package}: {instead}' if owner else ""
+
+
+def _judged_fields(
+    path: KeyPath, given: dict[str, Any], known: Definitions, rubric: dict[str, Any], scenario: dict[str, Any]
+) -> Iterator[Fault]:
+    """Yield fields that no type of the topic has, and bounds and values that such a field never has."""
+    topic = given.get("topic")
+    if isinstance(topic, str):
+        types = sorted({kind for kind in types_of(topic, rubric, scenario) if isinstance(kind, str)})
+        named: list[tuple[KeyPath, object]] = [(("field",), given["field"])] if "field" in given else []
+        named += [(("fields", key), one) for key, one in as_map(given.get("fields")).items()]
+        for at, field in named:
+            faults = [_no_such(shape, field, given) if (shape := known.shape(kind)) else "" for kind in types]
+            usual = USUAL_TYPES.get(topic.rpartition("/")[2])
+            if not faults and usual and (shape := known.shape(usual)):
+                faults = [_no_such(shape._replace(partial=frozenset(shape.types)), field, {})]
+            if isinstance(field, str) and faults and all(faults):
+                yield (*path, *at), faults[0]
+        for key in COUNTED & given.keys():
+            kinds = [kind.partition("/")[2].lower() for kind in types if kind.startswith("std_msgs/")]
+            wrong = [_no_value(kind, given[key]) if limits_of(kind) else "" for kind in kinds]
+            if wrong and all(wrong) and len(wrong) == len(types):
+                yield (*path, key), f"data of {types[0]} {wrong[0]}"
+    for key, inner in given.items():
+        if isinstance(inner, dict):
+            yield from _judged_fields((*path, key), inner, known, rubric, scenario)
+
+
+def _other_type(path: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield a type that a topic has not elsewhere in the rubric: two types on one topic are never connected."""
+    topic, kind = given.get("topic"), str(given.get("type"))
+    own = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+    there = {str(one) for one in (kind, *types_of(str(topic), rubric))}
+    there = {one for one in there if not ros_packages().type_fault(one, "msg", own)}
+    others = sorted(there - {kind})
+    if isinstance(topic, str) and kind in there and others:
+        yield (*path, "type"), f"elsewhere in the rubric {topic} carries {join_words(others)}, not {kind}"
+
+
+def _no_such(shape: Shape, path: object, given: dict[str, Any]) -> str:
+    values = given.get("values")
+    judged = [given.get("value"), *(values if isinstance(values, list) else ())]
+    try:
+        field = shape.field_at(str(path))
+        if field is None:
+            return ""
+        for value in judged:
+            if value is not None:
+                shape.compare(field, value, str(path))
+    except Misfit as error:
+        return str(error)
+    return _no_bounds(field, given, f"{path} of {shape.what} is")
+
+
+def _no_bounds(field: Field, given: dict[str, Any], what: str) -> str:
+    """Return why a field is no stamp, or is never within the bounds."""
+    if STAMPED in given and field.type not in {"std_msgs/Header", "time"}:
+        return f"{what} {field.type}, no Header and no time"
+    bounds = {key: given[key] for key in ("min", "max") if isinstance(given.get(key), int | float)}
+    if not bounds:
+        return ""
+    if field.array:
+        return f"{what} a list: name one item with [0], or all with [*]"
+    if field.type == "string" or not field.primitive:
+        return f"{what} {field.type}, and bounds are for numbers"
+    low, high = limits_of(field.type) or (-math.inf, math.inf)
+    if bounds.get("min", low) > high or bounds.get("max", high) < low:
+        return f"{what} {field.type}, {low} to {high}: none of these is within the bounds"
+    return ""
+
+
+def types_of(topic: str, rubric: dict[str, Any], scenario: dict[str, Any] | None = None) -> Iterator[object]:
+    """Yield the types that the rubric gives a topic: those that it sends there or asks for, and that of a program of
+    the scenario."""
+    yield from ("tf2_msgs/TFMessage",) if topic in {"/tf", "/tf_static"} else ()
+    programs = topics_of_programs(scenario or {})
+    yield from (programs[topic],) if topic in programs else ()
+    for _, criterion in as_maps(rubric.get("criteria")):
+        given = as_map(criterion.get("with"))
+        if criterion.get("check") == "topic-type" and given.get("topic") == topic:
+            yield given.get("type")
+        yield from (left["type"] for name, left in as_map(given.get("topics")).items()
+                    if name == topic and as_map(left).get("type"))  # fmt: skip
+    for one in as_map(rubric.get("scenarios")).values():
+        sent = [probe for _, probe in as_maps(as_map(one).get("probes"))]
+        sent += [as_map(step.get("publish")) for _, step in as_maps(as_map(one).get("steps"))]
+        yield from (one.get("type") for one in sent if one.get("topic") == topic)
+
+
+def _expected(
+    path: KeyPath, criterion: dict[str, Any], known: Definitions, scenario: dict[str, Any]
+) -> Iterator[Fault]:
+    """Yield fields of requests, answers, goals and results that their types do not have."""
+    given, check = as_map(criterion.get("with")), criterion.get("check")
+    part = {"calls": "request", "service-answers": "response", "action-result": "result"}.get(str(check), "")
+    key, name = ("result", given.get("action")) if part == "result" else ("expect", given.get("service"))
+    services = [(one.get("service"), one) for _, _, one in services_in(scenario)]
+    actions = [
+        (one.get("name") or one.get("action"), one)
+        for one in (
+            *(as_map(step.get("action")) for _, step in as_maps(scenario.get("steps"))),
+            *(one for _, one in as_maps(scenario.get("serves")) if one.get("action")),
+        )
+    ]
+    of_action = part == "request" and any(name == called for called, _ in actions)
+    about = next((one for called, one in (*services, *actions) if called == name and name), None)
+    if not part or about is None:
+        return
+    shape = known.shape(str(about.get("type")), "goal" if of_action else part)
+    expected = given.get(key)
+    each = [((), expected)] if isinstance(expected, dict) else [((n,), one) for n, one in as_maps(expected)]
+    for at, one in each if shape else ():
+        assert shape is not None  # noqa: S101 - for the type checker
+        if fault := shape.misfit(one):
+            yield (*path, key, *at), fault
+
+
+def _sent_fields(scenario: dict[str, Any], known: Definitions) -> Iterator[tuple[KeyPath, str]]:
+    """Yield what is sent in messages, requests, answers and goals whose types the rubric alone knows."""
+    sent: list[tuple[KeyPath, str, str, object]] = []
+    for index, step in as_maps(scenario.get("steps")):
+        publish, action = as_map(step.get("publish")), as_map(step.get("action"))
+        at: KeyPath = ("steps", index, "publish")
+        values = publish.get("values")
+        sent += [((*at, "value"), str(publish.get("type")), "", publish.get("value"))]
+        sent += [((*at, "values", n), str(publish.get("type")), "", one) for n, one in as_maps(values)]
+        sent += [(("steps", index, "action", "goal"), str(action.get("type")), "goal", action.get("goal"))]
+    for at, part, one in services_in(scenario):
+        key = "answer" if part == "response" else part
+        if "definition" in one:
+            continue  # looked at with it
+        sent += [((*at, key), str(one.get("type")), part, one.get(key))]
+        sent += [((*at, "answers", n), str(one.get("type")), part, v) for n, v in as_maps(one.get("answers"))]
+    for index, one in as_maps(scenario.get("serves")):
+        kind = str(one.get("type"))
+        sent += [(("serves", index, "result"), kind, "result", one.get("result"))]
+        sent += [
+            (("serves", index, "feedback", n), kind, "feedback", v) for n, v in as_maps(one.get("feedback"))
+        ]
+    for at, kind, part, value in sent:
+        own = known.text(kind, SUFFIXES[part])
+        shape = known.shape(kind, part) if own and isinstance(value, dict) else None
+        if shape is not None and (fault := shape.misfit(value)):
+            yield at, fault
+
+
+def _other_definitions(
+    path: KeyPath, criterion: dict[str, Any], known: Definitions, rubric: dict[str, Any]
+) -> Iterator[Fault]:
+    """Yield fields that a criterion asks of a definition, and that another place in the rubric defines otherwise."""
+    given, file = as_map(criterion.get("with")), PurePosixPath(str(as_map(criterion.get("with")).get("file")))
+    if criterion.get("check") != "definition" or file.suffix not in PARTS:
+        return
+    package = criterion.get("package") or next(iter(packages_in(rubric)), "")
+    type_ = f"{package}/{file.stem}"
+    own = known.text(type_, file.suffix)
+    if own is None or not own.whole or not all(known.shape(type_, part) for part in PARTS[file.suffix]):
+        return
+    try:
+        found = {_name(one): one.type for one in parse_definition(own.text, file.suffix)}
+    except ValueError:  # said where it stands
+        return
+    for name, kind in as_map(given.get("fields")).items():
+        if name not in found:
+            fault = f"the rubric's definition of {type_} has no {name}{_instead(str(name), found)}"
+            yield (*path, "fields", name), fault
+        elif found[name] != kind:
+            yield (
+                (*path, "fields", name),
+                f"is {found[name]} in the rubric's definition of {type_}, not {kind}",
+            )
+
+
+def _name(one: InterfaceField) -> str:
+    return f"{one.part}.{one.name}" if one.part else one.name

@@ -1,0 +1,127 @@
+"""Names in a rubric that one line alone has: those that may be a slip, and those that surely are one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from grader.checks.support.topics import SYSTEM_TOPICS
+from grader.rubric.message_fields import types_of
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.wording import is_one_edit
+
+ONE_NAME = re.compile(
+    r"/[A-Za-z][\w/]*|[\w./-]*\.(?:py|cpp|launch|ya?ml|csv|txt|bag|pgm|urdf|srv|msg|action)"
+)
+"""A topic, a service, a node or a parameter, and a file of the student's."""
+PLAIN_NAMES = {"script", "parent", "child", "publisher", "subscriber"}
+"""Keys of names that have neither a slash nor an ending: programs in C++, nodes and frames."""
+FIELDS = {"result", "expect", "request", "goal", "answer", "feedback"}
+"""Keys of maps from fields to values."""
+CHARS_MIN = 3
+"""Of names of so few letters, one that differs in a letter is another name."""
+PROSE = {"title", "handout", "hint", "reproduce"}
+
+
+def doubtful_names(data: object, folder: Path) -> Iterator[Fault]:
+    """Yield the names that one line alone has, and no file in the rubric's folder. Such a name may be right, or a slip
+    that no other line shows."""
+    for path, text, near in _named_once(data, folder):
+        if not near:
+            yield path, f"nothing else in the rubric names {text}: is it spelt as in the handout?"
+
+
+def misspelt_names(data: object, folder: Path) -> Iterator[Fault]:
+    """Yield those of them that are one letter off from a name that other lines have."""
+    for path, text, near in _named_once(data, folder):
+        if near:
+            fault = f'nothing else in the rubric names {text} (did you mean "{near}"?): '
+            yield path, fault + "if it is right, say it in the handout too"
+
+
+def _named_once(data: object, folder: Path) -> Iterator[tuple[KeyPath, str, str]]:
+    """Yield each name that one line alone has, and the name that is meant by it, "" where none is known."""
+    rubric, texts = as_map(data), list(texts_in((), data))
+    programs = {text.rpartition("/")[2] for path, text in texts if path[-1] == "program"}
+    names = [(path, text, last) for path, text in texts if (last := _last_word(path, text, rubric))]
+    names = [one for one in names if not PROSE & {*one[0]}]
+    handout = str(rubric.get("handout"))
+    words = {word for path, text in texts if not PROSE & {*path} for word in re.findall(r"\w+", text)}
+    for path, text, last in names:
+        if text in SYSTEM_TOPICS or (folder / text).is_file() or not programs.isdisjoint(text.split("/")):
+            continue
+        if _count(last, text, texts) == 1:
+            known = (
+                [other for _, other, _ in names if other.startswith("/")] if text.startswith("/") else words
+            )
+            word = text if text.startswith("/") else last
+            near = next(
+                (one for one in sorted(known) if is_slip(word, one) and _count(one, one, texts) > 1), ""
+            )
+            quoted = [one for one in re.findall(r"`[/~]?(\w+)`", handout) if is_slip(last, one)]
+            yield path, text, near or next(iter(quoted), "")
+        elif text.startswith("/") and _count(text, text, texts) == 1:
+            known = [other for _, other, _ in names if _is_slip_in_path(text, other, texts)]
+            yield from ((path, text, one) for one in known[:1])
+
+
+def _count(word: str, name: str, texts: list[tuple[KeyPath, str]]) -> int:
+    """Return how often a word is there. `steps` is a word of prose too, `/steps` is not."""
+    end = rf"{re.escape(word)}(?!\w)"
+    whole = re.compile(rf"(?<!\w){end}")
+    in_prose = re.compile(rf"[/~`_]{end}") if name.startswith("/") and not word.startswith("/") else whole
+    return sum(len((in_prose if PROSE & {*at} else whole).findall(one)) for at, one in texts)
+
+
+def is_slip(word: str, other: str) -> bool:
+    """Return whether a word is one letter off from another: `talker2` is not, and words of two letters are none."""
+    plain, other_plain = re.sub(r"\d", "", word), re.sub(r"\d", "", other)
+    return (
+        plain != other_plain
+        and min(len(word), len(other)) >= CHARS_MIN
+        and max(len(word), len(other)) > CHARS_MIN
+        and is_one_edit(word, other)
+    )
+
+
+def _is_slip_in_path(name: str, other: str, texts: list[tuple[KeyPath, str]]) -> bool:
+    """Return whether one part of a name with slashes is one letter off. The last part has to be the same, or the other
+    name to be there more than once."""
+    parts, others = name.split("/"), other.split("/")
+    differing = [pair for pair in zip(parts, others, strict=False) if pair[0] != pair[1]]
+    if len(parts) != len(others) or len(differing) != 1 or not is_slip(*differing[0]):
+        return False
+    return parts[-1] == others[-1] or _count(other, other, texts) > 1
+
+
+def _last_word(path: KeyPath, text: str, rubric: dict[str, Any]) -> str:
+    """Return the part of a name by which others would know it; "" for a text that is no name of the student's."""
+    if ONE_NAME.fullmatch(text) or (path[-1] in PLAIN_NAMES and text != path[-1]):
+        return PurePosixPath(text).stem
+    is_field = FIELDS & {*path[:-1]} and text == path[-1]
+    return text.rpartition(".")[2].partition("[")[0] if is_field or _is_own_field(path, rubric) else ""
+
+
+def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
+    """Return whether a field of a message type is meant that the student or the course defines."""
+    if len(path) != 4 or path[-2:] != ("with", "field"):
+        return False
+    own = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+    criterion = next((one for index, one in as_maps(rubric.get("criteria")) if index == path[1]), {})
+    topic = as_map(criterion.get("with")).get("topic")
+    return any(str(kind).partition("/")[0] in own for kind in types_of(str(topic), rubric))
+
+
+def texts_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, str]]:
+    """Yield all texts in a part of a rubric, keys too, each with its place."""
+    if isinstance(value, str):
+        yield path, value
+    elif isinstance(value, dict):
+        for key, inner in value.items():
+            yield (*path, key), str(key)
+            yield from texts_in((*path, key), inner)
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            yield from texts_in((*path, index), inner)

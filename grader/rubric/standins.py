@@ -1,0 +1,185 @@
+"""Simulators that come with the grader, as rubrics use them: their topics and types, and the parameters they read."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, as_texts
+from grader.wording import closest
+
+LIKELY, SURE = 0.7, 0.85
+
+
+class Program(NamedTuple):
+    """A program's node, its topics with their types, those on which it alone publishes, and its private parameters: all
+    of them where the grader alone has it, while an installed one may have others."""
+
+    node: str
+    topics: Mapping[str, str]
+    published: re.Pattern[str]
+    params: frozenset[str]
+    is_installed: bool = False
+
+
+PROGRAMS: Mapping[str, Program] = {
+    "turtlesim/turtlesim_node": Program(
+        "turtlesim",
+        {
+            "/turtle1/cmd_vel": "geometry_msgs/Twist",
+            "/turtle1/pose": "turtlesim/Pose",
+            "/turtle1/color_sensor": "turtlesim/Color",
+        },
+        re.compile(r"/turtle\d+/(pose|color_sensor)"),
+        frozenset({"background_r", "background_g", "background_b"}),
+        is_installed=True,
+    ),
+    "robot_world/robot_world": Program(
+        "robot_world",
+        {
+            "/cmd_vel": "geometry_msgs/Twist",
+            "/scan": "sensor_msgs/LaserScan",
+            "/base_scan": "sensor_msgs/LaserScan",
+            "/odom": "nav_msgs/Odometry",
+            "/base_pose_ground_truth": "nav_msgs/Odometry",
+            "/collision": "std_msgs/Bool",
+        },
+        re.compile(r"/(scan|base_scan|odom|base_pose_ground_truth|collision)"),
+        frozenset({
+            "angle_max", "angle_min", "boxes", "cmd_vel_timeout", "laser_frame", "laser_x", "map", "max_angular",
+            "max_linear", "noise", "odom_hz", "radius", "range_max", "range_min", "robot", "samples", "scan_hz",
+            "scan_topic", "seed", "start", "walls",
+        }),
+    ),
+}  # fmt: skip
+OTHERS_SCAN = {"/base_scan": {"turtlebot3": "/scan"}, "/scan": {"stage": "/base_scan"}}
+"""By a topic that one robot of the robot world has, that of the other robot."""
+
+
+def topics_of_programs(scenario: dict[str, Any]) -> dict[str, str]:
+    """Return the topics, with their types, of the programs that a scenario starts. Arguments may rename them."""
+    starts = [start for _, start in as_maps(scenario.get("start")) if not start.get("args")]
+    programs = [PROGRAMS[program] for start in starts if (program := str(start.get("program"))) in PROGRAMS]
+    return {topic: kind for program in programs for topic, kind in program.topics.items()}
+
+
+def only_publisher(topic: str, scenario: dict[str, Any]) -> str:
+    """Return the program of the grader's that publishes there, and no one else would; "" for none."""
+    programs = {
+        str(start.get("program")) for _, start in as_maps(scenario.get("start")) if not start.get("args")
+    }
+    return next(
+        (name for name, p in PROGRAMS.items() if name in programs and p.published.fullmatch(topic)), ""
+    )
+
+
+def parameter_faults(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    """Yield parameters that a scenario sets for a program that reads none of that name, or no such value."""
+    nodes: dict[str, Program] = {}
+    for index, start in as_maps(scenario.get("start")):
+        program = PROGRAMS.get(str(start.get("program")))
+        if program is None:
+            continue
+        args = [(number, *text.partition(":=")[::2]) for number, text in as_texts(start.get("args"))]
+        given = {name: value.strip("/") for _, name, value in args}
+        nodes[f"{given.get('__ns', '')}/{given.get('__name', program.node)}".strip("/")] = program
+        for number, name, _ in args:
+            if re.match("_[a-z]", name) and (fault := _no_parameter(program, name[1:])):
+                yield ("start", index, "args", number), fault
+    for at, one in set_in(scenario):
+        node, _, private = str(one.get("name")).strip("/").rpartition("/")
+        owner = next((name for name, program in nodes.items() if private in program.params), "")
+        if node in nodes and (fault := _no_parameter(nodes[node], private)):
+            yield (*at, "name"), fault
+        elif node in nodes and private in FORMS and "value" in one and not FORMS[private][1](one["value"]):
+            yield (*at, "value"), f"{private} is {FORMS[private][0]}"
+        elif not node and owner:
+            yield (*at, "name"), f"{owner} reads private parameters: write /{owner}/{private}"
+
+
+def set_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
+    """Yield the parameters that a scenario sets, and where."""
+    yield from ((("params", n), one) for n, one in as_maps(scenario.get("params")))
+    for index, step in as_maps(scenario.get("steps")):
+        if "set_param" in step:
+            yield ("steps", index, "set_param"), as_map(step["set_param"])
+
+
+def _no_parameter(program: Program, private: str) -> str:
+    if private in program.params:
+        return ""
+    near = closest(private, program.params, cutoff=LIKELY)
+    if program.is_installed and not near:
+        return ""
+    instead = f' (did you mean "{near}"?)' if near else f": it has {', '.join(sorted(program.params))}"
+    return f"{program.node} has no parameter {private}{instead}"
+
+
+def _are_numbers(value: object, count: int) -> bool:
+    return isinstance(value, list) and len(value) == count and all(isinstance(n, int | float) for n in value)
+
+
+def _are_all(value: object, is_one: Callable[[object], bool], at_least: int = 0) -> bool:
+    return isinstance(value, list) and len(value) >= at_least and all(map(is_one, value))
+
+
+FORMS: Mapping[str, tuple[str, Callable[[object], bool]]] = {
+    "robot": ("turtlebot3 or stage", lambda value: value in ["turtlebot3", "stage"]),
+    "start": ("[x, y, heading], in metres and radians", lambda value: _are_numbers(value, 3)),
+    "boxes": ("[[x0, y0, x1, y1], …]", lambda value: _are_all(value, lambda box: _are_numbers(box, 4))),
+    "walls": (
+        "[[[x, y], [x, y], …], …], lines of two points and more",
+        lambda value: _are_all(
+            value, lambda line: _are_all(line, lambda point: _are_numbers(point, 2), at_least=2)
+        ),
+    ),
+}
+"""What a parameter of the robot world has to be."""
+
+
+def asked_faults(
+    given: dict[str, Any], scenario: dict[str, Any], named: Collection[str]
+) -> Iterator[tuple[KeyPath, str]]:
+    """Yield what a criterion asks of such a program and it does not have. The rest of the rubric names the topics in
+    `named`."""
+    for at, topic in _topics(given):
+        if topic not in named and (near := _near_topic(topic, scenario)):
+            yield at, f'no program of the scenario has {topic} (did you mean "{near}"?)'
+    nodes = {program.node: program for program in PROGRAMS.values()}
+    topic = str(given.get("topic"))
+    for key, is_publisher in (("publisher", True), ("subscriber", False)):
+        node = nodes.get(str(given.get(key)))
+        if node and topic in node.topics and bool(node.published.fullmatch(topic)) != is_publisher:
+            does = "hears what comes" if is_publisher else "publishes"
+            yield (
+                (key,),
+                f"{node.node} {does} on {topic}, and {'sends' if is_publisher else 'hears'} nothing there",
+            )
+    for name in as_map(given.get("params")):
+        for _, program in as_texts(given.get("programs")):
+            known = PROGRAMS[program].params if program in PROGRAMS else ()
+            private = str(name).rpartition("/")[2]
+            near = "" if private in known else closest(private, known, cutoff=SURE)
+            if near:
+                yield ("params", name), f'{program} has no parameter {private} (did you mean "{near}"?)'
+
+
+def _topics(given: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    if isinstance(given.get("topic"), str):
+        yield ("topic",), given["topic"]
+    yield from ((("topics", index), topic) for index, topic in as_texts(given.get("topics")))
+    for key, inner in given.items():
+        yield from (((key, *at), topic) for at, topic in _topics(as_map(inner)))
+
+
+def _near_topic(topic: str, scenario: dict[str, Any]) -> str:
+    """Return the topic of one of the scenario's programs for which this one stands; "" where it is none of theirs."""
+    topics = topics_of_programs(scenario)
+    if topic not in topics:
+        others = [one for one in topics if re.sub(r"\d+", "1", topic) != one]  # /turtle2/pose is another's
+        return closest(topic, others, cutoff=SURE)
+    values = {str(one.get("name")).strip("/"): one.get("value") for _, one in set_in(scenario)}
+    robot = str(values.get("robot_world/robot", "turtlebot3"))
+    renamed = "robot_world/scan_topic" in values
+    return OTHERS_SCAN.get(topic, {}).get(robot, "") if not renamed else ""

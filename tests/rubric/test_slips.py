@@ -1,0 +1,359 @@
+"""Slips in the examples' rubrics: each is refused with its line and what to write, before any student is graded."""
+
+from __future__ import annotations
+
+import ast
+import random
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from grader.errors import RubricError
+from grader.ros_packages import STANDINS
+from grader.rubric.find import rubrics_folder
+from grader.rubric.load import load_rubric
+from grader.rubric.standins import PROGRAMS as PROGRAMS_KNOWN
+from tests.rubric.samples import faults
+
+
+@pytest.fixture(scope="module")
+def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the examples, with what lies beside them."""
+    return shutil.copytree(rubrics_folder() / "examples", tmp_path_factory.mktemp("rubrics") / "examples")
+
+
+def _spoiled(examples: Path, name: str, old: str, new: str) -> Path:
+    text = (examples / f"{name}.yaml").read_text(encoding="utf-8")
+    assert old in text
+    path = examples / "spoiled.yaml"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return path
+
+
+FIELDS = [
+    ("tf-broadcaster", "transforms[*].header", "transforms.header",
+     ("47: criteria[4].with.field: tf2_msgs/TFMessage: transforms is a list: write transforms[0].header, or "
+     "transforms[*].header")),
+    ("tf-broadcaster", "topic: /distance, field: data", 'topic: /tf, field: "transforms[0].translation.x"',
+     ("51: criteria[6].with.field: transforms[0] of tf2_msgs/TFMessage has no field translation "
+     '(did you mean "transform"?)')),
+    ("scan-to-cmd-vel", "field: linear.x, value: 0.2", "field: linear.X, value: 0.2",
+     '33: criteria[2].with.field: linear of geometry_msgs/Twist has no field X (did you mean "x"?)'),
+    ("avoid-obstacles", 'field: "ranges[0]"', 'field: "range[0]"',
+     '47: criteria[4].with.cause.field: sensor_msgs/LaserScan has no field range (did you mean "ranges"?)'),
+    ("own-message", "field: temperature", "field: temprature",
+     '39: criteria[6].with.field: thermometer/Reading has no field temprature (did you mean "temperature"?)'),
+    ("own-message", "within_s: 0.1", "within_s: 0.1, field: temperature",
+     "37: criteria[5].with.field: temperature of thermometer/Reading is float64, no Header and no time"),
+    ("own-message", "field: temperature, min: 10, max: 30", "field: state, min: 256",
+     "39: criteria[6].with.field: state of thermometer/Reading is uint8, 0 to 255: none of these is within the bounds"),
+    ("own-message", "field: temperature", "field: header.frame_id",
+     "39: criteria[6].with.field: header.frame_id of thermometer/Reading is string, and bounds are for numbers"),
+    ("two-packages", "{temperature: 29}", "{temprature: 29}",
+     ("24: scenarios.alarm.steps[0].publish.values[0]: weather_msgs/Reading has no field temprature "
+     '(did you mean "temperature"?)')),
+    ("two-packages", "{temperature: 29}", "{temperature: warm}",
+     "24: scenarios.alarm.steps[0].publish.values[0]: temperature of weather_msgs/Reading is a number, not 'warm'"),
+    ("action-server", "goal: {target: 5}", "goal: {tagret: 5}",
+     ("21: scenarios.goals.steps[0].action.goal: the goal of counting/Count has no field tagret "
+     '(did you mean "target"?)')),
+    ("action-server", "result: {total: 5}", "result: {totl: 5}",
+     '33: criteria[3].with.result: the result of counting/Count has no field totl (did you mean "total"?)'),
+    ("action-server", "result: {total: 5}", "result: {total: 3000000000}",
+     ("33: criteria[3].with.result: total of the result of counting/Count is int32, -2147483648 to 2147483647, "
+     "and never 3e+09")),
+    ("service-client", "response.sum", "response.total",
+     ("38: criteria[1].with.fields.response.total: the rubric's definition of adder/Add has no response.total "
+     '(did you mean "response.sum"?)')),
+    ("service-client", "response.sum: int64", "response.sum: int32",
+     "38: criteria[1].with.fields.response.sum: is int64 in the rubric's definition of adder/Add, not int32"),
+    ("service-own-type", "{result: 0.5, changed: false}", "{result: 0.5, changed: 0}",
+     "48: criteria[3].with.expect[2]: changed of the response of own_service/Clamp is true or false, not 0"),
+    ("latched-map", "value: [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]", "value: [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 200]",
+     "45: criteria[6].with.field: data[11] of nav_msgs/OccupancyGrid is int8, -128 to 127, and never 200"),
+]  # fmt: skip
+"""Fields that a message does not have, and values that a field never has."""
+PROGRAMS = [
+    ("avoid-obstacles", "/robot_world/walls", "/robot_world/wall",
+     '19: scenarios.room.params[0].name: robot_world has no parameter wall (did you mean "walls"?)'),
+    ("avoid-obstacles", "/robot_world/boxes", "/boxes",
+     "20: scenarios.room.params[1].name: robot_world reads private parameters: write /robot_world/boxes"),
+    ("avoid-obstacles", "[1.8, 1.2, 2.3, 1.7]", "[1.8, 1.2]",
+     "20: scenarios.room.params[1].value: boxes is [[x0, y0, x1, y1], …]"),
+    ("avoid-obstacles", "start, value: [0.6, 0.6, 0.0]", "robot, value: turtlebot",
+     "21: scenarios.room.params[2].value: robot is turtlebot3 or stage"),
+    ("avoid-obstacles", "robot_world/robot_world}", 'robot_world/robot_world, args: ["_radus:=0.2"]}',
+     '23: scenarios.room.start[0].args[0]: robot_world has no parameter radus (did you mean "radius"?)'),
+    ("avoid-obstacles", "steps: [wait", "steps: [set_param: {name: /robot_world/nois, value: 0.1}, wait",
+     '25: scenarios.room.steps[0].set_param.name: robot_world has no parameter nois (did you mean "noise"?)'),
+    ("avoid-obstacles", "cause: {topic: /scan", "cause: {topic: /base_scan",
+     '47: criteria[4].with.cause.topic: no program of the scenario has /base_scan (did you mean "/scan"?)'),
+    ("avoid-obstacles", "/base_pose_ground_truth", "/base_pose_groundtruth",
+     ("45: criteria[3].with.topic: no program of the scenario has /base_pose_groundtruth "
+      '(did you mean "/base_pose_ground_truth"?)')),
+    ("turtle-square", "/square/side, value: 1.0", "/turtlesim/backgroud_r, value: 9",
+     '28: scenarios.restart.params[0].name: turtlesim has no parameter backgroud_r (did you mean "background_r"?)'),
+    ("turtle-square", "publisher: square, subscriber: turtlesim", "publisher: turtlesim, subscriber: square",
+     "75: criteria[2].with.publisher: turtlesim hears what comes on /turtle1/cmd_vel, and sends nothing there"),
+    ("turtle-square", '[/turtle1/cmd_vel, "/square/*"]', '[/turtle/cmd_vel, "/square/*"]',
+     ("130: criteria[8].with.topics[0]: no program of the scenario has /turtle/cmd_vel "
+      '(did you mean "/turtle1/cmd_vel"?)')),
+    ("turtle-square",
+     "check: path\n    with: {topic: /turtle1/pose, points: [[0, 0], [2, 0], [2, 1]], tolerance_m: 0.3}",
+     ("check: launch-runs\n    "
+      "with: {launch: turtle.launch, programs: [turtlesim/turtlesim_node], params: {bckground_r: 9}}"),
+     ("170: criteria[12].with.params.bckground_r: turtlesim/turtlesim_node has no parameter bckground_r "
+      '(did you mean "background_r"?)')),
+]  # fmt: skip
+"""Parameters and topics that the grader's programs do not have."""
+DEFINITIONS = [
+    ("own-message", "header: Header,", "header: Headr,",
+     '28: criteria[1].with.fields.header: there is no type "Headr" (did you mean "Header"?)'),
+    ("own-message", "temperature: float64", "temperature: Float64",
+     '28: criteria[1].with.fields.temperature: there is no type "Float64" (did you mean "float64"?)'),
+    ("own-message", "temperature: float64", "temperature: Pose",
+     ('28: criteria[1].with.fields.temperature: "Pose" without a package is one of thermometer: write '
+      "geometry_msgs/Pose, or thermometer/Pose for the package's own")),
+    ("own-message", "state: uint8}", "state: uint8, OK: uint8}",
+     "26: criteria[1].with: OK is a field and a constant"),
+    ("own-message", "type: thermometer/Reading}", "type: thermometer/Reading, definition: 'Headr header'}",
+     '33: criteria[3].with.definition: there is no type "Headr" (did you mean "Header"?)'),
+    ("own-message", "type: thermometer/Reading}", "type: thermometer/Reading, definition: geometry_msgs/Pos at}",
+     ('33: criteria[3].with.definition: geometry_msgs has no message type "Pos" '
+      '(did you mean "Pose"?)')),
+    ("two-packages", "topic: /reading, type: weather_msgs/Reading}, scenario",
+     "topic: /reading, type: std_msgs/Float64}, scenario",
+     ("40: criteria[4].with.type: elsewhere in the rubric /reading carries weather_msgs/Reading, "
+      "not std_msgs/Float64")),
+]  # fmt: skip
+"""Types that there are not."""
+FRAMES = [
+    ("tf-broadcaster", "with: {parent: base_link", "with: {parent: /base_link",
+     ("45: criteria[3].with.parent: must be a frame without blanks or a slash before it, as tf2 has them, like "
+      'base_link, not "/base_link"')),
+    ("tf-broadcaster", "transform: {parent: base_link", "transform: {parent: /base_link",
+     ("34: scenarios.distance.steps[0].transform.parent: tf2 has no frame that begins with a slash: "
+      "write base_link")),
+    ("tf-broadcaster", "frame_id: odom}", "frame_id: /odom}",
+     ("25: scenarios.frames.steps[0].publish.value.header.frame_id: tf2 has no frame that begins with a slash: "
+      "write odom")),
+    ("own-message", "frame_id: thermometer}", "frame_id: /thermometer}",
+     "37: criteria[5].with.frame_id: tf2 has no frame that begins with a slash: write thermometer"),
+    ("tf-broadcaster", "topic: /distance, field: data, value: 5, tolerance: 0.01",
+     'topic: /tf, field: "transforms[0].child_frame_id", value: /laser',
+     "51: criteria[6].with.value: tf2 has no frame that begins with a slash: write laser"),
+    ("tf-broadcaster", "with: {parent: odom, child: base_link", "with: {parent: base_link, child: odom",
+     ("43: criteria[2].with.parent: odom is the parent elsewhere in the rubric, and base_link the child: a frame has "
+      "one parent")),
+    ("tf-broadcaster", "rotation_deg: [0, 0, 90]", "rotation_deg: [0, 0, 1.5708]",
+     ("35: scenarios.distance.steps[1].transform.rotation_deg: 1.5708 is 90 degrees in radians: "
+      "write 90")),
+    ("tf-broadcaster", "from: 0, to: 90", "from: 0, to: -3.14",
+     ("27: scenarios.frames.steps[0].publish.value.pose.pose.orientation.rpy_deg: -3.14 is -180 degrees in radians: "
+      "write -180")),
+    ("tf-broadcaster", "pose_of: /odom, static: false", "pose_of: /odom, static: true",
+     "43: criteria[2].with: pose_of is not for a static transform: it is sent once, and stays"),
+    ("tf-broadcaster", "pose_of: /odom", "pose_of: /odm",
+     ("43: criteria[2].with.pose_of: nothing in frames sends on /odm, and no other criterion names it "
+      '(did you mean "/odom"?)')),
+]  # fmt: skip
+"""Frames that tf does not have, and angles in another unit."""
+SCENARIOS = [
+    ("action-server", "cancel_after_s: 1", "cancel_after_s: 15",
+     ("22: scenarios.goals.steps[1].action.cancel_after_s: 15 s is not before limit_s, 15 s, after which the run goes "
+      "on: nothing is cancelled")),
+    ("action-server", "cancel_after_s: 1, ", "",
+     "37: criteria[5].with.status: no step cancels goal 2 of /count: give its step cancel_after_s"),
+    ("record-and-replay", "at_least: 15", "at_least: 150",
+     "38: criteria[3].with.topics./steps.at_least: record ends after 30 messages on /steps"),
+    ("own-message", "rate_hz: 20", "rate_hz: 0.05",
+     ("35: criteria[4].with.rate_hz: at 0.05 Hz a message comes each 20 s, and window_s is 6 s: it is messages a "
+      "second")),
+    ("latched-map", "start: [{name: mapper, script: scripts/mapper.py}]", "start: [{name: mapper, script: mapper}]",
+     "22: scenarios.map.start[0].script: the rubric names mapper.py elsewhere: write it with its ending"),
+    ("latched-map", "/mapper/width", "~width",
+     "19: scenarios.map.params[0].name: ~width is private to the grader: write /, the node's name, and /width"),
+    ("scan-to-cmd-vel", '"ranges[*]", max: 0.5', '"ranges[*]", min: 0.5, max: 0.1',
+     "40: criteria[3].with.cause: min, 0.5, is more than max, 0.1"),
+    ("scan-to-cmd-vel", "{number} m", "{nubmer} m",
+     "54: criteria[5].with.text: {nubmer} stands for nothing here: write {number}"),
+    ("scan-to-cmd-vel", "{number} m", "{value} m",
+     "54: criteria[5].with.text: {value} stands for nothing here: write {number}"),
+]  # fmt: skip
+"""Scenarios that cannot show what a criterion asks for, and texts without a place for it."""
+COUNTERS = [
+    ("maximum: 127, wraps: 2", "maximum: 300, wraps: 2",
+     "151: criteria[12].with.maximum: data of std_msgs/Int8 is int8, -128 to 127, and never 300"),
+    ("minimum: 0, maximum: 127", "minimum: 127, maximum: 0",
+     "151: criteria[12].with: minimum, 127, is not less than maximum, 0"),
+    ("wraps: 2", "wraps: 5", "151: criteria[12].with.wraps: wraps ends after 258 messages, and 5 wraps take 641"),
+    ("258", "100", "151: criteria[12].with.wraps: wraps ends after 100 messages, and 2 wraps take 257"),
+]  # fmt: skip
+"""Slips in the rubric of a lab with a counter."""
+REMAPS = [
+    ("params-and-namespaces", "state:=light", "stat:=light",
+     '30: scenarios.garage.start[0].args[1]: nothing else in the rubric names stat (did you mean "state:=light"?)'),
+    ("params-and-namespaces", "state:=light", "state:=lihgt",
+     ("30: scenarios.garage.start[0].args[1]: nothing else in the rubric names /garage/lihgt "
+      '(did you mean "state:=/garage/light"?)')),
+    ("params-and-namespaces", "state:=light", "state:=/light",
+     ("30: scenarios.garage.start[0].args[1]: nothing else in the rubric names /light "
+      '(did you mean "state:=/garage/light"?)')),
+    ("params-and-namespaces", "_color:=", "color:=",
+     ("30: scenarios.garage.start[0].args[2]: color is a parameter, and this remaps a topic: write _color:=bbbbbbb "
+      "(made up: other)")),
+    ("params-and-namespaces", "__ns:=", "__nss:=",
+     '30: scenarios.garage.start[0].args[0]: ROS has no __nss (did you mean "__ns"?)'),
+    ("params-and-namespaces", "__ns:=", "_ns:=",
+     "30: scenarios.garage.start[0].args[0]: ROS reads __ns:=garage, with two underscores"),
+    ("service-client", '"20000000000"', '"operands:=terms"',
+     "27: scenarios.slow.start[0].args[0]: nothing else in the rubric names operands or terms"),
+    ("avoid-obstacles", "robot_world/robot_world}", 'robot_world/robot_world, args: ["laser:=/front"]}',
+     ("23: scenarios.room.start[0].args[0]: robot_world has no topic laser: it has base_pose_ground_truth, base_scan, "
+      "cmd_vel, collision, odom and scan")),
+]  # fmt: skip
+"""Arguments that remap nothing of which the rubric speaks."""
+NAMES = [
+    ("record-and-replay", "topics: {/steps", "topics: {/step", "38: criteria[3].with.topics./step", "/step", "/steps"),
+    ("turtle-square", "publisher: square", "publisher: sqare", "75: criteria[2].with.publisher", "sqare", "square"),
+    ("turtle-square", "with: {name: /square/side", "with: {name: /sqare/side", "111: criteria[6].with.name",
+     "/sqare/side", "/square/side"),
+    ("turtle-square", "topic: /square/status", "topic: /square/statu", "121: criteria[7].with.topic",
+     "/square/statu", "status"),
+    ("cpp-and-python", "script: average", "script: averge", "22: scenarios.tests.start[0].script", "averge", "average"),
+    ("service-client", "file: srv/Add.srv", "file: srv/Adds.srv", "38: criteria[1].with.file", "srv/Adds.srv", "Add"),
+]  # fmt: skip
+"""Names that one line alone has, and that are a letter off."""
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "fault"), [*FIELDS, *PROGRAMS, *DEFINITIONS, *FRAMES, *SCENARIOS, *REMAPS]
+)
+def test_a_slip_is_refused(examples: Path, name: str, old: str, new: str, fault: str) -> None:
+    assert faults(_spoiled(examples, name, old, new)) == [f"spoiled.yaml:{fault}"]
+
+
+@pytest.mark.parametrize(("old", "new", "fault"), COUNTERS)
+def test_a_counter_that_no_message_shows_is_refused(old: str, new: str, fault: str, tmp_path: Path) -> None:
+    text = (rubrics_folder() / "leeds-comp3631-lab1.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "lab.yaml"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    assert faults(path)[0] == f"lab.yaml:{fault}"
+
+
+def test_a_rubric_that_names_no_fields_loads_no_definitions() -> None:
+    """They take a quarter of a second, of the second within which a student sees the first verdict."""
+    load = "import sys; from grader.rubric.load import load_rubric; load_rubric(sys.argv[1])"
+    command = f"{load}; print('numpy' in sys.modules)"
+    lab = str(rubrics_folder() / "leeds-comp3631-lab1.yaml")
+    done = subprocess.run([sys.executable, "-c", command, lab], capture_output=True, check=True, text=True)
+    assert done.stdout == "False\n"
+
+
+@pytest.mark.parametrize("slip", NAMES, ids=lambda slip: slip[4])
+def test_a_name_that_is_a_letter_off_is_refused(examples: Path, slip: tuple[str, ...]) -> None:
+    name, old, new, where, word, meant = slip
+    fault = f'nothing else in the rubric names {word} (did you mean "{meant}"?): if it is right, say it in the handout'
+    path = _spoiled(examples, name, old, new)
+    assert faults(path) == [f"spoiled.yaml:{where}: {fault} too"]
+    text = path.read_text(encoding="utf-8").replace("handout: >\n", f"handout: >\n  It is called `{word}`.\n")
+    path.write_text(text, encoding="utf-8")
+    assert load_rubric(str(path)).rubric.id == name, "the handout names it"
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("own-message", "field: temperature", "field: humidity"),
+        ("two-packages", "{temperature: 29}", "{temperature: 29, wind: 3}"),
+        ("scan-to-cmd-vel", "field: linear.x, value: 0.2", "field: twist.linear.x, value: 0.2"),
+        ("tf-broadcaster", "transforms[*].header", "transforms[*].header.stamp"),
+        ("action-server", "result: {total: 5}", "result: {total: 5, seconds: 1}"),
+        ("own-message", "temperature: float64", "temperature: thermometer/Pose"),
+        ("own-message", "temperature: float64", "temperature: Celsius"),
+        ("tf-broadcaster", "rotation_deg: [0, 0, 90]", "rotation_deg: [0, 0, 1.5]"),
+        ("params-and-namespaces", '"state:=light"', '"state:=light", "~color:=red"'),
+        ("turtle-square", "topic: /turtle1/pose, points", "topic: /turtle2/pose, points"),
+        ("avoid-obstacles", "start, value: [0.6, 0.6, 0.0]", "map, value: package://rooms/room.yaml"),
+        ("turtle-square", "/square/side, value: 1.0", "/turtlesim/holonomic, value: true"),
+    ],
+)
+def test_what_may_be_right_is_taken(examples: Path, name: str, old: str, new: str) -> None:
+    assert load_rubric(str(_spoiled(examples, name, old, new))).rubric.id == name
+
+
+def test_the_parameters_of_the_robot_world_are_known() -> None:
+    """The program itself runs on ROS's Python alone: its source is read."""
+    source = (STANDINS / "robot_world" / "world_node.py").read_text(encoding="utf-8")
+    tables = [node.value for node in ast.parse(source).body
+              if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) in {"ROBOTS", "SHARED"}]  # fmt: skip
+    keys = [
+        key for table in tables for one in ast.walk(table) if isinstance(one, ast.Dict) for key in one.keys
+    ]
+    named = {key.value for key in keys if isinstance(key, ast.Constant)}
+    asked = set(re.findall(r'get_param\("~(\w+)"', source))
+    program = PROGRAMS_KNOWN["robot_world/robot_world"]
+    assert program.params == (named - {"turtlebot3", "stage"}) | asked
+    documented = (Path(__file__).parents[2] / "docs/how-to/robot-world.md").read_text(encoding="utf-8")
+    table = documented[documented.index("| parameter |") :]
+    rows = "".join(line.split("|")[1] for line in table.splitlines() if line.startswith("| `"))
+    assert program.params == set(re.findall(r"`(\w+)`", rows))
+
+
+def test_a_bag_with_a_topic_that_is_a_letter_off_is_refused(examples: Path) -> None:
+    text = (examples / "record-and-replay.yaml").read_text(encoding="utf-8")
+    path = examples / "spoiled.yaml"
+    path.write_text(text.replace("/steps", "/stepss"), encoding="utf-8")
+    (fault,) = faults(path)
+    assert fault.startswith(
+        "spoiled.yaml:24: scenarios.replay.steps[0].play.bag: walk.bag has /steps, and the rubric"
+    )
+
+
+ODD = [
+    None,
+    [],
+    {},
+    [[1]],
+    {"a": {}},
+    "",
+    "/",
+    0,
+    1e300,
+    True,
+    ":=",
+    "{number}",
+    "a/b",
+    [None],
+    {"field": [1]},
+]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_no_value_of_its_key_is_refused_and_ends_nothing(examples: Path, seed: int) -> None:
+    choice = random.Random(seed).choice  # noqa: S311 - no secret
+    files = sorted(path for path in examples.glob("*.yaml") if path.name != "spoiled.yaml")
+    for _ in range(20):
+        data = yaml.safe_load(choice(files).read_text(encoding="utf-8"))
+        part, key = choice(list(_places(data)))
+        part[key] = choice(ODD)
+        path = examples / "spoiled.yaml"
+        path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
+        with suppress(RubricError):
+            assert load_rubric(str(path)).rubric.criteria
+
+
+def _places(value: object) -> Iterator[tuple[Any, Any]]:
+    for key in (
+        range(len(value)) if isinstance(value, list) else list(value) if isinstance(value, dict) else ()
+    ):
+        yield value, key
+        yield from _places(value[key])
