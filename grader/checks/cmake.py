@@ -64,7 +64,7 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         absent = failed(NO_FILE, expected=expected, measured="no file", hint=hint)
         return absent.model_copy(update={"cause": NO_FILE})
     # what is missing may stand behind the line that cannot be read
-    wrong = [one for one in _wrong(facts, names) if facts.fault is None or one[2] is not None]
+    wrong = [one for one in _wrong(facts, names) if facts.fault is None or one.line is not None]
     named = [c for c in facts.calls if c.name in {"project", "find_package", "catkin_package"}]
     measured = ", ".join(f"{c.name}({' '.join(c.args[:3])})" for c in named[:6]) or "none of the three calls"
     fault = facts.fault
@@ -72,14 +72,14 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         places = tuple(FileCitation(file=c.file, line=c.line) for c in named[:3])
         all_there = passed(f"{facts.file} has all three calls")
         return all_there.about(expected=expected, measured=measured, citations=places)
-    lines = tuple(FileCitation(file=facts.file, line=line) for _, _, line in wrong)
+    lines = tuple(FileCitation(file=facts.file, line=one.place) for one in wrong)
     if fault:
         lines = (*lines, FileCitation(file=fault.file, line=fault.line))
     return failed(
-        f"{facts.file}: {'; '.join([*_fault(fault), *(message for message, _, _ in wrong)])}",
+        f"{facts.file}: {'; '.join([*_fault(fault), *(one.why for one in wrong)])}",
         expected=expected,
         measured=measured,
-        hint="; ".join([*_repair_of(fault), *(hint for _, hint, _ in wrong)]),
+        hint="; ".join([*_repair_of(fault), *(f"{one.fix}{_below(one.below)}" for one in wrong)]),
         citations=tuple(dict.fromkeys(lines)),
     )
 
@@ -101,41 +101,53 @@ def _misspelt(facts: CMakeFacts, name: str) -> CMakeCall | None:
     return next((call for call in facts.calls if meant_command(call.name) == name), None)
 
 
-def _respell(call: CMakeCall, name: str) -> tuple[str, str, int]:
-    return f"line {call.line}: there is no command {call.name}(…)", f"write {name} for {call.name}", call.line
+class Wrong(NamedTuple):
+    """What is wrong, how to fix it, and in which line; or what is missing, and the call below which it goes."""
+
+    why: str
+    fix: str
+    line: int | None = None
+    below: CMakeCall | None = None
+
+    @property
+    def place(self) -> int | None:
+        """The line to look at."""
+        return self.below.line if self.below is not None else self.line
 
 
-def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str, int | None]]:
-    """Yield what is missing or wrong, how to fix it, and the line."""
+def _respell(call: CMakeCall, name: str) -> Wrong:
+    why = f"line {call.line}: there is no command {call.name}(…)"
+    return Wrong(why, f"write {name} for {call.name}", call.line)
+
+
+def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
+    """Yield what is wrong or missing."""
     wanted = names[0]
     project = _first(facts, "project")
     if project is None and (slip := _misspelt(facts, "project")):
         yield _respell(slip, "project")
     elif project is None:
-        yield "project(…) is missing", f"add project({wanted})", None
+        yield Wrong("project(…) is missing", f"add project({wanted})")
     elif not project.args or project.args[0] not in names:
         name = project.args[0] if project.args else ""
         message = f"line {project.line}: project({name}) differs from the package's name {wanted}"
-        yield message, f"write project({wanted})", project.line
+        yield Wrong(message, f"write project({wanted})", project.line)
     packages = [c for c in facts.calls if c.name == "find_package"]
     if slip := _misspelt(facts, "find_package"):
         yield _respell(slip, "find_package")
     elif not any(c.args[:1] == ("catkin",) for c in packages):
         slip = next((c for c in packages if c.args and c.args[0].casefold() == "catkin"), None)
-        other = f" (line {slip.line} says {slip.args[0]})" if slip else ""
-        line = slip.line if slip else None
-        fix = (
-            f"write catkin in place of {slip.args[0]}"
-            if slip
-            else f"add find_package(catkin REQUIRED){_below(project)}"
-        )
-        yield f"find_package(catkin …) is missing{other}", fix, line
+        why = "find_package(catkin …) is missing"
+        if slip is None:
+            yield Wrong(why, "add find_package(catkin REQUIRED)", below=project)
+        else:
+            why = f"{why} (line {slip.line} says {slip.args[0]})"
+            yield Wrong(why, f"write catkin in place of {slip.args[0]}", slip.line)
     if slip := _misspelt(facts, "catkin_package"):
         yield _respell(slip, "catkin_package")
     elif _first(facts, "catkin_package") is None:
         above = next((c for c in packages if c.args[:1] == ("catkin",)), project)
-        fix = f"add catkin_package(){_below(above)}"
-        yield "catkin_package(…) is missing", fix, None
+        yield Wrong("catkin_package(…) is missing", "add catkin_package()", below=above)
 
 
 def _below(call: CMakeCall | None) -> str:
@@ -158,7 +170,7 @@ class Lack(NamedTuple):
     """Why a script is not installed, how to fix that, and the line; `{}` in both stands for the scripts.
 
     `path` is where the script lies. `unsure` where only CMake could tell; `follows` where it follows from a missing
-    `catkin_package()`, which gives the destination its value.
+    `catkin_package()`, which gives the destination its value; `uncalled` where nothing installs any script.
     """
 
     why: str
@@ -167,6 +179,7 @@ class Lack(NamedTuple):
     path: str = ""
     unsure: bool = False
     follows: bool = False
+    uncalled: bool = False
 
 
 @check("cmake-install", params=CMakeInstallParams, run_anyway=True)
@@ -218,6 +231,8 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
         hint="; ".join(_fixes(lacks)),
         citations=cited or (FileCitation(file=facts.file),),
     )
+    if all(lack.uncalled for lack in lacks.values()):
+        found = found.seeking("call", PYTHON)
     right = [script for script in params.scripts if script not in lacks]
     return found.in_part(len(right) / len(params.scripts), join_words(right))
 
@@ -284,8 +299,8 @@ def _why_unnamed(
         )
     of_python = [one for one in all_named if one.call.name == PYTHON]
     if not of_python and package.cmake and (slip := _misspelt(package.cmake, PYTHON)):
-        why, fix, line = _respell(slip, PYTHON)
-        return Lack(f"{why}, so nothing installs {{}}", fix, FileCitation(file=slip.file, line=line))
+        why, fix = _respell(slip, PYTHON)[:2]
+        return Lack(f"{why}, so nothing installs {{}}", fix, FileCitation(file=slip.file, line=slip.line))
     if not of_python:
         return _without_call(package, all_named, path)
     names = {PurePosixPath(one.path).name: one for one in of_python if not _is_there(package, one)}
@@ -321,9 +336,16 @@ def _without_call(package: PackageFacts, all_named: Sequence[Installed], path: s
     ):
         why = f"line {of_programs.call.line}: install(PROGRAMS …) does not name {{}}"
         return Lack(why, "write {} into it, after PROGRAMS", _line(of_programs), path)
+    why = f"{NOT_CALLED}, so nothing installs {{}}"
     above = _first(package.cmake, "catkin_package") if package.cmake else None
-    below = _below(above) or " below catkin_package()"
-    return Lack(f"{NOT_CALLED}, so nothing installs {{}}", f"{fix}{below}", None, path)
+    line = FileCitation(file=above.file, line=above.line) if above else None
+    return Lack(why, f"{fix}{below_catkin_package(package)}", line, path, uncalled=True)
+
+
+def below_catkin_package(package: PackageFacts) -> str:
+    """Return where the call that installs scripts goes, as the end of a hint."""
+    above = _first(package.cmake, "catkin_package") if package.cmake else None
+    return _below(above) or " below catkin_package()"
 
 
 def _folder_above(all_named: Sequence[Installed], path: str) -> Installed | None:

@@ -376,7 +376,7 @@ def _page(
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
     if absence := refusal(run, package):
-        return failed(absence.why, hint=absence.hint, citations=absence.citations)
+        return absence.verdict(absence.why)
     slip = _unread_variable(package, build, file, params)
     hint = f"{slip.file}: {slip.fix}" if slip else hint
     return failed(f"the script opens nothing in {params.program}{_words(package, file, run)}", hint=hint)

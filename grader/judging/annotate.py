@@ -10,11 +10,12 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 
-from grader.checks.cmake import NOT_CALLED
+from grader.checks.cmake import NOT_CALLED, below_catkin_package
 from grader.checks.messages import code_of
 from grader.checks.support.console_output import probes_on
 from grader.checks.support.exit_causes import NO_INPUT, RATE, SYNTAX, name_slip, syntax_hint
 from grader.checks.support.launch import (
+    NOT_STARTED,
     find_launch,
     node_slip,
     not_executable,
@@ -346,7 +347,7 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     if file is None or file.fault is not None:
         return
     refused = refusal(run, package) if isinstance(run, Run) else None
-    if refused is not None and "first line" not in refused.hint and not any(refusals(package, file)):
+    if refused is not None and refused.refused != NOT_STARTED and not any(refusals(package, file)):
         yield f"{refused.hint}: {refused.why}"
     yield from unset_arg_fixes(file, refused.hint if refused is not None else "")
     nodes = [one for one in file.brings if one.type in names]
@@ -410,8 +411,8 @@ def cite_words(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run)
         for number, text in enumerate(build.file_lines(path)[:_LINES_READ], 1)
         if len(text) <= LINE_CHARS and not text.lstrip().startswith(("#", "//"))
     ]
-    said = f"{verdict.measured} {verdict.message.partition(', not ')[0]} {verdict.message.partition(' it prints ')[2]}"
-    found = lines_that_set(lines, str(field)) if field else lines_that_say(lines, said)
+    said = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
+    found = lines_that_set(lines, str(field)) if field else said
     if field or criterion.check == "message":
         published = lines_that_publish(lines, str(criterion.parameters.get("topic", "")))
         # of several, the one that is published; of none, what is published has nothing of it
@@ -430,8 +431,8 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
     if not verdict.status.is_lost or package is None or package.cmake is None:
         return verdict
     lines = build.file_lines(CMAKE)[:_LINES_READ]
-    if (below := _BELOW.search(verdict.hint)) and verdict.citations == (FileCitation(file=CMAKE),):
-        return _cite_install(verdict, lines, int(below[1] or 0) or None)
+    if called := verdict.sought_name("call"):
+        return _cite_install(verdict, package, commented_call(lines, called))
     found = commented_calls(package, lines, verdict.hint)
     if not found:
         return verdict
@@ -451,38 +452,31 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
 CMAKE = "CMakeLists.txt"
 
 
-def _cite_install(verdict: Verdict, lines: Sequence[str], below: int | None) -> Verdict:
-    place = commented_call(lines, PYTHON) if NOT_CALLED in verdict.message else None
+def _cite_install(verdict: Verdict, package: PackageFacts, place: tuple[int, int] | None) -> Verdict:
     if place is None:
-        return verdict.model_copy(update={"citations": (FileCitation(file=CMAKE, line=below),)})
+        return verdict
     where = lines_text(*place)
     update = {
         "message": verdict.message.replace(NOT_CALLED, f"{NOT_CALLED}: it is commented out in {where}", 1),
-        "hint": f"in place of {where} {_BELOW.sub('', verdict.hint)}, without # before it",
+        "hint": f"in place of {where} {verdict.hint.removesuffix(below_catkin_package(package))}, without # before it",
         "citations": (FileCitation(file=CMAKE, line=place[0] + 1),),
     }
     return verdict.model_copy(update=update)
 
 
-_BELOW = re.compile(r" below (?:the )?\w+\(…?\)(?: of line (\d+))?$")
-_NO_PACKAGE = re.compile(r"roslaunch starts nothing: there is no package (\w+)")
-_UNDECLARED = re.compile(r" does not declare (\w+) as a run-time dependency")
-_LACKED = re.compile(r": it needs the package (\w+), which this grading machine lacks")
-
-
 def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | None, build: Run) -> Verdict:
     """Return the verdict; one on a package that roslaunch does not find cites the lines of the launch file that name
     it."""
-    absent = _NO_PACKAGE.search(verdict.message)
+    absent = verdict.sought_name("package")
     file = find_launch(package, str(criterion.parameters.get("launch", ""))) if package and absent else None
-    if file is None or absent is None or not verdict.status.is_lost:
+    if file is None or not verdict.status.is_lost:
         return verdict
-    name = re.compile(rf"""\$\(find\s+{absent[1]}\)|pkg\s*=\s*["']{absent[1]}["']""")
+    name = re.compile(rf"""\$\(find\s+{re.escape(absent)}\)|pkg\s*=\s*["']{re.escape(absent)}["']""")
     lines = [n for n, text in enumerate(build.file_lines(file.path)[:_LINES_READ], 1) if name.search(text)]
     if not lines:
         return verdict
     where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))}"
-    hint = f"write the package's exact name in {where}, push {absent[1]} if it is your own, or leave that out"
+    hint = f"write the package's exact name in {where}, push {absent} if it is your own, or leave that out"
     cited = tuple(FileCitation(file=file.path, line=n) for n in lines)
     return verdict.model_copy(update={"hint": hint, "citations": cited})
 
@@ -491,20 +485,21 @@ def cite_name(verdict: Verdict, build: Run) -> Verdict:
     """Return the verdict; one on a dependency cites the line that has its name: a tag that is commented out, or that of
     a `find_package(…)` over several lines."""
     place = next((one for one in verdict.citations if isinstance(one, FileCitation) and one.line), None)
-    undeclared, lacked = _UNDECLARED.search(verdict.message), _LACKED.search(verdict.message)
+    undeclared, lacked = verdict.sought_name("dependency"), verdict.sought_name("component")
     if place is None or place.line is None or not (undeclared or lacked):
         return verdict
+    message, hint = verdict.message, verdict.hint
     lines = [text[:LINE_CHARS] for text in build.file_lines(place.file)[:_LINES_READ]]
     if undeclared:
-        tag = re.compile(rf"\s*<!--\s*<(depend|exec_depend|run_depend)>\s*{undeclared[1]}\s*</\1>\s*-->")
+        name = re.escape(undeclared)
+        tag = re.compile(rf"\s*<!--\s*<(depend|exec_depend|run_depend)>\s*{name}\s*</\1>\s*-->")
         line = next((number for number, text in enumerate(lines, 1) if tag.match(text)), None)
-        message = f"{verdict.message}: line {line} has it in a comment"
+        message = f"{message}: line {line} has it in a comment"
         hint = f"remove `<!--` and `-->` from line {line}"
     else:
-        name = re.compile(rf"[^#]*\b{lacked[1] if lacked else ''}\b")
+        word = re.compile(rf"[^#]*\b{re.escape(lacked)}\b")
         inside = enumerate(lines[place.line - 1 :], place.line)
-        line = next((number for number, text in inside if name.match(text)), None)
-        message, hint = verdict.message, verdict.hint
+        line = next((number for number, text in inside if word.match(text)), None)
     if line is None:
         return verdict
     cited = tuple(

@@ -93,12 +93,13 @@ class BuildError(NamedTuple):
 
 class Explained(NamedTuple):
     """The error in a student's words, and what to do; `of_machine`: the grading machine lacks something; `place`: the
-    line that is wrong, where that is not the one that the build names."""
+    line that is wrong, where that is not the one that the build names; `lacks`: the package that it lacks."""
 
     why: str
     hint: str
     of_machine: bool = False
     place: FileCitation | None = None
+    lacks: str = ""
 
 
 def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | None:
@@ -228,6 +229,7 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
             f"it needs the package {name}, which this grading machine lacks",
             install_hint(name, lines),
             of_machine=True,
+            lacks=name,
         )
     meant = f"write {near[0]}" if near else "correct its name or remove it"
     hint = (
