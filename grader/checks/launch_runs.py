@@ -162,7 +162,7 @@ def _absent(package: PackageFacts, run: Run, nodes: Sequence[str], absent: Seque
         why = not_started(*unstarted.values())
     else:
         why = why_not_up(package, run, absent[0])
-    said = "" if why.citations or why.unbuilt or "roslaunch says" in why.why else quoted(run)
+    said = "" if why.citations or why.unbuilt or quoted(run) in why.why else quoted(run)
     if not why.citations:
         why = why._replace(citations=(FileCitation(file=absent[0].file, line=absent[0].line),))
     name = "" if several else f"{absent[0].full_name}: "

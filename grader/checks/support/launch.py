@@ -80,13 +80,15 @@ _REFUSALS = (
 
 
 class Slip(NamedTuple):
-    """What is wrong with a line of a launch file, and what to write. `of_manifest`: the manifest's name is at fault."""
+    """What is wrong with a line of a launch file, and what to write. `of_manifest`: the manifest's name is at fault;
+    `refused`: roslaunch starts nothing at all."""
 
     file: str
     line: int
     why: str
     fix: str
     of_manifest: bool = False
+    refused: bool = False
 
     def verdict(self, said: str = "") -> Verdict:
         """Return the verdict with what roslaunch said (`said`) at the end."""
@@ -183,7 +185,8 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
         stem = PurePosixPath(node.type or "<file>.py").stem
         own = {"pkg": package.name, "type": f"{node.name or '<file>'}.py", "name": stem}
         add = " ".join(f'{name}="{own[name]}"' for name in missing)
-        return _slip(node, f"<node> has no {join_words(missing)}{told}", fix or f"add {add} to the <node>")
+        why = f"<node> has no {join_words(missing)}{told}"
+        return _slip(node, why, fix or f"add {add} to the <node>")._replace(refused=True)
     pkg, name = str(node.pkg), str(node.type)
     if path := next((a for a in ("pkg", "type") if "$(find" in str(getattr(node, a))), None):
         return _slip(
@@ -216,7 +219,7 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
     seen: dict[str, LaunchNode] = {}
     for node in file.brings:
         slip = node_slip(package, node)
-        if slip is not None and slip.why.startswith("<node> has no"):
+        if slip is not None and slip.refused:
             yield slip
         elif "/" in (node.name or ""):
             fix = f'write name="{PurePosixPath(str(node.name)).name}"; a namespace goes into ns="…"'
