@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Literal
 
 from pydantic import Field
+from typing_extensions import TypedDict, Unpack
 
 from grader.model.record import Record
 
@@ -196,89 +197,41 @@ def share_text(share: float) -> str:
     return {1.0: "all", 0.5: "half"}.get(share, f"{share * 100:.0f} %")
 
 
-def passed(
-    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
-) -> Verdict:
+class Details(TypedDict, total=False):
+    """What a verdict may say beside its message."""
+
+    expected: str
+    measured: str
+    hint: str
+    citations: Citations
+
+
+def passed(message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that earns all points."""
-    return _verdict(
-        Status.PASS, 1.0, message, expected=expected, measured=measured, hint=hint, citations=citations
-    )
+    return Verdict(status=Status.PASS, score=1.0, message=message, **details)
 
 
-def partial(
-    score: float,
-    message: str,
-    *,
-    expected: str = "",
-    measured: str = "",
-    hint: str = "",
-    citations: Citations = (),
-) -> Verdict:
+def partial(score: float, message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that earns the share `score`, 0 to 1, of the points."""
-    return _verdict(
-        Status.PARTIAL, score, message, expected=expected, measured=measured, hint=hint, citations=citations
-    )
+    return Verdict(status=Status.PARTIAL, score=score, message=message, **details)
 
 
-def failed(
-    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
-) -> Verdict:
+def failed(message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that earns nothing."""
-    return _verdict(
-        Status.FAIL, 0.0, message, expected=expected, measured=measured, hint=hint, citations=citations
-    )
+    return Verdict(status=Status.FAIL, score=0.0, message=message, **details)
 
 
-def unjudged(
-    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
-) -> Verdict:
+def unjudged(message: str, **details: Unpack[Details]) -> Verdict:
     """Return the verdict that there is nothing to judge: a fail, or `blocked` where a required criterion
     explains it."""
-    verdict = _verdict(
-        Status.FAIL, 0.0, message, expected=expected, measured=measured, hint=hint, citations=citations
-    )
-    return verdict.model_copy(update={"unjudged": True})
+    return Verdict(status=Status.FAIL, score=0.0, message=message, unjudged=True, **details)
 
 
-def inconclusive(
-    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
-) -> Verdict:
+def inconclusive(message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that is still open, for no fault of the student's."""
-    return _verdict(
-        Status.INCONCLUSIVE,
-        0.0,
-        message,
-        expected=expected,
-        measured=measured,
-        hint=hint,
-        citations=citations,
-    )
+    return Verdict(status=Status.INCONCLUSIVE, score=0.0, message=message, **details)
 
 
-def machine_lacks(
-    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
-) -> Verdict:
+def machine_lacks(message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that is open until the grading machine has what it lacks."""
-    verdict = inconclusive(message, expected=expected, measured=measured, hint=hint, citations=citations)
-    return verdict.model_copy(update={"of_machine": True})
-
-
-def _verdict(
-    status: Status,
-    score: float,
-    message: str,
-    *,
-    expected: str,
-    measured: str,
-    hint: str,
-    citations: Citations,
-) -> Verdict:
-    return Verdict(
-        status=status,
-        score=score,
-        message=message,
-        expected=expected,
-        measured=measured,
-        hint=hint,
-        citations=citations,
-    )
+    return Verdict(status=Status.INCONCLUSIVE, score=0.0, message=message, of_machine=True, **details)
