@@ -11,7 +11,15 @@ from pydantic import Field
 
 from grader.checks.registry import PackageName, check
 from grader.checks.support.build_errors import misspelt_cmake_lists
-from grader.checks.support.scripts import PYTHON, Installed, copies_of, installed, is_bin, names_script
+from grader.checks.support.scripts import (
+    PYTHON,
+    Installed,
+    cmake_calls,
+    copies_of,
+    installed,
+    is_bin,
+    names_script,
+)
 from grader.checks.support.text import near_names, shown
 from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts, meant_command
 from grader.model.record import Record
@@ -271,7 +279,8 @@ def _why_misplaced(package: PackageFacts, one: Installed) -> Lack:
     if one.kind != "PROGRAMS":
         why = f"{where}: catkin_install_python(…) does not begin with the word PROGRAMS"
         return Lack(why, f"write catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(one))
-    if "DESTINATION" in one.call.args and not one.destination and not _has_call(package, "catkin_package"):
+    empty = "DESTINATION" in one.call.args and not one.destination
+    if empty and not cmake_calls(package, "catkin_package"):
         why = f"{where}: {BIN} has no value, because catkin_package() is not called before it"
         return Lack(why, "call catkin_package() above catkin_install_python(…)", _line(one), follows=True)
     if one.destination is None:
@@ -337,14 +346,14 @@ def _without_call(package: PackageFacts, all_named: Sequence[Installed], path: s
         why = f"line {of_programs.call.line}: install(PROGRAMS …) does not name {{}}"
         return Lack(why, "write {} into it, after PROGRAMS", _line(of_programs), path)
     why = f"{NOT_CALLED}, so nothing installs {{}}"
-    above = _first(package.cmake, "catkin_package") if package.cmake else None
+    above = next(iter(cmake_calls(package, "catkin_package")), None)
     line = FileCitation(file=above.file, line=above.line) if above else None
     return Lack(why, f"{fix}{below_catkin_package(package)}", line, path, uncalled=True)
 
 
 def below_catkin_package(package: PackageFacts) -> str:
     """Return where the call that installs scripts goes, as the end of a hint."""
-    above = _first(package.cmake, "catkin_package") if package.cmake else None
+    above = next(iter(cmake_calls(package, "catkin_package")), None)
     return _below(above) or " below catkin_package()"
 
 
@@ -353,10 +362,6 @@ def _folder_above(all_named: Sequence[Installed], path: str) -> Installed | None
     above = PurePosixPath(path).parent.as_posix()
     folders = (one for one in all_named if one.kind == "DIRECTORY")
     return next((one for one in folders if names_script(one, above)), None)
-
-
-def _has_call(package: PackageFacts, name: str) -> bool:
-    return package.cmake is not None and any(call.name == name for call in package.cmake.calls)
 
 
 def _line(one: Installed) -> FileCitation:

@@ -525,7 +525,11 @@ def _broken(found: Traceback, package: PackageFacts) -> str:
         for name in file.path.split("/")[-2:]
         if file.python and not name.startswith("__init__")
     }
-    shadowed = own - {_stem(f.file) for f in found.own_frames} - {"src", "scripts", "nodes", "bin"}
+    shadowed = (
+        own
+        - {f.file.rpartition("/")[2].partition(".")[0] for f in found.own_frames}
+        - {"src", "scripts", "nodes", "bin"}
+    )
     return "" if shadowed & words else f"{last.file}, line {last.line}"
 
 
@@ -533,10 +537,6 @@ def _imported(found: Traceback) -> str:
     """Return the student's line that imports something, if it was the last of the student's to be run."""
     source = found.own_frames[-1].source if found.own_frames else ""
     return source if re.match(r"(import|from)\s", source) else ""
-
-
-def _stem(path: str) -> str:
-    return path.rpartition("/")[2].partition(".")[0]
 
 
 def process_tracebacks(
