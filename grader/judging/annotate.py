@@ -150,6 +150,7 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
     """Return the verdicts; where there was nothing to judge of a node, the hint goes on with what its source shows of
     the criteria that were not reached."""
     later: dict[str, list[str]] = {}
+    retyped: dict[str, tuple[str, str]] = {}
     for criterion in rubric.criteria:
         verdict = verdicts[criterion.id]
         package = facts.package_of(criterion)
@@ -171,8 +172,10 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
         ):
             told += unset_arg_fixes(file, verdict.hint)
         elif verdict.unjudged or verdict.of_machine or criterion.check in OF_TOPICS:
-            told += Later(criterion, verdict, package, facts).faults()
-    return {name: _with_later(verdict, later.get(name, ())) for name, verdict in verdicts.items()}
+            own_later = Later(criterion, verdict, package, facts)
+            told += own_later.faults()
+            retyped |= own_later.retyped
+    return {name: _with_later(verdict, later.get(name, ()), retyped) for name, verdict in verdicts.items()}
 
 
 def _of_its_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: Rubric) -> str | None:
@@ -188,17 +191,17 @@ def _imports_again(fix: str, hint: str) -> bool:
     return bool(code) and fix.endswith("at the top") and all(f"`{one}`" in hint for one in code)
 
 
-_OTHER_TYPE = re.compile(r"(?:publish|subscribe with) (\w+)/(\w+) in .*, not (\w+)")
-
-
-def _with_later(verdict: Verdict, later: Iterable[str]) -> Verdict:
+def _with_later(verdict: Verdict, later: Iterable[str], retyped: Mapping[str, tuple[str, str]]) -> Verdict:
     hint, said = verdict.hint, in_language(verdict.hint, "python")
     new = [one for one in dict.fromkeys(later) if one.removeprefix("publish ") not in said]
     told = [one for one in new if not _imports_again(one, hint)]
     if not told or not hint:
         return verdict
-    for other in filter(None, map(_OTHER_TYPE.fullmatch, told)):  # what is not wanted is not imported first
-        hint = re.sub(rf"from \w+\.msg import {other[3]}\b", f"from {other[1]}.msg import {other[2]}", hint)
+    for wanted, other in (
+        retyped[one] for one in told if one in retyped
+    ):  # what is not wanted is not imported
+        package, _, name = wanted.partition("/")
+        hint = re.sub(rf"from \w+\.msg import {other}\b", f"from {package}.msg import {name}", hint)
     if verdict.of_machine:
         hint = f"{join_words(told)}. {hint.replace(NOTHING_TO_DO, 'For the rest, ', 1)}"
         return verdict.model_copy(update={"hint": hint})
@@ -220,6 +223,8 @@ class Later:
         self._slips += self._texts_of_cpp()
         self._ran = not verdict.cause
         """Names are told already then, and only what is behind them is not."""
+        self.retyped: dict[str, tuple[str, str]] = {}
+        """Of faults of a type: the one that the lab wants, and the one that the script has."""
 
     def faults(self) -> Iterator[str]:
         """Yield how each is repaired."""
@@ -279,7 +284,7 @@ class Later:
         types = [one for one in self._of("publisher-type") if one.line in lines or len(published) <= 1]
         types = types if not (self._ran and lines) else []
         if len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
-            yield f"publish {kind} in {_line(types[0])}, not {types[0].message}"
+            yield self._retype("publish", kind, types[0])
 
     def _heard(self) -> Iterator[str]:
         scenario = self._rubric.scenarios.get(self._criterion.scenario or "")
@@ -292,7 +297,7 @@ class Later:
             yield f"subscribe to {self._topic} in {_line(heard[0])}, not to {heard[0].message}"
         other = sent and len(types) == 1 and types[0].message != own
         if other and (elsewhere or (not heard and f"/{types[0].message}" not in self._verdict.message)):
-            yield f"subscribe with {sent[0]} in {_line(types[0])}, not {types[0].message}"
+            yield self._retype("subscribe with", sent[0], types[0])
         template, said = str(self._wanted.get("template", VALUE)), self._of("prints")
         said = [one for one in said if SAID_DATA in one.message]
         unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
@@ -304,6 +309,11 @@ class Later:
             yield f"print '{in_words(template)}'"
         elif other and not said and len(self._of("prints")) == 1:  # a field that the right type does not have
             yield f"print the `data` of the message in {_line(self._of('prints')[0])}"
+
+    def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> str:
+        fault = f"{verb} {wanted} in {_line(slip)}, not {slip.message}"
+        self.retyped[fault] = wanted, slip.message
+        return fault
 
     def _lacks_words(self, words: str) -> bool:
         """Return whether the words stand in no line of the sources, which are known."""
