@@ -50,21 +50,22 @@ _TAGS = re.compile(
     re.DOTALL,
 )
 _MESSAGE_CHARS_MAX = 300
+_TAGS_MAX = 2_000
 _OPENERS_A_TAG = 20
 _MESSAGES = 50
 _LAST_LINE = 65_535
 
 
 def parse_xml(
-    data: bytes, file: str, *, root: str, encoding: str | None = None, max_tags: int = 2_000
+    data: bytes, file: str, *, root: str, encoding: str | None = None
 ) -> tuple[etree._Element | None, Fault | None]:
     """Return the root element, or None and the fault. `root` is the tag that the file should begin with.
 
     `encoding` overrides what the file says of itself. Nothing that a file declares is expanded or fetched, and
-    nothing of more than `max_tags` tags is looked at.
+    nothing of more than `_TAGS_MAX` tags is looked at.
     """
-    if data.count(b"<") > _OPENERS_A_TAG * max_tags:
-        return None, _too_many(file, max_tags)
+    if data.count(b"<") > _OPENERS_A_TAG * _TAGS_MAX:
+        return None, _too_many(file)
     parser = _parser(encoding)
     try:
         element = etree.fromstring(data, parser)
@@ -74,19 +75,19 @@ def parse_xml(
     if dtd is not None and dtd.entities():  # type: ignore[union-attr] # lxml-stubs lack it
         cause = "`<!ENTITY ...>` is not read: delete the `<!DOCTYPE ...>` block and write the text out"
         return None, Fault(file=file, line=1, kind="Entity", message="declares entities", cause=cause)
-    if sum(1 for _ in element.iter(etree.Element)) > max_tags:
-        return None, _too_many(file, max_tags)
+    if sum(1 for _ in element.iter(etree.Element)) > _TAGS_MAX:
+        return None, _too_many(file)
     _set_first_lines(element, data)
     return element, None
 
 
-def parse_what_is_left(data: bytes, *, max_tags: int = 2_000) -> etree._Element | None:
+def parse_what_is_left(data: bytes) -> etree._Element | None:
     """Return what a lenient parser makes of a file that is not well-formed; None where that is nothing, or too much."""
     try:
         element = etree.fromstring(data, _parser(None, recover=True))
     except etree.XMLSyntaxError:
         return None
-    few = element is not None and sum(1 for _ in element.iter(etree.Element)) <= max_tags
+    few = element is not None and sum(1 for _ in element.iter(etree.Element)) <= _TAGS_MAX
     return element if few else None
 
 
@@ -103,8 +104,8 @@ def _parser(encoding: str | None, *, recover: bool = False) -> etree.XMLParser:
     )
 
 
-def _too_many(file: str, max_tags: int) -> Fault:
-    cause = f"`{file}` holds more than {max_tags} tags and was not read"
+def _too_many(file: str) -> Fault:
+    cause = f"`{file}` holds more than {_TAGS_MAX} tags and was not read"
     return Fault(file=file, line=None, kind="TooLarge", message="too many tags", cause=cause)
 
 
