@@ -197,9 +197,8 @@ def _with_later(verdict: Verdict, later: Iterable[str], retyped: Mapping[str, tu
     told = [one for one in new if not _imports_again(one, hint)]
     if not told or not hint:
         return verdict
-    for wanted, other in (
-        retyped[one] for one in told if one in retyped
-    ):  # what is not wanted is not imported
+    # what is not wanted is not imported first
+    for wanted, other in (retyped[one] for one in told if one in retyped):
         package, _, name = wanted.partition("/")
         hint = re.sub(rf"from \w+\.msg import {other}\b", f"from {package}.msg import {name}", hint)
     if verdict.of_machine:
@@ -440,10 +439,9 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
     in which it is commented out."""
     if not verdict.status.is_lost or package is None or package.cmake is None:
         return verdict
-    lines = build.file_lines(CMAKE)[:_LINES_READ]
     if called := verdict.sought_name("call"):
-        return _cite_install(verdict, package, commented_call(lines, called))
-    found = commented_calls(package, lines, verdict.hint)
+        return _cite_install(verdict, package, build, called)
+    found = commented_calls(package, build.file_lines(CMAKE)[:_LINES_READ], verdict.hint)
     if not found:
         return verdict
     told = "; ".join(f"{name}(…) is commented out in {lines_text(*place)}" for name, place in found.items())
@@ -462,14 +460,16 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
 CMAKE = "CMakeLists.txt"
 
 
-def _cite_install(verdict: Verdict, package: PackageFacts, place: tuple[int, int] | None) -> Verdict:
+def _cite_install(verdict: Verdict, package: PackageFacts, build: Run, called: str) -> Verdict:
+    file = next((one.file for one in verdict.citations if isinstance(one, FileCitation)), CMAKE)
+    place = commented_call(build.file_lines(file)[:_LINES_READ], called)
     if place is None:
         return verdict
     where = lines_text(*place)
     update = {
         "message": verdict.message.replace(NOT_CALLED, f"{NOT_CALLED}: it is commented out in {where}", 1),
         "hint": f"in place of {where} {verdict.hint.removesuffix(below_catkin_package(package))}, without # before it",
-        "citations": (FileCitation(file=CMAKE, line=place[0] + 1),),
+        "citations": (FileCitation(file=file, line=place[0] + 1),),
     }
     return verdict.model_copy(update=update)
 

@@ -222,6 +222,16 @@ def test_a_call_that_is_commented_out_is_named_by_its_lines(text: str, place: st
     assert found.hint == f"in place of {place} {call}, without # before it"
 
 
+def test_a_call_that_is_commented_out_is_looked_for_in_the_file_of_its_own_package() -> None:
+    own, other = "../lab2/CMakeLists.txt", "# catkin_install_python(PROGRAMS a DESTINATION b)\n"
+    texts = {"CMakeLists.txt": other, own: f"project(lab2)\n{other}"}
+    runs = build_runs({"runs": {"package": {"package": {"cmake": {"calls": []}}, "attachments": texts}}})
+    package = try_facts(rubric(CMAKE_CHECK), runs).package
+    place = FileCitation(file=own, line=1)
+    lost = failed("it is lost", citations=(place,)).seeking("call", "catkin_install_python")
+    assert cite_commented_call(lost, package, runs["package"]).citations == (FileCitation(file=own, line=2),)
+
+
 def commented(text: str, *interfaces: str) -> tuple[Run, PackageFacts]:
     """Return the build and the facts of a package with this CMakeLists.txt, whose calls are all comments."""
     package = {
