@@ -39,23 +39,9 @@ _HEADS = {
 _GAP = re.compile(r"(?<=[\w\")\]])\s+(?=[\w\"(\[{])")
 _CLOSED_ENOUGH = re.compile(r"([\w\")\]}]:?|\(:)$")
 _STATEMENTS = (
-    *(
-        "assert",
-        "break",
-        "class",
-        "continue",
-        "def",
-        "del",
-        "elif",
-        "else",
-        "except",
-        "finally",
-        "for",
-        "from",
-        "global",
-    ),
-    *("if", "import", "pass", "raise", "return", "try", "while", "with"),
-)
+    "assert", "break", "class", "continue", "def", "del", "elif", "else", "except", "finally", "for", "from", "global",
+    "if", "import", "pass", "raise", "return", "try", "while", "with",
+)  # fmt: skip
 _RESERVED = "|".join(keyword.kwlist[3:])
 PLAIN = str.maketrans(
     {

@@ -45,25 +45,9 @@ class Refers:
     """
 
     to: Literal[
-        "process",
-        "launch",
-        "program",
-        "message",
-        "service",
-        "field",
-        "sent",
-        "published",
-        "set",
-        "action",
-        "kept",
-        "served",
-        "rostest",
-        "watched_s",
-        "dependency",
-        "package",
-        "node",
-        "cause",
-    ]
+        "process", "launch", "program", "message", "service", "field", "sent", "published", "set", "action", "kept",
+        "served", "rostest", "watched_s", "dependency", "package", "node", "cause",
+    ]  # fmt: skip
 
 
 class Reference(NamedTuple):

@@ -29,28 +29,9 @@ ATTEMPTS = 3
 """A source that crashes Python costs its own repairs, not those of the others."""
 
 Cause = Literal[
-    "tabs",
-    "level",
-    "indent",
-    "braces",
-    "commented",
-    "python2",
-    "characters",
-    "token",
-    "global",
-    "outside",
-    "old-name",
-    "module",
-    "import",
-    "name",
-    "attribute",
-    "value",
-    "call",
-    "callback",
-    "guard",
-    "main",
-    "spin",
-]
+    "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
+    "old-name", "module", "import", "name", "attribute", "value", "call", "callback", "guard", "main", "spin",
+]  # fmt: skip
 CALLS = ("name", "attribute", "value", "call", "callback", "guard", "main", "spin")
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "import"), "missing-import"),
