@@ -15,7 +15,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -75,26 +75,26 @@ def module_command(name: str) -> list[str]:
     return [sys.executable, "-c", _MODULE.format(name)]
 
 
+def run_host_program(
+    command: Sequence[str], limit_s: float, data: bytes = b""
+) -> subprocess.CompletedProcess[bytes]:
+    """Run a program of this machine that reads `data`. Raises OSError, or TimeoutExpired after `limit_s`."""
+    return subprocess.run(
+        command, env=HOST_ENV, cwd="/", input=data, capture_output=True, check=False, timeout=limit_s
+    )
+
+
 @lru_cache(maxsize=4)
 def resolves(name: str) -> bool:
     """Return whether this machine knows an address of the host; by `getent`, since the resolver has no time limit.
     Where there is none, nothing is known, and that says yes."""
     command = [find_host_program("getent") or "/usr/bin/getent", "hosts", name]
     try:
-        done = subprocess.run(
-            command,
-            env=HOST_ENV,
-            cwd="/",
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            check=False,
-            timeout=RESOLVE_S,
-        )
+        return run_host_program(command, RESOLVE_S).returncode == 0
     except subprocess.TimeoutExpired:
         return False
     except OSError:
         return True
-    return done.returncode == 0
 
 
 @lru_cache(maxsize=32)

@@ -67,6 +67,30 @@ def noetic_messages() -> dict[str, dict[str, tuple[str, ...]]]:
     return found
 
 
+LIBRARIES = {
+    "PCL": "libpcl-dev",
+    "OpenCV": "libopencv-dev",
+    "Eigen3": "libeigen3-dev",
+    "Eigen": "libeigen3-dev",
+    "Boost": "libboost-all-dev",
+    "Qt5": "qtbase5-dev",
+    "yaml-cpp": "libyaml-cpp-dev",
+    "VTK": "libvtk9-dev",
+    "OpenGL": "libgl-dev",
+    "GLUT": "freeglut3-dev",
+    "SDL": "libsdl1.2-dev",
+    "SDL2": "libsdl2-dev",
+    "CURL": "libcurl4-openssl-dev",
+    "Ceres": "libceres-dev",
+    "Protobuf": "libprotobuf-dev",
+    "GTest": "libgtest-dev",
+    "Bullet": "libbullet-dev",
+    "octomap": "liboctomap-dev",
+    "TBB": "libtbb-dev",
+    "PythonLibs": "python3-dev",
+    "Curses": "libncurses-dev",
+}
+"""Libraries beside ROS that `find_package` finds, with Debian's packages."""
 TUTORIALS = frozenset({"beginner_tutorials", "learning_joy", "my_package", "package_name", "your_package"})
 """What handouts call a student's package: a name that is copied from them stands for one of the student's own."""
 PYTHON_2 = {

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from grader.errors import RosMissing
-from grader.host_programs import HOST_ENV, find_host_program
+from grader.host_programs import find_host_program, run_host_program
 from grader.installable import install_command, known_packages, noetic_messages
 from grader.ros_env import RosInstallation, find_ros
 from grader.wording import closest, did_you_mean
@@ -176,18 +176,9 @@ def _has_module(python: str, name: str) -> bool:
 
 def _prints(command: list[str]) -> str:
     try:
-        done = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            check=False,
-            timeout=LOOK_S,
-            env=HOST_ENV,
-            cwd="/",
-        )
+        return run_host_program(command, LOOK_S).stdout.decode(errors="replace").strip()
     except (OSError, subprocess.TimeoutExpired):
         return ""
-    return done.stdout.decode(errors="replace").strip()
 
 
 @lru_cache(maxsize=4)

@@ -39,23 +39,9 @@ _HEADS = {
 _GAP = re.compile(r"(?<=[\w\")\]])\s+(?=[\w\"(\[{])")
 _CLOSED_ENOUGH = re.compile(r"([\w\")\]}]:?|\(:)$")
 _STATEMENTS = (
-    *(
-        "assert",
-        "break",
-        "class",
-        "continue",
-        "def",
-        "del",
-        "elif",
-        "else",
-        "except",
-        "finally",
-        "for",
-        "from",
-        "global",
-    ),
-    *("if", "import", "pass", "raise", "return", "try", "while", "with"),
-)
+    "assert", "break", "class", "continue", "def", "del", "elif", "else", "except", "finally", "for", "from", "global",
+    "if", "import", "pass", "raise", "return", "try", "while", "with",
+)  # fmt: skip
 _RESERVED = "|".join(keyword.kwlist[3:])
 PLAIN = str.maketrans(
     {
@@ -238,8 +224,13 @@ def _taken_apart(line: str) -> tuple[str, str, list[str]]:
     """Return the line with its texts emptied and without its comment, the comment, and the texts."""
     texts = [found[1] for found in _TEXT.finditer(line) if found[1]]
     comment = next((found[0] for found in _TEXT.finditer(line) if not found[1]), "")
-    code = _TEXT.sub(lambda found: '""' if found[1] else "", line)
+    code = without_texts(line)
     return code.rstrip(), code[len(code.rstrip()) :] + comment if comment else "", texts
+
+
+def without_texts(line: str) -> str:
+    """Return the line with its string literals emptied and its comment cut."""
+    return _TEXT.sub(lambda found: '""' if found[1] else "", line)
 
 
 def _together(code: str, comment: str, texts: list[str]) -> str:

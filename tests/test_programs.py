@@ -34,7 +34,6 @@ class Start(NamedTuple):
 
 
 STARTS = {
-    "arena/sandbox.py:_last_line": Start("HOST_ENV", "'/'", "nothing"),
     "arena/ros/launching.py:launch": Start(
         "HOST_ENV",
         "stage.folder if gate is not None else NOWHERE",
@@ -42,13 +41,11 @@ STARTS = {
     ),
     "ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
     "arena/arena_process.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
-    "host_programs.py:resolves": Start("HOST_ENV", "'/'", "nothing"),
+    "host_programs.py:run_host_program": Start("HOST_ENV", "'/'", "nothing: names that the rubric gives"),
     "cli/doctor.py:_modules": Start("ros.env", "'/'", "nothing"),
     "arena/control_groups.py:_move_to_scope": Start(
         "_environment()", "'/'", "nothing: systemd is asked for this process's number"
     ),
-    "ros_packages.py:_prints": Start("HOST_ENV", "'/'", "nothing: names that the rubric gives"),
-    "cli/host_support.py:_probe": Start("HOST_ENV", "'/'", "nothing"),
     "rubric/pytest_check.py:_run": Start(
         "_environment()", "folder", "a copy of the evidence, and values of its functions, as JSON"
     ),

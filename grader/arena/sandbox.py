@@ -27,7 +27,7 @@ from grader.arena.control_groups import Cgroups, find_cgroups
 from grader.arena.limits import RunLimits
 from grader.arena.sandbox_files import HOME, RECORD, RECORD_INSIDE, RECORD_SHIM, SHIMS, STANDINS
 from grader.errors import HostError, SandboxMissing
-from grader.host_programs import HOST_ENV, LOCALHOST, LOCALHOST_HINT, find_host_program, resolves
+from grader.host_programs import LOCALHOST, LOCALHOST_HINT, find_host_program, resolves, run_host_program
 from grader.model import SandboxMode
 from grader.model.record import Record
 from grader.ros_env import RosInstallation
@@ -294,7 +294,7 @@ def refused_limits() -> str:
     if prlimit is None:
         return ""
     limits = Sandbox(bubblewrap=False, uid=None).rlimits(RunLimits())
-    return _last_line([*_drop(), prlimit, *limits, "--", "/bin/true"])
+    return last_error_line([*words_to_drop_root(), prlimit, *limits, "--", "/bin/true"])
 
 
 def why_no_sandbox() -> str:
@@ -335,29 +335,28 @@ def _refusal(*more: str) -> str:
     calls = ["--seccomp", "0"] if system_call_filter() else []
     files = ["--ro-bind", "/", "/", "--proc", "/proc", "--clearenv", "--setenv", "LANG", "C.UTF-8"]
     walls = [*files, *WALLS, *more, *calls, "--die-with-parent", "/bin/true"]
-    return _last_line(
-        [sys.executable, "-I", str(NAMESPACES), *_drop(), find_host_program("bwrap") or "bwrap", *walls]
+    return last_error_line(
+        [
+            sys.executable,
+            "-I",
+            str(NAMESPACES),
+            *words_to_drop_root(),
+            find_host_program("bwrap") or "bwrap",
+            *walls,
+        ]
     )
 
 
-def _drop() -> list[str]:
+def words_to_drop_root() -> list[str]:
     """Return the words by which root becomes another user."""
     setpriv = find_host_program("setpriv") if os.geteuid() == 0 else None
     return [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if setpriv else []
 
 
-def _last_line(command: list[str]) -> str:
+def last_error_line(command: list[str]) -> str:
     """Return the last line that a command of this machine printed where it failed; empty where it did not fail."""
     try:
-        done = subprocess.run(
-            command,
-            input=system_call_filter() or b"",
-            capture_output=True,
-            check=False,
-            timeout=PROBE_S,
-            env=HOST_ENV,
-            cwd="/",
-        )
+        done = run_host_program(command, PROBE_S, system_call_filter() or b"")
     except subprocess.TimeoutExpired:
         return f"no answer within {PROBE_S:g} s"
     except OSError as error:

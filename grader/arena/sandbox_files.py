@@ -33,18 +33,8 @@ BROWSERS = (
     "opera", "sensible-browser", "www-browser", "x-www-browser", "xdg-open",
 )  # fmt: skip
 ASKING = (
-    "curl",
-    "fping",
-    "host",
-    "nslookup",
-    "notify-send",
-    "ping",
-    "wget",
-    "wmctrl",
-    "xdpyinfo",
-    "xrandr",
-    "xset",
-)
+    "curl", "fping", "host", "nslookup", "notify-send", "ping", "wget", "wmctrl", "xdpyinfo", "xrandr", "xset",
+)  # fmt: skip
 """What scripts ask whether there is a network or a screen, before they open a page."""
 ANSWERS = "grader-known"
 QUESTIONS = (

@@ -140,7 +140,7 @@ def nice_rate(times_ns: Sequence[int]) -> float | None:
     if stats.mean_hz is None or stats.count < MESSAGES_MIN:
         return None
     gaps = [later - earlier for earlier, later in pairwise(sorted(times_ns))]
-    if periodic_share(gaps, nominal_hz=1e9 / (median(gaps) or 1)) < PERIODIC_SHARE:
+    if periodic_share(gaps, median(gaps) or 1) < PERIODIC_SHARE:
         return None
     nearest = min(NICE_HZ, key=lambda hz: abs(hz - stats.mean_hz) / hz)  # type: ignore[operator]
     return (

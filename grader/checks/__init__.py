@@ -23,34 +23,11 @@ from grader.model.verdict import (
 )
 
 FAMILIES = (
-    "package_files",
-    "cmake",
-    "build",
-    "executable",
-    "node",
-    "topics",
-    "messages",
-    "reacts",
-    "stamps",
-    "interfaces",
-    "transform",
-    "rate",
-    "counter",
-    "listener",
-    "console",
-    "files_left",
-    "launch_files",
-    "launch_runs",
-    "launch_params",
-    "parameters",
-    "services",
-    "calls",
-    "actions",
-    "rostest",
-    "two_copies",
-    "robot_path",
+    "package_files", "cmake", "build", "executable", "node", "topics", "messages", "reacts", "stamps", "interfaces",
+    "transform", "rate", "counter", "listener", "console", "files_left", "launch_files", "launch_runs",
+    "launch_params", "parameters", "services", "calls", "actions", "rostest", "two_copies", "robot_path",
     "robot_places",
-)
+)  # fmt: skip
 for family in FAMILIES:
     import_module(f"grader.checks.{family}")
 

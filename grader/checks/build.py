@@ -134,7 +134,8 @@ def explain_by_build(package: PackageFacts | None, build: Run | None, verdict: V
     if not built.status.is_open:
         return verdict
     said = inconclusive(f"{verdict.message}; {built.message}", hint=built.hint, citations=built.citations)
-    return said.about(expected=verdict.expected, measured=verdict.measured)
+    update = {"expected": verdict.expected, "measured": verdict.measured, "sought": built.sought}
+    return said.model_copy(update=update)
 
 
 def _stopped_build(build: Run, took: str) -> Verdict:
@@ -174,6 +175,8 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
         hint=told.hint if told else FIRST_ERROR_HINT,
         citations=(place or cite(build, "/grader/console"),),
     )
+    if told and told.lacks:
+        verdict = verdict.seeking("component", told.lacks)
     # what the package lacks of catkin's own lines shows as a command that CMake does not know
     if not line or told is None or error is None or UNKNOWN_COMMAND in error.text:
         return verdict

@@ -10,7 +10,15 @@ from pydantic import Field
 
 from grader.checks.registry import PackageName, check
 from grader.checks.support.build_errors import misspelt_cmake_lists, repair_of_file
-from grader.checks.support.scripts import PYTHON, Installed, copies_of, installed, is_bin, names_script
+from grader.checks.support.scripts import (
+    PYTHON,
+    Installed,
+    cmake_calls,
+    copies_of,
+    installed,
+    is_bin,
+    names_script,
+)
 from grader.checks.support.text import near_names, shown
 from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts, meant_command
 from grader.model.record import Record
@@ -63,7 +71,7 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         absent = failed(NO_FILE, expected=expected, measured="no file", hint=hint)
         return absent.model_copy(update={"cause": NO_FILE})
     # what is missing may stand behind the line that cannot be read
-    wrong = [one for one in _wrong(facts, names) if facts.fault is None or one[2] is not None]
+    wrong = [one for one in _wrong(facts, names) if facts.fault is None or one.line is not None]
     named = [c for c in facts.calls if c.name in {"project", "find_package", "catkin_package"}]
     measured = ", ".join(f"{c.name}({' '.join(c.args[:3])})" for c in named[:6]) or "none of the three calls"
     fault = facts.fault
@@ -71,14 +79,16 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         places = tuple(FileCitation(file=c.file, line=c.line) for c in named[:3])
         all_there = passed(f"{facts.file} has all three calls")
         return all_there.about(expected=expected, measured=measured, citations=places)
-    lines = tuple(FileCitation(file=facts.file, line=line) for _, _, line in wrong)
+    lines = tuple(FileCitation(file=facts.file, line=one.place) for one in wrong)
     if fault:
         lines = (*lines, FileCitation(file=fault.file, line=fault.line))
     return failed(
-        f"{facts.file}: {'; '.join([*_fault(fault), *(message for message, _, _ in wrong)])}",
+        f"{facts.file}: {'; '.join([*_fault(fault), *(one.why for one in wrong)])}",
         expected=expected,
         measured=measured,
-        hint="; ".join([*([repair_of_file(fault)] if fault else []), *(hint for _, hint, _ in wrong)]),
+        hint="; ".join(
+            [*([repair_of_file(fault)] if fault else []), *(f"{one.fix}{_below(one.below)}" for one in wrong)]
+        ),
         citations=tuple(dict.fromkeys(lines)),
     )
 
@@ -94,41 +104,53 @@ def _misspelt(facts: CMakeFacts, name: str) -> CMakeCall | None:
     return next((call for call in facts.calls if meant_command(call.name) == name), None)
 
 
-def _respell(call: CMakeCall, name: str) -> tuple[str, str, int]:
-    return f"line {call.line}: there is no command {call.name}(…)", f"write {name} for {call.name}", call.line
+class Wrong(NamedTuple):
+    """What is wrong, how to fix it, and in which line; or what is missing, and the call below which it goes."""
+
+    why: str
+    fix: str
+    line: int | None = None
+    below: CMakeCall | None = None
+
+    @property
+    def place(self) -> int | None:
+        """The line to look at."""
+        return self.below.line if self.below is not None else self.line
 
 
-def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str, int | None]]:
-    """Yield what is missing or wrong, how to fix it, and the line."""
+def _respell(call: CMakeCall, name: str) -> Wrong:
+    why = f"line {call.line}: there is no command {call.name}(…)"
+    return Wrong(why, f"write {name} for {call.name}", call.line)
+
+
+def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
+    """Yield what is wrong or missing."""
     wanted = names[0]
     project = _first(facts, "project")
     if project is None and (slip := _misspelt(facts, "project")):
         yield _respell(slip, "project")
     elif project is None:
-        yield "project(…) is missing", f"add project({wanted})", None
+        yield Wrong("project(…) is missing", f"add project({wanted})")
     elif not project.args or project.args[0] not in names:
         name = project.args[0] if project.args else ""
         message = f"line {project.line}: project({name}) differs from the package's name {wanted}"
-        yield message, f"write project({wanted})", project.line
+        yield Wrong(message, f"write project({wanted})", project.line)
     packages = [c for c in facts.calls if c.name == "find_package"]
     if slip := _misspelt(facts, "find_package"):
         yield _respell(slip, "find_package")
     elif not any(c.args[:1] == ("catkin",) for c in packages):
         slip = next((c for c in packages if c.args and c.args[0].casefold() == "catkin"), None)
-        other = f" (line {slip.line} says {slip.args[0]})" if slip else ""
-        line = slip.line if slip else None
-        fix = (
-            f"write catkin in place of {slip.args[0]}"
-            if slip
-            else f"add find_package(catkin REQUIRED){_below(project)}"
-        )
-        yield f"find_package(catkin …) is missing{other}", fix, line
+        why = "find_package(catkin …) is missing"
+        if slip is None:
+            yield Wrong(why, "add find_package(catkin REQUIRED)", below=project)
+        else:
+            why = f"{why} (line {slip.line} says {slip.args[0]})"
+            yield Wrong(why, f"write catkin in place of {slip.args[0]}", slip.line)
     if slip := _misspelt(facts, "catkin_package"):
         yield _respell(slip, "catkin_package")
     elif _first(facts, "catkin_package") is None:
         above = next((c for c in packages if c.args[:1] == ("catkin",)), project)
-        fix = f"add catkin_package(){_below(above)}"
-        yield "catkin_package(…) is missing", fix, None
+        yield Wrong("catkin_package(…) is missing", "add catkin_package()", below=above)
 
 
 def _below(call: CMakeCall | None) -> str:
@@ -151,7 +173,7 @@ class Lack(NamedTuple):
     """Why a script is not installed, how to fix that, and the line; `{}` in both stands for the scripts.
 
     `path` is where the script lies. `unsure` where only CMake could tell; `follows` where it follows from a missing
-    `catkin_package()`, which gives the destination its value.
+    `catkin_package()`, which gives the destination its value; `uncalled` where nothing installs any script.
     """
 
     why: str
@@ -160,6 +182,7 @@ class Lack(NamedTuple):
     path: str = ""
     unsure: bool = False
     follows: bool = False
+    uncalled: bool = False
 
 
 @check("cmake-install", params=CMakeInstallParams, run_anyway=True)
@@ -211,6 +234,8 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
         hint="; ".join(_fixes(lacks)),
         citations=cited or (FileCitation(file=facts.file),),
     )
+    if all(lack.uncalled for lack in lacks.values()):
+        found = found.seeking("call", PYTHON)
     right = [script for script in params.scripts if script not in lacks]
     return found.in_part(len(right) / len(params.scripts), join_words(right))
 
@@ -249,7 +274,8 @@ def _why_misplaced(package: PackageFacts, one: Installed) -> Lack:
     if one.kind != "PROGRAMS":
         why = f"{where}: catkin_install_python(…) does not begin with the word PROGRAMS"
         return Lack(why, f"write catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(one))
-    if "DESTINATION" in one.call.args and not one.destination and not _has_call(package, "catkin_package"):
+    empty = "DESTINATION" in one.call.args and not one.destination
+    if empty and not cmake_calls(package, "catkin_package"):
         why = f"{where}: {BIN} has no value, because catkin_package() is not called before it"
         return Lack(why, "call catkin_package() above catkin_install_python(…)", _line(one), follows=True)
     if one.destination is None:
@@ -277,8 +303,8 @@ def _why_unnamed(
         )
     of_python = [one for one in all_named if one.call.name == PYTHON]
     if not of_python and package.cmake and (slip := _misspelt(package.cmake, PYTHON)):
-        why, fix, line = _respell(slip, PYTHON)
-        return Lack(f"{why}, so nothing installs {{}}", fix, FileCitation(file=slip.file, line=line))
+        why, fix = _respell(slip, PYTHON)[:2]
+        return Lack(f"{why}, so nothing installs {{}}", fix, FileCitation(file=slip.file, line=slip.line))
     if not of_python:
         return _without_call(package, all_named, path)
     names = {PurePosixPath(one.path).name: one for one in of_python if not _is_there(package, one)}
@@ -314,9 +340,16 @@ def _without_call(package: PackageFacts, all_named: Sequence[Installed], path: s
     ):
         why = f"line {of_programs.call.line}: install(PROGRAMS …) does not name {{}}"
         return Lack(why, "write {} into it, after PROGRAMS", _line(of_programs), path)
-    above = _first(package.cmake, "catkin_package") if package.cmake else None
-    below = _below(above) or " below catkin_package()"
-    return Lack(f"{NOT_CALLED}, so nothing installs {{}}", f"{fix}{below}", None, path)
+    why = f"{NOT_CALLED}, so nothing installs {{}}"
+    above = next(iter(cmake_calls(package, "catkin_package")), None)
+    line = FileCitation(file=above.file, line=above.line) if above else None
+    return Lack(why, f"{fix}{below_catkin_package(package)}", line, path, uncalled=True)
+
+
+def below_catkin_package(package: PackageFacts) -> str:
+    """Return where the call that installs scripts goes, as the end of a hint."""
+    above = next(iter(cmake_calls(package, "catkin_package")), None)
+    return _below(above) or " below catkin_package()"
 
 
 def _folder_above(all_named: Sequence[Installed], path: str) -> Installed | None:
@@ -324,10 +357,6 @@ def _folder_above(all_named: Sequence[Installed], path: str) -> Installed | None
     above = PurePosixPath(path).parent.as_posix()
     folders = (one for one in all_named if one.kind == "DIRECTORY")
     return next((one for one in folders if names_script(one, above)), None)
-
-
-def _has_call(package: PackageFacts, name: str) -> bool:
-    return package.cmake is not None and any(call.name == name for call in package.cmake.calls)
 
 
 def _line(one: Installed) -> FileCitation:

@@ -294,7 +294,7 @@ def _other_level(lines: Iterable[Logged], params: LogsParams) -> Verdict | None:
         return None
     level = (one.level or "unknown").upper()
     message = f"{one.node} logs {shown(one.text)!r} at level {level}, not {params.level.upper()}"
-    return failed(message, hint=_call(params))
+    return failed(message, hint=_call(params)).about(said=one.text)
 
 
 def _only_printed(run: Run, params: LogsParams) -> Verdict | None:
@@ -305,7 +305,8 @@ def _only_printed(run: Run, params: LogsParams) -> Verdict | None:
     of_logger = next((log for log in map(split_log_line, (line.line for line in said)) if log), None)
     if of_logger is None:
         message = f"{shown(said[0].line)!r} is only printed, not logged"
-        return failed(message, hint=f"{_call(params)} instead of {both('print(…)', 'std::cout')}")
+        hint = f"{_call(params)} instead of {both('print(…)', 'std::cout')}"
+        return failed(message, hint=hint).about(said=said[0].line)
     if of_logger[0] != params.level:
         message = f"{params.text!r} is logged at level {of_logger[0].upper()}, not {params.level.upper()}"
         return failed(message, hint=_call(params))
@@ -345,7 +346,8 @@ def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | No
             text = (split_log_line(alike) or ("", alike))[1]
             message, hint = f"{shown(text)!r} {how}, not {params.text!r}", _call(params)
             share = OTHER_WORDS_SHARE if texts is logged else 0.0
-            return failed(message, hint=hint).in_part(share, "the level, and nearly the text")
+            verdict = failed(message, hint=hint).in_part(share, "the level, and nearly the text")
+            return verdict.about(said=text)
     return None
 
 
@@ -374,7 +376,7 @@ def _nothing(
         return unjudged("no node was registered that could log", hint=hint)
     if lines:
         message = f"{join_words(nodes)} logs {shown(lines[0].text)!r}, not {params.text!r}"
-        return failed(message, hint=_call(params))
+        return failed(message, hint=_call(params)).about(said=lines[0].text)
     hint = f"{_call(params)} below {INIT}: above it, nothing is sent"
     return failed(f"{join_words(nodes)} logs nothing", hint=hint)
 

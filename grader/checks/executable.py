@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 
 from grader.checks.build import judge_build
 from grader.checks.registry import check
-from grader.checks.support.exit_causes import syntax_fault, syntax_hint
+from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.scripts import (
     PYTHON,
     RIGHT_SHEBANG,
@@ -20,6 +20,7 @@ from grader.checks.support.scripts import (
     names_script,
     paths_by_name,
     shebang_obstacles,
+    syntax_fault,
 )
 from grader.checks.support.text import near_names, shown
 from grader.evidence.events import CATKIN_MAKE

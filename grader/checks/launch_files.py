@@ -326,13 +326,8 @@ def _script(package: PackageFacts, build: Run, file: LaunchFile, params: OpensPa
         source = find_script(package, node.type or "")
         path = source.path if source else node.type or ""
         verdict = executable(package, build, ExecutableParams(path=path))
-        verdicts.append(_of_shell(verdict))
+        verdicts.append(verdict.model_copy(update={"hint": verdict.hint.replace(RIGHT_SHEBANG, SHELL)}))
     return None if any(v.status is Status.PASS for v in verdicts) else verdicts[0]
-
-
-def _of_shell(verdict: Verdict) -> Verdict:
-    """Return the executable check's verdict with the shell's first line."""
-    return verdict.model_copy(update={"hint": verdict.hint.replace(RIGHT_SHEBANG, SHELL)})
 
 
 def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> Verdict:
@@ -376,7 +371,7 @@ def _page(
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
     if absence := refusal(run, package):
-        return failed(absence.why, hint=absence.hint, citations=absence.citations)
+        return absence.verdict(absence.why)
     slip = _unread_variable(package, build, file, params)
     hint = f"{slip.file}: {slip.fix}" if slip else hint
     return failed(f"the script opens nothing in {params.program}{_words(package, file, run)}", hint=hint)

@@ -11,6 +11,8 @@ from grader.checks.launch_files import missing_node
 from grader.checks.registry import LaunchName, check
 from grader.checks.support.console_output import printed_lines
 from grader.checks.support.launch import (
+    BAD_FILE,
+    NO_FILE,
     Absence,
     Slip,
     finished,
@@ -191,7 +193,7 @@ def _not_loaded(
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
     if absence := refusal(run, package):
-        slip = _misplaced(package, file, params) if "does not exist" in absence.why else None
+        slip = _misplaced(package, file, params) if absence.refused == NO_FILE else None
         return slip.verdict(quoted(run)) if slip else _refusal_verdict(file, params, absence)
     loads = [load for load in file.loads if _is_of(load, params)]
     if not loads:
@@ -232,11 +234,10 @@ def _misplaced(package: PackageFacts, file: LaunchFile, params: LaunchLoadsParam
 
 def _refusal_verdict(file: LaunchFile, params: LaunchLoadsParams, absence: Absence) -> Verdict:
     """roslaunch starts nothing. Where it found the file and could not read it, the file is at fault."""
-    broken = "cannot load its file" in absence.why
-    verdict = unjudged if broken else failed
-    cited = (FileCitation(file=file.path, line=_line(file, params)),)
+    broken = absence.refused == BAD_FILE
     what = f", {params.file}" if broken else ""
-    return verdict(f"{absence.why}{what}", hint=absence.hint, citations=cited)
+    cited = (FileCitation(file=file.path, line=_line(file, params)),)
+    return absence._replace(of_script=broken, citations=cited).verdict(f"{absence.why}{what}")
 
 
 def _is_of(load: LaunchLoad, params: LaunchLoadsParams) -> bool:

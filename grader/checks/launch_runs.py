@@ -39,7 +39,7 @@ from grader.checks.support.topics import cite, nodes_on, topics_with
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Status, Verdict, failed, machine_lacks, passed, unjudged
+from grader.model.verdict import FileCitation, Status, Verdict, failed, passed, unjudged
 from grader.wording import join_words, plural
 
 
@@ -162,7 +162,7 @@ def _absent(package: PackageFacts, run: Run, nodes: Sequence[str], absent: Seque
         why = not_started(*unstarted.values())
     else:
         why = why_not_up(package, run, absent[0])
-    said = "" if why.citations or why.unbuilt or "roslaunch says" in why.why else quoted(run)
+    said = "" if why.citations or why.unbuilt or quoted(run) in why.why else quoted(run)
     if not why.citations:
         why = why._replace(citations=(FileCitation(file=absent[0].file, line=absent[0].line),))
     name = "" if several else f"{absent[0].full_name}: "
@@ -426,13 +426,8 @@ def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) 
     node = lacking.node
     absence = why_not_up(package, run, node)
     name = node.full_name if is_exact(node) else f"the node of {node.type}"
-    lost = unjudged if lacking.own and absence.of_script else failed
-    verdict = machine_lacks if absence.of_machine else lost
-    place = FileCitation(file=node.file or file.path, line=node.line)
-    found = verdict(
-        f"{name} did not come up: {absence.why}", hint=absence.hint, citations=(*absence.citations, place)
-    )
-    return found.model_copy(update={"unbuilt": absence.unbuilt})
+    verdict = absence.verdict(f"{name} did not come up: {absence.why}", judged=not lacking.own)
+    return verdict.about(citations=(FileCitation(file=node.file or file.path, line=node.line),))
 
 
 def _are_connected(run: Run, topic: str, names: list[str]) -> bool:

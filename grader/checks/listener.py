@@ -127,7 +127,8 @@ def _other_words(
     share = 1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes)
     all_of = plural(len(probes), "message")
     measured = f"{len(probes)} of {all_of} printed, {len(missing)} of them in other words"
-    return failed(message, hint=hint, measured=measured).in_part(share, "what is printed of each message")
+    verdict = failed(message, hint=hint, measured=measured).in_part(share, "what is printed of each message")
+    return verdict.about(said="".join(said[:1]))
 
 
 def _how_many(missing: Sequence[Probe], probes: Sequence[Probe]) -> str:
@@ -170,6 +171,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         meant = near or (subscribed if len(subscribed) == 1 else [])
         cited = named_at(package, run, "subscriber", meant[0]) if meant else ()
         verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint, citations=cited)
+        verdict = verdict.about(said=" ".join(meant))
     return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))
 
 
@@ -228,7 +230,8 @@ def _by_number(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequenc
     if len(missing) == len(probes):
         seen = f"it prints {shown(after[0]).strip(' :')!r}" if after else "it prints nothing at all"
         sent = f"; {probes[0].value!r} was sent first" if isinstance(probes[0].value, str) else ""
-        return failed(f"none of the messages that were sent was printed{sent}; {seen}", hint=CALLBACK_HINT)
+        message = f"none of the messages that were sent was printed{sent}; {seen}"
+        return failed(message, hint=CALLBACK_HINT).about(said="".join(after[:1]))
     if len(missing) == len(probes) - 1 and missing[0] is not probes[0]:
         waits = both("wait_for_message(…)", "waitForMessage(…)")
         hint = f"subscribe with a callback and {SPIN}; {waits} waits for one message only"

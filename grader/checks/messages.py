@@ -137,9 +137,9 @@ def _misfit(
     cited = cite(run, params.topic, at_ns, at_ns)
     value = TIMED if SECONDS in params.template else ""
     hint = f"publish {code_of(params.template)}"
-    if value and _tells_time(package, run, heard):
-        return failed(message, hint=hint, citations=(cited,)).in_part(OTHER_WORDS_SHARE, "the time")
-    return failed(message, hint=hint, citations=(cited,))
+    verdict = failed(message, hint=hint, citations=(cited,)).about(said=in_one_line(text))
+    right = value and _tells_time(package, run, heard)
+    return verdict.in_part(OTHER_WORDS_SHARE, "the time") if right else verdict
 
 
 def code_of(template: str) -> str:

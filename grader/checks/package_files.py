@@ -362,12 +362,13 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     if len(missing) == len(misspelt) == 1:
         hint = f"write {missing[0]} for {misspelt[0].name} in line {misspelt[0].line}"
         lines = (FileCitation(file=found.file, line=misspelt[0].line),)
-    return failed(
+    verdict = failed(
         f"{found.file} does not declare {join_words(missing)} as a run-time dependency{slip or only}",
         measured=_declared_text(found),
         hint=hint,
         citations=lines or (FileCitation(file=found.file, line=last),),
     )
+    return verdict.seeking("dependency", missing[0]) if len(missing) == 1 else verdict
 
 
 def _last_line(found: Manifest) -> int:

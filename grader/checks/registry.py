@@ -45,26 +45,9 @@ class Refers:
     """
 
     to: Literal[
-        "process",
-        "launch",
-        "program",
-        "message",
-        "service",
-        "field",
-        "sent",
-        "published",
-        "set",
-        "action",
-        "kept",
-        "served",
-        "rostest",
-        "watched_s",
-        "dependency",
-        "package",
-        "node",
-        "cause",
-        "heard",
-    ]
+        "process", "launch", "program", "message", "service", "field", "sent", "published", "set", "action", "kept",
+        "served", "rostest", "watched_s", "dependency", "package", "node", "cause", "heard",
+    ]  # fmt: skip
 
 
 class Reference(NamedTuple):

@@ -60,13 +60,11 @@ class BatchProgress:
     points_sum: float = 0.0
     running: dict[str, float] = field(default_factory=dict)
     _ends_s: list[float] = field(default_factory=list)
-    _begun_s: float = 0.0
     _paced_s: float = 0.0
 
     def planned(self, total: int) -> None:
         """`total` submissions will be graded."""
         self.total = total
-        self._begun_s = self.clock()
 
     def begun(self, name: str) -> None:
         """The submission of that id begins."""

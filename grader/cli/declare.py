@@ -19,6 +19,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
 
@@ -185,6 +186,39 @@ def package_name(text: str) -> str:
     return text.strip()
 
 
+def percent(text: str) -> float:
+    """Parse 1 to 100, with or without a percent sign."""
+    try:
+        number = float(text.removesuffix("%"))
+    except ValueError:
+        number = 0.0
+    if not 1 <= number <= 100:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a percentage from 1 to 100")
+    return number
+
+
+def port(text: str) -> int:
+    """Parse a port; 0 means any free one."""
+    return _whole(text, 0, 65535, f"{text!r} is not a port from 1 to 65535")
+
+
+def count(text: str) -> int:
+    """Parse 1 to 64."""
+    return _whole(text, 1, 64, f"{text!r} is not a number from 1 to 64")
+
+
+def minutes(most: int) -> Callable[[str], int]:
+    """Return a parser of 2 to `most` minutes: half a minute of a time limit is not for grading."""
+    return lambda text: _whole(text, 2, most, f"{text!r} is not a number from 2 to {most}")
+
+
+def _whole(text: str, least: int, most: int, otherwise: str) -> int:
+    number = int(text) if text.isascii() and text.isdecimal() else -1
+    if not least <= number <= most:
+        raise argparse.ArgumentTypeError(otherwise)
+    return number
+
+
 RUBRIC = Option(
     "--rubric", "ID|FILE", "a lab's id, a rubric's file or https:// address; #sha256:DIGEST behind it pins it"
 )
@@ -197,6 +231,18 @@ PackageOption = Annotated[
     str | None,
     Option("--package", "NAME", "grade this package, whatever the lab calls it", package_name),
 ]
+JobsOption = Annotated[
+    int | None, Option("--jobs", "N", "how many at a time (default: four per core, with --static one)", count)
+]
+OnlyOption = Annotated[
+    Sequence[str],
+    Option("--only", "WHICH", "failed, inconclusive, changed, or ids: grade these again, keep all others"),
+]
+LocalOption = Annotated[
+    Sequence[Path],
+    Option("--allow-local", "DIR",
+           "let the roster name paths below DIR too, not only below its own folder; may be repeated", repeated=True),
+]  # fmt: skip
 STATIC = Flag("--static", "check the files only and run nothing")
 BATCH_FOLDER = "the --out of `grader batch`"
 
@@ -264,36 +310,3 @@ EXPORT_EXIT_CODES = """exit codes:
   2    the command line or the rubric is wrong, or the grader is not installed
   130  interrupted
 """
-
-
-def percent(text: str) -> float:
-    """Parse 1 to 100, with or without a percent sign."""
-    try:
-        number = float(text.removesuffix("%"))
-    except ValueError:
-        number = 0.0
-    if not 1 <= number <= 100:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a percentage from 1 to 100")
-    return number
-
-
-def port(text: str) -> int:
-    """Parse a port; 0 means any free one."""
-    return _whole(text, 0, 65535, f"{text!r} is not a port from 1 to 65535")
-
-
-def count(text: str) -> int:
-    """Parse 1 to 64."""
-    return _whole(text, 1, 64, f"{text!r} is not a number from 1 to 64")
-
-
-def minutes(most: int) -> Callable[[str], int]:
-    """Return a parser of 2 to `most` minutes: half a minute of a time limit is not for grading."""
-    return lambda text: _whole(text, 2, most, f"{text!r} is not a number from 2 to {most}")
-
-
-def _whole(text: str, least: int, most: int, otherwise: str) -> int:
-    number = int(text) if text.isascii() and text.isdecimal() else -1
-    if not least <= number <= most:
-        raise argparse.ArgumentTypeError(otherwise)
-    return number

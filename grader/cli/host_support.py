@@ -5,9 +5,8 @@ Rows for `grader doctor` go out, and warnings before students' code is run. What
 
 from __future__ import annotations
 
-import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Literal
@@ -15,10 +14,17 @@ from typing import Literal
 from pydantic import AliasChoices, Field
 
 from grader.arena.control_groups import describe, find_cgroups, has_memory
-from grader.arena.sandbox import NAMESPACES, ULIMIT_HINT, choose_sandbox, refused_limits
+from grader.arena.sandbox import (
+    NAMESPACES,
+    ULIMIT_HINT,
+    choose_sandbox,
+    last_error_line,
+    refused_limits,
+    words_to_drop_root,
+)
 from grader.cli.output import say_beside
 from grader.errors import GraderError, HostError, RosMissing
-from grader.host_programs import HOST_ENV, find_host_program
+from grader.host_programs import find_host_program
 from grader.model import SandboxMode
 from grader.model.record import Record
 from grader.portable import system, user_id
@@ -27,7 +33,6 @@ from grader.ros_env import why_nodes_cannot_run
 from grader.rubric.load import LoadedRubric, needs_ros
 
 PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
-PROBE_S = 20
 SETTINGS = Path("/proc/sys")
 SWITCHES = {
     "kernel/unprivileged_userns_clone": ("0", "sysctl -w kernel.unprivileged_userns_clone=1"),
@@ -64,8 +69,10 @@ def sandbox_rows() -> Iterator[DoctorRow]:
     """Return a row for each part, then one for the sandbox that `--sandbox auto` chooses."""
     yield from map(_program, PROGRAMS)
     unshare = find_host_program("unshare") or "unshare"
-    yield _probe("user namespaces", [unshare, "--user", "--pid", "--fork", "/bin/true"], drop=user_id() == 0)
-    yield _probe("network", [sys.executable, "-I", str(NAMESPACES), "/bin/true"], drop=False)
+    yield _probe(
+        "user namespaces", [*words_to_drop_root(), unshare, "--user", "--pid", "--fork", "/bin/true"]
+    )
+    yield _probe("network", [sys.executable, "-I", str(NAMESPACES), "/bin/true"])
     yield _limits_of_trees()
     yield from _inherited_rows()
     yield _limits_of_processes()
@@ -79,27 +86,11 @@ def _program(name: str) -> DoctorRow:
     return DoctorRow(name=name, state="ok", detail=path)
 
 
-def _probe(name: str, command: Sequence[str], *, drop: bool) -> DoctorRow:
-    """Return whether namespaces of that kind can be made, by the user who needs them."""
-    setpriv = find_host_program("setpriv") or "setpriv"
-    unprivileged = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
-    try:
-        done = subprocess.run(
-            [*unprivileged, *command],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            check=False,
-            timeout=PROBE_S,
-            env=HOST_ENV,
-            cwd="/",
-        )
-        said = done.stderr.decode(errors="replace").strip().splitlines()
-        reason = "" if done.returncode == 0 else (said or [f"exit code {done.returncode}"])[-1]
-    except (OSError, subprocess.TimeoutExpired) as error:
-        reason = str(error)
-    if not reason:
-        return DoctorRow(name=name, state="ok", detail="namespaces can be made")
-    return DoctorRow(name=name, state="limited", detail=reason[:200], fix=_switch())
+def _probe(name: str, command: list[str]) -> DoctorRow:
+    """Return whether namespaces of that kind can be made."""
+    if reason := last_error_line(command):
+        return DoctorRow(name=name, state="limited", detail=reason, fix=_switch())
+    return DoctorRow(name=name, state="ok", detail="namespaces can be made")
 
 
 def _switch() -> str:

@@ -24,7 +24,16 @@ from grader.evidence.container import MAX_CHUNK_BYTES, MAX_UNPACKED_BYTES
 from grader.evidence.definitions import DefinitionError
 from grader.evidence.events import FIELDS
 from grader.evidence.message_values import md5_of
-from grader.evidence.run import LESS, BudgetExceeded, Channel, MemoryBudget, Message, Run, merge_channels
+from grader.evidence.run import (
+    LESS,
+    BudgetExceeded,
+    Channel,
+    MemoryBudget,
+    Message,
+    Run,
+    merge_channels,
+    recorded_elsewhere,
+)
 
 BZ2 = b"BZh"
 LZ4 = b"\x04\x22\x4d\x18"
@@ -69,17 +78,7 @@ def load_bag(path: Path, budget: MemoryBudget | None = None, data: bytes | None 
         raise EvidenceError(f"{path}: {error}", hint=LESS) from error
     except (*_DAMAGE, struct.error, OSError) as error:
         raise EvidenceError(f"{path}: damaged", hint=_AGAIN) from error
-    times = [t for channel in channels for t in channel.times_ns]
-    return Run(
-        evidence=path.name,
-        scenario=path.stem,
-        clock="real",
-        warp=1.0,
-        metadata={},
-        start_ns=min(times, default=0),
-        end_ns=max(times, default=0),
-        channels=channels,
-    )
+    return recorded_elsewhere(path, channels)
 
 
 def _explain(path: Path, reason: str) -> EvidenceError:

@@ -159,31 +159,10 @@ class ActorEvent(Record):
     """
 
     action: Literal[
-        "publish",
-        "clock",
-        "interrupt",
-        "param",
-        "call",
-        "answer",
-        "open",
-        "note",
-        "refused",
-        "limit",
-        "wait",
-        "start",
-        "stop",
-        "kill",
-        "type",
-        "set_param",
-        "goal",
-        "cancel",
-        "result",
-        "play",
-        "left",
-        "serve",
-        "lookup",
+        "publish", "clock", "interrupt", "param", "call", "answer", "open", "note", "refused", "limit", "wait",
+        "start", "stop", "kill", "type", "set_param", "goal", "cancel", "result", "play", "left", "serve", "lookup",
         "read",
-    ]
+    ]  # fmt: skip
     """What was done."""
     actor: str
     """Who did it."""

@@ -26,8 +26,7 @@ class RateStats(Record):
     gaps are cut into up to 10 consecutive batches, and Student's t is applied to the batches' mean periods.
     That stays honest where gaps depend on each other, as they do with `rospy.Rate`, whose long gap is
     followed by a short one. `gap_std_s` is the population's, as in `rostopic hz`; `gap_p95_s` is the smallest
-    gap that 95 % do not exceed. `periodic_share` is the share of gaps within ±50 % (ends included) of the
-    nominal period, if one was given.
+    gap that 95 % do not exceed.
     """
 
     count: int
@@ -41,13 +40,10 @@ class RateStats(Record):
     gap_p95_s: float | None = None
     gap_max_s: float | None = None
     gap_std_s: float | None = None
-    periodic_share: float | None = None
 
 
-def rate_stats(times_ns: Sequence[int], *, nominal_hz: float | None = None) -> RateStats:
-    """Return the rate of messages that arrived at `times_ns`, in any order. Raises ValueError for a rate of 0 Hz."""
-    if nominal_hz is not None and not nominal_hz > 0:
-        raise ValueError("the nominal rate must be above 0 Hz")
+def rate_stats(times_ns: Sequence[int]) -> RateStats:
+    """Return the rate of messages that arrived at `times_ns`, in any order."""
     times = sorted(times_ns)
     if len(times) < 2:
         return RateStats(count=len(times), duration_s=0.0)
@@ -67,14 +63,12 @@ def rate_stats(times_ns: Sequence[int], *, nominal_hz: float | None = None) -> R
         gap_p95_s=ordered[ceil(0.95 * len(ordered)) - 1] / 1e9,
         gap_max_s=ordered[-1] / 1e9,
         gap_std_s=pstdev(gaps) / 1e9,
-        periodic_share=None if nominal_hz is None else periodic_share(gaps, nominal_hz=nominal_hz),
     )
 
 
-def periodic_share(gaps_ns: Sequence[int], *, nominal_hz: float, spread: float = 0.5) -> float:
-    """Return the share (0 to 1) of gaps within ±`spread` of the nominal period, ends included; 0 without gaps."""
-    period_ns = 1e9 / nominal_hz
-    low, high = round(period_ns * (1 - spread)), round(period_ns * (1 + spread))
+def periodic_share(gaps_ns: Sequence[int], period_ns: float) -> float:
+    """Return the share (0 to 1) of gaps within ±50 % of the period, ends included; 0 without gaps."""
+    low, high = round(period_ns * 0.5), round(period_ns * 1.5)
     return sum(low <= gap <= high for gap in gaps_ns) / len(gaps_ns) if gaps_ns else 0.0
 
 

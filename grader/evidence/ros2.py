@@ -16,7 +16,15 @@ from typing import NamedTuple
 
 from grader.errors import EvidenceError
 from grader.evidence.definitions import DefinitionError, sections_of
-from grader.evidence.run import BudgetExceeded, Channel, MemoryBudget, Message, Run, merge_channels
+from grader.evidence.run import (
+    BudgetExceeded,
+    Channel,
+    MemoryBudget,
+    Message,
+    Run,
+    merge_channels,
+    recorded_elsewhere,
+)
 
 OWN_TYPES = {
     "byte": "uint8",
@@ -125,18 +133,8 @@ def load_rosbag2(path: Path, budget: MemoryBudget) -> Run:
         raise EvidenceError(f"{path}: {error}", hint=_LESS) from error
     except (sqlite3.Error, ValueError, OverflowError, MemoryError) as error:
         raise EvidenceError(f"{path}: a bag of ROS 2 in SQLite, damaged or cut short", hint=_AGAIN) from error
-    times = [message.log_time_ns for found in messages.values() for message in found]
     found = (_channel(path, topic, definitions, messages[topic.number], budget) for topic in topics)
-    return Run(
-        evidence=path.name,
-        scenario=path.stem,
-        clock="real",
-        warp=1.0,
-        metadata={},
-        start_ns=min(times, default=0),
-        end_ns=max(times, default=0),
-        channels=merge_channels(found, renumber=True),
-    )
+    return recorded_elsewhere(path, merge_channels(found, renumber=True))
 
 
 def _open(path: Path) -> sqlite3.Connection:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
 from grader.errors import EvidenceError
@@ -293,6 +294,21 @@ class Run:
     def outcome(self) -> ScenarioEvent | None:
         """How the run ended; None for a file that was cut short."""
         return next((e for _, e in reversed(self.course) if e.event == "end"), None)
+
+
+def recorded_elsewhere(path: Path, channels: tuple[Channel, ...]) -> Run:
+    """Return a run that another tool recorded: it is named after the file, in real time and without processes."""
+    times = [t for channel in channels for t in channel.times_ns]
+    return Run(
+        evidence=path.name,
+        scenario=path.stem,
+        clock="real",
+        warp=1.0,
+        metadata={},
+        start_ns=min(times, default=0),
+        end_ns=max(times, default=0),
+        channels=channels,
+    )
 
 
 def once_for_each_run(

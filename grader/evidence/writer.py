@@ -83,24 +83,6 @@ class EvidenceStream:
         self._channels[key] = EvidenceChannel(self._mcap, number)
         return self._channels[key]
 
-    def message(
-        self,
-        *,
-        topic: str,
-        callerid: str,
-        type: str,  # noqa: A002 - ROS's own word
-        md5sum: str,
-        definition: str,
-        latching: bool,
-        log_time_ns: int,
-        data: bytes,
-    ) -> None:
-        """Write one message as sent, with its arrival (ns). The channel is made on first use."""
-        channel = self.register_channel(
-            topic=topic, callerid=callerid, type=type, md5sum=md5sum, definition=definition, latching=latching
-        )
-        channel.message(log_time_ns, data)
-
     def event(self, topic: str, log_time_ns: int, record: Record) -> None:
         """Write one event on the JSON channel `topic` (one of `events.TOPICS`), whose record it must be."""
         if type(record) is not TOPICS.get(topic):

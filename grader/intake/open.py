@@ -166,20 +166,27 @@ def unreadable(given: str, error: OSError) -> GraderError:
 
 
 @contextmanager
-def _base(workdir: Path) -> Iterator[Path]:
-    """A new folder below `workdir`. If opening fails nothing of it stays."""
+def new_folder(workdir: Path) -> Iterator[Path]:
+    """A new folder in `workdir`, of which nothing stays after an error."""
     try:
         workdir.mkdir(parents=True, exist_ok=True)
-        base = Path(tempfile.mkdtemp(prefix="source-", dir=workdir)).resolve()
+        folder = Path(tempfile.mkdtemp(prefix="source-", dir=workdir)).resolve()
     except OSError as error:
         raise OutputError(
             f"the work folder {workdir} cannot be written: {error.strerror}", hint="Choose another folder."
         ) from error
     try:
-        yield base
+        yield folder
     except BaseException:
-        shutil.rmtree(base, ignore_errors=True)
+        shutil.rmtree(folder, ignore_errors=True)
         raise
+
+
+@contextmanager
+def _base(workdir: Path) -> Iterator[Path]:
+    """A new folder, which stays where something was unpacked in it."""
+    with new_folder(workdir) as base:
+        yield base
     if not (base / "tree").exists():
         shutil.rmtree(base, ignore_errors=True)
 

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal, NamedTuple
 
 from grader.errors import SubmissionError, Unreachable
 from grader.intake.credentials import Access, accesses, split_address, without_password
@@ -293,93 +294,50 @@ _PRIVATE = (
 )
 _NETWORK = "Check the address and the network, and try `git ls-remote URL`."
 _PAGE = "This looks like a page of the website: give the repository's own address, then @branch."
-_NOT_THEIRS = re.compile(r"this machine|name was not found|cannot be reached|has failed|broke off")
-_MAY_PASS = re.compile(r"name was not found|cannot be reached|has failed|broke off")
+
+
+class Cause(NamedTuple):
+    """What a pattern of git's words means, what to do, and whose fault it is: the network's passes by itself."""
+
+    pattern: str
+    cause: str
+    hint: str
+    fault_of: Literal["submission", "machine", "network"] = "submission"
+
+
 # In this order: the first that fits what git said is the cause.
-_CAUSES: tuple[tuple[str, str, str], ...] = (
-    (
-        r"^prlimit: ",
-        "the limits of git cannot be set on this machine",
-        "Raise what this shell allows (`ulimit -Ha` shows it).",
-    ),
-    (
-        r"invalid path",
-        "it holds a path that git itself does not write (`.git`, `..`)",
-        "Take it out of the repository, commit and push.",
-    ),
-    (
-        r"No space left",
-        "it could not be written to this machine's disk",
-        "Free some room (`df -h`) and try again.",
-    ),
-    (
-        r"(?:error: |HTTP (?:code )?)(?:429|5\d\d)\b",
-        "the server has failed, or has too much to do",
-        "Try again later.",
-    ),
-    (
-        r"Host key verification failed",
-        "this machine does not know the server's ssh key",
-        "Connect once by hand (`ssh HOST`) and accept the key.",
-    ),
-    (
-        r"Permission denied|publickey",
-        "the server refused the ssh key",
-        "Add a key of this machine to the account (`ssh -T git@HOST` shows it), or use the https:// address.",
-    ),
-    (
-        r"Could not resolve host|Couldn't resolve host|Name or service not known|Temporary failure in name",
-        "the server's name was not found",
-        _NETWORK,
-    ),
-    (
-        (
-            r"Connection refused|Connection timed out|Failed to connect|Network is unreachable"
-            r"|No route to host|Couldn't connect|unable to connect|Operation timed out"
-        ),
-        "the server cannot be reached",
-        _NETWORK,
-    ),
-    (
-        (
-            r"Connection (was )?reset|Connection closed by|SSL_read|SSL_ERROR_SYSCALL|recv error|early EOF"
-            r"|Empty reply|transfer closed|unexpected disconnect|HTTP/2 stream|Broken pipe"
-        ),
-        "the connection broke off",
-        _NETWORK,
-    ),
-    (
-        r"SSL|certificate",
-        "the server's certificate is not trusted by this machine",
-        "Ask for the server's certificate to be installed, or use the ssh address.",
-    ),
-    (
-        (
-            r"could not read (Username|Password)|terminal prompts disabled|Authentication failed"
-            r"|Access denied|error: 40[13]|HTTP 40[13]"
-        ),
-        "it does not exist, or it needs a password",
-        _PRIVATE,
-    ),
-    (
-        (
-            r"not found|does not exist|does not appear to be a git repository|not a git repository|error: 404"
-            r"|not valid: is this a git|[Nn]o such (file|repository|project)"
-        ),
-        "there is no such repository",
-        f"Check the address. {_PRIVATE}",
-    ),
-    (
-        r"unable to write|cannot create|could not create",
-        "it could not be written to this machine's disk",
-        "Free some room (`df -h`) and try again.",
-    ),
-    (
-        r"RPC failed|hung up unexpectedly",
-        "the connection broke off",
-        _NETWORK,
-    ),
-)
+_CAUSES = (
+    Cause(r"^prlimit: ", "the limits of git cannot be set on this machine",
+          "Raise what this shell allows (`ulimit -Ha` shows it).", "machine"),
+    Cause(r"invalid path", "it holds a path that git itself does not write (`.git`, `..`)",
+          "Take it out of the repository, commit and push."),
+    Cause(r"No space left", "it could not be written to this machine's disk",
+          "Free some room (`df -h`) and try again.", "machine"),
+    Cause(r"(?:error: |HTTP (?:code )?)(?:429|5\d\d)\b", "the server has failed, or has too much to do",
+          "Try again later.", "network"),
+    Cause(r"Host key verification failed", "this machine does not know the server's ssh key",
+          "Connect once by hand (`ssh HOST`) and accept the key.", "machine"),
+    Cause(r"Permission denied|publickey", "the server refused the ssh key",
+          "Add a key of this machine to the account (`ssh -T git@HOST` shows it), or use the https:// address."),
+    Cause(r"Could not resolve host|Couldn't resolve host|Name or service not known|Temporary failure in name",
+          "the server's name was not found", _NETWORK, "network"),
+    Cause(r"Connection refused|Connection timed out|Failed to connect|Network is unreachable"
+          r"|No route to host|Couldn't connect|unable to connect|Operation timed out",
+          "the server cannot be reached", _NETWORK, "network"),
+    Cause(r"Connection (was )?reset|Connection closed by|SSL_read|SSL_ERROR_SYSCALL|recv error|early EOF"
+          r"|Empty reply|transfer closed|unexpected disconnect|HTTP/2 stream|Broken pipe",
+          "the connection broke off", _NETWORK, "network"),
+    Cause(r"SSL|certificate", "the server's certificate is not trusted by this machine",
+          "Ask for the server's certificate to be installed, or use the ssh address.", "machine"),
+    Cause(r"could not read (Username|Password)|terminal prompts disabled|Authentication failed"
+          r"|Access denied|error: 40[13]|HTTP 40[13]", "it does not exist, or it needs a password", _PRIVATE),
+    Cause(r"not found|does not exist|does not appear to be a git repository|not a git repository|error: 404"
+          r"|not valid: is this a git|[Nn]o such (file|repository|project)", "there is no such repository",
+          f"Check the address. {_PRIVATE}"),
+    Cause(r"unable to write|cannot create|could not create", "it could not be written to this machine's disk",
+          "Free some room (`df -h`) and try again.", "machine"),
+    Cause(r"RPC failed|hung up unexpectedly", "the connection broke off", _NETWORK, "network"),
+)  # fmt: skip
 
 
 def explained(failure: GitFailed, source: Source) -> SubmissionError:
@@ -400,10 +358,9 @@ def explained(failure: GitFailed, source: Source) -> SubmissionError:
             hint="Hand in the package's folder alone, without recordings and data.",
         )
     if known := _cause(failure):
-        cause, hint = known
         page = re.search(r"/(tree|blob)/|/-/", source.url)
-        kind = Unreachable if _NOT_THEIRS.search(cause) else SubmissionError
-        return kind(f"{source.given}: {cause}", hint=_PAGE if page else hint)
+        kind = SubmissionError if known.fault_of == "submission" else Unreachable
+        return kind(f"{source.given}: {known.cause}", hint=_PAGE if page else known.hint)
     return SubmissionError(f"{source.given}: git says: {error_line(failure, source)}", hint=_NETWORK)
 
 
@@ -412,13 +369,12 @@ def may_pass(failure: GitFailed) -> bool:
     if isinstance(failure, GitMissing | GitTimeout | GitTooMuch):
         return isinstance(failure, GitTimeout)
     known = _cause(failure)
-    return known is not None and _MAY_PASS.search(known[0]) is not None
+    return known is not None and known.fault_of == "network"
 
 
-def _cause(failure: GitFailed) -> tuple[str, str] | None:
-    """The cause and the hint, where what git said is known."""
-    fitting = ((cause, hint) for pattern, cause, hint in _CAUSES if re.search(pattern, failure.stderr))
-    return next(fitting, None)
+def _cause(failure: GitFailed) -> Cause | None:
+    """Return the first that fits what git said."""
+    return next((one for one in _CAUSES if re.search(one.pattern, failure.stderr)), None)
 
 
 def error_line(failure: GitFailed, source: Source) -> str:

@@ -32,18 +32,8 @@ ID = "submission"
 REPORTS = "grader"
 """The folder beside results.json with all reports and the evidence."""
 ARCHIVES = (
-    ".zip",
-    ".tar",
-    ".tar.gz",
-    ".tgz",
-    ".tar.bz2",
-    ".tbz2",
-    ".tar.xz",
-    ".txz",
-    ".bag",
-    ".mcap",
-    ".db3",
-)
+    ".zip", ".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tbz2", ".tar.xz", ".txz", ".bag", ".mcap", ".db3",
+)  # fmt: skip
 LEFT_BEHIND = ("__MACOSX", ".DS_Store", "Thumbs.db")
 """What operating systems add to the files that they pack."""
 TOO_LONG = "grading was stopped: it took longer than the {minutes} minutes allowed"

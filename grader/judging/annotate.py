@@ -10,11 +10,12 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 
-from grader.checks.cmake import NOT_CALLED
+from grader.checks.cmake import NOT_CALLED, below_catkin_package
 from grader.checks.messages import code_of
 from grader.checks.support.console_output import probes_on
-from grader.checks.support.exit_causes import NO_INPUT, RATE, SYNTAX, name_slip, syntax_hint
+from grader.checks.support.exit_causes import NO_INPUT, RATE, name_slip, syntax_hint
 from grader.checks.support.launch import (
+    NOT_STARTED,
     find_launch,
     node_slip,
     not_executable,
@@ -27,6 +28,7 @@ from grader.checks.support.launch_names import find_renaming
 from grader.checks.support.scripts import (
     BACKUPS,
     PYTHON,
+    SYNTAX,
     SourceLine,
     commented_call,
     commented_calls,
@@ -148,6 +150,7 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
     """Return the verdicts; where there was nothing to judge of a node, the hint goes on with what its source shows of
     the criteria that were not reached."""
     later: dict[str, list[str]] = {}
+    retyped: dict[str, tuple[str, str]] = {}
     for criterion in rubric.criteria:
         verdict = verdicts[criterion.id]
         package = facts.package_of(criterion)
@@ -169,8 +172,10 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
         ):
             told += unset_arg_fixes(file, verdict.hint)
         elif verdict.unjudged or verdict.of_machine or criterion.check in OF_TOPICS:
-            told += Later(criterion, verdict, package, facts).faults()
-    return {name: _with_later(verdict, later.get(name, ())) for name, verdict in verdicts.items()}
+            own_later = Later(criterion, verdict, package, facts)
+            told += own_later.faults()
+            retyped |= own_later.retyped
+    return {name: _with_later(verdict, later.get(name, ()), retyped) for name, verdict in verdicts.items()}
 
 
 def _of_its_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: Rubric) -> str | None:
@@ -186,17 +191,16 @@ def _imports_again(fix: str, hint: str) -> bool:
     return bool(code) and fix.endswith("at the top") and all(f"`{one}`" in hint for one in code)
 
 
-_OTHER_TYPE = re.compile(r"(?:publish|subscribe with) (\w+)/(\w+) in .*, not (\w+)")
-
-
-def _with_later(verdict: Verdict, later: Iterable[str]) -> Verdict:
+def _with_later(verdict: Verdict, later: Iterable[str], retyped: Mapping[str, tuple[str, str]]) -> Verdict:
     hint, said = verdict.hint, in_language(verdict.hint, "python")
     new = [one for one in dict.fromkeys(later) if one.removeprefix("publish ") not in said]
     told = [one for one in new if not _imports_again(one, hint)]
     if not told or not hint:
         return verdict
-    for other in filter(None, map(_OTHER_TYPE.fullmatch, told)):  # what is not wanted is not imported first
-        hint = re.sub(rf"from \w+\.msg import {other[3]}\b", f"from {other[1]}.msg import {other[2]}", hint)
+    # what is not wanted is not imported first
+    for wanted, other in (retyped[one] for one in told if one in retyped):
+        package, _, name = wanted.partition("/")
+        hint = re.sub(rf"from \w+\.msg import {other}\b", f"from {package}.msg import {name}", hint)
     if verdict.of_machine:
         hint = f"{join_words(told)}. {hint.replace(NOTHING_TO_DO, 'For the rest, ', 1)}"
         return verdict.model_copy(update={"hint": hint})
@@ -218,6 +222,8 @@ class Later:
         self._slips += self._texts_of_cpp()
         self._ran = not verdict.cause
         """Names are told already then, and only what is behind them is not."""
+        self.retyped: dict[str, tuple[str, str]] = {}
+        """Of faults of a type: the one that the lab wants, and the one that the script has."""
 
     def faults(self) -> Iterator[str]:
         """Yield how each is repaired."""
@@ -277,7 +283,7 @@ class Later:
         types = [one for one in self._of("publisher-type") if one.line in lines or len(published) <= 1]
         types = types if not (self._ran and lines) else []
         if len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
-            yield f"publish {kind} in {_line(types[0])}, not {types[0].message}"
+            yield self._retype("publish", kind, types[0])
 
     def _heard(self) -> Iterator[str]:
         scenario = self._rubric.scenarios.get(self._criterion.scenario or "")
@@ -290,7 +296,7 @@ class Later:
             yield f"subscribe to {self._topic} in {_line(heard[0])}, not to {heard[0].message}"
         other = sent and len(types) == 1 and types[0].message != own
         if other and (elsewhere or (not heard and f"/{types[0].message}" not in self._verdict.message)):
-            yield f"subscribe with {sent[0]} in {_line(types[0])}, not {types[0].message}"
+            yield self._retype("subscribe with", sent[0], types[0])
         template, said = str(self._wanted.get("template", VALUE)), self._of("prints")
         said = [one for one in said if SAID_DATA in one.message]
         unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
@@ -302,6 +308,11 @@ class Later:
             yield f"print '{in_words(template)}'"
         elif other and not said and len(self._of("prints")) == 1:  # a field that the right type does not have
             yield f"print the `data` of the message in {_line(self._of('prints')[0])}"
+
+    def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> str:
+        fault = f"{verb} {wanted} in {_line(slip)}, not {slip.message}"
+        self.retyped[fault] = wanted, slip.message
+        return fault
 
     def _lacks_words(self, words: str) -> bool:
         """Return whether the words stand in no line of the sources, which are known."""
@@ -345,7 +356,7 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     if file is None or file.fault is not None:
         return
     refused = refusal(run, package) if isinstance(run, Run) else None
-    if refused is not None and "first line" not in refused.hint and not any(refusals(package, file)):
+    if refused is not None and refused.refused != NOT_STARTED and not any(refusals(package, file)):
         yield f"{refused.hint}: {refused.why}"
     yield from unset_arg_fixes(file, refused.hint if refused is not None else "")
     nodes = [one for one in file.brings if one.type in names]
@@ -409,8 +420,8 @@ def cite_words(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run)
         for number, text in enumerate(build.file_lines(path)[:_LINES_READ], 1)
         if len(text) <= LINE_CHARS and not text.lstrip().startswith(("#", "//"))
     ]
-    said = f"{verdict.measured} {verdict.message.partition(', not ')[0]} {verdict.message.partition(' it prints ')[2]}"
-    found = lines_that_set(lines, str(field)) if field else lines_that_say(lines, said)
+    said = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
+    found = lines_that_set(lines, str(field)) if field else said
     if field or criterion.check == "message":
         published = lines_that_publish(lines, str(criterion.parameters.get("topic", "")))
         # of several, the one that is published; of none, what is published has nothing of it
@@ -430,10 +441,9 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
         return verdict
     if f"{CMAKE} line" in verdict.hint or f"{CMAKE}: " in verdict.hint:
         return verdict  # how the line is repaired is told
-    lines = build.file_lines(CMAKE)[:_LINES_READ]
-    if (below := _BELOW.search(verdict.hint)) and verdict.citations == (FileCitation(file=CMAKE),):
-        return _cite_install(verdict, lines, int(below[1] or 0) or None)
-    found = commented_calls(package, lines, verdict.hint)
+    if called := verdict.sought_name("call"):
+        return _cite_install(verdict, package, build, called)
+    found = commented_calls(package, build.file_lines(CMAKE)[:_LINES_READ], verdict.hint)
     if not found:
         return verdict
     told = "; ".join(f"{name}(…) is commented out in {lines_text(*place)}" for name, place in found.items())
@@ -452,38 +462,33 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
 CMAKE = "CMakeLists.txt"
 
 
-def _cite_install(verdict: Verdict, lines: Sequence[str], below: int | None) -> Verdict:
-    place = commented_call(lines, PYTHON) if NOT_CALLED in verdict.message else None
+def _cite_install(verdict: Verdict, package: PackageFacts, build: Run, called: str) -> Verdict:
+    file = next((one.file for one in verdict.citations if isinstance(one, FileCitation)), CMAKE)
+    place = commented_call(build.file_lines(file)[:_LINES_READ], called)
     if place is None:
-        return verdict.model_copy(update={"citations": (FileCitation(file=CMAKE, line=below),)})
+        return verdict
     where = lines_text(*place)
     update = {
         "message": verdict.message.replace(NOT_CALLED, f"{NOT_CALLED}: it is commented out in {where}", 1),
-        "hint": f"in place of {where} {_BELOW.sub('', verdict.hint)}, without # before it",
-        "citations": (FileCitation(file=CMAKE, line=place[0] + 1),),
+        "hint": f"in place of {where} {verdict.hint.removesuffix(below_catkin_package(package))}, without # before it",
+        "citations": (FileCitation(file=file, line=place[0] + 1),),
     }
     return verdict.model_copy(update=update)
-
-
-_BELOW = re.compile(r" below (?:the )?\w+\(…?\)(?: of line (\d+))?$")
-_NO_PACKAGE = re.compile(r"roslaunch starts nothing: there is no package (\w+)")
-_UNDECLARED = re.compile(r" does not declare (\w+) as a run-time dependency")
-_LACKED = re.compile(r": it needs the package (\w+), which this grading machine lacks")
 
 
 def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | None, build: Run) -> Verdict:
     """Return the verdict; one on a package that roslaunch does not find cites the lines of the launch file that name
     it."""
-    absent = _NO_PACKAGE.search(verdict.message)
+    absent = verdict.sought_name("package")
     file = find_launch(package, str(criterion.parameters.get("launch", ""))) if package and absent else None
-    if file is None or absent is None or not verdict.status.is_lost:
+    if file is None or not verdict.status.is_lost:
         return verdict
-    name = re.compile(rf"""\$\(find\s+{absent[1]}\)|pkg\s*=\s*["']{absent[1]}["']""")
+    name = re.compile(rf"""\$\(find\s+{re.escape(absent)}\)|pkg\s*=\s*["']{re.escape(absent)}["']""")
     lines = [n for n, text in enumerate(build.file_lines(file.path)[:_LINES_READ], 1) if name.search(text)]
     if not lines:
         return verdict
     where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))}"
-    hint = f"write the package's exact name in {where}, push {absent[1]} if it is your own, or leave that out"
+    hint = f"write the package's exact name in {where}, push {absent} if it is your own, or leave that out"
     cited = tuple(FileCitation(file=file.path, line=n) for n in lines)
     return verdict.model_copy(update={"hint": hint, "citations": cited})
 
@@ -492,20 +497,21 @@ def cite_name(verdict: Verdict, build: Run) -> Verdict:
     """Return the verdict; one on a dependency cites the line that has its name: a tag that is commented out, or that of
     a `find_package(…)` over several lines."""
     place = next((one for one in verdict.citations if isinstance(one, FileCitation) and one.line), None)
-    undeclared, lacked = _UNDECLARED.search(verdict.message), _LACKED.search(verdict.message)
+    undeclared, lacked = verdict.sought_name("dependency"), verdict.sought_name("component")
     if place is None or place.line is None or not (undeclared or lacked):
         return verdict
+    message, hint = verdict.message, verdict.hint
     lines = [text[:LINE_CHARS] for text in build.file_lines(place.file)[:_LINES_READ]]
     if undeclared:
-        tag = re.compile(rf"\s*<!--\s*<(depend|exec_depend|run_depend)>\s*{undeclared[1]}\s*</\1>\s*-->")
+        name = re.escape(undeclared)
+        tag = re.compile(rf"\s*<!--\s*<(depend|exec_depend|run_depend)>\s*{name}\s*</\1>\s*-->")
         line = next((number for number, text in enumerate(lines, 1) if tag.match(text)), None)
-        message = f"{verdict.message}: line {line} has it in a comment"
+        message = f"{message}: line {line} has it in a comment"
         hint = f"remove `<!--` and `-->` from line {line}"
     else:
-        name = re.compile(rf"[^#]*\b{lacked[1] if lacked else ''}\b")
+        word = re.compile(rf"[^#]*\b{re.escape(lacked)}\b")
         inside = enumerate(lines[place.line - 1 :], place.line)
-        line = next((number for number, text in inside if name.match(text)), None)
-        message, hint = verdict.message, verdict.hint
+        line = next((number for number, text in inside if word.match(text)), None)
     if line is None:
         return verdict
     cited = tuple(

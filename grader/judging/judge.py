@@ -17,10 +17,10 @@ from typing import Any, NamedTuple, cast
 from grader.checks import CHECKS, Check
 from grader.checks.build import explain_by_build
 from grader.checks.registry import NotRecorded
-from grader.checks.support.exit_causes import SYNTAX, explain_by_exception
+from grader.checks.support.exit_causes import explain_by_exception
 from grader.checks.support.parameters import explain_by_unread_parameter
 from grader.checks.support.processes import plain_type
-from grader.checks.support.scripts import without_git
+from grader.checks.support.scripts import SYNTAX, without_git
 from grader.checks.support.text import near_names, texts_in
 from grader.checks.support.topics import SYSTEM_TOPICS, account_for_losses, explain_by_unheard_topic
 from grader.errors import EvidenceError

@@ -12,24 +12,10 @@ from grader.model.submission import chmod_hint
 from grader.wording import join_words, plural
 
 RepairKind = Literal[
-    "executable-bit",
-    "encoding",
-    "byte-order-mark",
-    "line-ends",
-    "shebang",
-    "file-name",
-    "python-syntax",
-    "manifest-line",
-    "build-line",
-    "launch-syntax",
-    "package-name",
-    "launch-type",
-    "missing-import",
-    "missing-call",
-    "node-name",
-    "topic-name",
-    "parameter-name",
-]
+    "executable-bit", "encoding", "byte-order-mark", "line-ends", "shebang", "file-name", "python-syntax",
+    "manifest-line", "build-line", "launch-syntax", "package-name", "launch-type", "missing-import", "missing-call",
+    "node-name", "topic-name", "parameter-name",
+]  # fmt: skip
 """In the order in which a student would meet them."""
 
 KINDS: tuple[RepairKind, ...] = get_args(RepairKind)

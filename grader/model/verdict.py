@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Literal
 
 from pydantic import Field
+from typing_extensions import TypedDict, Unpack
 
 from grader.model.record import Record
 
@@ -89,6 +90,18 @@ class Mistake(Record):
     """The file that the lab asks for, or the script, from the package's root."""
 
 
+SoughtKind = Literal["call", "component", "dependency", "package"]
+
+
+class Sought(Record):
+    """A name whose lines are looked up in the sources once all is judged, and then cited: checks see few of them."""
+
+    kind: SoughtKind
+    """A command that `CMakeLists.txt` does not call; a package that the machine lacks and `find_package(…)` names, that
+    `package.xml` does not declare, or that roslaunch does not find."""
+    name: str
+
+
 class Verdict(Record):
     """One check's judgement.
 
@@ -98,7 +111,8 @@ class Verdict(Record):
     `timing` marks a loss that one run's timing could have made: it counts only if it is seen twice. `of_machine`: it is
     open until the machine has what it lacks, and grading again before changes nothing. `cause` is what a
     process ended of, in words that are the same in every verdict that rests on it. `blocked_by` is the criterion that
-    explains the absence, `right` what earned a part of the points, `mistake` the kind of what was done wrong.
+    explains the absence, `right` what earned a part of the points, `mistake` the kind of what was done wrong. `said` is
+    what a node printed, logged or published in place of what was asked, `sought` a name: the lines of both are cited.
     """
 
     status: Status
@@ -117,14 +131,21 @@ class Verdict(Record):
     blocked_by: str = ""
     right: str = ""
     mistake: Mistake | None = None
+    said: str = ""
+    sought: Sought | None = None
 
     def about(
-        self, *, expected: str | None = None, measured: str | None = None, citations: Citations | None = None
+        self,
+        *,
+        expected: str | None = None,
+        measured: str | None = None,
+        said: str | None = None,
+        citations: Citations | None = None,
     ) -> Verdict:
-        """Return the verdict with what was expected and measured; None leaves a field. `citations`, where it shows,
-        come behind those that it has."""
+        """Return the verdict with what was expected, measured and said; None leaves a field. `citations`, where it
+        shows, come behind those that it has."""
         places = None if citations is None else tuple(dict.fromkeys((*self.citations, *citations)))
-        fields = {"expected": expected, "measured": measured, "citations": places}
+        fields = {"expected": expected, "measured": measured, "said": said, "citations": places}
         return self.model_copy(update={name: value for name, value in fields.items() if value is not None})
 
     def moved(self, folder: str) -> Verdict:
@@ -142,6 +163,14 @@ class Verdict(Record):
     def lost_by(self, kind: MistakeKind, name: str) -> Verdict:
         """Return the verdict with the kind of mistake that it is lost by."""
         return self.model_copy(update={"mistake": Mistake(kind=kind, name=name)})
+
+    def seeking(self, kind: SoughtKind, name: str) -> Verdict:
+        """Return the verdict with a name to cite the lines of."""
+        return self.model_copy(update={"sought": Sought(kind=kind, name=name)})
+
+    def sought_name(self, kind: SoughtKind) -> str:
+        """Return the name of this kind to cite the lines of; "" where none is sought."""
+        return self.sought.name if self.sought is not None and self.sought.kind == kind else ""
 
     def once(self) -> Verdict:
         """Return the verdict marked as a loss that one run's timing could have made."""
@@ -168,89 +197,41 @@ def share_text(share: float) -> str:
     return {1.0: "all", 0.5: "half"}.get(share, f"{share * 100:.0f} %")
 
 
-def passed(
-    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
-) -> Verdict:
+class Details(TypedDict, total=False):
+    """What a verdict may say beside its message."""
+
+    expected: str
+    measured: str
+    hint: str
+    citations: Citations
+
+
+def passed(message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that earns all points."""
-    return _verdict(
-        Status.PASS, 1.0, message, expected=expected, measured=measured, hint=hint, citations=citations
-    )
+    return Verdict(status=Status.PASS, score=1.0, message=message, **details)
 
 
-def partial(
-    score: float,
-    message: str,
-    *,
-    expected: str = "",
-    measured: str = "",
-    hint: str = "",
-    citations: Citations = (),
-) -> Verdict:
+def partial(score: float, message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that earns the share `score`, 0 to 1, of the points."""
-    return _verdict(
-        Status.PARTIAL, score, message, expected=expected, measured=measured, hint=hint, citations=citations
-    )
+    return Verdict(status=Status.PARTIAL, score=score, message=message, **details)
 
 
-def failed(
-    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
-) -> Verdict:
+def failed(message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that earns nothing."""
-    return _verdict(
-        Status.FAIL, 0.0, message, expected=expected, measured=measured, hint=hint, citations=citations
-    )
+    return Verdict(status=Status.FAIL, score=0.0, message=message, **details)
 
 
-def unjudged(
-    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
-) -> Verdict:
+def unjudged(message: str, **details: Unpack[Details]) -> Verdict:
     """Return the verdict that there is nothing to judge: a fail, or `blocked` where a required criterion
     explains it."""
-    verdict = _verdict(
-        Status.FAIL, 0.0, message, expected=expected, measured=measured, hint=hint, citations=citations
-    )
-    return verdict.model_copy(update={"unjudged": True})
+    return Verdict(status=Status.FAIL, score=0.0, message=message, unjudged=True, **details)
 
 
-def inconclusive(
-    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
-) -> Verdict:
+def inconclusive(message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that is still open, for no fault of the student's."""
-    return _verdict(
-        Status.INCONCLUSIVE,
-        0.0,
-        message,
-        expected=expected,
-        measured=measured,
-        hint=hint,
-        citations=citations,
-    )
+    return Verdict(status=Status.INCONCLUSIVE, score=0.0, message=message, **details)
 
 
-def machine_lacks(
-    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
-) -> Verdict:
+def machine_lacks(message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that is open until the grading machine has what it lacks."""
-    verdict = inconclusive(message, expected=expected, measured=measured, hint=hint, citations=citations)
-    return verdict.model_copy(update={"of_machine": True})
-
-
-def _verdict(
-    status: Status,
-    score: float,
-    message: str,
-    *,
-    expected: str,
-    measured: str,
-    hint: str,
-    citations: Citations,
-) -> Verdict:
-    return Verdict(
-        status=status,
-        score=score,
-        message=message,
-        expected=expected,
-        measured=measured,
-        hint=hint,
-        citations=citations,
-    )
+    return Verdict(status=Status.INCONCLUSIVE, score=0.0, message=message, of_machine=True, **details)

@@ -17,7 +17,7 @@ from grader.limited_child import ChildLimits, run_limited
 from grader.model.package import Fault, PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.package.reading import printable
-from grader.syntax_fixes import BLOCK, COMMENTED_OUT, MERGE_MARKER, cause_of_line
+from grader.syntax_fixes import BLOCK, COMMENTED_OUT, MERGE_MARKER, cause_of_line, without_texts
 
 CHECK = "grader.arena.ros.syntax:check_all"
 MEMORY_BYTES, CPU_S = 1 << 30, 20
@@ -277,13 +277,8 @@ def _first(table: tuple[tuple[str, str], ...], text: str) -> str:
     return ""
 
 
-def _without_texts(line: str) -> str:
-    """Return the line with its string literals emptied and its comment cut."""
-    return re.sub(r"""("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|#.*""", lambda m: '""' if m[1] else "", line)
-
-
 def _lacks_colon(text: str, column: int | None) -> bool:
-    code = _without_texts(text).rstrip()
+    code = without_texts(text).rstrip()
     at_end = column is None or column > len(text.split("#", maxsplit=1)[0].rstrip())
     return at_end and not re.search(r":\W*$", code) and _BLOCK.match(code) is not None
 

@@ -45,18 +45,9 @@ NAME_CHARS_MIN = 4
 """Shorter names differ by one letter because they are different names."""
 SLIP_CHARS = 3
 OF_ROS = {
-    "rosbag",
-    "roscpp",
-    "rosgraph",
-    "roslaunch",
-    "roslib",
-    "rosmsg",
-    "rosnode",
-    "rosparam",
-    "rospkg",
-    "rosservice",
+    "rosbag", "roscpp", "rosgraph", "roslaunch", "roslib", "rosmsg", "rosnode", "rosparam", "rospkg", "rosservice",
     "rostopic",
-}
+}  # fmt: skip
 """Modules that there are, whose names begin like that of another one."""
 MODULES = frozenset({"math", "os", "random", "rospy", "sys", "time"})
 NAMES_OF_ROSPY = (

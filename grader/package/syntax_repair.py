@@ -12,7 +12,14 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from grader.syntax_fixes import PLAIN, cause_of_line, corrections, without_brace, without_comment_sign
+from grader.syntax_fixes import (
+    PLAIN,
+    cause_of_line,
+    corrections,
+    without_brace,
+    without_comment_sign,
+    without_texts,
+)
 
 STEPS_MAX = 60
 STATEMENT_LINES_MAX = 12
@@ -140,8 +147,8 @@ def _without_braces(lines: list[str]) -> str:
 def _with_body_indented(lines: list[str], at: int) -> Iterator[str]:
     """Yield the text with the line indented, where it alone can be the body of the block that begins above it."""
 
-    head = next((line for line in reversed(lines[:at]) if _code(line).strip()), "")
-    after = next((line for line in lines[at + 1 :] if _code(line).strip()), "")
+    head = next((line for line in reversed(lines[:at]) if without_texts(line).strip()), "")
+    after = next((line for line in lines[at + 1 :] if without_texts(line).strip()), "")
     own = _indentation(lines[at])
     ends = len(_indentation(after)) < len(own) or not after or CONTINUES.match(after.strip())
     if lines[at].strip() and own == _indentation(head) and ends:
@@ -152,9 +159,9 @@ def _with_head_uncommented(lines: list[str], at: int) -> Iterator[str]:
     """Yield the text with the comment right above the line that is the first line of its block."""
     for number in range(at - 1, -1, -1):
         if head := without_comment_sign(lines[number]):
-            before = next((line for line in reversed(lines[:number]) if _code(line).strip()), "")
+            before = next((line for line in reversed(lines[:number]) if without_texts(line).strip()), "")
             yield with_line(lines, number, _indentation(before) + head.lstrip())
-        if _code(lines[number]).strip():
+        if without_texts(lines[number]).strip():
             return
 
 
@@ -163,7 +170,7 @@ def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:
     far in, at the level of the line before it; or, where it is further out than that, at the one level above that is
     nearest."""
     own = _width(lines[at])
-    numbers = [number for number, line in enumerate(lines[:at]) if _code(line).strip()]
+    numbers = [number for number, line in enumerate(lines[:at]) if without_texts(line).strip()]
     above = [_width(lines[number]) for number in numbers] or [0]
     if own > above[-1] and above[-2:-1] == [own]:  # the line between two of one level is the odd one
         yield with_line(lines, numbers[-1], " " * own + lines[numbers[-1]].lstrip())
@@ -244,7 +251,7 @@ def _fixed_statement(lines: list[str]) -> list[str] | None:
     keyword = re.match(r"\w*", first)
     head = {"elif": "if x:\n    pass\n", "else": "if x:\n    pass\n", "except": "try:\n    pass\n"}
     before = head.get(keyword[0] if keyword else "", "")
-    after = "    pass\n" if _code(lines[-1]).endswith(":") else ""
+    after = "    pass\n" if without_texts(lines[-1]).rstrip().endswith(":") else ""
     source = before + "\n".join([first, *lines[1:]]) + "\n" + after
     tools = _tools()[::-1] if OLD_PRINT.search(source) else _tools()
     fixed = next((f for tool in tools if (f := _refactor(tool, source)) not in (None, source)), None)
@@ -273,12 +280,6 @@ def _refactor(tool: Any, source: str) -> str | None:  # noqa: ANN401 - a library
         return str(tool.refactor_string(source, "script"))
     except Exception:  # noqa: BLE001 - the library raises whatever its parser and tokenizer do
         return None
-
-
-def _code(line: str) -> str:
-    """The line without its comment and its texts' contents."""
-    emptied = re.sub(r"""("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|#.*""", lambda m: '""' if m[1] else "", line)
-    return emptied.rstrip()
 
 
 def is_docstring(statement: ast.stmt) -> bool:

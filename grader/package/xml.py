@@ -14,19 +14,21 @@ from grader.model.package import Fault
 
 _TYPOGRAPHIC = re.compile("[\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u2033\u00ab\u00bb]")
 
+_NO_END = r"Premature end of data in tag (\S+) line (\d+)"
+_NO_QUOTE = (r"Unescaped '<' not allowed in attr", r"AttValue: ['\"] expected")
 # libxml2's message and what it means ({0}, {1}: the pattern's groups, {root}: the root tag)
 _CAUSES = (
     (r"Document is empty", "the file is empty: write `<{root}>` and `</{root}>` into it"),
     (r"Start tag expected", "there is something before the first tag: the file must start with `<{root}>`"),
-    (r"Premature end of data in tag (\S+) line (\d+)", "`<{0}>` of line {1} is never closed: add `</{0}>`"),
+    (_NO_END, "`<{0}>` of line {1} is never closed: add `</{0}>`"),
     (r"hyphen|must not contain '--'", "`--` is not allowed inside a comment `<!-- ... -->`: delete it there"),
     (r"Comment not terminated", "a comment is opened by `<!--` and never closed: write `-->` where it ends"),
     (r"Extra content at the end", "text comes after the first block: delete it, since only one `<{root}>` is allowed"),
     (r"XML declaration allowed only", "something comes before `<?xml ... ?>`: delete it, blank lines too"),
     (r"Attribute (\S+) redefined", "the attribute `{0}` is given twice in one tag: delete one of the two"),
-    (r"Unescaped '<' not allowed in attr",
+    (_NO_QUOTE[0],
      'a closing quote is missing, so that the value runs on into the next tag: write `"` where it ends'),
-    (r"AttValue: ['\"] expected", 'a closing quote is missing: write `"` where the value ends'),
+    (_NO_QUOTE[1], 'a closing quote is missing: write `"` where the value ends'),
     (r"AttValue: \" or ' expected", 'the value of an attribute has no quotes around it: write name="value"'),
     (r"Specification mandates value for attribute (\S+)", '`{0}` has no value: write {0}="..."'),
     (r"invalid element name", "a `<` begins no tag: delete the space after it, or write `&lt;` for a plain `<`"),
@@ -48,21 +50,22 @@ _TAGS = re.compile(
     re.DOTALL,
 )
 _MESSAGE_CHARS_MAX = 300
+_TAGS_MAX = 2_000
 _OPENERS_A_TAG = 20
 _MESSAGES = 50
 _LAST_LINE = 65_535
 
 
 def parse_xml(
-    data: bytes, file: str, *, root: str, encoding: str | None = None, max_tags: int = 2_000
+    data: bytes, file: str, *, root: str, encoding: str | None = None
 ) -> tuple[etree._Element | None, Fault | None]:
     """Return the root element, or None and the fault. `root` is the tag that the file should begin with.
 
     `encoding` overrides what the file says of itself. Nothing that a file declares is expanded or fetched, and
-    nothing of more than `max_tags` tags is looked at.
+    nothing of more than `_TAGS_MAX` tags is looked at.
     """
-    if data.count(b"<") > _OPENERS_A_TAG * max_tags:
-        return None, _too_many(file, max_tags)
+    if data.count(b"<") > _OPENERS_A_TAG * _TAGS_MAX:
+        return None, _too_many(file)
     parser = _parser(encoding)
     try:
         element = etree.fromstring(data, parser)
@@ -72,19 +75,19 @@ def parse_xml(
     if dtd is not None and dtd.entities():  # type: ignore[union-attr] # lxml-stubs lack it
         cause = "`<!ENTITY ...>` is not read: delete the `<!DOCTYPE ...>` block and write the text out"
         return None, Fault(file=file, line=1, kind="Entity", message="declares entities", cause=cause)
-    if sum(1 for _ in element.iter(etree.Element)) > max_tags:
-        return None, _too_many(file, max_tags)
+    if sum(1 for _ in element.iter(etree.Element)) > _TAGS_MAX:
+        return None, _too_many(file)
     _set_first_lines(element, data)
     return element, None
 
 
-def parse_what_is_left(data: bytes, *, max_tags: int = 2_000) -> etree._Element | None:
+def parse_what_is_left(data: bytes) -> etree._Element | None:
     """Return what a lenient parser makes of a file that is not well-formed; None where that is nothing, or too much."""
     try:
         element = etree.fromstring(data, _parser(None, recover=True))
     except etree.XMLSyntaxError:
         return None
-    few = element is not None and sum(1 for _ in element.iter(etree.Element)) <= max_tags
+    few = element is not None and sum(1 for _ in element.iter(etree.Element)) <= _TAGS_MAX
     return element if few else None
 
 
@@ -101,8 +104,8 @@ def _parser(encoding: str | None, *, recover: bool = False) -> etree.XMLParser:
     )
 
 
-def _too_many(file: str, max_tags: int) -> Fault:
-    cause = f"`{file}` holds more than {max_tags} tags and was not read"
+def _too_many(file: str) -> Fault:
+    cause = f"`{file}` holds more than {_TAGS_MAX} tags and was not read"
     return Fault(file=file, line=None, kind="TooLarge", message="too many tags", cause=cause)
 
 
@@ -138,8 +141,8 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
     text = _line(data, line)
     known = 0 < column <= len(text) + 1
     log = [str(entry.message)[:_MESSAGE_CHARS_MAX] for entry in islice(parser.error_log, _MESSAGES)]
-    cause = cause_of(message, log, text, root=root)[:_MESSAGE_CHARS_MAX]
-    if (opened := _unclosed_line(cause, log)) and opened != line:
+    cause, opened = _explain(message, log, text, root=root)
+    if opened and opened != line:
         line, text = opened, _line(data, opened)
         column = text.find("<") + 1
         known = column > 0
@@ -149,19 +152,9 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
         column=column if known else None,
         kind="XMLSyntaxError",
         message=message[:_MESSAGE_CHARS_MAX],
-        cause=_opened_again(message, data, text, root) or cause,
+        cause=_opened_again(message, data, text, root) or cause[:_MESSAGE_CHARS_MAX],
         source=text.rstrip("\r") if known else "",
     )
-
-
-def _unclosed_line(cause: str, log: list[str]) -> int | None:
-    """Return the line of the tag that is not ended, where the cause is that one: libxml2 says where it noticed."""
-    if told := re.search(r"of line (\d+) (?:is still open|is never closed)", cause):
-        return int(told[1])
-    if "is not finished properly" in cause or cause.startswith("a closing quote is missing"):
-        found = (re.search(r"end of Start Tag \S+ line (\d+)", message) for message in log)
-        return next((int(one[1]) for one in found if one), None)
-    return None
 
 
 def _opened_again(message: str, data: bytes, text: str, root: str) -> str:
@@ -179,42 +172,41 @@ def _line(data: bytes, number: int) -> str:
     )
 
 
-def cause_of(message: str, log: list[str], line: str, *, root: str) -> str:
-    """Return libxml2's message in plain words. `log` holds all its messages, `line` the text of the faulty line."""
+def _explain(message: str, log: list[str], line: str, *, root: str) -> tuple[str, int | None]:
+    """Return libxml2's message in plain words, with the line of the tag that is not ended where it is that: libxml2
+    says where it noticed. `log` holds all its messages, `line` the text of the faulty line."""
     if line.startswith(("<<<<<<<", "=======", ">>>>>>>")):
-        return (
-            "git's merge markers (`<<<<<<<`) are still in the file: keep one version and delete the markers"
-        )
+        why = "git's merge markers (`<<<<<<<`) are still in the file: keep one version and delete the markers"
+        return why, None
     if "AttValue" in message and (quote := _TYPOGRAPHIC.search(line)):
-        return f'a typographic quote {quote[0]} was copied from a PDF or a web page: type plain quotes (")'
+        why = f'a typographic quote {quote[0]} was copied from a PDF or a web page: type plain quotes (")'
+        return why, None
     if mismatch := re.search(r"tag mismatch: (\S+) line (\d+) and (\S+)", message):
-        return _mismatch(mismatch[1], mismatch[2], mismatch[3], root)
-    unfinished = next(filter(None, (re.search(r"end of Start Tag (\S+)", m) for m in log)), None)
-    if unfinished and re.search("attribute name|attributes construct", message):
-        return (
-            f"the tag `<{unfinished[1]}` is not finished properly: it needs a space before each attribute, "
+        return _mismatch(mismatch[1], int(mismatch[2]), mismatch[3], root)
+    begun = next(filter(None, (re.search(r"end of Start Tag (\S+) line (\d+)", m) for m in log)), None)
+    at = int(begun[2]) if begun else None
+    if begun and re.search("attribute name|attributes construct", message):
+        why = (
+            f"the tag `<{begun[1]}` is not finished properly: it needs a space before each attribute, "
             "quotes round each value, and `>` or `/>` at its end"
         )
+        return why, at
     for pattern, cause in _CAUSES:
         if found := re.search(pattern, message):
-            return cause.format(*found.groups(), root=root)
-    return ""
+            why = cause.format(*found.groups(), root=root)
+            return why, int(found[2]) if pattern == _NO_END else at if pattern in _NO_QUOTE else None
+    return "", None
 
 
-def _mismatch(opened: str, line: str, closed: str, root: str) -> str:
+def _mismatch(opened: str, line: int, closed: str, root: str) -> tuple[str, int | None]:
+    tag = f"`<{opened}>` of line {line}"
     if opened.lower() == closed.lower():
-        return (
-            f"`<{opened}>` of line {line} is closed by `</{closed}>`, in other letters: write `</{opened}>`"
-        )
+        return f"{tag} is closed by `</{closed}>`, in other letters: write `</{opened}>`", None
     if get_close_matches(closed, [opened], cutoff=0.7):
-        return f"`<{opened}>` of line {line} is closed by `</{closed}>`: write `</{opened}>`"
+        return f"{tag} is closed by `</{closed}>`: write `</{opened}>`", None
     if opened == root:
-        only = f"only `<{opened}>` of line {line} is open here"
-        return f"`</{closed}>` closes nothing, since {only}: delete `</{closed}>`"
-    return (
-        f"`<{opened}>` of line {line} is still open where `</{closed}>` comes: "
-        f"end it with `/>` or with `</{opened}>`"
-    )
+        return f"`</{closed}>` closes nothing, since only {tag} is open here: delete `</{closed}>`", None
+    return f"{tag} is still open where `</{closed}>` comes: end it with `/>` or with `</{opened}>`", line
 
 
 # ---- one edit that makes a file well-formed
@@ -257,7 +249,7 @@ def _edits(text: str, fault: Fault, root: str) -> Iterator[str]:
         return
     if mismatch := re.search(r"tag mismatch: (\S+) line (\d+) and (\S+)", message):
         yield from _matching(lines, mismatch[1], int(mismatch[2]) - 1, mismatch[3], root)
-    elif unclosed := re.search(r"Premature end of data in tag (\S+) line (\d+)", message):
+    elif unclosed := re.search(_NO_END, message):
         yield from _closed(lines, unclosed[1], int(unclosed[2]) - 1, root)
     elif re.search(r"hyphen|must not contain '--'", message):
         yield _COMMENT.sub(lambda found: f"<!--{re.sub(r'-(?=-)|-$', '- ', found[1])}-->", text)

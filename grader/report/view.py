@@ -301,18 +301,18 @@ LAST_BRACKET = re.compile(r" \((?=[a-z]+ [^()]*\)$)")
 """Where a message may go on with what is less important."""
 
 
-def headline(text: str, chars: int = HEADLINE_CHARS) -> tuple[str, str]:
+def headline(text: str) -> tuple[str, str]:
     """Return what a message says first, and the rest of a long one: what follows its last stop that leaves no more than
-    `chars`. A message without one is a headline as a whole."""
-    if len(text) <= chars:
+    `HEADLINE_CHARS`. A message without one is a headline as a whole."""
+    if len(text) <= HEADLINE_CHARS:
         return text, ""
     stops = [
         at
         for at in _outside(text, STOPS)
-        if HEADLINE_LEAST <= at.start() <= chars and not PLACE_LAST.search(text, 0, at.start())
+        if HEADLINE_LEAST <= at.start() <= HEADLINE_CHARS and not PLACE_LAST.search(text, 0, at.start())
     ]
     if text.endswith(")"):
-        stops += [at for at in _outside(text, LAST_BRACKET) if HEADLINE_LEAST <= at.start() <= chars]
+        stops += [at for at in _outside(text, LAST_BRACKET) if HEADLINE_LEAST <= at.start() <= HEADLINE_CHARS]
     best = max(stops, key=lambda at: (at[0] == "; ", at.start()), default=None)
     if best is None:
         return text, ""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from grader.checks.registry import Check
+from grader.checks.support.fields import is_number
 from grader.rubric.fault_words import model_faults
 from grader.rubric.model import ManualParams
 from grader.rubric.references import reference_faults
@@ -187,7 +188,7 @@ def _points(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) 
                 f"give one of points, bonus and penalty, not {' and '.join(given)}",
             )
     given_points = [c.get("points", 0) for _, c in criteria]
-    if not all(_is_number(points) for points in given_points):
+    if not all(is_number(points) for points in given_points):
         return
     total = _total(rubric, criteria)
     if abs(total - TOTAL_POINTS) > 1e-6:
@@ -195,10 +196,6 @@ def _points(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) 
     mark = rubric.get("pass_mark")
     if isinstance(mark, int | float) and mark > total:
         yield ("pass_mark",), f"{mark:g} is more than all the points, {total:g}"
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _total(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) -> float:

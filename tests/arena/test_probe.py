@@ -69,7 +69,7 @@ def bwrap(folder: Path, monkeypatch, script: str) -> None:
     found = {**{name: find_host_program(name) for name in sandbox.PROGRAMS}, "bwrap": str(path)}
     monkeypatch.setattr(sandbox, "find_host_program", found.get)
     monkeypatch.setattr(sandbox, "NAMESPACES", Path(__file__).parent / "no_network.py")
-    monkeypatch.setattr(sandbox, "_drop", list)
+    monkeypatch.setattr(sandbox, "words_to_drop_root", list)
 
 
 @pytest.mark.parametrize("said", FORBIDDEN)
@@ -173,10 +173,10 @@ def test_root_who_may_not_become_a_student_is_told_so(monkeypatch) -> None:
 @pytest.mark.skipif(os.geteuid() != 0, reason="root gives up what it may do")
 def test_limits_are_asked_for_as_the_user_who_gets_them(monkeypatch) -> None:
     """Root may raise a limit that its student's user may not."""
-    command = sandbox._drop()
+    command = sandbox.words_to_drop_root()
     assert Path(command[0]).name == "setpriv"
     asked: list[list[str]] = []
-    monkeypatch.setattr(sandbox, "_last_line", lambda argv: asked.append(argv) or "")
+    monkeypatch.setattr(sandbox, "last_error_line", lambda argv: asked.append(argv) or "")
     sandbox.refused_limits.cache_clear()
     try:
         assert sandbox.refused_limits() == ""

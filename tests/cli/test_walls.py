@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from grader import host_programs
 from grader.arena import control_groups
 from grader.arena.control_groups import Cgroup, Cgroups
 from grader.arena.sandbox import Sandbox
@@ -60,8 +61,8 @@ def test_namespaces_that_are_forbidden(monkeypatch, tmp_path: Path, name: str, v
     (tmp_path / name).write_text(f"{value}\n")
     refused = subprocess.CompletedProcess([], 1, b"", b"unshare: unshare failed: Operation not permitted\n")
     monkeypatch.setattr(host_support, "SETTINGS", tmp_path)
-    monkeypatch.setattr(host_support.subprocess, "run", lambda *_args, **_more: refused)
-    row = host_support._probe("user namespaces", ["unshare"], drop=False)
+    monkeypatch.setattr(host_programs.subprocess, "run", lambda *_args, **_more: refused)
+    row = host_support._probe("user namespaces", ["unshare"])
     assert (row.state, row.detail) == ("limited", "unshare: unshare failed: Operation not permitted")
     assert fix in row.fix
 

@@ -39,9 +39,9 @@ def fill(writer: EvidenceStream, count: int = 30) -> None:
     for n in range(count):
         at = T0 + n * 100 * MS
         data = decode.encode("std_msgs/Int8", {"data": n % 128})
-        writer.message(**identity("/numeric", "std_msgs/Int8"), log_time_ns=at, data=data)
+        writer.register_channel(**identity("/numeric", "std_msgs/Int8")).message(at, data)
         text = decode.encode("std_msgs/String", {"data": f"hello {n}"})
-        writer.message(**identity("/chatter", "std_msgs/String"), log_time_ns=at + 1, data=text)
+        writer.register_channel(**identity("/chatter", "std_msgs/String")).message(at + 1, text)
         writer.event(
             "/grader/console", at + 2, ConsoleLine(process="talker", stream="stdout", line=f"hé {n}")
         )

@@ -139,7 +139,7 @@ def test_a_node_cannot_take_the_schema_of_the_graders_records():
         "type": "grader.ActorEvent",
         "definition": text,
     }
-    writer.message(**about, log_time_ns=T0, data=b"")
+    writer.register_channel(**about).message(T0, b"")
     writer.event("/grader/actor", T0, ActorEvent(action="refused", actor="talker", detail="asked too much"))
     writer.finish()
     stream.seek(0)

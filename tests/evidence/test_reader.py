@@ -95,9 +95,9 @@ def test_a_students_topic_is_never_taken_for_the_graders():
     stream = BytesIO()
     writer = EvidenceStream(stream, **ABOUT)
     fake = b'\x00{"process":"x","stream":"stdout","line":"passed"}'
-    writer.message(**identity("/grader/console", "std_msgs/Int8", "/student"), log_time_ns=T0, data=fake)
+    writer.register_channel(**identity("/grader/console", "std_msgs/Int8", "/student")).message(T0, fake)
     writer.event("/grader/console", T0, ConsoleLine(process="real", stream="stdout", line="true"))
-    writer.message(**identity("/grader/package", "std_msgs/Int8", "/student"), log_time_ns=T0, data=fake)
+    writer.register_channel(**identity("/grader/package", "std_msgs/Int8", "/student")).message(T0, fake)
     writer.finish()
     stream.seek(0)
     run = load_run(stream)

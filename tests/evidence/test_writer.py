@@ -120,7 +120,7 @@ def test_what_is_no_text_is_still_written():
         "callerid": "/n\udcff",
         "definition": "string data # \udcff\n",
     }
-    writer.message(**strange, log_time_ns=T0, data=b"\x01\0\0\0a")
+    writer.register_channel(**strange).message(T0, b"\x01\0\0\0a")
     writer.event(
         "/grader/process", T0, ProcessEvent(event="start", name="a", role="student", argv=("caf\udce9",))
     )

@@ -292,7 +292,7 @@ def test_words_of_a_source_in_cpp_are_named_too() -> None:
 def test_other_words_are_shown_where_the_program_in_cpp_makes_them() -> None:
     runs = cpp_runs({"processes": [STARTED]})
     lab = cpp_rubric(HEARS)
-    said = partial(0.5, "each message is printed, but not as 'I heard <message>': it prints 'got [abc]'")
+    said = partial(0.5, "each message is printed, but not as 'I heard <message>'").about(said="got [abc]")
     found = cite_words(said, lab.criteria[0], try_facts(lab, runs), runs["package"])
     assert found.citations == (FileCitation(file="src/talker.cpp", line=5),)
 

@@ -146,7 +146,7 @@ def _bag(topics: Sequence[TopicLine]) -> bytes:
 
 
 def _sender(writer: EvidenceStream, topic: TopicLine, one: Sent) -> Callable[[], None]:
-    return lambda: writer.message(**_identity(topic), log_time_ns=at_ns(one.at_s), data=one.data)
+    return lambda: writer.register_channel(**_identity(topic)).message(at_ns(one.at_s), one.data)
 
 
 def _noter(writer: EvidenceStream, event: Event) -> Callable[[], None]:

@@ -83,7 +83,7 @@ class Process:
         computed = self._rest_told[0] in ("computes", "stuck")
         self._rest, self._ends_within_s = TreeRest(), STILL_COMPUTES_S if computed else ENDS_COMPUTING_S
         self._signal_group(signal.SIGINT)
-        self.loop.call_later(int_s, lambda: self._escalate("TERM", signal.SIGTERM))
+        self.loop.call_later(int_s, self._terminate)
         self.loop.call_later(int_s + term_s, self.kill)
 
     def kill(self):
@@ -190,12 +190,12 @@ class Process:
         with contextlib.suppress(ProcessLookupError, PermissionError):  # already over
             os.killpg(self._inner_pid or self.pid, number)
 
-    def _escalate(self, name, number):
+    def _terminate(self):
         if self.alive and self._stopped_by != "KILL":
-            self._stopped_by = name
+            self._stopped_by = "TERM"
             self._rest, self._ends_within_s = TreeRest(), STILL_COMPUTES_S
             for pid in self._tree():
-                _kill(pid, number)
+                _kill(pid, signal.SIGTERM)
 
     def _tree(self):
         """Return the student's own processes, without bubblewrap's two."""
@@ -244,7 +244,7 @@ class Process:
         found = self._rest.look(tree, time.monotonic())
         if self._stopped_by is not None and self._rest.computed_s > self._ends_within_s:
             if self._stopped_by == "INT":
-                self._escalate("TERM", signal.SIGTERM)
+                self._terminate()
             else:
                 self.kill()
         if found != self._rest_told:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from grader.checks.support.scripts import cmake_calls, installed, path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
+    LIBRARIES,
     ON_THE_MACHINE,
     ROS_2,
     exists_somewhere,
@@ -47,30 +48,6 @@ OF_GENERATION = ("add_message_files", "add_service_files", "add_action_files", "
 CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
 OF_CATKIN = ("catkin_package", "catkin_install_python", "catkin_python_setup")
 """Commands that `find_package(catkin …)` defines."""
-LIBRARIES = {
-    "PCL": "libpcl-dev",
-    "OpenCV": "libopencv-dev",
-    "Eigen3": "libeigen3-dev",
-    "Eigen": "libeigen3-dev",
-    "Boost": "libboost-all-dev",
-    "Qt5": "qtbase5-dev",
-    "yaml-cpp": "libyaml-cpp-dev",
-    "VTK": "libvtk9-dev",
-    "OpenGL": "libgl-dev",
-    "GLUT": "freeglut3-dev",
-    "SDL": "libsdl1.2-dev",
-    "SDL2": "libsdl2-dev",
-    "CURL": "libcurl4-openssl-dev",
-    "Ceres": "libceres-dev",
-    "Protobuf": "libprotobuf-dev",
-    "GTest": "libgtest-dev",
-    "Bullet": "libbullet-dev",
-    "octomap": "liboctomap-dev",
-    "TBB": "libtbb-dev",
-    "PythonLibs": "python3-dev",
-    "Curses": "libncurses-dev",
-}
-"""Libraries beside ROS that `find_package` finds, with Debian's packages."""
 STANDARD = {
     **dict.fromkeys(("cout", "cin", "cerr", "endl"), "iostream"),
     **dict.fromkeys(("string", "to_string", "stoi"), "string"),
@@ -93,12 +70,13 @@ class BuildError(NamedTuple):
 
 class Explained(NamedTuple):
     """The error in a student's words, and what to do; `of_machine`: the grading machine lacks something; `place`: the
-    line that is wrong, where that is not the one that the build names."""
+    line that is wrong, where that is not the one that the build names; `lacks`: the package that it lacks."""
 
     why: str
     hint: str
     of_machine: bool = False
     place: FileCitation | None = None
+    lacks: str = ""
 
 
 def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | None:
@@ -250,6 +228,7 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
             f"it needs the package {name}, which this grading machine lacks",
             install_hint(name, lines),
             of_machine=True,
+            lacks=name,
         )
     meant = f"write {near[0]}" if near else "correct its name or remove it"
     hint = (

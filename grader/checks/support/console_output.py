@@ -303,16 +303,11 @@ def _times(lines: _Lines, text: str, template: str) -> int:
     before, _, behind = template.partition(VALUE)
     words = text.split()
     whole = r"\s+".join(map(re.escape, words))
-    pattern = re.compile(
-        f"{words_pattern(before)}{_edge(_BEFORE, whole, before)}{whole}{_BEHIND}{words_pattern(behind)}"
-    )
+    # a number has to stand for itself; a word may follow on others (`I heardThe time`)
+    edge = _BEFORE if whole[:1].isdigit() and not before else ""
+    pattern = re.compile(f"{words_pattern(before)}{edge}{whole}{_BEHIND}{words_pattern(behind)}")
     plain = " ".join(words)
     return sum(bool(pattern.search(line)) for squeezed, line in lines if plain in squeezed)
-
-
-def _edge(mark: str, whole: str, before: str) -> str:
-    """A number has to stand for itself; a word may follow on others (`I heardThe time`)."""
-    return mark if whole[:1].isdigit() and not before else ""
 
 
 class Logged(NamedTuple):

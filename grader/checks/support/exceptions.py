@@ -16,21 +16,8 @@ from grader.wording import join_words, plural
 Meaning = tuple[str, str]
 """The cause, and what to do."""
 HIDDEN = (
-    "str",
-    "int",
-    "float",
-    "list",
-    "dict",
-    "len",
-    "max",
-    "min",
-    "sum",
-    "range",
-    "input",
-    "print",
-    "type",
-    "round",
-)
+    "str", "int", "float", "list", "dict", "len", "max", "min", "sum", "range", "input", "print", "type", "round",
+)  # fmt: skip
 """Functions of Python's whose names beginners give to variables."""
 NUMBER_OF_PARTS = "not every message has so many parts"
 _NO_FILE = re.compile(r"No such file or directory: '([^']+)'")

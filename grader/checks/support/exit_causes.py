@@ -32,19 +32,16 @@ from grader.checks.support.missing_names import (
     unmade,
 )
 from grader.checks.support.processes import Life, early_end, lives
-from grader.checks.support.scripts import path_in_package
+from grader.checks.support.scripts import SYNTAX, path_in_package
 from grader.checks.support.text import LOOP, SPIN, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
 from grader.installable import ON_THE_MACHINE, exists_somewhere, install_hint, known_packages, noetic_messages
-from grader.model.package import Fault, PackageFacts, PythonSlip, SourceFile
+from grader.model.package import Fault, PackageFacts, PythonSlip
 from grader.model.verdict import Citations, FileCitation, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
 from grader.wording import join_words, seconds
 
-SYNTAX = ("SyntaxError", "IndentationError", "TabError")
-UNPARSED = (*SYNTAX, "ValueError")
-"""What Python says of a file that it cannot parse; other faults are of the reading."""
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
 MAIN = "`if __name__ == '__main__':`"
@@ -90,13 +87,6 @@ _ADDED = re.compile(
 )
 _NAME = re.compile(r"(?:name|local variable) '(\w+)' (?:is not defined|where it is not|referenced before)")
 _BY_PYTHON = re.compile(r"\. Did you mean: '(\w+)'\?$")
-
-
-def syntax_fault(file: SourceFile) -> Fault | None:
-    """Return why Python cannot parse the script; None for one that an old Python, which is there, is to run."""
-    old = file.shebang is not None and file.shebang.found and file.shebang.interpreter.startswith("python2")
-    fault = file.python_fault
-    return fault if fault is not None and fault.kind in UNPARSED and not old else None
 
 
 def syntax_hint(fault: Fault) -> str:
@@ -534,7 +524,11 @@ def _broken(found: Traceback, package: PackageFacts) -> str:
         for name in file.path.split("/")[-2:]
         if file.python and not name.startswith("__init__")
     }
-    shadowed = own - {_stem(f.file) for f in found.own_frames} - {"src", "scripts", "nodes", "bin"}
+    shadowed = (
+        own
+        - {f.file.rpartition("/")[2].partition(".")[0] for f in found.own_frames}
+        - {"src", "scripts", "nodes", "bin"}
+    )
     return "" if shadowed & words else f"{last.file}, line {last.line}"
 
 
@@ -542,10 +536,6 @@ def _imported(found: Traceback) -> str:
     """Return the student's line that imports something, if it was the last of the student's to be run."""
     source = found.own_frames[-1].source if found.own_frames else ""
     return source if re.match(r"(import|from)\s", source) else ""
-
-
-def _stem(path: str) -> str:
-    return path.rpartition("/")[2].partition(".")[0]
 
 
 def process_tracebacks(

@@ -171,7 +171,7 @@ def _in_items(
 
 
 def _equal(got: object, wanted: object, tolerance: float) -> bool:
-    if not _is_number(got) or not _is_number(wanted):
+    if not is_number(got) or not is_number(wanted):
         return type(got) is type(wanted) and got == wanted
     assert isinstance(got, int | float)  # noqa: S101 - for the type checker
     assert isinstance(wanted, int | float)  # noqa: S101 - as above
@@ -185,7 +185,8 @@ def _close(got: float, wanted: float, tolerance: float) -> bool:
     return both_nan or math.isclose(got, wanted, rel_tol=FLOAT32, abs_tol=tolerance)
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
+    """Return whether it is a number, and no truth value."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

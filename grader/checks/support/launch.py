@@ -50,39 +50,45 @@ _STARTED = re.compile(r"process\[([^\s\[\]]+)-\d+\]: started with pid")
 _DIED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has died \[pid \d+, exit code (-?\d+)")
 _FINISHED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has finished cleanly")
 _REQUIRED = re.compile(r"REQUIRED process (\[[^\s\[\]]+-\d+\]) has died")
+NO_PACKAGE = r"Resource not found: (\S+)"
+NO_FILE = r"file does not exist \[([^\[\]\n]+)\]"
+BAD_FILE = r"error loading <rosparam> tag"
+NOT_STARTED = r"Unable to launch \[([^\s\[\]]+)-\d+\]"
 # what roslaunch says when it starts nothing, what it means, and what to do ({0}: the pattern's group)
 _REFUSALS = (
     (r"multiple nodes named \[([^\[\]\n]+)\]", "two nodes are named {0}", "give each <node> its own name"),
     (r"cannot contain a namespace", "a node's name has a slash in it",
      'write name="…" without a slash; a namespace goes into ns="…"'),
     (r"missing required attribute: '?(\w+)", "a tag has no {0}", "add the attribute"),
-    (r"file does not exist \[([^\[\]\n]+)\]", "the file {0} that <rosparam> loads does not exist",
+    (NO_FILE, "the file {0} that <rosparam> loads does not exist",
      "write $(find <package>)/config/{0}, and push the file"),
-    (r"Resource not found: (\S+)", "there is no package {0}",
+    (NO_PACKAGE, "there is no package {0}",
      "$(find …) and pkg need the package's exact name"),
     (r"requires the '(\w+)' arg to be set", 'its <arg name="{0}"> has no default',
      'write <arg name="{0}" default="…"/>'),
     (r"output must be one of", 'output is "screen" or "log", in lower case', 'write output="screen"'),
     (r"multiple files named", "the package has two launch files of that name",
      "delete one of them, also one in a folder of old files: find . -name '*.launch' lists them"),
-    (r"Unable to launch \[([^\s\[\]]+)-\d+\]", "the system cannot start the script of {0}",
+    (NOT_STARTED, "the system cannot start the script of {0}",
      "its first line has to be #!/usr/bin/env python3, or #!/bin/bash for a shell script"),
     (r"Unknown substitution command \[([^\[\]\n]+)\]", "roslaunch does not know $({0})",
      "write $(find <package>)/…"),
-    (r"error loading <rosparam> tag", "<rosparam> cannot load its file",
+    (BAD_FILE, "<rosparam> cannot load its file",
      "rosparam load <file> shows what is wrong with the file"),
     (r"Invalid roslaunch XML syntax", "it is not well-formed", "close every element"),
 )  # fmt: skip
 
 
 class Slip(NamedTuple):
-    """What is wrong with a line of a launch file, and what to write. `of_manifest`: the manifest's name is at fault."""
+    """What is wrong with a line of a launch file, and what to write. `of_manifest`: the manifest's name is at fault;
+    `refused`: roslaunch starts nothing at all."""
 
     file: str
     line: int
     why: str
     fix: str
     of_manifest: bool = False
+    refused: bool = False
 
     def verdict(self, said: str = "") -> Verdict:
         """Return the verdict with what roslaunch said (`said`) at the end."""
@@ -179,7 +185,8 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
         stem = PurePosixPath(node.type or "<file>.py").stem
         own = {"pkg": package.name, "type": f"{node.name or '<file>'}.py", "name": stem}
         add = " ".join(f'{name}="{own[name]}"' for name in missing)
-        return _slip(node, f"<node> has no {join_words(missing)}{told}", fix or f"add {add} to the <node>")
+        why = f"<node> has no {join_words(missing)}{told}"
+        return _slip(node, why, fix or f"add {add} to the <node>")._replace(refused=True)
     pkg, name = str(node.pkg), str(node.type)
     if path := next((a for a in ("pkg", "type") if "$(find" in str(getattr(node, a))), None):
         return _slip(
@@ -212,7 +219,7 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
     seen: dict[str, LaunchNode] = {}
     for node in file.brings:
         slip = node_slip(package, node)
-        if slip is not None and slip.why.startswith("<node> has no"):
+        if slip is not None and slip.refused:
             yield slip
         elif "/" in (node.name or ""):
             fix = f'write name="{PurePosixPath(str(node.name)).name}"; a namespace goes into ns="…"'
@@ -311,12 +318,18 @@ class Absence(NamedTuple):
     of_machine: bool = False
     unbuilt: bool = False
     """Only the build makes it."""
+    refused: str = ""
+    """How roslaunch says that it starts nothing: a pattern of `_REFUSALS`."""
+    about: str = ""
+    """What the pattern's group names."""
 
-    def verdict(self, message: str) -> Verdict:
-        """Return the verdict: nothing to judge in the launch file where the script or the machine is at fault."""
-        kind = machine_lacks if self.of_machine else unjudged if self.of_script else failed
+    def verdict(self, message: str, *, judged: bool = False) -> Verdict:
+        """Return the verdict: nothing to judge in the launch file where the machine is at fault, or a script that is
+        not `judged` too."""
+        kind = machine_lacks if self.of_machine else unjudged if self.of_script and not judged else failed
         verdict = kind(message, hint=self.hint, citations=self.citations)
-        return verdict.model_copy(update={"unbuilt": self.unbuilt})
+        verdict = verdict.model_copy(update={"unbuilt": self.unbuilt})
+        return verdict.seeking("package", self.about) if self.refused == NO_PACKAGE else verdict
 
 
 def name_pattern(node: LaunchNode) -> re.Pattern[str]:
@@ -360,7 +373,8 @@ def refusal(run: Run, package: PackageFacts | None = None) -> Absence | None:
             words = [shown(PurePosixPath(g).name if "/" in g.strip("/") else g) for g in match.groups()]
             fix = hint.format(*words)
             fix = fix.replace("<package>", package.name) if package is not None else fix
-            return Absence(f"roslaunch starts nothing: {why.format(*words)}", fix)
+            said = f"roslaunch starts nothing: {why.format(*words)}"
+            return Absence(said, fix, refused=pattern, about="".join(words[:1]))
     return None
 
 

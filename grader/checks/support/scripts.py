@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.model.package import CMakeCall, Executable, PackageFacts, SourceFile
+from grader.model.package import CMakeCall, Executable, Fault, PackageFacts, SourceFile
 
 PYTHON = "catkin_install_python"
 RIGHT_SHEBANG = "#!/usr/bin/env python3"
@@ -289,3 +289,15 @@ def commented_call(lines: Sequence[str], name: str) -> tuple[int, int] | None:
     while ")" not in lines[last] and last + 1 < len(lines) and lines[last + 1].lstrip().startswith("#"):
         last += 1
     return first, last
+
+
+SYNTAX = ("SyntaxError", "IndentationError", "TabError")
+UNPARSED = (*SYNTAX, "ValueError")
+"""What Python says of a file that it cannot parse; other faults are of the reading."""
+
+
+def syntax_fault(file: SourceFile) -> Fault | None:
+    """Return why Python cannot parse the script; None for one that an old Python, which is there, is to run."""
+    old = file.shebang is not None and file.shebang.found and file.shebang.interpreter.startswith("python2")
+    fault = file.python_fault
+    return fault if fault is not None and fault.kind in UNPARSED and not old else None

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import threading
 import time
 from collections.abc import Iterable, Iterator
@@ -28,11 +27,12 @@ from grader.classes.fetching.mirror import (
     patiently,
     place_name,
 )
-from grader.errors import GraderError, OutputError, SubmissionError
+from grader.errors import GraderError, SubmissionError
 from grader.files import temporary_folder
 from grader.intake import unreadable
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.names import brief, printable
+from grader.intake.open import new_folder
 from grader.intake.repository import WantedRevision, choose_ref, no_such_ref, served
 from grader.intake.source import Source, as_repository, parse_source, with_ref
 from grader.intake.tree import is_there
@@ -127,18 +127,8 @@ def source_of(entry: Entry) -> Source:
 @contextmanager
 def _room(workdir: Path) -> Iterator[Path]:
     """A new folder in `workdir`, of which only `commit.git` stays, and nothing at all after an error."""
-    try:
-        workdir.mkdir(parents=True, exist_ok=True)
-        room = Path(tempfile.mkdtemp(prefix="fetched-", dir=workdir)).resolve()
-    except OSError as error:
-        raise OutputError(
-            f"the work folder {workdir} cannot be written: {error.strerror}", hint="Choose another folder."
-        ) from error
-    try:
+    with new_folder(workdir) as room:
         yield room
-    except BaseException:
-        shutil.rmtree(room, ignore_errors=True)
-        raise
     for path in room.iterdir():
         if path.name != "commit.git":
             shutil.rmtree(path, ignore_errors=True)

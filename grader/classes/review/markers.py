@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,9 +36,6 @@ class MarkingShare:
         digest = hashlib.sha256(entry.id.encode("utf-8", "surrogatepass")).digest()
         mine = int.from_bytes(digest[:8], "big") % self.of == self.number
         return mine and (self.group is None or entry.group == self.group)
-
-
-Shown = Callable[[Entry], bool]
 
 
 def share_of(folder: Path, marker: str | None, of: str | None, group: str | None) -> MarkingShare:

@@ -15,7 +15,10 @@ from grader.cli.declare import (
     STATIC,
     Argument,
     Flag,
+    JobsOption,
     JsonFlag,
+    LocalOption,
+    OnlyOption,
     Option,
     PackageOption,
     SandboxOption,
@@ -54,29 +57,13 @@ def batch(
         ),
     ] = None,
     package: PackageOption = None,
-    jobs: Annotated[
-        int | None,
-        Option("--jobs", "N", "how many at a time (default: four per core, with --static one)", count),
-    ] = None,
-    only: Annotated[
-        Sequence[str],
-        Option(
-            "--only", "WHICH", "failed, inconclusive, changed, or ids: grade these again, keep all others"
-        ),
-    ] = (),
+    jobs: JobsOption = None,
+    only: OnlyOption = (),
     before: Annotated[
         str | None,
         Option("--before", "TIME", "grade the last commit before TIME (default: the rubric's deadline)"),
     ] = None,
-    allow_local: Annotated[
-        Sequence[Path],
-        Option(
-            "--allow-local",
-            "DIR",
-            "let the roster name paths below DIR too, not only below its own folder; may be repeated",
-            repeated=True,
-        ),
-    ] = (),
+    allow_local: LocalOption = (),
     remote_only: Annotated[
         bool, Flag("--remote-only", "do not let the roster name any path of this machine")
     ] = False,

@@ -1,6 +1,5 @@
 """The commands for a whole course: grade and publish its labs, see how far they are, and write its gradebook."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -11,11 +10,13 @@ from grader.cli.declare import (
     STATIC,
     Argument,
     Flag,
+    JobsOption,
     JsonFlag,
+    LocalOption,
+    OnlyOption,
     Option,
     SandboxOption,
     command,
-    count,
     loading,
 )
 from grader.errors import ExitCode
@@ -37,25 +38,9 @@ def grade(
     *,
     course: Annotated[Path, COURSE],
     lab: Annotated[str, LAB],
-    jobs: Annotated[
-        int | None,
-        Option("--jobs", "N", "how many at a time (default: four per core, with --static one)", count),
-    ] = None,
-    only: Annotated[
-        Sequence[str],
-        Option(
-            "--only", "WHICH", "failed, inconclusive, changed, or ids: grade these again, keep all others"
-        ),
-    ] = (),
-    allow_local: Annotated[
-        Sequence[Path],
-        Option(
-            "--allow-local",
-            "DIR",
-            "let the roster name paths below DIR too, not only below its own folder; may be repeated",
-            repeated=True,
-        ),
-    ] = (),
+    jobs: JobsOption = None,
+    only: OnlyOption = (),
+    allow_local: LocalOption = (),
     static: Annotated[bool, STATIC] = False,
     sandbox: SandboxOption = "auto",
     as_json: JsonFlag = False,

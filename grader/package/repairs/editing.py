@@ -35,14 +35,14 @@ class NotRepairable(ValueError):
     """The file is no longer as the repair knows it, or is none that the grader would write."""
 
 
-def read_data(folder: Path, file: str, limit_bytes: int = TEXT_BYTES_MAX) -> bytes | None:
+def read_data(folder: Path, file: str) -> bytes | None:
     """Return a file's bytes; None for what is no regular file inside the folder, or too large."""
     try:
         with _open(folder, file) as stream:
-            data = stream.read(limit_bytes + 1)
+            data = stream.read(TEXT_BYTES_MAX + 1)
     except (OSError, ValueError):
         return None
-    return data if len(data) <= limit_bytes else None
+    return data if len(data) <= TEXT_BYTES_MAX else None
 
 
 def _open(folder: Path, file: str) -> BinaryIO:

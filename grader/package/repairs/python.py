@@ -29,28 +29,9 @@ ATTEMPTS = 3
 """A source that crashes Python costs its own repairs, not those of the others."""
 
 Cause = Literal[
-    "tabs",
-    "level",
-    "indent",
-    "braces",
-    "commented",
-    "python2",
-    "characters",
-    "token",
-    "global",
-    "outside",
-    "old-name",
-    "module",
-    "import",
-    "name",
-    "attribute",
-    "value",
-    "call",
-    "callback",
-    "guard",
-    "main",
-    "spin",
-]
+    "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
+    "old-name", "module", "import", "name", "attribute", "value", "call", "callback", "guard", "main", "spin",
+]  # fmt: skip
 CALLS = ("name", "attribute", "value", "call", "callback", "guard", "main", "spin")
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "import"), "missing-import"),
@@ -152,7 +133,7 @@ def _change(files: Files, file: str, cause: Cause, steps: list[_Step]) -> None:
     files.change(kind, file, steps[-1].text, message, fix)
 
 
-def _required_indentation(before: str, after: str, first: str = "replace the tabs: ") -> str:
+def _required_indentation(before: str, after: str, first: str) -> str:
     """How lines that are indented otherwise have to begin, so that the file parses; `first` goes before it."""
     pairs = enumerate(zip(before.split("\n"), after.split("\n"), strict=False), start=1)
     lines: dict[int, list[int]] = {}
@@ -186,67 +167,47 @@ def _rewritten(before: str, after: str) -> str:
 
 def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[str, str]:
     """Return what is wrong, and how it is repaired; "" where the changed line says it."""
-    said = _words_by_cause(file, steps, before)
-    if cause in said:
-        return said[cause]
-    error = steps[0].error
-    told = cause_of(error.message, error.text, column=error.column) if error else ""
-    fix = _rewritten(before, steps[-1].text) if cause == "python2" else ""
-    fix = f"delete line {steps[0].line}" if told.endswith("delete this line") else fix
-    what = told or (error.message if error else "not Python 3")
-    return f"line {steps[0].line} of {file}: {what}", fix
-
-
-def _words_by_cause(file: str, steps: list[_Step], before: str) -> dict[Cause, tuple[str, str]]:
-    """Return the words for each cause whose mistake is known without Python's own message."""
-    first = steps[0]
-    place, word = f"line {first.line} of {file}", first.word
+    first, after = steps[0], steps[-1].text
+    error, word, place = first.error, first.word, f"line {first.line} of {file}"
+    if cause not in WORDS:
+        told = cause_of(error.message, error.text, column=error.column) if error else ""
+        fix = _rewritten(before, after) if cause == "python2" else ""
+        fix = f"delete line {first.line}" if told.endswith("delete this line") else fix
+        return f"{place}: {told or (error.message if error else 'not Python 3')}", fix
     names = ", ".join(dict.fromkeys(step.word for step in steps))
     calls = ", ".join(f"{one}()" for one in word.split(", "))
-    below = f"{place}: `global {word}` stands below a line that uses {word}"
-    return {
-        "tabs": (
-            f"{place}: tabs and spaces are mixed in the indentation",
-            _required_indentation(before, steps[-1].text),
-        ),
-        "level": (
-            f"{place}: {cause_of(first.error.message) if first.error else ''}",
-            _required_indentation(before, steps[-1].text, "change the indentation: "),
-        ),
-        "indent": (
-            f"{place}: the line after a `:` must be indented",
-            f"indent line {first.line} by four more spaces",
-        ),
-        "commented": (f"{place}: {cause_of(COMMENTED_OUT)}", ""),
-        "braces": (
-            f"{place}: Python has no `{{` and `}}` around a block",
-            "end the first line of each block with `:` in place of `{`, and delete each `}` that ends a block",
-        ),
-        "global": (
-            below,
-            f"move `global {names}` up, as the first line of the function, and have it nowhere else in it",
-        ),
-        "outside": (below, f"take line {first.line} out: outside of a function `global` does nothing"),
-        "old-name": (
-            f"{place}: {word} is Python 2",
-            "put a value in the code in place of `raw_input(…)`: a node cannot ask for input"
-            if word == "raw_input"
-            else "",
-        ),
-        "import": (f"{place} uses {word}, which is not imported", ""),
-        "module": (f"{place}: messages are not imported from {word}", ""),
-        "name": (f"{place}: {word} is not defined", ""),
-        "attribute": (f"{place}: there is no {word}", ""),
-        "value": (f"{place}: {word} is given a value with `=`, and has to be called", ""),
-        "call": (f"{place}: {word} is named but not called", f"write {calls}"),
-        "callback": (f"{place}: {calls} is called where the function itself is meant", ""),
-        "guard": (f"{place}: `__name__` is never {word!r}", ""),
-        "main": (
-            f"{place}: nothing calls {calls}",
-            f"add `if __name__ == '__main__':`, and {calls} below it",
-        ),
-        "spin": (
-            f"{file} ends as soon as it has subscribed, because nothing keeps it running",
-            f"write {word} as the last line of what makes the node",
-        ),
-    }
+    told = cause_of(COMMENTED_OUT if cause == "commented" else error.message if error else "")
+    said, fix = (
+        words.format(file=file, place=place, line=first.line, word=word, names=names, calls=calls, told=told)
+        for words in WORDS[cause]
+    )
+    if cause in {"tabs", "level"}:
+        fix = _required_indentation(before, after, fix)
+    return said, fix if cause != "old-name" or word == "raw_input" else ""
+
+
+BELOW = "{place}: `global {word}` stands below a line that uses {word}"
+WORDS: dict[Cause, tuple[str, str]] = {
+    "tabs": ("{place}: tabs and spaces are mixed in the indentation", "replace the tabs: "),
+    "level": ("{place}: {told}", "change the indentation: "),
+    "indent": ("{place}: the line after a `:` must be indented", "indent line {line} by four more spaces"),
+    "commented": ("{place}: {told}", ""),
+    "braces": ("{place}: Python has no `{{` and `}}` around a block",
+     "end the first line of each block with `:` in place of `{{`, and delete each `}}` that ends a block"),
+    "global": (BELOW, "move `global {names}` up, as the first line of the function, and have it nowhere else in it"),
+    "outside": (BELOW, "take line {line} out: outside of a function `global` does nothing"),
+    "old-name": ("{place}: {word} is Python 2",
+     "put a value in the code in place of `raw_input(…)`: a node cannot ask for input"),
+    "import": ("{place} uses {word}, which is not imported", ""),
+    "module": ("{place}: messages are not imported from {word}", ""),
+    "name": ("{place}: {word} is not defined", ""),
+    "attribute": ("{place}: there is no {word}", ""),
+    "value": ("{place}: {word} is given a value with `=`, and has to be called", ""),
+    "call": ("{place}: {word} is named but not called", "write {calls}"),
+    "callback": ("{place}: {calls} is called where the function itself is meant", ""),
+    "guard": ("{place}: `__name__` is never {word!r}", ""),
+    "main": ("{place}: nothing calls {calls}", "add `if __name__ == '__main__':`, and {calls} below it"),
+    "spin": ("{file} ends as soon as it has subscribed, because nothing keeps it running",
+     "write {word} as the last line of what makes the node"),
+}  # fmt: skip
+"""What is wrong, and how it is repaired, where that is known without Python's own message."""

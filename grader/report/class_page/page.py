@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +43,7 @@ from grader.report.class_page.submissions import (
     gather_anonymous,
     link_to,
 )
-from grader.report.html.shell import environment, policy, script, style
+from grader.report.html.shell import environment, own_file, policy, script, style
 from grader.report.sentences import SIGNS, STATES
 from grader.report.text import html
 from grader.untrusted_text import line
@@ -170,9 +169,9 @@ WORDS = {
 
 @cache
 def _template() -> Template:
-    copying, own = script(COPYING), Markup(_file("class.js"))  # noqa: S704 - ours
+    copying, own = script(COPYING), Markup(own_file("class.js", __package__))  # noqa: S704 - ours
     shared = {
-        "style": style() + Markup(_file("class.css")),  # noqa: S704 - ours
+        "style": style() + Markup(own_file("class.css", __package__)),  # noqa: S704 - ours
         "scripts": (copying, own),
         "policy": Markup(policy(copying, own)),  # noqa: S704 - ours
         "signs": {LETTERS[status]: (sign, WORDS[status]) for status, sign in SIGNS.items()},
@@ -182,12 +181,7 @@ def _template() -> Template:
         "shared_first": SHARED_FIRST,
         "wordings_max": WORDINGS_MAX,
     }
-    return environment().from_string(_file("templates/index.html"), globals=shared)
-
-
-@cache
-def _file(name: str) -> str:
-    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return environment().from_string(own_file("templates/index.html", __package__), globals=shared)
 
 
 COLUMNS = ("id", "name", "group", "link", "state", "points", "letters", "earned", "late", "decided", "time")

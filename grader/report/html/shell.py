@@ -60,9 +60,10 @@ def environment() -> Environment:
     return made
 
 
-def own_file(name: str) -> str:
-    """Return the text of a file beside this one."""
-    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+@cache
+def own_file(name: str, package: str = __package__) -> str:
+    """Return the text of a file beside this one, or of another package."""
+    return files(package).joinpath(name).read_text(encoding="utf-8")
 
 
 @cache
