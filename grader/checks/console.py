@@ -151,9 +151,12 @@ def _not_printed(
     if error := explain_error(package, run):
         return error.verdict(unjudged, f"it never prints {params.words}: {error.cause}")
     own = [line for line in lines if one.interrupt_ns is None or line.at_ns < one.interrupt_ns]
-    if any(NO_ANSWER in line.text for line in own):
-        hint = "end the service's callback with `return …Response(…)`"
-        return unjudged(f"it never prints {params.words}: the service's callback returns nothing", hint=hint)
+    for said, wrong in WRONG_ANSWERS.items():
+        if any(said in line.text for line in own):
+            hint = "end the service's callback with `return …Response(…)`"
+            return unjudged(
+                f"it never prints {params.words}: the service's callback returns {wrong}", hint=hint
+            )
     if not own:
         nothing = unjudged(f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True").once()
         return nothing.model_copy(update={"silent": True})
@@ -227,8 +230,11 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
 
 
 ALIKE = 0.7
-NO_ANSWER = "service handler returned None"
-"""What rospy tells a client whose server's callback returns nothing."""
+WRONG_ANSWERS = {
+    "service handler returned None": "nothing",
+    "handler returned wrong number of values": "something that is no response",
+}
+"""What rospy tells a client whose server's callback returns nothing that it can send."""
 
 
 class LogsParams(Record):

@@ -464,7 +464,7 @@ def _other_value(
     other = next((v for v in first.values if any(differences(v, params.value, params.tolerance))), None)
     why = next(map(str, differences(other, params.value, params.tolerance)), "")
     seen = f"it is {shown(why)}" if first.values else f"it is not there ({first.fault})"
-    hint = f"set {params.field} to {params.words} before you publish"
+    hint = f"{params.field} has to be {params.words} when you publish"
     if params.when == "any":
         message = (
             f"{params.field} of {params.topic} is {params.words} in none of {plural(len(found), 'message')}"
@@ -474,9 +474,12 @@ def _other_value(
         after = time_between(run, found[0].time_ns, first.time_ns)
         where = f"in {len(wrong)} of {plural(len(found), 'message')}: {seen}, {after} after the first"
         return failed(f"{params.field} of {params.topic} is wrong {where}", hint=hint)
-    verdict = failed(
-        f"{params.field} of {params.topic} is wrong in the {params.when} message: {seen}", hint=hint
-    )
+    message = f"{params.field} of {params.topic} is wrong in the {params.when} message: {seen}"
+    sent = {e.topic: t for t, e in reversed(run.actors) if e.action == "publish" and e.topic != params.topic}
+    if params.when == "last" and sent and found[-1].time_ns < min(sent.values()):
+        topics = join_words(sorted(filter(None, sent)))
+        message, hint = f"{message}; none came after {topics}", f"publish again in the callback of {topics}"
+    verdict = failed(message, hint=hint)
     return verdict.once() if params.when == "last" else verdict
 
 

@@ -256,7 +256,8 @@ def _instead(
 def _judge_unanswered(
     answers: Sequence[Answer], run: Run, params: ReactsParams, instead: tuple[str, str] | None
 ) -> Verdict | None:
-    hint = f"publish on {params.effect.topic} in the callback of {params.cause.topic}"
+    when = f"in the callback of {params.cause.topic}, where {params.cause.words} comes"
+    hint = f"{when}, see that {params.effect.words} is published"
     if not answers and (unsent := misfit(run, params.cause.topic)):
         return unsent
     deaf = refused_type(run, params.cause.topic) or unheard(run)

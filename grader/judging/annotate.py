@@ -13,7 +13,7 @@ from pathlib import PurePosixPath
 from grader.checks.cmake import NOT_CALLED, below_catkin_package
 from grader.checks.messages import code_of
 from grader.checks.support.console_output import probes_on
-from grader.checks.support.exit_causes import NO_INPUT, RATE, name_slip, syntax_hint
+from grader.checks.support.exit_causes import NO_INPUT, RATE, syntax_hint
 from grader.checks.support.launch import (
     NOT_STARTED,
     find_launch,
@@ -25,6 +25,7 @@ from grader.checks.support.launch import (
     unset_arg_fixes,
 )
 from grader.checks.support.launch_names import find_renaming
+from grader.checks.support.missing_names import name_slip
 from grader.checks.support.scripts import (
     BACKUPS,
     PYTHON,
@@ -211,7 +212,7 @@ class Later:
     """What a criterion that was not reached would be lost by next, as far as the sources say so in plain values."""
 
     def __init__(self, criterion: Criterion, verdict: Verdict, package: PackageFacts, facts: Facts) -> None:
-        self._criterion, self._verdict = criterion, verdict
+        self._criterion, self._verdict, self._package = criterion, verdict, package
         self._rubric, self._run = facts.rubric, facts.runs.get(criterion.scenario or "")
         self._build = facts.runs.get(PACKAGE_RUN)
         self._wanted = criterion.parameters
@@ -249,7 +250,7 @@ class Later:
         for slip in self._of("misspelt", "undefined"):
             lines = self._build.file_lines(slip.file) if self._build is not None else []
             caught = slip.line <= len(lines) and lines[slip.line - 1].lstrip().startswith("except")
-            if (one := name_slip(slip, self._slips)) is not None and not caught:
+            if (one := name_slip(slip, self._package)) is not None and not caught:
                 yield one.fix
 
     def _rate(self) -> Iterator[str]:

@@ -309,7 +309,14 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         clauses = [clause for clause in clauses if any(_is_told(one, clause) for one in told)]
     hints = clauses + advice_on(one for one in repairs if one not in told)
     said = verdict.message
-    words = [said, *(one.message for one in repairs if one.file not in said and one.message not in said)]
+    words = [
+        said,
+        *(
+            one.message
+            for one in repairs
+            if PurePosixPath(one.file).name not in said and one.message not in said
+        ),
+    ]
     is_new = not copy.hint or not set(copy.hint.split("; ")) <= set(hints)
     if is_next and is_new:
         untold = [clause for clause in copy.message.split("; ") if clause not in said]

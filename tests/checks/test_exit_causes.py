@@ -74,7 +74,7 @@ from std_msgs.msg import Int8
         (6, "pub.publish(text)", "AttributeError: 'tuple' object has no attribute 'encode'",
          'put the values into the text with `%`: `"… %s" % value`, not behind a comma'),
         (6, "pub.publish(dta=3)", "AttributeError: dta is not an attribute of Int8",
-         "leave out `dta=`, or write the field that you mean"),
+         "write `data=` for `dta=`"),
         (6, "rospy.publish(3)",
          "AttributeError: module 'rospy' has no attribute 'publish'. Did you mean: 'Publisher'?",
          "write that name in front of it: `pub.publish(…)`"),
@@ -123,7 +123,7 @@ from std_msgs.msg import Int8
         (6, "rospy.init_node(talker, anonymous=True)", "TypeError: argument of type 'function' is not iterable",
          "write `rospy.init_node('talker', anonymous=True)`"),
         (6, "print('sum: %d' % answer)", "TypeError: %d format: a real number is required, not AddResponse",
-         "take its field, as in `msg.data`"),
+         "take one of its fields"),
         (6, "reading.header.frame_id = 'a'", "AttributeError: 'member_descriptor' object has no attribute 'frame_id'",
          "write brackets where it is made: `reading = …()`"),
         (6, "if reading.temperature > LIMIT:", "TypeError: '>' not supported between instances of 'str' and 'float'",
@@ -251,6 +251,54 @@ def test_a_class_that_the_build_makes_is_imported_from_its_module(tmp_path, sour
     end = explain_traceback(said(package, ("node.py", 1, source), error=error), package)
     assert end.hint == hint
     assert end.unbuilt == (not hint.startswith("write `from"))
+
+
+@pytest.mark.parametrize(
+    ("source", "error", "hint"),
+    [
+        ("return AddResponse(3)", "NameError: name 'AddResponse' is not defined",
+         "write `from lab.srv import AddResponse` at the top"),
+        ("x = Reading()", "NameError: name 'Reading' is not defined", "write `from lab.msg import Reading` at the top"),
+        ("Reading(levl=1)", "AttributeError: levl is not an attribute of Reading", "write `level=` for `levl=`"),
+        ("Reading(x=1)", "AttributeError: x is not an attribute of Reading", "write `level=` for `x=`"),
+        ("found = buffer.lookup_transform('a', 'b', rospy.Time(0))",
+         'tf2.LookupException: "a" passed to lookupTransform argument target_frame does not exist',
+         "catch it, `try: … except tf2_ros.TransformException:`"),
+        ("ask(a, b)", "genpy.message.SerializationError: field value must be float type",
+         "in line 4, write `a, b = map(float, sys.argv[1:3])`"),
+        ("ask(a, b)", "genpy.message.SerializationError: field value must be an integer type",
+         "in line 4, write `a, b = map(int, sys.argv[1:3])`"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_messages_is_told_with_their_fields(tmp_path, source, error, hint):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    for path, text in {
+        "msg/Reading.msg": "int32 level\n",
+        "srv/Add.srv": "int64 a\n---\nint64 sum\n",
+    }.items():
+        (tmp_path / path).parent.mkdir()
+        (tmp_path / path).write_text(text)
+    (tmp_path / "node.py").write_text(
+        f"import sys\nimport rospy\n\na, b = sys.argv[1:3]\nx = {source}\n".replace("x = return", "x =")
+    )
+    package = facts_of(tmp_path)
+    assert hint in explain_traceback(said(package, ("node.py", 5, source), error=error), package).hint
+
+
+def test_a_number_in_place_of_a_field_with_fields_is_told_with_its_name(tmp_path):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "node.py").write_text(SCRIPT)
+    package = facts_of(tmp_path)
+    own, twist = "/ws/src/lab/node.py", "/usr/lib/python3/dist-packages/geometry_msgs/msg/_Twist.py"
+    lines = [
+        "Traceback (most recent call last):",
+        f'  File "{own}", line 4, in <module>', "    publisher.publish(command)",
+        f'  File "{twist}", line 75, in serialize', "    buff.write(_get_struct_6d().pack(_x.linear.x, _x.angular.x))",
+        "                                     ^^^^^^^^^^^",
+        "AttributeError: 'float' object has no attribute 'x'",
+    ]  # fmt: skip
+    end = explain_traceback(tracebacks(lines)[0], package)
+    assert end.hint == "write `.linear.x = …`, not `.linear = …`"
 
 
 @pytest.mark.parametrize(

@@ -342,6 +342,10 @@ CASES = {
         {CMAKELISTS: CMAKE.replace("catkin_package()", "# catkin_package(\n)")}, ["build-line"],
         "remove the `#` of line 4", after={CMAKELISTS: "\ncatkin_package(\n)"},
     ),
+    "program-without-libraries": Case(
+        {CMAKELISTS: CMAKE + "add_executable(mean src/mean.cpp)\n", "src/mean.cpp": "int main() {}\n"}, ["build-line"],
+        "below line 5 add `target_link_libraries(mean ${catkin_LIBRARIES})`",
+    ),
     "run-dependency": Case(
         {CMAKELISTS: CMAKE.replace("package()", "package(CATKIN_DEPENDS rospy message_runtime)")}, ["manifest-line"],
         "names message_runtime", after={XML: "  <exec_depend>message_runtime</exec_depend>"},

@@ -135,6 +135,7 @@ CALLBACKS = {
     "Subscriber": ("callback", 2, 1),
     "Timer": ("callback", 1, 1),
     "Service": ("handler", 2, 1),
+    "SimpleActionServer": ("execute_cb", 2, 1),
     "on_shutdown": ("h", 0, 0),
     "signal": ("handler", 1, 2),
 }
@@ -177,6 +178,7 @@ def callbacks(tree):
             elif own and not called and not least <= values <= most:
                 what = {
                     "Service": "the request",
+                    "SimpleActionServer": "the goal",
                     "Timer": "the event",
                     "on_shutdown": "nothing",
                     "signal": "the signal's number and a frame",

@@ -512,19 +512,21 @@ def _no_member(found: re.Match[str], _package: PackageFacts, _lines: Sequence[st
     return Explained(found.string, f"write {found[2]} in place of {found[1]}")
 
 
-def _explain_unlinked(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+def _explain_unlinked(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     if found[1] == "main":
         return Explained(
             "a program has no `main` function",
             "write `int main(int argc, char **argv)` in one of its sources",
         )
     name = found[1].partition("(")[0]
+    linked = {call.args[0] for call in cmake_calls(package, "target_link_libraries") if call.args}
+    alone = [c.args[0] for c in cmake_calls(package, "add_executable") if c.args and c.args[0] not in linked]
+    of_ros = name.startswith("ros::") and bool(alone)
+    programs = alone if of_ros else ["<program>"]
+    calls = join_words(f"target_link_libraries({program} ${{catkin_LIBRARIES}})" for program in programs)
+    own = "" if of_ros else "; a function of your own needs its .cpp file in add_executable(…)"
     why = f"{name} is used, but nothing that is linked defines it"
-    return Explained(
-        why,
-        "write target_link_libraries(<program> ${catkin_LIBRARIES}) below add_executable(…); a function of your own"
-        " needs its .cpp file in add_executable(…)",
-    )
+    return Explained(why, f"write {calls} below add_executable(…){own}")
 
 
 def _main_twice(_found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:

@@ -182,7 +182,11 @@ def _tree(source: str) -> ast.AST:
 def _no_number(message: str, source: str) -> Meaning | None:
     """Of a whole message, or a text, where a number is wanted."""
     if (whole := _WHOLE.search(message)) and (kind := whole[whole.lastindex or 0]) != "NoneType":
-        return f"this is the whole message ({kind})", "take its field, as in `msg.data`"
+        data = kind in noetic_messages()["std_msgs"]
+        return (
+            f"this is the whole message ({kind})",
+            "take its field, as in `msg.data`" if data else "take one of its fields",
+        )
     if re.search(r" of (?:'str' and '(?:int|float)|'(?:int|float)' and 'str)'", message):
         return "a text is compared with a number", "turn the text into a number first, or leave out `str(…)`"
     if wanted := _WANTS_NUMBER.search(message):

@@ -25,6 +25,7 @@ from grader.checks.support.missing_names import (
     IMPORT_ERRORS,
     NO_MODULE,
     fields_of,
+    name_slip,
     other_name,
     own_message,
     own_modules,
@@ -36,11 +37,11 @@ from grader.checks.support.scripts import SYNTAX, path_in_package
 from grader.checks.support.text import LOOP, SPIN, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
-from grader.installable import ON_THE_MACHINE, exists_somewhere, install_hint, known_packages, noetic_messages
+from grader.installable import ON_THE_MACHINE, exists_somewhere, install_hint, known_packages
 from grader.model.package import Fault, PackageFacts, PythonSlip
 from grader.model.verdict import Citations, FileCitation, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
-from grader.wording import join_words, seconds
+from grader.wording import seconds
 
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
@@ -63,6 +64,9 @@ CAUSES = {
      "call your main function in `try: … except rospy.ROSInterruptException: pass`"),
     "ROSInitException": ("it uses ROS before `rospy.init_node(…)`",
      "call `rospy.init_node(…)` before the first publish, Rate or sleep"),
+    **dict.fromkeys(("LookupException", "ExtrapolationException", "ConnectivityException"), (
+        "at that moment tf does not know the transform, as always at the start",
+        "catch it, `try: … except tf2_ros.TransformException:`, or give `lookup_transform(…)` a time to wait")),
     "KeyboardInterrupt": ("Ctrl-C came at a point where nothing handles it",
      "loop with `while not rospy.is_shutdown():` and sleep with `rospy.Rate`"),
     "ModuleNotFoundError": ("",
@@ -292,12 +296,17 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
 
 def _no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
     """Return where a text comes from that a message takes for a number; None for what is published."""
+    kind = "int" if "integer" in found.message else "float"
     read = next((s for s in package.slips if (s.file, s.kind) == (place.file, "argument-text")), None)
     if read is not None:
-        return "an argument of the command line is a text", f"in line {read.line}, write `{read.fix}`"
+        fix = (
+            read.fix
+            if kind == "int"
+            else read.fix.replace("map(int, ", "map(float, ").replace("= int(", "= float(")
+        )
+        return "an argument of the command line is a text", f"in line {read.line}, write `{fix}`"
     if ".publish(" in found.own_frames[-1].source:
         return None
-    kind = "int" if "integer" in found.message else "float"
     return "it takes a number but gets something else", f"turn the value into one first: `{kind}(…)`"
 
 
@@ -349,42 +358,13 @@ def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> t
     slips = [s for s in package.slips if s.file == place.file]
     if outside := next((s for s in slips if (s.line, s.kind) == (place.line, "outside-method")), None):
         return outside.message, outside.fix
-    meant = [one for s in slips if (one := name_slip(s, slips)) is not None]
+    meant = [one for s in slips if (one := name_slip(s, package)) is not None]
     here = next((one for one in meant if name and (one.line, one.name) == (place.line, name[1])), None)
     if here is None:
         return None
     others = {one.fix: one for one in reversed(meant) if one.line != place.line and one.fix != here.fix}
     fixes = [one.fix for one in reversed(others.values())]
     return here.why, "; ".join([here.fix, *fixes[:OTHER_NAMES_SHOWN]])
-
-
-class NameSlip(NamedTuple):
-    """A name that is not there: why, and what to do."""
-
-    name: str
-    line: int
-    why: str
-    fix: str
-
-
-def name_slip(slip: PythonSlip, others: Sequence[PythonSlip]) -> NameSlip | None:
-    """Return what a slip says of a name that is not there; None of any other slip. `others` are those of its file."""
-    name, why, fix = slip.name, slip.message, slip.fix
-    gone = [s for s in others if s.kind == "commented-out" and s.name.startswith(f"{name} = ")]
-    if gone and slip.kind in {"misspelt", "undefined"}:
-        why = f"line {gone[0].line}, which gives it its value, is commented out"
-        return NameSlip(name, slip.line, why, gone[0].fix)
-    if slip.kind == "misspelt":
-        return NameSlip(name, slip.line, why, f"in line {slip.line}, {fix}")
-    if slip.kind != "undefined":
-        return None
-    if known := SLIPS.get(f"name '{name}' is not defined"):
-        return NameSlip(name, slip.line, known[0], f"in line {slip.line}, {known[1]}")
-    having = [package for package, types in noetic_messages().items() if name in types]
-    if name[:1].isupper() and having and "<package>" in fix:
-        lines = join_words([f"`from {package}.msg import {name}`" for package in having], "or")
-        why, fix = f"{name} is not imported", f"write {lines} at the top"
-    return NameSlip(name, slip.line, why, fix)
 
 
 def _callback(found: Traceback, place: FileCitation | None, package: PackageFacts) -> PythonSlip | None:

@@ -9,12 +9,14 @@ import re
 from collections.abc import Collection
 from contextlib import suppress
 from pathlib import PurePosixPath
+from typing import NamedTuple
 
 from grader.checks.support.console_output import Traceback
+from grader.checks.support.exceptions import SLIPS
 from grader.checks.support.scripts import cmake_calls, is_product, path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.installable import PYTHON_2, ROS_2, TUTORIALS, known_packages, nearest_module, noetic_messages
-from grader.model.package import PackageFacts
+from grader.model.package import PackageFacts, PythonSlip
 from grader.wording import join_words
 
 SETUP_PAGE = "http://docs.ros.org/en/noetic/api/catkin/html/howto/format2/installing_python.html"
@@ -66,13 +68,13 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
         return _other_types(wrong[1], wrong[2])
     if wrong := _NO_ATTRIBUTE.search(found.message):
         source = found.own_frames[-1].source if found.own_frames else ""
-        return _other_attributes(package, wrong[1], wrong[2], source)
+        return _field_of_number(found, wrong[1]) or _other_attributes(package, wrong[1], wrong[2], source)
     if wrong := re.match(r"(\w+) is not an attribute of (\w+)$", found.message):
-        fields = join_words(fields_of(package, wrong[2])[:ATTRIBUTES_SHOWN])
-        return (
-            f"{wrong[2]} has {fields}" if fields else "",
-            f"leave out `{wrong[1]}=`, or write the field that you mean",
-        )
+        known = fields_of(package, wrong[2])
+        near = near_names(wrong[1], known) or (known if len(known) == 1 else ())
+        hint = f"write `{near[0]}=` for `{wrong[1]}=`" if near else ""
+        said = f"{wrong[2]} has {join_words(known[:ATTRIBUTES_SHOWN])}" if known else ""
+        return said, hint or f"leave out `{wrong[1]}=`, or write the field that you mean"
     if wrong := _KEYWORD.search(found.message):
         near = near_names(wrong[1], KEYWORDS)
         return (f"it is called {near[0]}", f"write {near[0]}= for {wrong[1]}=") if near else None
@@ -251,6 +253,18 @@ def _other_attributes(package: PackageFacts, owner: str, wrong: str, source: str
     return f"{owner} has {listed}", f"write the field that you mean for {wrong}"
 
 
+def _field_of_number(found: Traceback, owner: str) -> tuple[str, str] | None:
+    """Return which field of a message has a number in place of its own fields: that shows when it is published."""
+    frame = found.frames[-1] if found.frames else None
+    if owner not in {"int", "float"} or frame is None or frame.marked is None or not frame.in_library:
+        return None
+    path = re.match(r"_x\.((?:\w+\.)*\w+)\.(\w+)$", frame.source[slice(*frame.marked)])
+    if path is None:
+        return None
+    field, inner = path[1], f"{path[1]}.{path[2]}"
+    return f"the message's {field} has fields of its own", f"write `.{inner} = …`, not `.{field} = …`"
+
+
 def _begins_alike(name: str, wrong: str) -> bool:
     return name.startswith(wrong) or wrong.startswith(name)
 
@@ -271,3 +285,37 @@ def fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
             if name.startswith(stem) and fields:
                 return fields
     return next((fields for types in noetic_messages().values() if (fields := types.get(name, ()))), ())
+
+
+class NameSlip(NamedTuple):
+    """A name that is not there: why, and what to do."""
+
+    name: str
+    line: int
+    why: str
+    fix: str
+
+
+def name_slip(slip: PythonSlip, package: PackageFacts) -> NameSlip | None:
+    """Return what a slip says of a name that is not there; None of any other slip."""
+    name, why, fix = slip.name, slip.message, slip.fix
+    others = [other for other in package.slips if other.file == slip.file]
+    gone = [s for s in others if s.kind == "commented-out" and s.name.startswith(f"{name} = ")]
+    if gone and slip.kind in {"misspelt", "undefined"}:
+        why = f"line {gone[0].line}, which gives it its value, is commented out"
+        return NameSlip(name, slip.line, why, gone[0].fix)
+    if slip.kind == "misspelt":
+        return NameSlip(name, slip.line, why, f"in line {slip.line}, {fix}")
+    if slip.kind != "undefined":
+        return None
+    if known := SLIPS.get(f"name '{name}' is not defined"):
+        return NameSlip(name, slip.line, known[0], f"in line {slip.line}, {known[1]}")
+    having = [f"{package}.msg" for package, types in noetic_messages().items() if name in types]
+    made = [
+        f"{p.name}.{i.module}" for p in (package, *package.also) for i in p.interfaces if name in i.classes
+    ]
+    having = made or having
+    if name[:1].isupper() and having and "<package>" in fix:
+        lines = join_words([f"`from {module} import {name}`" for module in having], "or")
+        why, fix = f"{name} is not imported", f"write {lines} at the top"
+    return NameSlip(name, slip.line, why, fix)

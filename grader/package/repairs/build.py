@@ -141,6 +141,7 @@ def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted)
         _add_call(files, "catkin_package()", "catkin_package()", below)
     _make_interfaces(files, package, name)
     _install(files, package, wanted)
+    _link_programs(files)
     _correct_include(files)
     _declare_exported(files)
     _name_project(files, package, name, wanted.package)
@@ -228,6 +229,18 @@ def _correct_include(files: Files) -> None:
         fix = f"take INCLUDE_DIRS {listed} out" if absent == given else f"take {listed} out of INCLUDE_DIRS"
         files.change("build-line", CMAKE, text, message, fix)
         return
+
+
+def _link_programs(files: Files) -> None:
+    """Link ROS to programs that nothing is linked to. A program without ROS is none the worse for it."""
+    linked = {words[0].value for c in _commands(files, "target_link_libraries") if (words := _words(c))}
+    for call in _commands(files, "add_executable"):
+        words = _words(call)
+        if words and words[0].value not in linked and "IMPORTED" not in [t.value for t in words]:
+            text, line = _cmake(files), f"target_link_libraries({words[0].value} ${{catkin_LIBRARIES}})"
+            at = text.index(text[call.span]) + len(text[call.span])
+            message = f"line {call.line} of {CMAKE}: nothing is linked to the program {words[0].value}"
+            files.change("build-line", CMAKE, f"{text[:at]}\n{line}{text[at:]}", message)
 
 
 def _declare_exported(files: Files) -> None:
