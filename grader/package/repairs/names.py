@@ -271,7 +271,8 @@ def _literal(name: Name, right: str, node: str) -> str:
         return right.strip("/")
     if (name.value.startswith("~") or name.role == "param") and node and right.startswith(own):
         return f"~{right.removeprefix(own)}"
-    return right if name.value.startswith(("/", "~")) else right.lstrip("/")
+    whole = name.value.startswith("/") or (name.role == "param" and name.value.startswith("~"))
+    return right if whole else right.lstrip("/")  # relative, so that the node stays in its namespace
 
 
 def _replace_literal(files: Files, file: str, name: Name, value: str, right: str) -> None:
