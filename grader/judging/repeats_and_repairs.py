@@ -248,6 +248,9 @@ def _charges(
     needed = dict.fromkeys(one for repairs in needs.values() for one in repairs)
     for repair in sorted(needed, key=lambda one: one.kind not in NAMES):
         asking = [c for c in rubric.criteria if c.scenario is None and _asks_for(first[c.id], repair)]
+        if repair.kind in OF_BUILDS:  # of a file with several faults, those that speak of this line
+            new = _words(repair.after) - _words(repair.before)
+            asking = [c for c in asking if c.id in better or new & _words(first[c.id].message)]
         asking = [c for c in asking if _names(c, repair)] or asking
         asking = [c for c in asking if repair.message.partition(": ")[2] in first[c.id].message] or asking
         if asking:
@@ -299,9 +302,10 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         verdict = failed(
             message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
         )
+    further = copy.status is Status.BLOCKED and verdict.unjudged and copy.cause != verdict.cause
     paths = re.findall(r"[\w-]+(?:/[\w.-]+)+", copy.hint)
     told_at_once = paths != [] and all(path in verdict.hint for path in paths)
-    if copy.status.is_lost and verdict.hint and (told_at_once or not is_next):
+    if copy.status.is_lost and verdict.hint and (told_at_once or not (is_next or further)):
         return verdict  # the repair brings up what its own advice is about
     told = [one for one in repairs if _is_told(one, verdict.hint)]
     clauses = verdict.hint.split("; ") if told else []
@@ -318,7 +322,10 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         ),
     ]
     is_new = not copy.hint or not set(copy.hint.split("; ")) <= set(hints)
-    if is_next and is_new:
+    if further:
+        words += [f"with that repaired, it is blocked by {copy.blocked_by}"]
+        hints += [f"then fix {copy.blocked_by}"]
+    elif is_next and is_new:
         untold = [clause for clause in copy.message.split("; ") if clause not in said]
         words += [f"with that repaired, {'; '.join(untold)}"] if untold else []
         hints += [f"then {_at_its_line(copy)}"] if copy.hint else []
