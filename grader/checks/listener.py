@@ -31,7 +31,7 @@ from grader.checks.support.text import (
 )
 from grader.checks.support.topics import call_in_comment, cite, misfit, refused_type, run_slip, topics_with
 from grader.evidence.run import Run
-from grader.model.package import PackageFacts
+from grader.model.package import PackageFacts, PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
@@ -183,8 +183,13 @@ def not_printed(
         _judge_error(package, run)
         or _some_numbers(probes, missing, lines)
         or _only_again(probes, missing)
-        or _by_number(probes, missing, lines)
+        or _by_number(probes, missing, lines, _print_in_comment(package, run))
     )
+
+
+def _print_in_comment(package: PackageFacts, run: Run) -> PythonSlip | None:
+    found = (call_in_comment(package, run, call) for call in ("loginfo", "print", "logwarn", "logerr"))
+    return next(filter(None, found), None)
 
 
 def _judge_error(package: PackageFacts, run: Run) -> Verdict | None:
@@ -224,13 +229,18 @@ def _only_again(probes: Sequence[Probe], missing: Sequence[Probe]) -> Verdict | 
     return failed(message, hint="print every message in the callback, even one that came before")
 
 
-def _by_number(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]) -> Verdict:
-    """Nothing, only the first, or some."""
+def _by_number(
+    probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line], gone: PythonSlip | None
+) -> Verdict:
+    """Nothing, only the first, or some. `gone` is the call that prints, where it is commented out."""
     after = [line.text for line in lines if line.at_ns >= probes[0].at_ns and line.text.strip()]
     if len(missing) == len(probes):
         seen = f"it prints {shown(after[0]).strip(' :')!r}" if after else "it prints nothing at all"
         sent = f"; {probes[0].value!r} was sent first" if isinstance(probes[0].value, str) else ""
         message = f"none of the messages that were sent was printed{sent}; {seen}"
+        if gone is not None:
+            message = f"{message}; in {gone.file}, line {gone.line}, {gone.message}"
+            return failed(message, hint=gone.fix, citations=(gone.place,))
         return failed(message, hint=CALLBACK_HINT).about(said="".join(after[:1]))
     if len(missing) == len(probes) - 1 and missing[0] is not probes[0]:
         waits = both("wait_for_message(…)", "waitForMessage(…)")

@@ -75,6 +75,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node(LOOP + "        p.publish(1)\n        # p.publish(2)\n        #rate.sleep()  # b\n        # sleep( a\n")
          + CALLED,
          [("commented-out", 6, "remove the `#` from line 6"), ("commented-out", 7, "`sleep(…)` is commented out")]),
+        ("def f(m):\n    # rospy.loginfo('I heard %s', m.data)\n    # print('old')\n    pass\n",
+         [("commented-out", 2, "`loginfo(…)` is commented out")]),
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, 'f')\n", [("callback-called", 3, "write `f`, without quotes")]),
         (node("    if not rospy.is_shutdown():\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "write `while` for `if` in line 4")]),

@@ -121,7 +121,8 @@ def argument_texts(text):
 
 
 COMMENTED_CALL = re.compile(
-    r"\s*#[#\s]*((?:([\w.]+) *= *)?[\w.]*\b(Publisher|Subscriber|Service|init_node|publish|sleep|spin)\(.*\))"
+    r"\s*#[#\s]*((?:([\w.]+) *= *)?[\w.]*\b(Publisher|Subscriber|Service|init_node|publish|sleep|spin|"
+    r"log\w+(?=\(.*\w\.data\b)|print(?=\(.*\w\.data\b))\(.*\))"
     r"\s*(?:#.*)?"
 )
 
