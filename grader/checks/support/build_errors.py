@@ -6,6 +6,7 @@ import posixpath
 import re
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
+from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.support.scripts import cmake_calls, installed, path_in_package
@@ -257,10 +258,8 @@ def _missing_folder(found: re.Match[str], _package: PackageFacts, _lines: Sequen
 def _missing_include(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     folder = found[1].rstrip("/")
     why = f"catkin_package(…) names the folder {folder}/, which is not in the package"
-    hint = (
-        f"remove INCLUDE_DIRS {folder}: it is for C++ header files; or put them into {folder}/ and push them"
-    )
-    return Explained(why, hint)
+    fix = f"remove INCLUDE_DIRS {folder}: it is for C++ header files"
+    return Explained(why, f"{fix}; or put them into {folder}/ and push them")
 
 
 def _missing_launch(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -323,9 +322,8 @@ def _message_of_another(found: re.Match[str], package: PackageFacts, lines: Sequ
 
 
 def _before_catkin_package(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    return Explained(
-        f"{found[1]}() is called after catkin_package()", f"move {found[1]}(…) above catkin_package(…)"
-    )
+    why = f"{found[1]}() is called after catkin_package()"
+    return Explained(why, f"move {found[1]}(…) above catkin_package(…)")
 
 
 def _missing_message(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -380,7 +378,8 @@ def misspelt_cmake_lists(package: PackageFacts) -> str:
 
 def _missing_dependency(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     why = f"add_dependencies({found[2]} {found[1]}) names the target {found[1]}, which does not exist"
-    hint = "write add_dependencies(<program> ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})"
+    targets = "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"
+    hint = f"write add_dependencies({found[2]} {targets})"
     return Explained(why, f"{hint}; messages of your own need generate_messages(…) above it")
 
 
@@ -425,11 +424,7 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
     text = f"{found[1]}/{found[2]}.h does not exist when the program is compiled"
     made = {f"{folder}/{found[2]}.{folder}" for folder in ("msg", "srv")}
     if found[1] != package.name or not made & {f.path for f in package.files}:
-        own = [
-            posixpath.basename(f.path).partition(".")[0]
-            for f in package.files
-            if f.path.endswith(tuple(MADE))
-        ]
+        own = [PurePosixPath(f.path).stem for f in package.files if f.path.endswith(tuple(MADE))]
         there = own if found[1] == package.name else noetic_messages().get(found[1], ())
         near = near_names(found[2], there) if found[2] not in there else ()
         if near:
@@ -440,23 +435,20 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
         if any(found[1] in call.args for call in cmake_calls(package, "find_package")):
             # found, and so built beside this package: its messages come too late
             why = f"{text}: nothing makes it wait for the messages of {found[1]}, so with -j it fails in some runs"
+            program = next(iter(_programs_without(package, "add_dependencies")), "<program>")
             return Explained(
-                why, "add_dependencies(<program> ${catkin_EXPORTED_TARGETS}) below add_executable(…)"
+                why, f"write {_call_below(program, 'add_dependencies', '${catkin_EXPORTED_TARGETS}')}"
             )
         return Explained(f"{text}: there is no such header", "check the #include and find_package(…)")
     why = f"{text}: nothing makes it wait for its message, so with -j it fails in some runs and not in others"
-    calls = package.cmake.calls if package.cmake else ()
-    waiting = {call.args[0] for call in calls if call.name == "add_dependencies" and call.args}
-    programs = [call for call in calls if call.name == "add_executable" and call.args]
+    waiting = _programs_without(package, "add_dependencies")
     fixes = [
         f"below the add_executable(…) of line {call.line}, write "
         f"add_dependencies({call.args[0]} ${{${{PROJECT_NAME}}_EXPORTED_TARGETS}})"
-        for call in programs
-        if call.args[0] not in waiting
+        for call in cmake_calls(package, "add_executable")
+        if call.args and call.args[0] in waiting
     ]
-    other = (
-        "write add_dependencies(<program> ${${PROJECT_NAME}_EXPORTED_TARGETS}) below its add_executable(…)"
-    )
+    other = f"write {_call_below('<program>', 'add_dependencies', '${${PROJECT_NAME}_EXPORTED_TARGETS}')}"
     return Explained(why, "; ".join(fixes[:FIXES_MAX]) or other)
 
 
@@ -514,26 +506,32 @@ def _no_member(found: re.Match[str], _package: PackageFacts, _lines: Sequence[st
 
 def _explain_unlinked(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     if found[1] == "main":
-        return Explained(
-            "a program has no `main` function",
-            "write `int main(int argc, char **argv)` in one of its sources",
-        )
+        why = "a program has no `main` function"
+        return Explained(why, "write `int main(int argc, char **argv)` in one of its sources")
     name = found[1].partition("(")[0]
-    linked = {call.args[0] for call in cmake_calls(package, "target_link_libraries") if call.args}
-    alone = [c.args[0] for c in cmake_calls(package, "add_executable") if c.args and c.args[0] not in linked]
-    of_ros = name.startswith("ros::") and bool(alone)
-    programs = alone if of_ros else ["<program>"]
-    calls = join_words(f"target_link_libraries({program} ${{catkin_LIBRARIES}})" for program in programs)
-    own = "" if of_ros else "; a function of your own needs its .cpp file in add_executable(…)"
+    alone = _programs_without(package, "target_link_libraries") if name.startswith("ros::") else []
+    program = alone[0] if alone else "<program>"
+    own = "" if alone else "; a function of your own needs its .cpp file in add_executable(…)"
     why = f"{name} is used, but nothing that is linked defines it"
-    return Explained(why, f"write {calls} below add_executable(…){own}")
+    return Explained(
+        why, f"write {_call_below(program, 'target_link_libraries', '${catkin_LIBRARIES}')}{own}"
+    )
+
+
+def _programs_without(package: PackageFacts, command: str) -> list[str]:
+    """Return the programs that no such command is called for."""
+    named = {call.args[0] for call in cmake_calls(package, command) if call.args}
+    made = [call.args[0] for call in cmake_calls(package, "add_executable") if call.args]
+    return [program for program in made if program not in named]
+
+
+def _call_below(program: str, command: str, words: str) -> str:
+    return f"{command}({program} {words}) below its add_executable(…)"
 
 
 def _main_twice(_found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    return Explained(
-        "two sources of one program have a `main` function",
-        "write a separate add_executable(…) for each program",
-    )
+    why = "two sources of one program have a `main` function"
+    return Explained(why, "write a separate add_executable(…) for each program")
 
 
 def _unknown_command(found: re.Match[str], *_: object) -> Explained:
