@@ -65,7 +65,7 @@ def test_rates(example: Example) -> None:
 def test_counters(example: Example) -> None:
     figures, result, run = _drawn(example)
     if NOTHING.fullmatch(result.measured):
-        assert figures == ()
+        assert not any(isinstance(f, CounterFigure) for f in figures)
         return
     (figure,) = (f for f in figures if isinstance(f, CounterFigure))
     if result.status is Status.PASS:
