@@ -14,6 +14,7 @@ from grader.checks.registry import DependencyName, LaunchName, ProgramName, chec
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.launch import (
     Slip,
+    finished,
     is_exact,
     node_slip,
     nodes_of_program,
@@ -34,7 +35,7 @@ from grader.checks.support.launch import (
 from grader.checks.support.launch_names import find_renaming
 from grader.checks.support.processes import GlobalName, early_end
 from grader.checks.support.scripts import shebang_obstacles
-from grader.checks.support.text import near_names
+from grader.checks.support.text import SPIN, near_names
 from grader.checks.support.topics import cite, nodes_on, topics_with
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
@@ -463,6 +464,11 @@ def _not_connected(
     """A node that died, the launch file's remaps and namespaces, or the scripts' own topics."""
     if dead := _judge_deaths(package, run, wanted, "came up, but before it was connected"):
         return dead
+    if ended := [w.node for w in wanted if finished(run, w.node)]:
+        names, places = join_words(n.full_name for n in ended), [(n.file or file.path, n.line) for n in ended]
+        cited = tuple(FileCitation(file=path, line=line) for path, line in places)
+        message = f"{names} came up, and ended by itself before it was connected"
+        return failed(message, hint=f"keep it alive: end with {SPIN}", citations=cited)
     other = over_another_topic(run, topic)
     moved = [w.node for w in wanted if w.node.remaps or w.node.namespace != "/"]
     if renaming := find_renaming(package, [w.node for w in wanted], topic, run):
