@@ -82,7 +82,7 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
     lines = tuple(FileCitation(file=facts.file, line=one.place) for one in wrong)
     if fault:
         lines = (*lines, FileCitation(file=fault.file, line=fault.line))
-    return failed(
+    verdict = failed(
         f"{facts.file}: {'; '.join([*_fault(fault), *(one.why for one in wrong)])}",
         expected=expected,
         measured=measured,
@@ -91,6 +91,8 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         ),
         citations=tuple(dict.fromkeys(lines)),
     )
+    above = [one.below for one in wrong if one.below is not None]
+    return verdict.seeking("below", above[0].name) if above and len(above) == len(wrong) else verdict
 
 
 def _fault(fault: Fault | None) -> Iterator[str]:

@@ -300,7 +300,11 @@ class Requirements:
         What else was wrong with a node, or with a file, is no reason for its process, or for the build, to end; unless
         it was at the same line, or what is absent is named.
         """
-        verdict, same_line = self.verdicts[required], bool(_lines(self.verdicts[required]) & _lines(found))
+        verdict = self.verdicts[required]
+        # the line below which a call that is missing goes is no fault
+        same_line = not (verdict.sought_name("call") or verdict.sought_name("below")) and bool(
+            _lines(verdict) & _lines(found)
+        )
         same_run = self._criteria[required].scenario == criterion.scenario
         if not verdict.status.is_lost:
             return False

@@ -90,15 +90,16 @@ class Mistake(Record):
     """The file that the lab asks for, or the script, from the package's root."""
 
 
-SoughtKind = Literal["call", "component", "dependency", "package"]
+SoughtKind = Literal["call", "below", "component", "dependency", "package"]
 
 
 class Sought(Record):
     """A name whose lines are looked up in the sources once all is judged, and then cited: checks see few of them."""
 
     kind: SoughtKind
-    """A command that `CMakeLists.txt` does not call; a package that the machine lacks and `find_package(…)` names, that
-    `package.xml` does not declare, or that roslaunch does not find."""
+    """A command that `CMakeLists.txt` does not call, or the one below which that goes, which is cited already; a package
+    that the machine lacks and `find_package(…)` names, that `package.xml` does not declare, or that roslaunch does not
+    find."""
     name: str
 
 
