@@ -97,7 +97,7 @@ class Sought(Record):
     """A name whose lines are looked up in the sources once all is judged, and then cited: checks see few of them."""
 
     kind: SoughtKind
-    """A command that `CMakeLists.txt` does not call, or the one below which that goes, which is cited already; a package
+    """A command that `CMakeLists.txt` does not call, or the one below which that goes, and is cited; a package
     that the machine lacks and `find_package(…)` names, that `package.xml` does not declare, or that roslaunch does not
     find."""
     name: str
