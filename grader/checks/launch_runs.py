@@ -467,7 +467,8 @@ def _not_connected(
     if ended := [w.node for w in wanted if finished(run, w.node)]:
         names, places = join_words(n.full_name for n in ended), [(n.file or file.path, n.line) for n in ended]
         cited = tuple(FileCitation(file=path, line=line) for path, line in places)
-        message = f"{names} came up, and ended by itself before it was connected"
+        alone = "itself before it was" if len(ended) == 1 else "themselves before they were"
+        message = f"{names} came up, and ended by {alone} connected"
         return failed(message, hint=f"keep it alive: end with {SPIN}", citations=cited)
     other = over_another_topic(run, topic)
     moved = [w.node for w in wanted if w.node.remaps or w.node.namespace != "/"]

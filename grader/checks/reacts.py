@@ -256,8 +256,8 @@ def _instead(
 def _judge_unanswered(
     answers: Sequence[Answer], run: Run, params: ReactsParams, instead: tuple[str, str] | None
 ) -> Verdict | None:
-    when = f"in the callback of {params.cause.topic}, where {params.cause.words} comes"
-    hint = f"{when}, see that {params.effect.words} is published"
+    hint = f"each time that {params.cause.words} comes, publish {params.effect.words}"
+    hint = f"{hint}, in the callback of {params.cause.topic}"
     if not answers and (unsent := misfit(run, params.cause.topic)):
         return unsent
     deaf = refused_type(run, params.cause.topic) or unheard(run)

@@ -302,9 +302,8 @@ class Requirements:
         """
         verdict = self.verdicts[required]
         # the line below which a call that is missing goes is no fault
-        same_line = not (verdict.sought_name("call") or verdict.sought_name("below")) and bool(
-            _lines(verdict) & _lines(found)
-        )
+        is_missing = bool(verdict.sought_name("call") or verdict.sought_name("below"))
+        same_line = not is_missing and bool(_lines(verdict) & _lines(found))
         same_run = self._criteria[required].scenario == criterion.scenario
         if not verdict.status.is_lost:
             return False

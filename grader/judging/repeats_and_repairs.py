@@ -189,7 +189,7 @@ def is_used_by(
     if repair.kind in DONE_BEFORE_RUNS:
         return launches and not known
     if repair.kind in OF_BUILDS:
-        made = GENERATION.search(repair.message) is not None
+        made = GENERATION.search(repair.after) is not None
         return made or not built or any(start.built for start in scenario.start)
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         return True

@@ -158,12 +158,10 @@ def meant_type(type_: str, own: Collection[str], known: Mapping[str, Collection[
     near = get_close_matches(base.lower(), sorted(map(str.lower, own)), 1)
     plain = OTHER_TYPES.get(base.lower(), base.lower())
     having = [package for package, types in known.items() if base in types]
-    right = (
-        plain
-        if plain in BUILT_IN
-        else f"{having[0]}/{base}"
-        if having
-        else next((one for one in own if near == [one.lower()]), "")
-    )
-    right = right or next(iter(get_close_matches(plain, sorted(BUILT_IN), 1)), base)
-    return f"{right}{bracket}{size}"
+    meant = [
+        *([plain] if plain in BUILT_IN else []),
+        *(f"{package}/{base}" for package in having),
+        *(one for one in own if near == [one.lower()]),
+        *get_close_matches(plain, sorted(BUILT_IN), 1),
+    ]
+    return f"{meant[0] if meant else base}{bracket}{size}"

@@ -28,7 +28,7 @@ def frame_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
     for index, criterion in criteria:
         yield from _in_values(("criteria", index, "with"), criterion.get("with"))
         if criterion.get("check") == "transform":
-            yield from _turned_round(index, criteria, as_map(scenarios.get(str(criterion.get("scenario")))))
+            yield from _swapped_frames(index, criteria, as_map(scenarios.get(str(criterion.get("scenario")))))
 
 
 def _slash(path: KeyPath, frame: object) -> Iterator[Fault]:
@@ -68,7 +68,7 @@ def _in_degrees(angle: float) -> int:
     return 45 * eighths if is_one and not angle.is_integer() else 0
 
 
-def _turned_round(
+def _swapped_frames(
     index: int, criteria: list[tuple[int, dict[str, Any]]], scenario: dict[str, Any]
 ) -> Iterator[Fault]:
     """Yield a transform whose parent is its child for what the scenario sends, or for an earlier criterion."""

@@ -440,7 +440,7 @@ def _other_goals_and_types(rubric: dict[str, Any], scenarios: dict[str, dict[str
 
 
 def _is_given_up(goal: dict[str, Any], scenario: dict[str, Any]) -> bool:
-    """Return whether a goal is cancelled, or something else is done meanwhile upon which a server may give it up."""
+    """Return whether a goal is cancelled, or something else is done meanwhile that may make a server give it up."""
     steps = [as_map(one) for _, step in as_maps(scenario.get("steps")) for one in step.values()]
     return goal.get("cancel_after_s") is not None or any(one.get("background") is True for one in steps)
 

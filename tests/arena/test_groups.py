@@ -125,6 +125,16 @@ def test_who_works_in_the_same_memory_computes(program: str, kinds: set[str | No
 WAITS = "import threading\nthreading.Thread(target=lambda: [sum([0]) or time.sleep(0.1) for _ in range(9000)]).start()"
 
 
+def _looks_until(kind: str | None, pid: int) -> list[str | None]:
+    """Return how a program rests, look by look, until it has been so five times, for a minute at most."""
+    rest, begun_s = TreeRest(), time.monotonic()
+    found: list[str | None] = []
+    while time.monotonic() < begun_s + 60 and (len(found) < 20 or found[-5:] != [kind] * 5):
+        time.sleep(LOOK_S)
+        found.append(rest.look([pid], time.monotonic())[0])
+    return found
+
+
 @pytest.mark.parametrize(("compiled", "kind"), [(True, "loops"), (False, None)])
 def test_a_compiled_program_rests_while_it_waits_for_its_threads(
     compiled: bool, kind: str | None, monkeypatch: pytest.MonkeyPatch
@@ -132,11 +142,7 @@ def test_a_compiled_program_rests_while_it_waits_for_its_threads(
     monkeypatch.setattr("process_tree._is_compiled", lambda _: compiled)
     with subprocess.Popen([sys.executable, "-c", f"import time\n{WAITS}"]) as process:
         try:
-            rest, begun_s = TreeRest(), time.monotonic()
-            found: list[str | None] = []
-            while time.monotonic() < begun_s + 60 and (len(found) < 20 or found[-5:] != [kind] * 5):
-                time.sleep(LOOK_S)
-                found.append(rest.look([process.pid], time.monotonic())[0])
+            found = _looks_until(kind, process.pid)
             assert found[-5:] == [kind] * 5, found
         finally:
             process.kill()
@@ -171,11 +177,7 @@ def test_a_program_rests_whose_threads_all_wait_for_each_other(program: str, kin
     """One that sets itself a limit may do anything after it."""
     with subprocess.Popen([sys.executable, "-c", f"import select, threading\n{program}"]) as process:
         try:
-            rest, begun_s = TreeRest(), time.monotonic()
-            found: list[str | None] = []
-            while time.monotonic() < begun_s + 60 and (len(found) < 20 or found[-5:] != [kind] * 5):
-                time.sleep(LOOK_S)
-                found.append(rest.look([process.pid], time.monotonic())[0])
+            found = _looks_until(kind, process.pid)
             assert found[-5:] == [kind] * 5, found
         finally:
             process.kill()

@@ -78,9 +78,8 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
     if wrong := _KEYWORD.search(found.message):
         near = near_names(wrong[1], KEYWORDS)
         return (f"it is called {near[0]}", f"write {near[0]}= for {wrong[1]}=") if near else None
-    return (
-        _own_module(found, package) or _other_module(found, package) if found.kind in IMPORT_ERRORS else None
-    )
+    is_import = found.kind in IMPORT_ERRORS
+    return (_own_module(found, package) or _other_module(found, package)) if is_import else None
 
 
 def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
@@ -192,30 +191,41 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
 def _own_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return why Python does not find a file of the package's own, and what lets it."""
     asked = NO_MODULE.search(found.message)
-    name = asked[1] if asked else ""
     script = path_in_package(package, found.own_frames[-1].file) if found.own_frames else None
-    paths = [PurePosixPath(file.path) for file in package.files if not is_product(file.path)]
-    folder = PurePosixPath(script or "").parent
-    file = next((path for path in paths if path.name == f"{name}.py"), None)
-    if name == package.name and PurePosixPath(f"src/{name}/__init__.py") in paths:
-        call = "catkin_python_setup()"
-        if PurePosixPath("setup.py") not in paths:
-            fix = f"write setup.py as {SETUP_PAGE} says, and call {call} above catkin_package(…)"
-            return f"src/{name}/ is there, and no setup.py makes it known", fix
-        makes = bool(cmake_calls(package, "catkin_python_setup"))
-        cause = f"src/{name}/ is there, and CMakeLists.txt does not call {call}"
-        return None if makes else (cause, f"call {call} above catkin_package(…)")
-    if script is None or file is None:
+    if asked is None or script is None:
         return None
-    path = "os.path.dirname(__file__)"
+    paths = [PurePosixPath(file.path) for file in package.files if not is_product(file.path)]
+    if asked[1] == package.name and PurePosixPath(f"src/{asked[1]}/__init__.py") in paths:
+        return _own_python_package(asked[1], package)
+    folder = PurePosixPath(script).parent
+    files = sorted(
+        (path for path in paths if path.name == f"{asked[1]}.py"), key=lambda path: path.parent != folder
+    )
+    if not files:
+        return None
+    file, place = files[0], "os.path.dirname(__file__)"
     if file.parent != folder:
         cause = f"{file} is in another folder, and Python looks beside {script}"
-        path = f"os.path.join({path}, '{posixpath.relpath(str(file.parent), str(folder))}')"
+        place = f"os.path.join({place}, '{posixpath.relpath(str(file.parent), str(folder))}')"
     elif any("/devel/lib/" in frame.file for frame in found.frames):
         cause = f"{file} is there, and the program that catkin_install_python makes of {script} does not look beside it"
     else:
         return None
-    return cause, f"write `import os, sys; sys.path.insert(0, {path})` above the import"
+    return cause, f"write `import os, sys; sys.path.insert(0, {place})` above the import"
+
+
+def _own_python_package(name: str, package: PackageFacts) -> tuple[str, str] | None:
+    """Return what keeps the build from making `src/<name>/` known to Python."""
+    call = "catkin_python_setup()"
+    if package.file("setup.py") is None:
+        fix = f"write setup.py as {SETUP_PAGE} says, and call {call} above catkin_package(…)"
+        return f"src/{name}/ is there, and no setup.py makes it known", fix
+    if cmake_calls(package, "catkin_python_setup"):
+        return None
+    return (
+        f"src/{name}/ is there, and CMakeLists.txt does not call {call}",
+        f"call {call} above catkin_package(…)",
+    )
 
 
 def own_modules(package: PackageFacts) -> set[str]:

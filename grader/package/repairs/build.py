@@ -238,7 +238,7 @@ def _link_programs(files: Files) -> None:
         words = _words(call)
         if words and words[0].value not in linked and "IMPORTED" not in [t.value for t in words]:
             text, line = _cmake(files), f"target_link_libraries({words[0].value} ${{catkin_LIBRARIES}})"
-            at = text.index(text[call.span]) + len(text[call.span])
+            at = call.span.stop
             message = f"line {call.line} of {CMAKE}: nothing is linked to the program {words[0].value}"
             files.change("build-line", CMAKE, f"{text[:at]}\n{line}{text[at:]}", message)
 
