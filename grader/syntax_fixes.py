@@ -8,12 +8,18 @@ from __future__ import annotations
 
 import ast
 import keyword
+import os
 import re
+import threading
 from collections.abc import Iterator
 from difflib import get_close_matches
 from typing import NamedTuple
 
 LINE_CHARS_MAX = 300
+_PARSING = threading.Lock()
+os.register_at_fork(
+    before=_PARSING.acquire, after_in_parent=_PARSING.release, after_in_child=_PARSING.release
+)
 BLOCK = r"(?:if|elif|else|while|for|def|class|try|except|finally|with)\b"
 COMMENTED_OUT = "block commented out"
 """What the grader says of a comment that is the first line of the block below it."""
@@ -146,6 +152,18 @@ _HABITS = (
     _Habit(r"(?<![\"')\]])(?<![\"')\]]\s)%[sdf]\b(?!\s*[.(\[])",
            'the string has no quotes around it: write `"` before and after it'),
 )  # fmt: skip
+
+
+def parsed(source: str) -> ast.Module:
+    """Return a student's source as a tree, for threads that parse at the same time.
+
+    Python counts how deep a tree is in one place for all threads: where two parse at once, the one or the other can
+    fail with SystemError (https://github.com/python/cpython/issues/106905).
+
+    :raises SyntaxError: it is not Python; ValueError, RecursionError or MemoryError likewise.
+    """
+    with _PARSING:
+        return ast.parse(source)
 
 
 def cause_of_line(line: str) -> str:
@@ -351,7 +369,7 @@ def _parses(line: str) -> bool:
         "\nfinally: pass" if re.match(r"try\s*:", code) else ""
     )
     try:
-        ast.parse(before + _together(code, "", texts) + after)
+        parsed(before + _together(code, "", texts) + after)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return False
     return True

@@ -134,6 +134,11 @@ def test_checks_and_records_do_no_io() -> None:
     assert wrong == []
 
 
+def test_checks_parse_python_where_threads_can() -> None:
+    wrong = [str(path) for path in _sources(GRADER / "checks") if "ast.parse(" in path.read_text("utf-8")]
+    assert wrong == [], "grader.syntax_fixes.parsed is for threads that parse at the same time"
+
+
 def test_checks_see_evidence_as_records_only() -> None:
     seen = {
         m for path in _sources(GRADER / "checks") for m in _imports(path) if m.startswith("grader.evidence")

@@ -3,13 +3,14 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from grader.checks.support.exit_causes import syntax_hint
 from grader.package.python import cause_of, check_syntax, read_syntax_report
-from grader.syntax_fixes import corrected
+from grader.syntax_fixes import corrected, parsed
 
 pytestmark = pytest.mark.usefixtures("without_processes")
 """What the child may take, and what ends it, is looked at in test_hostile.py."""
@@ -290,3 +291,27 @@ def test_a_right_line_is_never_corrected():
         "if not (a or b): pass",
     )
     assert [corrected(line) for line in lines] == [""] * len(lines)
+
+
+class _Busy:
+    """Garbage whose collection takes as long as a thread may run before another's turn."""
+
+    def __init__(self) -> None:
+        self.itself = self
+
+    def __del__(self) -> None:
+        assert sum(range(20_000))
+
+
+def test_threads_that_parse_at_the_same_time() -> None:
+    source = "if True:\n    x = [f(1), (2, 3), {'a': [4]}]\n" * 300
+
+    def parse(_: int) -> int:
+        found = 0
+        for _ in range(40):
+            _Busy()
+            found += len(parsed(source).body)
+        return found
+
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(parse, range(4))) == [40 * 300] * 4

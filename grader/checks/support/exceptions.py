@@ -11,6 +11,7 @@ from grader.checks.support.console_output import Frame, Traceback
 from grader.checks.support.text import shown
 from grader.installable import noetic_messages
 from grader.model.package import PackageFacts
+from grader.syntax_fixes import parsed
 from grader.wording import join_words, plural
 
 Meaning = tuple[str, str]
@@ -108,7 +109,7 @@ def _subscript(source: str, marked: tuple[int, int] | None) -> ast.Subscript | N
     """Return the only `x[i]` of the line, or the one that is marked."""
     begun = re.sub(r"^el(?=if\b)", "", source)
     with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-        tree = ast.parse(f"{begun} pass" if begun.rstrip().endswith(":") else begun)
+        tree = parsed(f"{begun} pass" if begun.rstrip().endswith(":") else begun)
         found = [
             n for n in ast.walk(tree) if isinstance(n, ast.Subscript) and not isinstance(n.slice, ast.Slice)
         ]
@@ -175,7 +176,7 @@ def _nested_index(message: str, source: str) -> Meaning | None:
 def _tree(source: str) -> ast.AST:
     """Return the syntax tree of a line that may begin a block; an empty one where Python cannot parse it."""
     with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-        return ast.parse(f"{source} pass" if source.rstrip().endswith(":") else source)
+        return parsed(f"{source} pass" if source.rstrip().endswith(":") else source)
     return ast.Module(body=[], type_ignores=[])
 
 
@@ -285,7 +286,7 @@ def _init_node(message: str, source: str) -> Meaning | None:
 def _calls(source: str, *names: str) -> list[ast.Call]:
     """Return the calls in a line of source, of functions or methods with one of these names."""
     with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-        found = [n for n in ast.walk(ast.parse(source)) if isinstance(n, ast.Call)]
+        found = [n for n in ast.walk(parsed(source)) if isinstance(n, ast.Call)]
         return [n for n in found if getattr(n.func, "attr", getattr(n.func, "id", "")) in names]
     return []
 

@@ -40,7 +40,7 @@ from grader.evidence.run import Run
 from grader.installable import ON_THE_MACHINE, exists_somewhere, install_hint, known_packages
 from grader.model.package import Fault, PackageFacts, PythonSlip
 from grader.model.verdict import Citations, FileCitation, Verdict, machine_lacks
-from grader.syntax_fixes import COMMENTED_OUT, corrected, without_brace
+from grader.syntax_fixes import COMMENTED_OUT, corrected, parsed, without_brace
 from grader.wording import seconds
 
 OTHER_NAMES_SHOWN = 3
@@ -406,7 +406,7 @@ def _other_side(frame: Frame, *, is_right: bool) -> str:
     """Return the side of a sum that is no text: of the one that Python marks, or of the line's only one."""
     source = frame.source[slice(*frame.marked)] if frame.marked else frame.source
     with suppress(SyntaxError, ValueError, RecursionError):
-        nodes = list(ast.walk(ast.parse(source)))
+        nodes = list(ast.walk(parsed(source)))
         sums = [n for n in nodes if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)]
         if sums and (frame.marked or len(sums) == 1):
             return shown(ast.unparse(sums[0].right if is_right else sums[0].left))
@@ -424,7 +424,7 @@ def _values_of_text(message: str, source: str) -> tuple[str, str] | None:
     there = "more" if lacks else "fewer"
     why = f"the string has {there} `%` than there are values after it"
     with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-        for node in ast.walk(ast.parse(source)):
+        for node in ast.walk(parsed(source)):
             beside = node.args if isinstance(node, ast.Call) else getattr(node, "elts", [])
             if fix := _values_in_brackets(source, beside) if lacks else _places_added(source, beside):
                 return why, fix

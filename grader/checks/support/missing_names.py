@@ -17,6 +17,7 @@ from grader.checks.support.scripts import cmake_calls, is_product, path_in_packa
 from grader.checks.support.text import near_names, shown
 from grader.installable import PYTHON_2, ROS_2, TUTORIALS, known_packages, nearest_module, noetic_messages
 from grader.model.package import PackageFacts, PythonSlip
+from grader.syntax_fixes import parsed
 from grader.wording import join_words
 
 SETUP_PAGE = "http://docs.ros.org/en/noetic/api/catkin/html/howto/format2/installing_python.html"
@@ -112,7 +113,7 @@ def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | No
 def _imported_names(source: str) -> tuple[str, tuple[str, ...]] | None:
     """Return the module and the names of a line that imports, None of any other: `import a.b` is `b` of `a`."""
     with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-        for node in ast.parse(source).body[:1]:
+        for node in parsed(source).body[:1]:
             if isinstance(node, ast.ImportFrom) and node.module:
                 return node.module, tuple(alias.name for alias in node.names)
             if isinstance(node, ast.Import) and "." in node.names[0].name:
