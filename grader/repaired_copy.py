@@ -64,7 +64,10 @@ def choose_repairs(
             one.with_paths(partial(posixpath.join, way))
             for one in find_repairs(package.folder, own, wanted_of(rubric, own.asked))
         ]
-    counting = [one for one in found if rubric.share_of(one.kind) > 0]
+    typed = any(step.type is not None for scenario in rubric.scenarios.values() for step in scenario.steps)
+    counting = [
+        one for one in found if rubric.share_of(one.kind) > 0 and (typed or "raw_input(" not in one.before)
+    ]
     built, launched = built or not needs_build(facts), launched_in(facts)
 
     def helps(one: Repair) -> bool:

@@ -178,7 +178,9 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
     if told and told.lacks:
         verdict = verdict.seeking("component", told.lacks)
     # what the package lacks of catkin's own lines shows as a command that CMake does not know
-    if not line or told is None or error is None or UNKNOWN_COMMAND in error.text:
+    if not line or told is None or error is None:
+        return verdict
+    if UNKNOWN_COMMAND in error.text and not told.by_itself:
         return verdict
     return verdict.model_copy(update={"cause": f"{line}{told.why}"})
 

@@ -183,6 +183,7 @@ def not_printed(
         _judge_error(package, run)
         or _some_numbers(probes, missing, lines)
         or _only_again(probes, missing)
+        or _waiting(package, run, probes, missing)
         or _by_number(probes, missing, lines, _print_in_comment(package, run))
     )
 
@@ -227,6 +228,18 @@ def _only_again(probes: Sequence[Probe], missing: Sequence[Probe]) -> Verdict | 
         return None
     message = f"{missing[0].value!r} came twice but was printed only once"
     return failed(message, hint="print every message in the callback, even one that came before")
+
+
+def _waiting(
+    package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe]
+) -> Verdict | None:
+    """What came while the callback was busy with an earlier message."""
+    slip = run_slip(package, run, "callback-waits")
+    if slip is None or len(missing) == len(probes):
+        return None
+    message = f"{len(missing)} of {plural(len(probes), 'message')} not printed in time: {slip.message}"
+    hint = f"in {slip.file}, {slip.fix}: no further message is read until the callback ends"
+    return failed(message, hint=hint, citations=(slip.place,))
 
 
 def _by_number(

@@ -263,8 +263,12 @@ class Later:
 
     def _node_name(self) -> Iterator[str]:
         own, names = self._of("node-name"), list(texts_in(self._wanted.get("names")))
-        if not self._ran and len(own) == 1 and names and own[0].message.lstrip("/") not in names:
+        if self._ran or len(own) != 1 or not names or f"init_node('{names[0]}'" in self._verdict.hint:
+            return
+        if own[0].message.lstrip("/") not in names:
             yield f"name the node {names[0]} in {_line(own[0])}, not {own[0].message}"
+        if own[0].name == "anonymous" and self._wanted.get("anonymous") == "forbidden":
+            yield f"take anonymous=True out of {_line(own[0])}"
 
     def _copied(self) -> Iterator[str]:
         started = [one.script for one in self._rubric.scenarios[self._criterion.scenario or ""].start]
@@ -327,7 +331,8 @@ class Later:
         )
 
     def _message(self) -> Iterator[str]:
-        template, said = str(self._wanted.get("template", "")), self._of("publishes")
+        template = str(self._wanted.get("template", ""))
+        said = list({one.message: one for one in self._of("publishes")}.values())
         code = in_language(code_of(template), "python")
         if len(said) != 1:
             if not said and self._lacks_words(template.partition(SECONDS)[0]):
@@ -336,6 +341,9 @@ class Later:
         text = said[0].message
         if text in {SAID_VALUE, SAID_DATA} and self._lacks_words(template.partition(SECONDS)[0]):
             yield f"publish `{code}` in {_line(said[0])}"
+        if len(self._of("publisher")) > 1:  # it may be another topic's
+            yield f"publish `{code}`"
+            return
         sample = template.replace(SECONDS, "1234567890.25")
         if not could_say(text, sample):
             words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code

@@ -247,10 +247,10 @@ class SourceFile(Record):
 SlipKind = Literal[
     "not-called", "input", "no-clock", "misspelt", "rate-parameter", "rate-number", "reset-value", "reset-limit",
     "set-in-loop", "reset-early", "never-called", "main-guard", "never-reached", "spin-in-loop", "loop-left",
-    "sleep-outside", "sleep-twice", "callback-called", "callback-missing", "callback-values", "clock-value",
-    "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type", "subscriber",
-    "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes", "prints",
-    "argument-text",
+    "sleep-outside", "sleep-twice", "callback-called", "callback-missing", "callback-values", "callback-waits",
+    "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
+    "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
+    "prints", "argument-text",
 ]  # fmt: skip
 
 
@@ -273,10 +273,11 @@ class PythonSlip(Record):
     first turn, or after a number of them; `sleep-outside`: the `sleep()` that one lacks stands outside of it;
     `sleep-twice`: one that waits twice in each turn. `callback-called`, `callback-values`, `callback-missing`: a
     callback that is called where it is to be named, that takes another number of values than ROS has for it, or that
-    is not there. `queue-size`: one that is a text, with which rospy sends nothing. `clock-value`: the values of the
-    topic `message` are read from a clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C.
-    `outside-method`: a call in a class that stands in none of its methods and uses a name that is not there. `object`:
-    why an object of a class lacks an attribute where it is read, or that the class stands in its place. `undefined`:
+    is not there. `callback-waits`: one of a topic that sleeps, or never ends. `queue-size`: one that is a text,
+    with which rospy sends nothing. `clock-value`: the values of the topic `message` are read from a clock, and
+    nothing is counted. `deaf`: why the node goes on after Ctrl-C. `outside-method`: a call in a class that stands
+    in none of its methods and uses a name that is not there. `object`: why an object of a class lacks an attribute
+    where it is read, or that the class stands in its place. `undefined`:
     why a name has no value where it is read. `commented-out`: a call of ROS in a comment; `name` is `sleep`, or `pub =
     Publisher`. `no-effect` and `compared`: a statement such as `++i`, or `i == 0`. `no-init`: a script with topics
     that never calls `init_node`. `publishes` and `prints`: no slips, but a text that is published or printed, `{}` for

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from itertools import groupby
+from itertools import groupby, zip_longest
 from typing import Literal, get_args
 
 from grader.model.record import Record
@@ -125,12 +125,21 @@ def _blanks(line: str) -> str:
 
 
 def advice_on(repairs: Iterable[Repair]) -> list[str]:
-    """Return the advice for each of the repairs, as one for those that follow each other in one line."""
-    split = [advice_of(one).partition(": ") for one in repairs]
+    """Return the advice for each of the repairs, as one for those that follow each other in one line. Of two that
+    write the same line, the last has both."""
+    made = list(repairs)
+    last = [
+        one for one, later in zip_longest(made, made[1:]) if later is None or not _is_rewritten(one, later)
+    ]
+    split = [advice_of(one).partition(": ") for one in last]
     return [
         f"{place}{colon}{', and '.join(fix for _, _, fix in found)}"
         for (place, colon), found in groupby(split, key=lambda one: one[:2])
     ]
+
+
+def _is_rewritten(one: Repair, later: Repair) -> bool:
+    return (one.file, one.line, one.after) == (later.file, later.line, later.before)
 
 
 def _indentation(line: str) -> str:

@@ -25,6 +25,8 @@ _CAUSES = (
     (r"Comment not terminated", "a comment is opened by `<!--` and never closed: write `-->` where it ends"),
     (r"Extra content at the end", "text comes after the first block: delete it, since only one `<{root}>` is allowed"),
     (r"XML declaration allowed only", "something comes before `<?xml ... ?>`: delete it, blank lines too"),
+    (r"Unsupported version '(.*)'|Malformed declaration expecting version",
+     'the only version of XML that is read here is 1.0: write `<?xml version="1.0"?>` for that line'),
     (r"Attribute (\S+) redefined", "the attribute `{0}` is given twice in one tag: delete one of the two"),
     (_NO_QUOTE[0],
      'a closing quote is missing, so that the value runs on into the next tag: write `"` where it ends'),

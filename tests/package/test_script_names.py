@@ -176,6 +176,25 @@ def test_what_a_loop_does_to_its_counter_and_its_rate(tmp_path, case):
     assert slips == ([found] if found else [])
 
 
+CALLBACK = "def callback(m):\n    print(m.data)\n    {0}\nrospy.Subscriber('c', String, callback)\n"
+WAITING = {
+    "sleeps": ("time.sleep(10)", "delete line 3"),
+    "sleeps-by-rate": ("rate.sleep()", "delete line 3"),
+    "loops": ("while not rospy.is_shutdown(): print(1)", "take the loop out of it"),
+    "spins": ("rospy.spin()", "move line 3 out of it"),
+    "short": ("rospy.sleep(0.01)", None),
+    "ends": ("for i in range(3): print(i)", None),
+}
+
+
+@pytest.mark.parametrize("case", WAITING)
+def test_a_callback_that_waits(tmp_path, case):
+    line, fix = WAITING[case]
+    (tmp_path / "a.py").write_text(CALLBACK.format(line))
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "callback-waits"]
+    assert [(s.line, s.fix, s.name) for s in slips] == ([(3, fix, "callback")] if fix else [])
+
+
 ARGUMENTS = {
     "one": ("a = sys.argv[1]\n", ["a = int(sys.argv[1])"]),
     "several": ("a, b = rospy.myargv(sys.argv)[1:3]\n", ["a, b = map(int, rospy.myargv(sys.argv)[1:3])"]),

@@ -77,6 +77,8 @@ def graph_names(tree):
 def published_type(call):
     """Return the name of the class that a `Publisher(…)` or `Subscriber(…)` is given, "" where it has none."""
     types = call.args[1:2] or [k.value for k in call.keywords if k.arg == "data_class"]
+    if types and called_name(types[0]) == "numpy_msg":
+        types = types[0].args
     return dotted(types[0]).rpartition(".")[2] if types else ""
 
 

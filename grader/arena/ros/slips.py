@@ -57,7 +57,8 @@ def slips(tree):
             found.append(slip(node.lineno, "input", message))
     finders = (
         misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice, callbacks,
-        queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips, without_effect,
+        waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
+        without_effect,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
@@ -256,6 +257,35 @@ def sleeps_twice(tree):
             lines = (body[at[0]].lineno, body[at[1]].lineno)
             message = "the loop sleeps in line %d and again in line %d" % lines
             yield slip(lines[1], "sleep-twice", message, fix="delete line %d" % lines[1])
+
+
+def waiting_callbacks(tree):
+    """Callbacks of topics that do not come to their end, or late: no further message is read before."""
+    functions = {n.name: n for n in walk(tree) if isinstance(n, ast.FunctionDef)}
+    for node in walk(tree):
+        given = node.args[2:3] if called_name(node) == "Subscriber" else []
+        given += [k.value for k in getattr(node, "keywords", ()) if given == [] and k.arg == "callback"]
+        own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
+        inside = list(ast.walk(own)) if own is not None else []
+        for inner in inside if node not in inside else ():
+            words = (own.name, inner.lineno) if hasattr(inner, "lineno") else ()
+            if isinstance(inner, ast.While) and is_endless(inner):
+                message, fix = "the loop in the callback `%s`, line %d, never ends", "take the loop out of it"
+            elif is_call(inner, "spin"):
+                message, fix = (
+                    "the callback `%s` calls spin() in line %d",
+                    "move line %d out of it" % inner.lineno,
+                )
+            elif called_name(inner) == "sleep" and not is_short(inner):
+                message, fix = "the callback `%s` sleeps in line %d", "delete line %d" % inner.lineno
+            else:
+                continue
+            yield slip(inner.lineno, "callback-waits", message % words, fix=fix, name=own.name)
+            break
+
+
+def is_short(sleep):
+    return bool(sleep.args) and (constant(sleep.args[0], lambda node: node) or 1.0) < 0.1
 
 
 def is_endless(loop):

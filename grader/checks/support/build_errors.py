@@ -71,13 +71,15 @@ class BuildError(NamedTuple):
 
 class Explained(NamedTuple):
     """The error in a student's words, and what to do; `of_machine`: the grading machine lacks something; `place`: the
-    line that is wrong, where that is not the one that the build names; `lacks`: the package that it lacks."""
+    line that is wrong, where that is not the one that the build names; `lacks`: the package that it lacks; `by_itself`:
+    a command that CMake does not know, and no line of catkin's own is why."""
 
     why: str
     hint: str
     of_machine: bool = False
     place: FileCitation | None = None
     lacks: str = ""
+    by_itself: bool = False
 
 
 def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | None:
@@ -534,17 +536,24 @@ def _main_twice(_found: re.Match[str], _package: PackageFacts, _lines: Sequence[
     return Explained(why, "write a separate add_executable(…) for each program")
 
 
-def _unknown_command(found: re.Match[str], *_: object) -> Explained:
+def _unknown_command(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     name = found[1]
     if right := meant_command(name.lower()):
         return Explained(f"there is no command {name}(…)", f"write {right} for {name}")
-    if name.lower() in OF_GENERATION:
+    has_catkin = any(one.args[:1] == ("catkin",) for one in cmake_calls(package, "find_package"))
+    if name.lower() in OF_GENERATION and has_catkin:
         why = f"{name}(…) comes with message_generation, which find_package(catkin …) does not name"
-        return Explained(why, "write find_package(catkin REQUIRED COMPONENTS … message_generation)")
-    if name.lower() in OF_CATKIN:
+        return Explained(why, _generation_fix(name, package), by_itself=True)
+    if name.lower() in {*OF_CATKIN, *OF_GENERATION}:
         why = f"{name}(…) is catkin's, and find_package(catkin …) is not called above it"
         return Explained(why, f"call find_package(catkin REQUIRED COMPONENTS …) above {name}(…)")
     return Explained(f"there is no command {name}(…)", "check the spelling of the command")
+
+
+def _generation_fix(name: str, package: PackageFacts) -> str:
+    if not package.interfaces and (calls := list(cmake_calls(package, name.lower()))):
+        return f"delete {name}(…), line {calls[0].line}: the package has no messages, services or actions of its own"
+    return "write find_package(catkin REQUIRED COMPONENTS … message_generation)"
 
 
 def _not_catkin(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:

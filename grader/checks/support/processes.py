@@ -236,7 +236,7 @@ def name_hint(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous
     if counted and anonymous == "allowed":
         name = names[0].lstrip("/")
         return f"write {init(name, anonymous=True)}: that adds numbers by itself"
-    spare = anonymous == "forbidden" and not {base_name(n) for n in there}.isdisjoint(_bases(names))
+    spare = anonymous == "forbidden" and any(base_name(n) != n for n in there)
     call = init(names[0].lstrip("/"), anonymous=anonymous == "required")
     return f"write {call} without {ANONYMOUS}" if spare else f"write {call}"
 
