@@ -9,7 +9,7 @@ from typing import NamedTuple
 from grader.checks.registry import DependencyName, NoParams, PackageName, check
 from grader.checks.support.scripts import add_hint, find_script
 from grader.checks.support.text import near_names, shown
-from grader.model.package import Fault, Manifest, PackageFacts
+from grader.model.package import Manifest, PackageFacts, meant_manifest
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
 from grader.wording import join_words, plural
@@ -201,7 +201,7 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
 def _judge_manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
     found = package.manifest
     if found is None:
-        return _unreadable(package.manifest_fault)
+        return _unreadable(package)
     if (found.build_type or "").startswith("ament"):
         return _of_ros_2(found, params)
     wrong = [v for v in (_judge_misnamed(package, found, params.name), _unbuilt(found)) if v is not None]
@@ -376,10 +376,12 @@ def _last_line(found: Manifest) -> int:
     return max((d.line for d in found.dependencies), default=found.name_line)
 
 
-def _unreadable(fault: Fault | None) -> Verdict:
+def _unreadable(package: PackageFacts) -> Verdict:
+    fault = package.manifest_fault
     if fault is None or fault.kind == "Missing":
+        meant = next(filter(None, (meant_manifest(file.path) for file in package.files)), "")
         hint = "write package.xml beside CMakeLists.txt, as catkin_create_pkg makes it, and push it"
-        return failed("there is no package.xml", measured="no file", hint=hint)
+        return failed("there is no package.xml", measured="no file", hint=meant or hint)
     line = f", line {fault.line}" if fault.line else ""
     return failed(
         f"{fault.file}{line} cannot be read: {fault.cause or fault.message}",

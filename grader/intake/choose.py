@@ -15,6 +15,7 @@ from grader.files import read_untrusted
 from grader.intake.find import BUILD_SPACES, MANIFEST, WORKSPACE_MARKS, Candidate, manifest_name, named_at
 from grader.intake.names import brief, encodable, is_archive_name, listing, printable
 from grader.intake.tree import NO_CONTENT, is_there, walk
+from grader.model.package import meant_manifest
 from grader.wording import is_one_edit
 
 COPIES_LOOKED_AT, FOLDERS_OF_A_COPY = 50, 300
@@ -270,6 +271,10 @@ def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
         for entry in folder.others:
             if entry.name == wanted and entry.is_symlink():
                 return f"{printable(folder.inside(wanted))} is a link: hand in the folder itself."
+        meant = next(filter(None, map(meant_manifest, sorted(files - {MANIFEST}))), "")
+        if meant and MANIFEST not in files:
+            where = "" if folder.path == "." else f"In {printable(folder.path)}/, "
+            return f"{where}{printable(meant)}."
         packed = [entry.name for entry in folder.others if is_archive_name(entry.name)]
         if packed and folder.path == ".":
             return f"{printable(packed[0])} is here: unpack it, or give that file."

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import posixpath
 import re
+import shlex
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from typing import Literal
@@ -16,6 +17,7 @@ from pydantic import Field
 from grader.model.record import Record
 from grader.model.submission import ModeSource
 from grader.model.verdict import FileCitation
+from grader.wording import is_one_edit
 
 
 class Fault(Record):
@@ -112,6 +114,17 @@ def meant_command(name: str) -> str:
     turned = [known for known in CMAKE_COMMANDS if sorted(known.split("_")) == sorted(name.split("_"))]
     near = turned or get_close_matches(name, CMAKE_COMMANDS, 1, ALIKE)
     return near[0] if near else ""
+
+
+def meant_manifest(name: str) -> str:
+    """Return what to do with a file that is there in place of package.xml; empty for any other file."""
+    if name == "manifest.xml":
+        return f"{name} is rosbuild's, which catkin does not read: write package.xml, as catkin_create_pkg makes it"
+    plain = re.sub(r"\s|\(\d+\)", "", name.casefold())
+    alike = plain == "package.xml" or is_one_edit(plain, "package.xml") or plain.startswith("package.xml.")
+    if name == "package.xml" or not alike:
+        return ""
+    return f"{name} has to be called package.xml: git mv {shlex.quote(name)} package.xml"
 
 
 class CMakeCall(Record):

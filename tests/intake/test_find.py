@@ -108,6 +108,18 @@ def test_the_package_is_found(files, path, hints, tmp_path):
         (tree("devel/share/lab1"), "no package.xml", "only a copy in devel/"),
         (tree("ws", "ws/lab1"), "packages here: ws", "below another package.xml"),
         ({"lab1.zip": "", "x": ""}, "no package.xml", "lab1.zip is here"),
+        (
+            {"a/Package.xml": ""},
+            "no package.xml",
+            "In a/, Package.xml has to be called package.xml: git mv Package.xml",
+        ),
+        ({"package (1).xml": ""}, "no package.xml", "git mv 'package (1).xml' package.xml."),
+        (
+            {"a/manifest.xml": ""},
+            "no package.xml",
+            "In a/, manifest.xml is rosbuild's, which catkin does not read",
+        ),
+        ({**tree("b:other"), "b/package.xml.orig": ""}, "packages here: other", "Rename to lab1"),
         # A workspace that is called like the lab is not the lab's package.
         (tree("lab1/src/other"), "packages here: other", "Rename to lab1"),
     ],
