@@ -134,7 +134,13 @@ def explain_by_build(package: PackageFacts | None, build: Run | None, verdict: V
     if not built.status.is_open:
         return verdict
     said = inconclusive(f"{verdict.message}; {built.message}", hint=built.hint, citations=built.citations)
-    update = {"expected": verdict.expected, "measured": verdict.measured, "sought": built.sought}
+    update = {
+        "expected": verdict.expected,
+        "measured": verdict.measured,
+        "sought": built.sought,
+        "of_machine": built.of_machine,
+        "cause": verdict.cause,
+    }
     return said.model_copy(update=update)
 
 

@@ -32,7 +32,7 @@ from grader.checks.support.launch import (
     why_died,
     why_not_up,
 )
-from grader.checks.support.launch_names import find_renaming
+from grader.checks.support.launch_names import find_renaming, names_in_scripts
 from grader.checks.support.processes import GlobalName, early_end
 from grader.checks.support.scripts import shebang_obstacles
 from grader.checks.support.text import SPIN, near_names
@@ -481,6 +481,25 @@ def _not_connected(
         return other.model_copy(update=update)
     if len({node.namespace for node in moved} - {"/"}) > 1:
         return _in_namespaces(file, other, moved, topic)
-    if moved or not all(w.own for w in wanted):
-        return other
-    return other.model_copy(update={"unjudged": True})
+    if moved:
+        return _named_in_scripts(package, file, other, wanted, topic)
+    return other.model_copy(update={"unjudged": True}) if all(w.own for w in wanted) else other
+
+
+def _named_in_scripts(
+    package: PackageFacts, file: LaunchFile, verdict: Verdict, wanted: list[Wanted], topic: str
+) -> Verdict:
+    """Name the lines of the scripts that have another topic, and what gives the right one another name then."""
+    nodes = [w.node for w in wanted]
+    named = names_in_scripts(package, nodes, topic)
+    if not named:
+        return verdict
+    renaming = find_renaming(package, nodes, topic, in_scripts=False)
+    lines = join_words(f"line {one.line} of {one.file}" for one in named)
+    hint = (
+        f"write {topic.lstrip('/')} in {lines}, not {join_words(dict.fromkeys(one.message for one in named))}"
+    )
+    if renaming is not None:
+        hint = f"{hint}; then in {file.path} {renaming.fix}"
+    cited = (*(one.place for one in named), *(renaming.citations if renaming is not None else ()))
+    return verdict.model_copy(update={"hint": hint, "citations": cited})

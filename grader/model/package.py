@@ -9,6 +9,7 @@ import posixpath
 import re
 import shlex
 from collections.abc import Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from difflib import get_close_matches
 from typing import Literal
 
@@ -412,6 +413,12 @@ class LaunchFile(Record):
     commented: tuple[tuple[str, int], ...] = ()
     switched_off: tuple[tuple[str, int, str], ...] = ()
     unset_args: tuple[LaunchArg, ...] = ()
+
+    def starts(self, programs: AbstractSet[str]) -> set[str]:
+        """Return which of these programs the file starts, by their names; the `.py` may be missing."""
+        types = {node.type for node in self.nodes}
+        return {name for name in programs if {name, name.removesuffix(".py")} & types}
+
     readable: tuple[LaunchNode, ...] = ()
 
 
@@ -496,6 +503,12 @@ class PackageFacts(Record):
             one.model_copy(update={"also": tuple(other for other in alone if other is not one)})
             for one in alone
         )
+
+    def launches_of(self, programs: AbstractSet[str]) -> list[str]:
+        """Return the launch files that start all of these programs; of several, those of the package's own nodes."""
+        found = [one for one in self.launch_files if programs and one.starts(programs) == programs]
+        own = [one for one in found if all(node.pkg == self.name for node in one.nodes)]
+        return [one.path for one in own or found]
 
     def file(self, path: str) -> SourceFile | None:
         """Return the file at this path, or None."""

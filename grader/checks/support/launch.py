@@ -126,8 +126,8 @@ def _unreadable(
     package: PackageFacts, file: LaunchFile | None, launch: str, wanted: set[str]
 ) -> Verdict | None:
     if file is None:
-        started = {f.path: starts(f, wanted) for f in package.launch_files if f.nodes}
-        full = [path for path, found in started.items() if found and found == wanted]
+        started = {f.path: f.starts(wanted) for f in package.launch_files if f.nodes}
+        full = package.launches_of(wanted)
         others = [f.path for f in package.launch_files]
         names = paths_by_name(package)
         near = [names[n] for n in near_names(launch, names)]
@@ -147,12 +147,6 @@ def _unreadable(
     message = f"{file.path}{line} is not well-formed: {file.fault.cause or file.fault.message}"
     hint = file.fault.fix or "close every element, and begin with <launch> and end with </launch>"
     return failed(message, hint=hint, citations=(file.fault.place,))
-
-
-def starts(file: LaunchFile, wanted: set[str]) -> set[str]:
-    """Return which of these programs the file starts, by their names; the `.py` may be missing."""
-    types = {node.type for node in file.nodes}
-    return {name for name in wanted if {name, name.removesuffix(".py")} & types}
 
 
 def not_run(run: Run) -> Verdict | None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from grader.checks.support.launch import nodes_up, own_script
 from grader.evidence.run import Run
-from grader.model.package import LaunchLine, LaunchNode, PackageFacts
+from grader.model.package import LaunchLine, LaunchNode, PackageFacts, PythonSlip
 from grader.model.verdict import FileCitation
 from grader.wording import join_words
 
@@ -46,11 +46,17 @@ class _Use(NamedTuple):
 
 
 def find_renaming(
-    package: PackageFacts, nodes: Sequence[LaunchNode], topic: str, run: Run | None = None
+    package: PackageFacts,
+    nodes: Sequence[LaunchNode],
+    topic: str,
+    run: Run | None = None,
+    *,
+    in_scripts: bool = True,
 ) -> Renaming | None:
     """Return what gives the topic another name in these nodes. None unless it has the right one in all of them once
-    that is removed, and the nodes have names of their own still. `run` shows which topics the nodes had."""
-    uses = [use for node in nodes if (use := _use_of(package, node, topic, run))]
+    that is removed, and the nodes have names of their own still. `run` shows which topics the nodes had; without
+    `in_scripts`, the scripts are taken to write the topic's name, whatever they write now."""
+    uses = [use for node in nodes if (use := _use_of(package, node, topic, run, in_scripts=in_scripts))]
     if len(uses) < 2 or all(use.topic() == topic for use in uses):
         return None
     for drop_ns, drop_remaps in ((True, False), (False, True), (True, True)):
@@ -61,14 +67,27 @@ def find_renaming(
     return None
 
 
-def _use_of(package: PackageFacts, node: LaunchNode, topic: str, run: Run | None) -> _Use | None:
-    """Return how the node's script writes the name, if that gives a topic that the node had."""
+def names_in_scripts(
+    package: PackageFacts, nodes: Sequence[LaunchNode], topic: str
+) -> tuple[PythonSlip, ...]:
+    """Return where the scripts of the nodes name a topic, and it is another one; nothing where a script names several,
+    or none of another name."""
+    named = [_named_in(package, node) for node in nodes]
+    other = [one for found in named for one in found if one.message.lstrip("/") != topic.lstrip("/")]
+    return tuple(dict.fromkeys(other)) if all(len(found) == 1 for found in named) else ()
+
+
+def _named_in(package: PackageFacts, node: LaunchNode) -> list[PythonSlip]:
     script = own_script(package, node)
-    written = {
-        slip.message
-        for slip in package.slips
-        if script is not None and slip.file == script.path and slip.kind in {"publisher", "subscriber"}
-    }
+    path = script.path if script is not None else None
+    return [s for s in package.slips if s.file == path and s.kind in {"publisher", "subscriber"}]
+
+
+def _use_of(
+    package: PackageFacts, node: LaunchNode, topic: str, run: Run | None, *, in_scripts: bool
+) -> _Use | None:
+    """Return how the node's script writes the name, if that gives a topic that the node had."""
+    written = {slip.message for slip in _named_in(package, node)} if in_scripts else set[str]()
     had = _topics(run, node) if run is not None else None
     resolvable = UNRESOLVED not in f"{node.namespace}{node.remaps}"
     for name in (topic.lstrip("/"), topic) if resolvable else ():

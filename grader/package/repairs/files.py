@@ -158,11 +158,9 @@ def _meant_launch(package: PackageFacts, wanted: Wanted, name: str, others: set[
     """Return the only launch file that starts what the one of this name has to start; "" if there is none."""
     scripts = {script for launch, script in wanted.started if PurePosixPath(launch).name == name}
     found = [
-        file.path
-        for file in package.launch_files
-        if PurePosixPath(file.path).name not in others and file.path not in others
-        for types in [{node.type for node in file.nodes}]
-        if scripts and all({one, one.removesuffix(".py")} & types for one in scripts)
+        path
+        for path in package.launches_of(scripts)
+        if PurePosixPath(path).name not in others and path not in others
     ]
     return found[0] if len(found) == 1 else ""
 
