@@ -101,6 +101,11 @@ def _added(before: str, after: str) -> list[str]:
     return [line.strip() for line in after.split("\n") if line not in old and line.strip()]
 
 
+def as_code(line: str) -> str:
+    """Return a line of code in backticks, unless it has some itself."""
+    return line if "`" in line else f"`{line}`"
+
+
 def advice_of(repair: Repair) -> str:
     """Return where and how the repair is done by hand: ``package.xml: below line 9 add `<depend>rospy</depend>` ``."""
     new, added = repair.after.split("\n"), _added(repair.before, repair.after)
@@ -110,7 +115,7 @@ def advice_of(repair: Repair) -> str:
         place = repair.file if named else place_of(repair)
         where = f"{repair.file}: below line {repair.line}," if below and not named else f"{place}:"
         return f"{where} {repair.fix}"
-    code = join_words([line if "`" in line else f"`{line}`" for line in added])
+    code = join_words(map(as_code, added))
     replaced, script = repair.before not in (new[0], new[-1]), repair.file.endswith(".py")
     if replaced:
         moved = script and _blanks(new[0]) != _blanks(repair.before)

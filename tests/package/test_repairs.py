@@ -55,6 +55,10 @@ if __name__ == '__main__':
 """
 OWN = {"msg/Level.msg": "float64 level\n", "src/level.py": "from lab.msg import Level\n"}
 OWN_CMAKE = CMAKE.replace("rospy)\n", "message_generation rospy)\nadd_message_files(FILES Level.msg)\n")
+SERVICE = {**OWN, "srv/Two.srv": "int64 a\n---\n", "src/level.py": "from lab.srv import Two\n"}
+SERVICE_CMAKE = CMAKE.replace(
+    "rospy)\n", "message_generation rospy)\nadd_service_files(FILES Two.srv)\ngenerate_messages()\n"
+)
 TEMPLATE = """\
 # add_message_files(
 #   FILES
@@ -353,6 +357,11 @@ CASES = {
     "own-message": Case(
         {**OWN, CMAKELISTS: CMAKE}, ["build-line"] * 3, "write message_generation after COMPONENTS",
         after={CMAKELISTS: OWN_CMAKE.replace("\ncatkin_p", "\ngenerate_messages()\ncatkin_p")},
+    ),
+    "own-message-that-nothing-uses": Case({**SERVICE, CMAKELISTS: SERVICE_CMAKE}, [], ""),
+    "own-message-in-a-service": Case(
+        {**SERVICE, "srv/Two.srv": "Level[] a\n---\n", CMAKELISTS: SERVICE_CMAKE}, ["build-line"],
+        "add `add_message_files(FILES Level.msg)`",
     ),
     "own-message-of-the-template": Case(
         {**OWN, CMAKELISTS: CMAKE.replace("catkin_p", f"{TEMPLATE}\ncatkin_p")}, ["build-line"] * 3,

@@ -261,8 +261,9 @@ def _declare_exported(files: Files) -> None:
 
 def _make_interfaces(files: Files, package: PackageFacts, name: str) -> None:
     """Find what CMakeLists.txt lacks to make the package's own messages, services and actions, where code uses them."""
-    made = {call: _definitions(package, folder) for call, folder in INTERFACES.items()}
-    if not any(made.values()) or not _uses_own(files, package, name):
+    used = _used_kinds(files, package, name)
+    made = {c: _definitions(package, folder) for c, folder in INTERFACES.items() if folder in used}
+    if not any(made.values()):
         return
     _correct_types(files, package)
     _generate(files, package)  # from below, so that the lines above stay where they are
@@ -301,11 +302,18 @@ def _definitions(package: PackageFacts, folder: str) -> list[str]:
     return sorted(p.name for p in paths if str(p.parent) == folder and p.suffix == f".{folder}")
 
 
-def _uses_own(files: Files, package: PackageFacts, name: str) -> bool:
-    """Return whether the package's code imports, or includes, what is made of its definitions."""
-    used = re.compile(rf"\b{re.escape(name)}(\.(msg|srv)\b|/\w+\.h\b)")
+def _used_kinds(files: Files, package: PackageFacts, name: str) -> set[str]:
+    """Return of which folders of definitions the package's code imports, or includes, what is made of them: itself, or
+    in a field of another definition. Which one a header of C++ is made of is not asked."""
+    made = re.compile(rf"\b{re.escape(name)}(?:\.(msg|srv)\b|/\w+\.h\b)")
     sources = (f.path for f in package.files if is_own(f.path) and (f.python or f.path.endswith(CPP)))
-    return any(used.search(files.text(path) or "") for path in sources)
+    found = {one[1] for path in sources for one in made.finditer(files.text(path) or "")}
+    paths = [PurePosixPath(one.path) for one in package.interfaces]
+    folders = {path.stem: path.parent.name for path in paths}
+    fields = {field.type.partition("[")[0] for one in package.interfaces for field in one.fields}
+    inner = {folders.get(kind.removeprefix(f"{name}/"), "") for kind in fields} if found else set[str]()
+    used = set(INTERFACES.values()) if None in found else found | inner
+    return used | ({"action"} if "msg" in used else set())
 
 
 def _values_of(call: Command, keyword: str) -> list[str]:

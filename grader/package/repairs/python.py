@@ -14,7 +14,7 @@ from typing import Literal
 
 from grader.limited_child import ChildLimits, run_limited
 from grader.model.record import Record
-from grader.model.repair import RepairKind
+from grader.model.repair import RepairKind, as_code
 from grader.package.python import cause_of
 from grader.package.repairs.editing import Files
 from grader.syntax_fixes import COMMENTED_OUT
@@ -156,7 +156,7 @@ def _required_indentation(before: str, after: str, first: str) -> str:
 def _rewritten(before: str, after: str) -> str:
     """Return how each of several lines is written instead; "" for one line, which the change itself shows."""
     pairs = list(zip(before.split("\n"), after.split("\n"), strict=False))
-    found = [(number, new.strip()) for number, (old, new) in enumerate(pairs, start=1) if old != new]
+    found = [(number, as_code(new.strip())) for number, (old, new) in enumerate(pairs, start=1) if old != new]
     if len(found) < 2 or before.count("\n") != after.count("\n"):
         return ""
     written = [f"in line {number}, write {new}" for number, new in found[1:LINES_SHOWN]]
