@@ -64,7 +64,6 @@ from grader.rubric.model import Criterion, Rubric
 from grader.wording import join_words, lines_text, significant
 
 POINTS_MAX = 3
-NOT_THERE = ("file-missing", "file-elsewhere")
 NAMES_SHOWN = 3
 OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_TOPICS = ("hears", "topic-type")
@@ -137,7 +136,7 @@ def _is_told(place: FileCitation, text: str, results: Sequence[CriterionResult])
     Without a line it is the whole file."""
     words = place.file if place.line is None else f"{place.file}, line {place.line}"
     lost = [c for c in results if c.status.is_lost]
-    absent = (c.mistake.name for c in lost if c.mistake and c.mistake.kind in NOT_THERE)
+    absent = (c.mistake.name for c in lost if c.mistake and c.mistake.is_absence)
     missing = any(f"there is no {PurePosixPath(name).name} " in text for name in absent)
     return missing or any(words in c.hint for c in results) or any(_cites(c, place) for c in lost)
 

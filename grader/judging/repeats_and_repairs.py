@@ -167,6 +167,9 @@ def concerns(
         return bool(wrong & _words(found[criterion.id].message)) or _cites(found[criterion.id], repair)
     if criterion.check == BUILD and repair.kind in OF_BUILDS:
         return True
+    seen = f"{found[criterion.id].message} {found[criterion.id].measured}"
+    if repair.kind == "file-name" and PurePosixPath(repair.before).name in seen:
+        return True
     if found[criterion.id].blocked_by:
         return any(_asks_for(found[name], repair) for name in criterion.requires)
     return repair.kind not in OF_BUILDS and _asks_for(found[criterion.id], repair)
@@ -184,7 +187,8 @@ def is_used_by(
 ) -> bool:
     """Return whether the scenario runs the repaired file, as far as the rubric says. A launch file may run any, and a
     script may import what is not in `launched`."""
-    name, launches = PurePosixPath(repair.file).name, any(start.launch for start in scenario.start)
+    name = PurePosixPath(repair.after if repair.kind == "file-name" else repair.file).name
+    launches = any(start.launch for start in scenario.start)
     known = any(name in _started_files(one) for one in rubric.scenarios.values())
     if repair.kind in DONE_BEFORE_RUNS:
         return launches and not known
@@ -279,7 +283,9 @@ def _asks_for(found: Verdict | CriterionResult, repair: Repair) -> bool:
     if repair.kind in SEEN_IN_RUNS:
         lines = {(getattr(c, "file", None), getattr(c, "line", None)) for c in found.citations}
         return lost and (repair.file, repair.line) in lines
-    return lost and _cites(found, repair)
+    absent = found.mistake.name if found.mistake and found.mistake.is_absence else ""
+    is_it = repair.kind == "file-name" and PurePosixPath(absent).name == PurePosixPath(repair.after).name
+    return lost and (is_it or _cites(found, repair))
 
 
 def _names(criterion: Criterion, repair: Repair) -> bool:

@@ -89,6 +89,11 @@ class Mistake(Record):
     name: str
     """The file that the lab asks for, or the script, from the package's root."""
 
+    @property
+    def is_absence(self) -> bool:
+        """Whether the file is not where it has to be."""
+        return self.kind in {"file-missing", "file-elsewhere"}
+
 
 SoughtKind = Literal["call", "below", "component", "dependency", "package"]
 

@@ -149,9 +149,25 @@ def find_renames(package: PackageFacts, wanted: Wanted) -> dict[str, str]:
         if name not in names and near:
             old = min(near, key=lambda p: (PurePosixPath(p).parent != PurePosixPath(path).parent, p))
             renames[old] = str(PurePosixPath(old).with_name(name))
-        elif name not in names and (meant := _meant_launch(package, wanted, name, {*right, *renames})):
-            renames[meant] = str(PurePosixPath(meant).with_name(name))
+        elif name not in names:
+            other = {*right, *renames}
+            meant = _meant_launch(package, wanted, name, other) or _meant_script(package, wanted, name, other)
+            renames |= {meant: str(PurePosixPath(meant).with_name(name))} if meant else {}
     return renames
+
+
+def _meant_script(package: PackageFacts, wanted: Wanted, name: str, others: set[str]) -> str:
+    """Return the only script that makes the lab's node, or has its topic, as the one of this name has to; "" if there
+    is none."""
+    does = {(kind, used.lstrip("/")) for path, kind, used in wanted.does if PurePosixPath(path).name == name}
+    found = {
+        slip.file
+        for slip in package.slips
+        if (slip.kind, slip.message.lstrip("/")) in does
+        and slip.file not in others
+        and PurePosixPath(slip.file).name not in others
+    }
+    return found.pop() if len(found) == 1 else ""
 
 
 def _meant_launch(package: PackageFacts, wanted: Wanted, name: str, others: set[str]) -> str:

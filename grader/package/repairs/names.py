@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import Any, Literal
 
-from grader.model.package import LaunchFile, PackageFacts
+from grader.model.package import LaunchFile, PackageFacts, SlipKind
 from grader.model.record import Record
 from grader.model.repair import RepairKind
 from grader.package.launch import parse_launch
@@ -39,6 +39,8 @@ class Wanted(Record):
     """Topics that the command line gives another name (`state:=light`), as the scripts have to write them."""
     started: tuple[tuple[str, str], ...] = ()
     """Launch files, and the names of the scripts that each has to start."""
+    does: tuple[tuple[str, SlipKind, str], ...] = ()
+    """Scripts that a scenario starts alone, each with a name that it has to use: of its node, or a topic's."""
 
 
 NAMES_ARE = {
@@ -75,8 +77,23 @@ def wanted_of(rubric: Rubric, package: str = "") -> Wanted:
         for script in (*c.parameters.get("scripts", ()), *filter(None, [c.parameters.get("script")]))
     )
     return Wanted(
-        package=package, started=tuple(started), **{field: tuple(names) for field, names in found.items()}
+        package=package,
+        started=tuple(started),
+        does=tuple(dict.fromkeys(_of_scripts(rubric, criteria))),
+        **{field: tuple(names) for field, names in found.items()},
     )
+
+
+def _of_scripts(rubric: Rubric, criteria: Sequence[Criterion]) -> Iterator[tuple[str, SlipKind, str]]:
+    for key, scenario in rubric.scenarios.items():
+        if len(scenario.start) != 1 or (script := scenario.start[0].script) is None:
+            continue
+        yield from ((script, "subscriber", probe.topic) for probe in scenario.probes)
+        for one in criteria:
+            if one.scenario == key and one.check == "node-name":
+                yield from ((script, "node-name", name) for name in one.parameters["names"])
+            elif one.scenario == key and one.check == "topic-type":
+                yield script, "publisher", one.parameters["topic"]
 
 
 def _of_scenarios(rubric: Rubric, package: str) -> Iterator[tuple[str, Any]]:
