@@ -46,7 +46,7 @@ BY_HAND: dict[RepairKind, str] = {
     "byte-order-mark": "an invisible mark before the first line: save it as UTF-8 without BOM",
     "line-ends": "Windows' line ends: dos2unix FILE, or switch CRLF to LF in the editor",
     "shebang": "no usable first line: write #!/usr/bin/env python3 as the very first line",
-    "file-name": "a file by another name than the lab's: rename it (git mv), and write the new name wherever the old one stands",
+    "file-name": "a file by another name: rename it (git mv), and write the new name wherever the old one stands",
     "python-syntax": "a syntax error: python3 -m py_compile FILE names the line",
     "manifest-line": "a line is missing in package.xml: compare it with one that catkin_create_pkg makes",
     "build-line": "a line is missing in CMakeLists.txt: compare it with one that catkin_create_pkg makes",
