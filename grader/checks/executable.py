@@ -175,7 +175,10 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     movable = [p for p in near if can_be_moved(p, path)]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
     seen = f"; there is {join_words(near)}" if near else ""
+    alike = [p for p in scripts if not near and _has_role_of(p, path)]
+    seen = f"; there is {alike[0]}" if len(alike) == 1 else seen
     hint = f"git mv {movable[0]} {path}" if movable else add_hint(package, path)
+    hint = f"{hint}, or git mv {alike[0]} {path} if that is meant to be it" if len(alike) == 1 else hint
     kind: MistakeKind = "file-elsewhere" if movable else "file-missing"
     if not movable and (elsewhere := package.hints_on(wanted.name)):
         where, _, hint = elsewhere[0].partition(": ")
@@ -186,6 +189,25 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
         hint=hint,
         citations=tuple(FileCitation(file=p) for p in near[:3]),
     ).lost_by(kind, path)
+
+
+ROLES = (
+    ("talker", "publisher", "pub", "sender", "emitter"),
+    ("listener", "subscriber", "sub", "receiver"),
+    ("server", "service"),
+)
+"""Words for the same kind of node in the names of scripts."""
+
+
+def _has_role_of(one: str, other: str) -> bool:
+    """Return whether two scripts are called by different words for the same kind of node, `talker.py` and
+    `my_publisher.py`. By the same word they are two that a lab asks for."""
+    given, wanted = (PurePosixPath(path).stem.casefold().split("_") for path in (one, other))
+    return any(
+        word in wanted and set(words).intersection(given) - {word} and word not in given
+        for words in ROLES
+        for word in words
+    )
 
 
 def _mode_obstacles(file: SourceFile, remarks: tuple[str, ...]) -> Iterator[Obstacle]:
