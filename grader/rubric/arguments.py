@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -12,6 +13,7 @@ from grader.rubric.standins import PROGRAMS, set_in
 from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, as_texts
 from grader.wording import did_you_mean, join_words
 
+_NUMBER = re.compile(r"-?\d+(\.\d+)?")
 SPECIAL = ("__name", "__ns", "__log", "__ip", "__hostname", "__master")
 
 
@@ -29,9 +31,19 @@ def argument_faults(scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterato
     for index, start in as_maps(scenario.get("start")):
         for number, text in as_texts(start.get("args")):
             known = known or _known(rubric)
-            fault = _no_colon(text, start) or _fault(text, start, known)
+            fault = _blanks(text) or _no_colon(text, start) or _fault(text, start, known)
             if fault:
                 yield ("start", index, "args", number), fault
+
+
+def _blanks(text: str) -> str:
+    """Return that one argument has been written in place of several, or with blanks around its `:=`."""
+    parts = text.split()
+    if re.search(r"\s:=|:=\s+\S", text):
+        return f"ROS reads no blanks around :=, write {re.sub(r' *:= *', ':=', text)}"
+    if len(parts) > 1 and (all(":=" in one for one in parts) or all(map(_NUMBER.fullmatch, parts))):
+        return f"is one argument: write {', '.join(json.dumps(one) for one in parts)}"
+    return ""
 
 
 def _no_colon(text: str, start: dict[str, Any]) -> str:
