@@ -124,7 +124,7 @@ def _place(
 
 def _uncalled_faults(path: KeyPath, criterion: dict[str, Any], scenarios: dict[str, Any]) -> Iterator[Fault]:
     """Answers can only be judged to calls that the scenario makes."""
-    given, scenario = as_map(criterion.get("with")), criterion.get("scenario")
+    given, scenario = as_map(criterion.get("with")), str(criterion.get("scenario"))
     expect, service = given.get("expect"), given.get("service")
     if criterion.get("check") != ANSWERS or not isinstance(expect, list) or scenario not in scenarios:
         return
