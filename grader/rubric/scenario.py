@@ -459,6 +459,16 @@ class Scenario(Record):
         return frozenset(name for name, kind in first.items() if name and kind)
 
     @property
+    def started_again(self) -> frozenset[str]:
+        """The names of those that a step may start a second time."""
+        later = self.started_later
+        again = {step.start for step in self.steps if step.start not in later}
+        again |= {
+            step.start for n, step in enumerate(self.steps) if step.start in {s.start for s in self.steps[:n]}
+        }
+        return frozenset(name for name in {*again, *(step.restart for step in self.steps)} if name)
+
+    @property
     def digest(self) -> str:
         """The sha256 of what is run and until when: evidence of a scenario with another one says something else."""
         left_out: dict[str, Any] = {"title": True}
