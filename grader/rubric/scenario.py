@@ -224,7 +224,7 @@ class Wait(Record):
     """A pause. Give one of `seconds`, `topic` and `node`."""
 
     seconds: StepSeconds | None = None
-    """So long by the run's clock."""
+    """So long by the run's clock, from when the processes that run are nodes, or cannot become any."""
     topic: str | None = None
     """Until this topic has had its messages."""
     messages: Annotated[int, Field(ge=1, le=MESSAGES_MAX)] = 1
