@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from grader.rubric.message_fields import slip_of
-from grader.rubric.spelling import PROSE, texts_in
+from grader.rubric.spelling import PROSE, is_slip, texts_in
 from grader.rubric.standins import PROGRAMS, set_in
 from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, as_texts
 from grader.wording import did_you_mean, join_words
@@ -66,7 +66,12 @@ def _fault(text: str, start: dict[str, Any], known: Known) -> str:
     spaces = {topic.split("/")[1] for topic in known.topics}
     if name == "_ns" and value.strip("/") in spaces:
         return f"ROS reads __ns:={value}, with two underscores"
-    return "" if name.startswith("_") else _remap(name, value, start, known)
+    if name.startswith("_"):
+        near = next((one for one in sorted(known.params) if is_slip(name[1:], one)), "")
+        if start.get("script") is None or not near or name[1:] in known.params | known.words:
+            return ""
+        return f'nothing else in the rubric names {name} (did you mean "_{near}:={value}"?)'
+    return _remap(name, value, start, known)
 
 
 def _remap(name: str, value: str, start: dict[str, Any], known: Known) -> str:
@@ -99,4 +104,6 @@ def _known(rubric: dict[str, Any]) -> Known:
     texts = [(path, text) for path, text in texts_in((), rubric) if "args" not in path]
     topics = {text for path, text in texts if re.fullmatch(r"(/\w+)+", text) and not PROSE & {*path}} - params
     words = {word for path, text in texts if PROSE & {*path} for word in re.findall(r"\w+", text)}
-    return Known(frozenset(topics), frozenset(name.rpartition("/")[2] for name in params), frozenset(words))
+    private = {name for path, text in texts if PROSE & {*path} for name in re.findall(r"~(\w+)", text)}
+    params = private | {name.rpartition("/")[2] for name in params}
+    return Known(frozenset(topics), frozenset(params), frozenset(words))

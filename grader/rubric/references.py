@@ -86,17 +86,8 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
                 f'roslaunch takes the file\'s whole name: "{launch}.launch"',
             )
         for key, file in (("script", start.get("script")), ("load", start.get("load"))):
-            if isinstance(file, str) and (file.startswith(("/", "~")) or ".." in PurePosixPath(file).parts):
-                name = PurePosixPath(file).name
-                fault = f"is a path in the student's package, from its folder: scripts/{name}, not {file}"
+            if isinstance(file, str) and (fault := _file_fault(file, rubric)):
                 yield (*path, "start", index, key), fault
-            elif isinstance(file, str) and file in PROGRAMS:
-                yield (*path, "start", index, key), f"is no file of the student's: write program: {file}"
-            elif isinstance(file, str) and (whole := _with_ending(file, rubric)):
-                yield (
-                    (*path, "start", index, key),
-                    f"the rubric names {whole} elsewhere: write it with its ending",
-                )
         at = (*path, "start", index, "program")
         yield from _of_machine(at, "program", start.get("program"), rubric)
         package, _, file = str(start.get("program")).partition("/")
@@ -105,6 +96,19 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
             yield at, f"is the student's: with program it would count as the grader's. Write {key}: {file}"
     for at, _, one in services_in(scenario):
         yield from _of_machine((*path, *at, "type"), "service", one.get("type"), rubric)
+
+
+def _file_fault(file: str, rubric: dict[str, Any]) -> str:
+    """Return why a start's file is none of the student's package; empty where it may be one."""
+    path = PurePosixPath(file)
+    if file.startswith(("/", "~")) or ".." in path.parts:
+        return f"is a path in the student's package, from its folder: scripts/{path.name}, not {file}"
+    if path.suffix in {".cpp", ".cc", ".cxx"}:
+        return f"is a source: write the name of the program that add_executable makes of it, {path.stem}"
+    if file in PROGRAMS:
+        return f"is no file of the student's: write program: {file}"
+    whole = _with_ending(file, rubric)
+    return f"the rubric names {whole} elsewhere: write it with its ending" if whole else ""
 
 
 def _with_ending(file: str, rubric: dict[str, Any]) -> str:

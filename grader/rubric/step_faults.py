@@ -227,6 +227,8 @@ def _transform(at: KeyPath, transform: dict[str, Any]) -> Iterator[Fault]:
                 yield (*at, key), "is not for a static transform: it is sent once, and stays"
     elif transform.get("count") is not None and transform.get("duration_s") is not None:
         yield at, "give count or duration_s, not both"
+    if transform.get("parent") == transform.get("child"):
+        yield (*at, "child"), "is the parent, too: a frame is placed in another one"
     if model_faults(Transform, transform):
         return  # said elsewhere
     sent = Transform.model_validate(transform).published
@@ -250,7 +252,7 @@ def _processes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
                 yield at, f'"{name}" is no script, program or launch file'
             elif kind == "start" and runs.get(name, False):
                 yield at, f'"{name}" runs already: stop it before, or restart it'
-            elif kind in {"stop", "kill"} and not runs.get(name, True):
+            elif kind in {"stop", "kill", "type"} and not runs.get(name, True):
                 yield at, f'"{name}" does not run: an earlier step has stopped it'
             if kind != "type":
                 runs[name] = kind in {"start", "restart"}
