@@ -103,6 +103,10 @@ class RosPackages:
             return f'{package} has no {WORDS[kind]} type "{name}"{did_you_mean(name, there)}'
         return self._unknown(package, own)
 
+    def package_fault(self, package: str) -> str:
+        """Return why no machine has this package; empty where one may."""
+        return "" if package in self.folders else self._unknown(package, ())
+
     def _unknown(self, package: str, own: Collection[str]) -> str:
         """Return what is to be said of a package that is not here; empty where it may be elsewhere."""
         known = {*own, *self.folders, *known_packages()}

@@ -32,8 +32,8 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     `silent`: what was waited for stopped coming, or never came though the nodes were up.
     """
     given, until = until, _patient(live, until)
-    starting = _is_starting(live, until, now_s)
-    enough = (not starting, *_enough(live, until, now_s))
+    still_starting = bool(starting(live, until, now_s))
+    enough = (not still_starting, *_enough(live, until, now_s))
     if live.ended and not live.running:
         return "complete" if until.ended and all(enough) else "ended", ""
     if waits(until):
@@ -41,7 +41,7 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
             return "complete", ""
     elif now_s - live.started_s > until.limit_s:
         return "complete", f"watched for {until.limit_s:g} s"
-    silent = "" if starting else _silent(live, until, now_s) or _never(live, until, given, now_s)
+    silent = "" if still_starting else _silent(live, until, now_s) or _never(live, until, given, now_s)
     silent = silent or _in_namespaces(live, until, now_s)
     if silent:
         return "silent", silent
@@ -96,7 +96,7 @@ def next_look_s(live: RunState, until: Until, now_s: float) -> float:
     """Return how long nothing can change by time alone."""
     until = _patient(live, until)
     looks = [live.started_s + until.limit_s, live.started_s + until.first_message_s]
-    looks += [_starts_until_s(live, until)]
+    looks += [starts_until_s(live, until)]
     for seen in live.topics.values():
         looks += [
             seen.first_s + (until.window_s or 0),
@@ -192,13 +192,14 @@ def _has_heard(live: RunState, until: Until, now_s: float) -> bool:
     return now_s > min(max(live.last_line_s, news_s) + HEARD_S, news_s + HEARD_AT_MOST_S) + lost_s
 
 
-def _is_starting(live: RunState, until: Until, now_s: float) -> bool:
-    """Return whether a process may yet become a node: on a busy machine, its imports alone can take many seconds."""
-    waited_for = {p for p in live.running - live.registered if not computes(live, p)}
-    return bool(waited_for) and now_s <= _starts_until_s(live, until)
+def starting(live: RunState, until: Until, now_s: float) -> set[str]:
+    """Return the processes that may yet become nodes: on a busy machine, imports alone can take many seconds."""
+    if now_s > starts_until_s(live, until):
+        return set()
+    return {p for p in live.running - live.registered if not computes(live, p)}
 
 
-def _starts_until_s(live: RunState, until: Until) -> float:
+def starts_until_s(live: RunState, until: Until) -> float:
     return live.last_start_s + until.silent_s + live.lost_s - live.lost_before_last_s
 
 

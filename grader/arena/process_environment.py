@@ -51,10 +51,12 @@ RUN_AS_NUMBER = 'cd "$HOME" && trap : INT TERM && { for ((n = 1; n < %d; n++)); 
 """In its sandbox, every process tree counts its processes from 1. So that those of one run that are named after their
 number have different ones, each but the first is run as a later child of its shell, which waits for it."""
 COPY = (
-    f"mkdir {INSIDE_WORKSPACE} && cp -R --preserve=mode,links {SOURCES} {INSIDE_WORKSPACE}/"
-    f" && {{ [ ! -e {BUILT} ] || tar -xpf {BUILT} -C {INSIDE_WORKSPACE} devel 2>/dev/null || true; }} || exit 125; "
+    f"[ -e {INSIDE_WORKSPACE} ] || {{ mkdir {INSIDE_WORKSPACE}"
+    f" && cp -R --preserve=mode,links {SOURCES} {INSIDE_WORKSPACE}/"
+    f" && {{ [ ! -e {BUILT} ] || tar -xpf {BUILT} -C {INSIDE_WORKSPACE} devel 2>/dev/null || true; }}; }} || exit 125; "
 )
-"""Each process tree has a workspace of its own: the sources, and what the build made of them."""
+"""Each process tree has a workspace of its own: the sources, and what the build made of them. One that is started again
+finds what it left there."""
 BUILD_COPY = (
     f"mkdir {INSIDE_WORKSPACE} && cp -R --preserve=mode,links {SOURCES} {INSIDE_WORKSPACE}/"
     f" && {{ [ ! -e {BASE_WORKSPACE} ] || tar -xmf {BASE_WORKSPACE} -C {INSIDE_WORKSPACE} build"
@@ -295,6 +297,7 @@ class ProcessEnvironment:
             "repairs": [],
             "stdin": False,
             "keeps": [],
+            "again": False,
             **more,
         }
 

@@ -105,6 +105,7 @@ async def run_scenario(
     for start, spec in starts:
         spec["stdin"] = start.name in typed_to
         spec["keeps"] = scenario.keeps if spec["role"] == "student" else ()
+        spec["again"] = spec["name"] in scenario.started_again
     with EvidenceWriter(path, scenario=name, clock=scenario.clock, warp=warp, metadata=metadata) as writer:
         session = ArenaSession(place, writer, last_run=last_run, on_lateness=admission.note_lateness)
         if not any(spec["role"] == "student" for _, spec in starts):

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from typing_extensions import Self
 
 from grader.arena.function_calls import call_functions
+from grader.arena.outcome import starting, starts_until_s
 from grader.arena.run_state import is_settled, is_silent
 from grader.arena.scenario_inputs import make_shots
 from grader.arena.served import ServedAction, ServedServices
@@ -365,9 +366,23 @@ class StepRunner:
         left_s = max(0.0, (time_ns - self._arena.ros_now_ns()) / NS)
         await self._arena.wait(lambda: self._arena.ros_now_ns() >= time_ns or self._is_over(), left_s)
 
+    async def _come_up(self) -> None:
+        """Wait for processes that may yet become nodes: on a busy machine, a pause would be over before they are up."""
+        live, until = self._live, self._scenario.until
+        typed_to = {step.type.process for step in self._scenario.steps if step.type is not None}
+
+        def is_up() -> bool:
+            now_s = time.monotonic()
+            waited_for = live.helpers - live.registered if now_s <= starts_until_s(live, until) else set()
+            waited_for |= starting(live, until, now_s) - typed_to
+            return not waited_for or is_settled(live, now_s) or self._is_over()
+
+        await self._arena.wait(is_up, starts_until_s(live, until) - time.monotonic())
+
     async def _wait(self, wait: Wait) -> None:
         live, patience_s = self._live, self._scenario.until.first_message_s
         if wait.seconds is not None:
+            await self._come_up()
             self._tell(f"waiting for {wait.seconds:g} s")
             await self._until(self._arena.ros_now_ns() + round(wait.seconds * NS))
             if not self._is_over():

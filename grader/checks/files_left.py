@@ -54,6 +54,12 @@ class ColumnBounds(Record):
     max: float | None = None
     """The greatest value, in the column's own unit; null: no bound."""
 
+    @model_validator(mode="after")
+    def _in_order(self) -> ColumnBounds:
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise ValueError(f"min, {self.min:g}, is more than max, {self.max:g}")
+        return self
+
 
 class FileLeftParams(Record):
     """A file, and what has to be in it."""

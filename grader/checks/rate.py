@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from typing import Annotated, Any
 
@@ -34,6 +35,8 @@ from grader.wording import hertz, plural, seconds, significant
 FLOOD_FACTOR = 5
 FLOOD_HZ = 500.0
 """No lab asks for so much: what is slower and even comes from a loop that sleeps, by a wrong number."""
+RATE_NAME = re.compile(r"rate|hz|freq", re.IGNORECASE)
+"""Names of parameters that are rates."""
 PAUSES_WAITED = 1.5
 """A silence of at most so many of the pauses that a script asks for is one of them."""
 NUMBER_SHARE = 0.1
@@ -334,13 +337,11 @@ def _by_parameter(
             read = {
                 e.topic or "" for _, e in run.actors if e.action == "read" and e.actor == channel.callerid
             }
-            verdict = _by_read_parameter(
-                verdict,
-                {n: v for n, v in params_on_server(run).items() if n in read},
-                package,
-                params,
-                mean_hz,
+            there = params_on_server(run)
+            explained = _by_read_parameter(
+                verdict, {n: v for n, v in there.items() if n in read}, package, params, mean_hz
             )
+            verdict = explained if explained is not verdict else _by_default(verdict, read, there, params)
             continue
         name = resolved_param(slip.message, channel.callerid)
         value = params_on_server(run).get(name)
@@ -373,6 +374,22 @@ def _by_read_parameter(
             hint = f"set {name} to {significant(params.rate_hz)} in {where}"
             return _explained(verdict, given, message, hint)
     return verdict
+
+
+def _by_default(
+    verdict: Verdict, read: Collection[str], there: Mapping[str, Any], params: RateParams
+) -> Verdict:
+    """Say which parameter the node asked for that is a rate by its name and that nothing sets: its default counts."""
+    unset = [name for name in read if name not in there and RATE_NAME.search(name.rpartition("/")[2])]
+    if len(unset) != 1 or not verdict.status.is_lost:
+        return verdict
+    message = (
+        f"{verdict.message}; the node asks for {unset[0]}, which nothing sets in this run: its default counts"
+    )
+    hint = (
+        f"make {significant(params.rate_hz)} the default of {unset[0]} in your program, if that is its rate"
+    )
+    return verdict.model_copy(update={"message": message, "hint": hint})
 
 
 def _explained(verdict: Verdict, place: PythonSlip | LaunchParam, message: str, hint: str) -> Verdict:

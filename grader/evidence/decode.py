@@ -258,6 +258,9 @@ def _zero(base: str) -> Value:
     return "" if base == "string" else False if base == "bool" else 0
 
 
+FLOAT32_MAX = float(np.finfo(np.float32).max)
+
+
 def _check_value(base: str, value: Value) -> Value:
     wanted = {"string": str, "bool": bool}.get(base, (int, float) if base.startswith("float") else int)
     if not isinstance(value, wanted) or (isinstance(value, bool) and base != "bool"):
@@ -267,6 +270,8 @@ def _check_value(base: str, value: Value) -> Value:
         low = 0 if _dtype(base).startswith("u") else -(1 << bits - 1)
         if not low <= value < low + (1 << bits):
             raise ValueError(f"{value} is out of range for {base}")
+    if base == "float32" and FLOAT32_MAX < abs(value) < float("inf"):
+        raise ValueError(f"{value} is out of range for {base}")
     return value
 
 

@@ -67,7 +67,7 @@ def drop_unrepeated_losses(
             message = f"{other.message} (seen once and not again, so it costs nothing: {one.message})"
             verdicts[criterion.id] = other.model_copy(update={"message": message})
         elif one.timing and other.status.is_lost:
-            update = {"citations": one.citations + other.citations}
+            update = {"citations": tuple(dict.fromkeys(one.citations + other.citations))}
             verdicts[criterion.id] = one.model_copy(update=update)
         elif one.timing and other.status.is_open:
             verdicts[criterion.id] = other

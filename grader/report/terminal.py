@@ -248,7 +248,7 @@ class Terminal:
 
     def _cost(self, criterion: CriterionResult) -> str:
         """`-5`; `0/5` where the points are not lost for good."""
-        if criterion.status.is_open:
+        if criterion.status.is_open or not criterion.missing:  # a gate may be a criterion that is not counted
             return points_of(criterion)
         return self._fit_encoding(minus(criterion.missing))
 

@@ -58,6 +58,7 @@ def arrange(result: GradingResult, rubric: Rubric | None = None) -> ReportView:
     unreached = [c for c in result.criteria if c.status is not Status.PASS]
     roots = {c.id: root_of(c, result, rubric) for c in unreached}
     causes = {root for name, root in roots.items() if root != name}
+    causes |= {result.gate.criterion} if result.gate else set()  # the rest counts for less without it
     losses = [
         Loss(criterion=c, blocked=tuple(b for b in unreached if b is not c and roots[b.id] == c.id))
         for c in unreached

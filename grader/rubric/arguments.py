@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from grader.rubric.message_fields import slip_of
-from grader.rubric.spelling import PROSE, texts_in
+from grader.rubric.spelling import PROSE, is_slip, texts_in
 from grader.rubric.standins import PROGRAMS, set_in
 from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, as_texts
 from grader.wording import did_you_mean, join_words
 
+_NUMBER = re.compile(r"-?\d+(\.\d+)?")
 SPECIAL = ("__name", "__ns", "__log", "__ip", "__hostname", "__master")
 
 
@@ -29,9 +31,19 @@ def argument_faults(scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterato
     for index, start in as_maps(scenario.get("start")):
         for number, text in as_texts(start.get("args")):
             known = known or _known(rubric)
-            fault = _no_colon(text, start) or _fault(text, start, known)
+            fault = _blanks(text) or _no_colon(text, start) or _fault(text, start, known)
             if fault:
                 yield ("start", index, "args", number), fault
+
+
+def _blanks(text: str) -> str:
+    """Return that one argument has been written in place of several, or with blanks around its `:=`."""
+    parts = text.split()
+    if re.search(r"\s:=|:=\s+\S", text):
+        return f"ROS reads no blanks around :=, write {re.sub(r' *:= *', ':=', text)}"
+    if len(parts) > 1 and (all(":=" in one for one in parts) or all(map(_NUMBER.fullmatch, parts))):
+        return f"is one argument: write {', '.join(json.dumps(one) for one in parts)}"
+    return ""
 
 
 def _no_colon(text: str, start: dict[str, Any]) -> str:
@@ -54,7 +66,12 @@ def _fault(text: str, start: dict[str, Any], known: Known) -> str:
     spaces = {topic.split("/")[1] for topic in known.topics}
     if name == "_ns" and value.strip("/") in spaces:
         return f"ROS reads __ns:={value}, with two underscores"
-    return "" if name.startswith("_") else _remap(name, value, start, known)
+    if name.startswith("_"):
+        near = next((one for one in sorted(known.params) if is_slip(name[1:], one)), "")
+        if start.get("script") is None or not near or name[1:] in known.params | known.words:
+            return ""
+        return f'nothing else in the rubric names {name} (did you mean "_{near}:={value}"?)'
+    return _remap(name, value, start, known)
 
 
 def _remap(name: str, value: str, start: dict[str, Any], known: Known) -> str:
@@ -87,4 +104,6 @@ def _known(rubric: dict[str, Any]) -> Known:
     texts = [(path, text) for path, text in texts_in((), rubric) if "args" not in path]
     topics = {text for path, text in texts if re.fullmatch(r"(/\w+)+", text) and not PROSE & {*path}} - params
     words = {word for path, text in texts if PROSE & {*path} for word in re.findall(r"\w+", text)}
-    return Known(frozenset(topics), frozenset(name.rpartition("/")[2] for name in params), frozenset(words))
+    private = {name for path, text in texts if PROSE & {*path} for name in re.findall(r"~(\w+)", text)}
+    params = private | {name.rpartition("/")[2] for name in params}
+    return Known(frozenset(topics), frozenset(params), frozenset(words))

@@ -124,7 +124,7 @@ def _place(
 
 def _uncalled_faults(path: KeyPath, criterion: dict[str, Any], scenarios: dict[str, Any]) -> Iterator[Fault]:
     """Answers can only be judged to calls that the scenario makes."""
-    given, scenario = as_map(criterion.get("with")), criterion.get("scenario")
+    given, scenario = as_map(criterion.get("with")), str(criterion.get("scenario"))
     expect, service = given.get("expect"), given.get("service")
     if criterion.get("check") != ANSWERS or not isinstance(expect, list) or scenario not in scenarios:
         return
@@ -194,6 +194,8 @@ def _points(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) 
     if abs(total - TOTAL_POINTS) > 1e-6:
         yield ("criteria",), f"the points add up to {total:g}, not to {TOTAL_POINTS}"
     mark = rubric.get("pass_mark")
+    if is_number(mark) and 0 < mark < 1:
+        yield ("pass_mark",), f"is in points, not a share: write {mark * TOTAL_POINTS:g}"
     if isinstance(mark, int | float) and mark > total:
         yield ("pass_mark",), f"{mark:g} is more than all the points, {total:g}"
 
@@ -258,6 +260,9 @@ def _gates(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) -
                 ("gates", index, "criterion"),
                 f'"{name}" is hidden: students could not see why points are missing',
             )
+        if is_number(at_most) and 0 < at_most < 1:
+            fault = f"is in points, not a share: write {at_most * TOTAL_POINTS:g}, or 0 for none"
+            yield ("gates", index, "at_most"), fault
         if isinstance(at_most, int | float) and at_most >= TOTAL_POINTS:
             yield (
                 ("gates", index, "at_most"),
@@ -269,6 +274,9 @@ def _late(rubric: dict[str, Any]) -> Iterator[Fault]:
     late = as_map(rubric.get("late"))
     if late and rubric.get("deadline") is None:
         yield ("late",), "needs a deadline: deadline: 2026-11-20T23:59:00+01:00"
+    for key in ("lost", "cap"):
+        if is_number(late.get(key)) and 0 < late[key] < 1:
+            yield ("late", key), f"is in percent, not a share: write {late[key] * 100:g}"
     grace, cut_off = late.get("grace_minutes"), late.get("cut_off_days")
     if isinstance(grace, int | float) and isinstance(cut_off, int | float) and grace > cut_off * 24 * 60:
         yield (
@@ -347,6 +355,8 @@ def _params(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
         elif named and (param.get("value") is None) == (param.get("made_up") is None):
             yield at, "give one of value and made_up"
         yield from private((*at, "name"), param.get("name"))
+        if not str(param.get("name")).startswith("~"):
+            yield from slash((*at, "name"), param.get("name"), "a parameter")
         if named and not of_file and param.get("also"):
             yield (*at, "also"), "is for a file: names that it may lack"
 

@@ -6,11 +6,14 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from grader.checks.support.fields import is_number
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
 
 FRAME_KEYS = frozenset({"frame_id", "child_frame_id"})
 ANGLES = frozenset({"rotation_deg", "rpy_deg", "heading_deg"})
+UNEQUAL = 0.02
+"""So far from 1 is no quaternion's length whose numbers are rounded."""
 ROUNDED = 0.004
 """So much is 1.57 off from a quarter turn in radians, and 6.28 from a whole one."""
 
@@ -46,11 +49,25 @@ def _in_values(path: KeyPath, value: object) -> Iterator[Fault]:
         at = (*path, key)
         if key in FRAME_KEYS:
             yield from _slash(at, inner)
+        elif key in {"orientation", "rotation"}:
+            yield from _no_rotation(at, inner)
         elif key in ANGLES:
             for angle in _numbers(inner):
                 if degrees := _in_degrees(angle):
                     yield at, f"{angle:g} is {degrees} degrees in radians: write {degrees}"
         yield from _in_values(at, inner)
+
+
+def _no_rotation(path: KeyPath, value: object) -> Iterator[Fault]:
+    """Yield a quaternion whose numbers are none: angles, most often."""
+    given = as_map(value)
+    numbers = [one for one in given.values() if is_number(one)]
+    length = math.hypot(*numbers)
+    if set(given) <= set("xyzw") and len(numbers) == len(given) and length and abs(length - 1) > UNEQUAL:
+        yield (
+            path,
+            f"is a quaternion, whose length is 1, not {length:.3g}: write {{rpy_deg: [0, 0, 90]}}, in degrees",
+        )
 
 
 def _numbers(value: object) -> Iterator[float]:

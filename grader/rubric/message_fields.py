@@ -25,7 +25,7 @@ from grader.model.message_definitions import (
 )
 from grader.model.package import InterfaceField
 from grader.ros_packages import ros_packages
-from grader.rubric.standins import topics_of_programs
+from grader.rubric.standins import set_in, topics_of_programs
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import closest, did_you_mean, is_one_edit, join_words
 
@@ -45,7 +45,9 @@ COUNTED = frozenset({"minimum", "maximum", "start"})
 """Of counters, the values that their field has."""
 STAMPED = "is_stamp"
 """Beside what a criterion says: its field has to be a stamp."""
-_STEPS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
+_NUMBER = re.compile(r"[-+]?\d+(\.\d*)?([eE][-+]?\d+)?")
+PATH_PARTS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
+"""The parts of a field's path: names, and items of lists."""
 
 
 def slip_of(name: str, there: Iterable[str]) -> str:
@@ -86,7 +88,7 @@ class Shape(NamedTuple):
     def field_at(self, path: str) -> Field | None:
         """Return the field to which a path leads; None where that is not known. Raises Misfit."""
         field, done = self.root, ""
-        for part in _STEPS.findall(path):
+        for part in PATH_PARTS.findall(path):
             found = self._item(field, part, done) if part[0] == "[" else self.inner(field, part, done)
             if found is None:
                 return None
@@ -277,6 +279,7 @@ def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield fields that are not there, and values that they can never have."""
     known = Definitions(rubric)
     yield from _no_types(rubric, known)
+    yield from _quoted_params(rubric)
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     for index, criterion in as_maps(rubric.get("criteria")):
         scenario = scenarios.get(str(criterion.get("scenario")), {})
@@ -337,14 +340,64 @@ def _judged_fields(
                 faults = [_no_such(shape._replace(partial=frozenset(shape.types)), field, {})]
             if isinstance(field, str) and faults and all(faults):
                 yield (*path, *at), faults[0]
-        for key in COUNTED & given.keys():
-            kinds = [kind.partition("/")[2].lower() for kind in types if kind.startswith("std_msgs/")]
-            wrong = [_no_value(kind, given[key]) if limits_of(kind) else "" for kind in kinds]
-            if wrong and all(wrong) and len(wrong) == len(types):
-                yield (*path, key), f"data of {types[0]} {wrong[0]}"
+        quoted = [one for key in ("value", "values") for one in _quoted((*path, key), given.get(key), topic)]
+        if quoted and "tolerance" not in given:
+            is_known = any(_has_field(known.shape(kind), given.get("field")) for kind in types)
+            yield from () if is_known else quoted
+        yield from _counted(path, given, types)
     for key, inner in given.items():
         if isinstance(inner, dict):
             yield from _judged_fields((*path, key), inner, known, rubric, scenario)
+
+
+def _counted(path: KeyPath, given: dict[str, Any], types: list[str]) -> Iterator[Fault]:
+    """Yield values of a counter that its field never has."""
+    for key in COUNTED & given.keys():
+        kinds = [kind.partition("/")[2].lower() for kind in types if kind.startswith("std_msgs/")]
+        wrong = [_no_value(kind, given[key]) if limits_of(kind) else "" for kind in kinds]
+        if wrong and all(wrong) and len(wrong) == len(types):
+            yield (*path, key), f"data of {types[0]} {wrong[0]}"
+
+
+def _has_field(shape: Shape | None, path: object) -> bool:
+    try:
+        return shape is not None and shape.field_at(str(path)) is not None
+    except Misfit:  # said elsewhere
+        return True
+
+
+def _quoted(path: KeyPath, value: object, topic: str = "") -> Iterator[Fault]:
+    """Yield truth values in quotes where nothing is known of the type; of a topic's field, numbers too."""
+    if isinstance(value, str) and value.lower() in {"true", "false"}:
+        yield path, f'"{value}" in quotes is a text: write {value.lower()}{_or_type(topic)}'
+    elif isinstance(value, str) and topic and _NUMBER.fullmatch(value):
+        yield path, f'"{value}" in quotes is a text: write {value}{_or_type(topic)}'
+    elif isinstance(value, dict | list):
+        for key, one in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _quoted((*path, key), one, topic)
+
+
+def _or_type(topic: str) -> str:
+    return f", or give {topic} its type in a criterion with topic-type" if topic else ""
+
+
+def _quoted_params(rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield values of parameters in quotes that are meant as a truth value, or that are numbers elsewhere."""
+    given: list[tuple[KeyPath, object, object]] = []
+    for name, scenario in as_map(rubric.get("scenarios")).items():
+        for at, one in set_in(as_map(scenario)):
+            given.append((("scenarios", name, *at, "value"), one.get("name"), one.get("value")))
+    for index, criterion in as_maps(rubric.get("criteria")):
+        asked, path = as_map(criterion.get("with")), ("criteria", index, "with")
+        if str(criterion.get("check")) in {"param-value", "params-set"}:
+            given.append(((*path, "value"), asked.get("name"), asked.get("value")))
+        elif criterion.get("check") == "launch-runs":
+            given += [((*path, "params", key), key, one) for key, one in as_map(asked.get("params")).items()]
+    numbers = {str(name).strip("/") for _, name, value in given if isinstance(value, int | float)}
+    for at, param, value in given:
+        yield from _quoted(at, value)
+        if isinstance(value, str) and _NUMBER.fullmatch(value) and str(param).strip("/") in numbers:
+            yield at, f'"{value}" in quotes is a text, and elsewhere {param} is a number: write {value}'
 
 
 def _other_type(path: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -430,9 +483,10 @@ def _expected(
     shape = known.shape(str(about.get("type")), "goal" if of_action else part)
     expected = given.get(key)
     each = [((), expected)] if isinstance(expected, dict) else [((n,), one) for n, one in as_maps(expected)]
-    for at, one in each if shape else ():
-        assert shape is not None  # noqa: S101 - for the type checker
-        if fault := shape.misfit(one):
+    for at, one in each:
+        if shape is None:
+            yield from _quoted((*path, key, *at), one)
+        elif fault := shape.misfit(one):
             yield (*path, key, *at), fault
 
 
@@ -463,6 +517,8 @@ def _sent_fields(scenario: dict[str, Any], known: Definitions) -> Iterator[tuple
         shape = known.shape(kind, part) if own and isinstance(value, dict) else None
         if shape is not None and (fault := shape.misfit(value)):
             yield at, fault
+        elif shape is None and (part or kind.partition("/")[0] not in noetic_messages()):
+            yield from _quoted(at, value)
 
 
 def _other_definitions(

@@ -78,7 +78,7 @@ def read_instructor(data: object, folder: Path) -> Beside:
             faults.append((path, str(fault)))
             continue
         if path in played:
-            faults += bag_faults(path, file, played[path], topics_named(rubric, path[:-1]))
+            faults += bag_faults(path, file, played[path], topics_named(rubric, path[:-1]), rubric)
         if path == ("checks",):
             own = run_checks_file(file, files[name])
     handed_out = frozenset(hashlib.sha256(content).hexdigest() for content in starter.values() if content)

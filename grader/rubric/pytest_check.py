@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import os
 import pickle
+import re
 import socket
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 import grader
 from grader.checks import Check, Evidence, FileCitation, Record, Verdict, failed, inconclusive, passed
@@ -43,6 +44,15 @@ class PytestParams(Record):
     """What pytest's `-k` takes: `comes_around or range`; empty: all tests."""
     timeout_s: Annotated[float, Field(gt=0, le=600)] = 60.0
     """For all tests together."""
+
+    @model_validator(mode="after")
+    def _select_tells_tests_apart(self) -> PytestParams:
+        words = (word for word in re.findall(r"\w+", self.select) if word not in {"and", "or", "not"})
+        if word := next((word for word in words if word.lower() in self.file.lower()), ""):
+            raise ValueError(
+                f'select: "{word}" is in the name of the file, too, and so fits all its tests: rename one'
+            )
+        return self
 
 
 class TestsBroken(Exception):

@@ -5,13 +5,11 @@ An instructor's slip (a process, a topic, a type that is nowhere) would else cos
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
-from typing import Any, TypeGuard
-
-from pydantic import ValidationError
+from typing import Any
 
 from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
@@ -19,12 +17,13 @@ from grader.ros_packages import TypeKind, ros_packages
 from grader.rubric.arguments import argument_faults
 from grader.rubric.frames import frame_faults
 from grader.rubric.message_fields import field_faults, services_in
-from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Scenario, Step, Until
+from grader.rubric.reachable import reach_faults, steps_s
+from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
 from grader.rubric.spelling import texts_in
-from grader.rubric.standins import asked_faults, only_publisher, parameter_faults
+from grader.rubric.standins import PROGRAMS, asked_faults, only_publisher, parameter_faults
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
-from grader.wording import closest, did_you_mean, join_words, plural
+from grader.wording import closest, did_you_mean, join_words
 
 LAUNCH_ENDINGS = (".launch", ".xml")
 OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended", "quiet_s")
@@ -32,12 +31,11 @@ OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended"
 TYPES: Mapping[str, TypeKind] = {"message": "msg", "field": "msg", "service": "srv"}
 LIKELY, SURE = 0.6, 0.85
 """How alike two names have to be: to be suggested, and to be taken for one with a slip."""
-WRAPS = {"minimum": 0, "maximum": 127, "wraps": 2}
-"""Of `counter-wrap`, with their defaults."""
-MANY = 3
-"""A recording may hold so many times the messages that a scenario waits for, as it is closed a little later."""
-FEWEST = 2
-"""Of fewer messages than these, nobody sees a rate."""
+ASKED_OF_STUDENT = frozenset({
+    "rate", "field-equals", "field-bounds", "topic-type", "latched", "message", "stamps", "counter-start",
+    "counter-step", "counter-wrap", "reacts",
+})  # fmt: skip
+"""Checks of messages on a topic that the student has to publish on."""
 _DIGITS = re.compile(r"\d+")
 _TOPIC = re.compile(r"(?:^|:=)(/[\w/]*\w)")
 
@@ -64,11 +62,13 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
     yield from frame_faults(rubric)
     yield from _unused_faults(rubric, scenarios, checks)
     yield from _unknown_topics(rubric, scenarios, checks)
-    yield from _too_many(rubric, scenarios, checks)
-    yield from _too_few(rubric, scenarios)
+    yield from reach_faults(rubric, scenarios, checks)
     yield from _unknown_causes(rubric, scenarios, checks)
     yield from _misspelt_nodes(rubric, scenarios)
     yield from _own_types(rubric)
+    yield from _of_grader(criteria, scenarios)
+    yield from _forgotten_topics(criteria)
+    yield from _same_names(criteria, scenarios)
     yield from _misspelt_scripts(rubric, scenarios)
     yield from _other_goals_and_types(rubric, scenarios)
 
@@ -77,25 +77,38 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
     """Yield what a scenario asks for that no machine has."""
     for index, start in as_maps(scenario.get("start")):
         launch = start.get("launch")
-        if isinstance(launch, str) and not launch.endswith(LAUNCH_ENDINGS):
+        if isinstance(launch, str) and " " in launch.strip():
+            fault = f"is the file alone, without its package: {launch.split()[-1]}"
+            yield (*path, "start", index, "launch"), fault
+        elif isinstance(launch, str) and not launch.endswith(LAUNCH_ENDINGS):
             yield (
                 (*path, "start", index, "launch"),
                 f'roslaunch takes the file\'s whole name: "{launch}.launch"',
             )
-        for key in ("script", "load"):
-            file = start.get(key)
-            if isinstance(file, str) and (file.startswith(("/", "~")) or ".." in PurePosixPath(file).parts):
-                name = PurePosixPath(file).name
-                fault = f"is a path in the student's package, from its folder: scripts/{name}, not {file}"
+        for key, file in (("script", start.get("script")), ("load", start.get("load"))):
+            if isinstance(file, str) and (fault := _file_fault(file, rubric)):
                 yield (*path, "start", index, key), fault
-            elif isinstance(file, str) and (whole := _with_ending(file, rubric)):
-                yield (
-                    (*path, "start", index, key),
-                    f"the rubric names {whole} elsewhere: write it with its ending",
-                )
-        yield from _of_machine((*path, "start", index, "program"), "program", start.get("program"), rubric)
+        at = (*path, "start", index, "program")
+        yield from _of_machine(at, "program", start.get("program"), rubric)
+        package, _, file = str(start.get("program")).partition("/")
+        if package in packages_in(rubric):
+            key = "launch" if file.endswith(LAUNCH_ENDINGS) else "script"
+            yield at, f"is the student's: with program it would count as the grader's. Write {key}: {file}"
     for at, _, one in services_in(scenario):
         yield from _of_machine((*path, *at, "type"), "service", one.get("type"), rubric)
+
+
+def _file_fault(file: str, rubric: dict[str, Any]) -> str:
+    """Return why a start's file is none of the student's package; empty where it may be one."""
+    path = PurePosixPath(file)
+    if file.startswith(("/", "~")) or ".." in path.parts:
+        return f"is a path in the student's package, from its folder: scripts/{path.name}, not {file}"
+    if path.suffix in {".cpp", ".cc", ".cxx"}:
+        return f"is a source: write the name of the program that add_executable makes of it, {path.stem}"
+    if file in PROGRAMS:
+        return f"is no file of the student's: write program: {file}"
+    whole = _with_ending(file, rubric)
+    return f"the rubric names {whole} elsewhere: write it with its ending" if whole else ""
 
 
 def _with_ending(file: str, rubric: dict[str, Any]) -> str:
@@ -121,6 +134,10 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
         meant = "" if value in own else closest(value, own, cutoff=SURE)
         fault = f'there is no package "{value}" (did you mean "{meant}"?)' if meant else ""
         fault = fault or ("" if value in own else ros_packages().misspelt(value))
+        if (
+            not fault and "nodes" in path and value not in own
+        ):  # a launch file's pkg, and none of rosdep's keys
+            fault = ros_packages().package_fault(value)
     elif to == "package" and value not in packages_in(rubric):
         fault = f'the lab has no package "{value}"{_instead(value, packages_in(rubric))}'
     elif to in TYPES and re.fullmatch(TYPE_PATTERN, value := value.partition("[")[0]):
@@ -170,22 +187,110 @@ def _misfits(
         of_process = [start for start in starts if start.get("name") == process or not process]
         yield from _named_otherwise(value, of_process if len(of_process) == 1 else [])
     elif one.to == "published":
-        yield from _wrong_sender(value, as_map(criterion.get("with")).get("of", "student"), check, scenario)
+        yield from _wrong_sender(value, as_map(criterion.get("with")).get("of"), check, scenario)
 
 
-def _wrong_sender(topic: str, of: object, check: Check, scenario: dict[str, Any]) -> Iterator[str]:
+def _wrong_sender(topic: str, says_of: object, check: Check, scenario: dict[str, Any]) -> Iterator[str]:
     """Yield why nobody whose messages are judged sends any."""
+    of = says_of or "student"
     program = only_publisher(topic, scenario)
     if of == "student" and program:
         yield f"{program} publishes on {topic}, and {check.name} judges the student's messages: give it of: program"
+    given = _sent_by_grader(scenario)
+    until = as_map(scenario.get("until"))
+    if (
+        says_of is None
+        and "of" in check.params.model_fields
+        and topic in given
+        and topic not in _topics_in(until)
+    ):
+        yield (
+            f"the grader itself sends on {topic}, and {check.name} judges the student's messages: if students publish "
+            "there too, write of: student"
+        )
     if of == "program" and not any(start.get("program") for start in _starts(scenario)):
         yield f"the scenario starts no program, and {check.name} judges the messages of one (of: program)"
+
+
+def _of_grader(
+    criteria: list[tuple[int, dict[str, Any]]], scenarios: dict[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield services and messages of the grader's that are taken for the student's."""
+    for name, scenario in scenarios.items():
+        for at, part, one in services_in(scenario):
+            if part == "request" and one.get("service") in _served_names(scenario):
+                fault = f"the grader offers {one['service']} itself (serves): a student's node is to call it"
+                yield ("scenarios", name, *at, "service"), fault
+    asked = {
+        str(as_map(c.get("with")).get("topic"))
+        for _, c in criteria
+        if str(c.get("check")) in ASKED_OF_STUDENT
+    }
+    for index, criterion in criteria:
+        path, given = ("criteria", index, "with"), as_map(criterion.get("with"))
+        scenario = scenarios.get(str(criterion.get("scenario")), {})
+        is_place = str(criterion.get("check")) in {"ends-at", "stays-within"} and given.get("of") is None
+        for at, topic in (
+            (("effect",), as_map(given.get("effect")).get("topic")),
+            ((), is_place and given.get("topic")),
+        ):
+            if isinstance(topic, str) and topic in _sent_by_grader(scenario) - asked:
+                fault = (
+                    f"the grader itself sends on {topic}: name the one on which the student's node answers"
+                )
+                yield (*path, *at, "topic"), fault
+        service = given.get("service")
+        if criterion.get("check") == "service" and service in _served_names(scenario):
+            fault = f"the grader offers {service} itself (serves), and service judges the student's"
+            yield (*path, "service"), f"{fault}: calls judges what was asked"
+
+
+def _forgotten_topics(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+    """Yield what only-topics forbids and another criterion of the same run asks the student to publish."""
+    for index, criterion in criteria:
+        if criterion.get("check") != "only-topics":
+            continue
+        allowed = [topic for _, topic in as_texts(as_map(criterion.get("with")).get("topics"))]
+        for _, other in criteria:
+            given = as_map(other.get("with"))
+            topic = str(as_map(given.get("effect")).get("topic") or given.get("topic"))
+            is_asked = str(other.get("check")) in ASKED_OF_STUDENT and given.get("of", "student") == "student"
+            if not is_asked or other.get("scenario") != criterion.get("scenario") or topic in SYSTEM_TOPICS:
+                continue
+            is_allowed = any(fnmatchcase(topic, one) for one in allowed)
+            if not is_allowed and not closest(topic, allowed, cutoff=SURE):  # a slip, which is told
+                yield ("criteria", index, "with", "topics"), f"{other.get('id')} asks for {topic}: add it"
+
+
+def _same_names(
+    criteria: list[tuple[int, dict[str, Any]]], scenarios: dict[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield starts of one script that would give two nodes the same name, of which the second one ends the first."""
+    strict = [c for _, c in criteria if as_map(c.get("with")).get("anonymous") == "forbidden"]
+    for name in sorted({str(c.get("scenario")) for c in strict if c.get("check") == "node-lives"}):
+        first: dict[str, int] = {}
+        started = [step for _, step in as_maps(scenarios.get(name, {}).get("steps")) if "start" in step]
+        for index, start in as_maps(scenarios.get(name, {}).get("start")):
+            named = any(text.startswith(("__ns:=", "__name:=")) for _, text in as_texts(start.get("args")))
+            script = start.get("script")
+            if (
+                isinstance(script, str)
+                and not named
+                and not started
+                and first.setdefault(script, index) != index
+            ):
+                fault = (
+                    f"a second node of {script} ends the first, which has its name: give it args, __name:=…"
+                )
+                yield ("scenarios", name, "start", index), fault
 
 
 def _named_otherwise(name: str, starts: list[dict[str, Any]]) -> Iterator[str]:
     """Yield which name the arguments of a start give its node, where that is another one."""
     if name.endswith((".py", ".cpp")):
         yield f"is the name of a node, not of its file: write {name.rpartition('.')[0]}"
+    elif re.search(r"[^\w/]", name):
+        yield f'no node is called "{name}": letters, digits and _, and anonymous: required where digits follow'
     for args in (as_texts(start.get("args")) for start in starts):
         given = dict(text.split(":=", 1) for _, text in args if text.startswith(("__ns:=", "__name:=")))
         own = given.get("__name", name.rpartition("/")[2])
@@ -222,35 +327,18 @@ def _too_short(one: Reference, check: Check, scenario: dict[str, Any]) -> Iterat
         return
     if not isinstance(one.value, int | float) or len(known) <= len(lasting):
         return
-    steps_s = _steps_s(scenario)
+    done_s = steps_s(scenario)
     waits = any(until.get(key) for key in OTHER_CONDITIONS)
-    if steps_s is None or not isinstance(limit_s, int | float):
+    if done_s is None or not isinstance(limit_s, int | float):
         return
-    if steps_s and not lasting and not waits:
-        longest_s, key = steps_s, "its steps"
+    if done_s and not lasting and not waits:
+        longest_s, key = done_s, "its steps"
     else:
         longest_s = min(max(lasting), limit_s) if lasting and not waits else limit_s
         key = "limit_s" if longest_s == limit_s else "window_s" if "window_s" in until else "alive_s"
-        longest_s, key = longest_s + steps_s, f"its steps and {key}" if steps_s else key
+        longest_s, key = longest_s + done_s, f"its steps and {key}" if done_s else key
     if one.value > longest_s:
         yield f"{one.value:g} s is more than the scenario lasts: {key}, {longest_s:g} s"
-
-
-def _steps_s(scenario: dict[str, Any]) -> float | None:
-    """Return how long a scenario's steps last; None where something of theirs has to come first."""
-    total_s = 0.0
-    for _, written in as_maps(scenario.get("steps")):
-        try:
-            step = Step.model_validate_json(json.dumps(written), strict=True)
-        except (ValidationError, TypeError):
-            return None
-        wait = step.wait
-        if step.call or step.action or step.play or (wait is not None and wait.seconds is None):
-            return None
-        if (sent := step.published) is not None and sent.background:
-            return None
-        total_s += step.lasts_s
-    return total_s
 
 
 def _unused_faults(
@@ -296,63 +384,6 @@ def _unknown_topics(
             near = "" if topic in there else _near(topic, named, cutoff=SURE)
             if near:
                 yield ("scenarios", name, *at), f'no criterion names {topic} (did you mean "{near}"?)'
-
-
-def _too_many(
-    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
-    """Yield counts of messages that cannot come before the run's limit, at the rate that a criterion asks for."""
-    rates: dict[str, float] = {}
-    for _, criterion in as_maps(rubric.get("criteria")):
-        given, check = as_map(criterion.get("with")), checks.get(str(criterion.get("check")))
-        topic, rate_hz = given.get("topic"), given.get("rate_hz")
-        of_rate = check is not None and hasattr(check.params, "rate_bounds")
-        if of_rate and isinstance(rate_hz, int | float) and rate_hz > 0:
-            rates[str(topic)] = float(rate_hz)
-    for name, scenario in scenarios.items():
-        until = as_map(scenario.get("until"))
-        limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
-        warp = scenario.get("warp", Scenario.model_fields["warp"].default)
-        warp = warp if scenario.get("clock") == "warped" else 1
-        for topic, count in as_map(until.get("messages")).items():
-            if not all(isinstance(n, int | float) for n in (limit_s, warp, count)) or topic not in rates:
-                continue
-            takes_s = count / rates[topic] / warp
-            if takes_s > limit_s:
-                fault = f"{count} messages at {rates[topic]:g} Hz take {takes_s:.3g} s, and limit_s is {limit_s:g} s"
-                yield ("scenarios", name, "until", "messages", topic), fault
-
-
-def _too_few(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
-    """Yield wraps, recordings and rates that a scenario with so few messages cannot show."""
-    for index, criterion in as_maps(rubric.get("criteria")):
-        name, path = str(criterion.get("scenario")), ("criteria", index, "with")
-        given, until = as_map(criterion.get("with")), as_map(scenarios.get(name, {}).get("until"))
-        counts = {} if {"window_s", "alive_s", "quiet_s"} & until.keys() else as_map(until.get("messages"))
-        if criterion.get("check") == "counter-wrap":
-            least, most, wraps = (given.get(key, default) for key, default in WRAPS.items())
-            count = counts.get(str(given.get("topic")))
-            numbers = all(isinstance(n, int) for n in (least, most, wraps, count))
-            if numbers and count < (needed := wraps * (most - least + 1) + 1):
-                fault = f"{name} ends after {count} messages, and {plural(wraps, 'wrap')} take {needed}"
-                yield (*path, "wraps"), fault
-        for topic, left in as_map(given.get("topics")).items():
-            count, least = counts.get(topic), as_map(left).get("at_least")
-            if isinstance(count, int) and isinstance(least, int) and least > MANY * count:
-                yield (*path, "topics", topic, "at_least"), f"{name} ends after {count} messages on {topic}"
-        window_s, rate_hz = until.get("window_s"), given.get("rate_hz")
-        if criterion.get("check") == "rate" and _is_number(window_s) and _is_number(rate_hz):
-            yield from (((*path, "rate_hz"), fault) for fault in _seldom(rate_hz, window_s))
-
-
-def _seldom(rate_hz: float, window_s: float) -> Iterator[str]:
-    if 0 < window_s * rate_hz < FEWEST:
-        each = f"at {rate_hz:g} Hz a message comes each {1 / rate_hz:g} s, and window_s is {window_s:g} s"
-        yield f"{each}: it is messages a second"
-
-
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float)
 
 
 def _unknown_causes(
@@ -489,6 +520,11 @@ def _topics_in(value: object) -> Iterator[str]:
         yield from (topic for key, item in value.items() for topic in (*_topics_in(key), *_topics_in(item)))
     elif isinstance(value, list | tuple):
         yield from (topic for item in value for topic in _topics_in(item))
+
+
+def _sent_by_grader(scenario: dict[str, Any]) -> set[str]:
+    probes = [probe for _, probe in as_maps(scenario.get("probes"))]
+    return {str(one.get("topic")) for one in (*given_steps(scenario, "publish"), *probes)}
 
 
 def _sent_topics(scenario: dict[str, Any]) -> set[str]:

@@ -224,7 +224,7 @@ class Wait(Record):
     """A pause. Give one of `seconds`, `topic` and `node`."""
 
     seconds: StepSeconds | None = None
-    """So long by the run's clock."""
+    """So long by the run's clock, from when the processes that run are nodes, or cannot become any."""
     topic: str | None = None
     """Until this topic has had its messages."""
     messages: Annotated[int, Field(ge=1, le=MESSAGES_MAX)] = 1
@@ -457,6 +457,16 @@ class Scenario(Record):
             for kind, name in named.items():
                 first.setdefault(name or "", kind)
         return frozenset(name for name, kind in first.items() if name and kind)
+
+    @property
+    def started_again(self) -> frozenset[str]:
+        """The names of those that a step may start a second time."""
+        later = self.started_later
+        again = {step.start for step in self.steps if step.start not in later}
+        again |= {
+            step.start for n, step in enumerate(self.steps) if step.start in {s.start for s in self.steps[:n]}
+        }
+        return frozenset(name for name in {*again, *(step.restart for step in self.steps)} if name)
 
     @property
     def digest(self) -> str:

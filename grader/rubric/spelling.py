@@ -63,8 +63,21 @@ def _named_once(data: object, folder: Path) -> Iterator[tuple[KeyPath, str, str]
             quoted = [one for one in re.findall(r"`[/~]?(\w+)`", handout) if is_slip(last, one)]
             yield path, text, near or next(iter(quoted), "")
         elif text.startswith("/") and _count(text, text, texts) == 1:
+            if (whole := _in_namespace(path, text, names)) and not re.search(
+                rf"(?<![\w~]){text}(?!\w)", handout
+            ):
+                yield path, text, whole
+                continue
             known = [other for _, other, _ in names if _is_slip_in_path(text, other, texts)]
             yield from ((path, text, one) for one in known[:1])
+
+
+def _in_namespace(path: KeyPath, text: str, names: list[tuple[KeyPath, str, str]]) -> str:
+    """Return the one name of the same scenario or of all criteria that has a namespace besides; "" for none."""
+    if "/" in text[1:]:
+        return ""
+    found = {other for at, other, _ in names if at != path and other.startswith("/") and other.endswith(text)}
+    return found.pop() if len(found) == 1 else ""
 
 
 def _count(word: str, name: str, texts: list[tuple[KeyPath, str]]) -> int:

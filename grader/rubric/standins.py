@@ -53,6 +53,10 @@ PROGRAMS: Mapping[str, Program] = {
         }),
     ),
 }  # fmt: skip
+ROBOTS = {"turtlebot3": {"max_linear": 0.22, "samples": 360}, "stage": {"max_linear": 1.0, "samples": 271}}
+"""What the robots of the robot world are like, where no parameter says otherwise."""
+FIELD_M = 11.09
+"""How long the field of turtlesim is on each side."""
 OTHERS_SCAN = {"/base_scan": {"turtlebot3": "/scan"}, "/scan": {"stage": "/base_scan"}}
 """By a topic that one robot of the robot world has, that of the other robot."""
 
@@ -62,6 +66,21 @@ def topics_of_programs(scenario: dict[str, Any]) -> dict[str, str]:
     starts = [start for _, start in as_maps(scenario.get("start")) if not start.get("args")]
     programs = [PROGRAMS[program] for start in starts if (program := str(start.get("program"))) in PROGRAMS]
     return {topic: kind for program in programs for topic, kind in program.topics.items()}
+
+
+def robot_of(scenario: dict[str, Any]) -> dict[str, Any]:
+    """Return what the robot world's robot is like in a scenario, by the names of its parameters; empty where it is not
+    started, or under another name."""
+    starts = [start for _, start in as_maps(scenario.get("start"))]
+    if not any(
+        start.get("program") == "robot_world/robot_world" and not start.get("args") for start in starts
+    ):
+        return {}
+    values = {str(one.get("name")).strip("/"): one.get("value") for _, one in set_in(scenario)}
+    given = {
+        name.partition("/")[2]: value for name, value in values.items() if name.startswith("robot_world/")
+    }
+    return {"start": [0, 0, 0], **ROBOTS.get(str(given.get("robot", "turtlebot3")), {}), **given}
 
 
 def only_publisher(topic: str, scenario: dict[str, Any]) -> str:

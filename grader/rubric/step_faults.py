@@ -10,12 +10,13 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
+from grader.checks.support.fields import is_number
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.errors import EvidenceError
 from grader.installable import noetic_messages
 from grader.ros_packages import ros_packages
 from grader.rubric.fault_words import model_faults
-from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform
+from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform, Until
 from grader.rubric.spelling import is_slip, texts_in
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts
 from grader.wording import did_you_mean
@@ -30,6 +31,8 @@ NAMED = {
     "set_param": ("name", "a parameter"),
 }
 """The key of a step that is a name of ROS's."""
+ROWS_PER_MESSAGE, ROWS_PER_S = 3, 100
+"""A node that writes more than this into a table is none of a lab's."""
 NOT_FINITE = (".inf", "-.inf", ".nan")
 WAITS = ("seconds", "topic", "node")
 
@@ -55,16 +58,21 @@ def topics_named(rubric: dict[str, Any], but: KeyPath) -> set[str]:
     return {name for text in texts for name in re.findall(r"(?<![\w.])/[A-Za-z][\w/]*\w", text)}
 
 
-def bag_faults(path: KeyPath, file: Path, play: dict[str, Any], named: Collection[str]) -> Iterator[Fault]:
+def bag_faults(
+    path: KeyPath, file: Path, play: dict[str, Any], named: Collection[str], rubric: dict[str, Any]
+) -> Iterator[Fault]:
     """Yield what is wrong with a recording that a step plays. `path` is the place of its name; the rest of the rubric
     names the topics in `named`."""
     from grader.evidence.reader import load_run  # noqa: PLC0415 - few rubrics play anything
 
     try:
-        topics = {channel.topic for channel in load_run(file).channels}
+        channels = load_run(file).channels
     except EvidenceError as error:
         yield path, f"cannot be played: {error.message}"
         return
+    topics = {channel.topic for channel in channels}
+    times_ns = [time for channel in channels for time in channel.times_ns]
+    yield from _rows_faults(path, file.name, times_ns, rubric)
     for number, topic in as_texts(play.get("topics")):
         if topic not in topics:
             yield (*path[:-1], "topics", number), f"{file.name} has no {topic}{did_you_mean(topic, topics)}"
@@ -72,6 +80,20 @@ def bag_faults(path: KeyPath, file: Path, play: dict[str, Any], named: Collectio
         near = next((one for one in sorted({*named} - topics) if is_slip(topic, one)), "")
         if near:
             yield path, f"{file.name} has {topic}, and the rubric names {near}: give the recording that topic"
+
+
+def _rows_faults(path: KeyPath, name: str, times_ns: list[int], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield tables with more rows than can come of so many messages, or in that time."""
+    until = as_map(as_map(as_map(rubric.get("scenarios")).get(str(path[1]))).get("until"))
+    limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
+    lasts_s = (max(times_ns, default=0) - min(times_ns, default=0)) / 1e9
+    for index, criterion in as_maps(rubric.get("criteria")):
+        rows = as_map(criterion.get("with")).get("rows_at_least")
+        if criterion.get("scenario") != path[1] or not is_number(rows) or not is_number(limit_s):
+            continue
+        if rows > ROWS_PER_MESSAGE * len(times_ns) + ROWS_PER_S * (lasts_s + limit_s):
+            fault = f"{name} has {len(times_ns)} messages in {lasts_s:.3g} s: so many rows never come"
+            yield ("criteria", index, "with", "rows_at_least"), fault
 
 
 def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
@@ -205,6 +227,8 @@ def _transform(at: KeyPath, transform: dict[str, Any]) -> Iterator[Fault]:
                 yield (*at, key), "is not for a static transform: it is sent once, and stays"
     elif transform.get("count") is not None and transform.get("duration_s") is not None:
         yield at, "give count or duration_s, not both"
+    if transform.get("parent") == transform.get("child"):
+        yield (*at, "child"), "is the parent, too: a frame is placed in another one"
     if model_faults(Transform, transform):
         return  # said elsewhere
     sent = Transform.model_validate(transform).published
@@ -228,7 +252,7 @@ def _processes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
                 yield at, f'"{name}" is no script, program or launch file'
             elif kind == "start" and runs.get(name, False):
                 yield at, f'"{name}" runs already: stop it before, or restart it'
-            elif kind in {"stop", "kill"} and not runs.get(name, True):
+            elif kind in {"stop", "kill", "type"} and not runs.get(name, True):
                 yield at, f'"{name}" does not run: an earlier step has stopped it'
             if kind != "type":
                 runs[name] = kind in {"start", "restart"}

@@ -122,6 +122,32 @@ bags[0].wait()
     assert left["~/killed.bag.active"].data is None
 
 
+def test_a_process_that_is_started_again_finds_its_files_and_their_last_state_is_kept(tmp_path: Path) -> None:
+    code = """
+write("gone.csv") if not os.path.exists("run.csv") else os.remove("gone.csv")
+with open("run.csv", "a") as file:
+    file.write("life\\n")
+while True:
+    signal.pause()
+"""
+    scenario = Scenario.model_validate(
+        {
+            "title": "test",
+            "start": [{"name": "node", "script": "src/node.py"}, {"name": "other", "script": "src/node.py"}],
+            "steps": [{"wait": {"seconds": 1.5}}, {"restart": "node"}, {"wait": {"seconds": 1.5}}],
+            "keeps": ["*.csv"],
+        }
+    )
+    with make_place({"src/node.py": SCRIPT + WRITES + code}) as place:
+        found = run(place, scenario, tmp_path / "run.mcap")
+    left = {(file.process, file.path): file.data for file in found.left_files}
+    assert left == {
+        ("node", "~/run.csv"): b"life\nlife\n",
+        ("other", "~/run.csv"): b"life\n",
+        ("other", "~/gone.csv"): b"x",
+    }
+
+
 def test_files_of_a_tree_that_is_killed_are_kept(tmp_path: Path) -> None:
     code = """
 write("run.csv")

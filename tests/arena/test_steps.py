@@ -61,6 +61,18 @@ def test_nodes_are_watched_as_long_as_a_criterion_asks_though_the_steps_are_over
     assert life.end.stopped_by == "INT"
 
 
+def test_a_pause_begins_once_the_processes_are_nodes(tmp_path: Path) -> None:
+    """On a busy machine, the imports alone may take as long as the pause."""
+    talker = NODE + (
+        "import time\ntime.sleep(1.5)\nfrom std_msgs.msg import Int8\nrospy.init_node('talker')\n"
+        "pub = rospy.Publisher('n', Int8, queue_size=10)\nrate = rospy.Rate(20)\n"
+        "while not rospy.is_shutdown():\n    pub.publish(1)\n    rate.sleep()\n"
+    )
+    seen = _run(tmp_path, {"scripts/talker.py": talker}, [{"wait": {"seconds": 1}}])
+    (sent,) = seen.student_channels("/n")
+    assert len(sent.messages) >= 10
+
+
 @pytest.mark.parametrize("clock", ["real", "warped"])
 def test_messages_that_change_and_what_is_waited_for(tmp_path: Path, clock: str) -> None:
     scan = {

@@ -17,7 +17,7 @@ from grader.report.gradescope import render_gradescope
 from grader.report.junit import render_junit
 from grader.report.markdown import render_markdown
 from grader.report.terminal import open_console, print_report
-from grader.report.view import points_of, without_hidden
+from grader.report.view import arrange, points_of, without_hidden
 from grader.rubric.model import Rubric
 from tests.judging.rubrics import rubric
 from tests.report.hostile import result
@@ -172,6 +172,22 @@ def test_every_report_gives_the_same_total_and_says_why() -> None:
     assert why in scope["output"]
     assert b'name="points" value="15"' in render_junit(found, lab)
     assert render_classroom(found, lab, passed=False)
+
+
+def test_what_closes_a_gate_is_no_advice_where_it_is_not_counted() -> None:
+    lab = rubric(
+        worth("rest", points=80),
+        *(worth(name, points=20) for name in NAMES[:2]),
+        gates=[{"criterion": "b", "at_most": 50}],
+        groups={"some": {"criteria": NAMES[:2], "best": 1}},
+    )
+    found = graded(lab, b="fail")
+    assert (found.points, found.gate and found.gate.points_before) == (50, 100)
+    shown = arrange(found, lab)
+    assert ([loss.criterion.id for loss in shown.lost], shown.advice) == (["b"], ())
+    text = io.StringIO()
+    print_report(found, lab, open_console(text))
+    assert "b  not counted" in " ".join(text.getvalue().split("To fix")[1].split("\n")).replace("✗ ", "")
 
 
 def test_students_see_the_total_of_what_they_see() -> None:

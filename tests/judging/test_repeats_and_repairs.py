@@ -11,9 +11,10 @@ import pytest
 from grader.evidence.run import Run
 from grader.judging import judge
 from grader.judging.judge import judge_all_runs
-from grader.judging.repeats_and_repairs import is_used_by
+from grader.judging.repeats_and_repairs import drop_unrepeated_losses, is_used_by
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
+from grader.model.verdict import FileCitation, failed
 from grader.package.launch import parse_launch_files
 from tests.judging.rubrics import ALL, EXECUTABLE, GOOD_RUN, NODE, PACKAGE, RATE, SCENARIO, SCRIPT, rubric
 from tests.support.timeline import build_runs
@@ -232,6 +233,16 @@ def test_what_was_seen_once_costs_nothing() -> None:
     assert "seen once and not again" in node.message
     (node,) = judge(rubric(alone), {**runs, "repeated-1/talker": runs["talker"]})
     assert (node.status.value, node.points) == ("fail", 0)
+
+
+def test_a_line_that_two_runs_show_is_cited_once() -> None:
+    lab = rubric({name: value for name, value in NODE.items() if name != "requires"})
+    (name,) = (c.id for c in lab.criteria)
+    slow = failed("slow", citations=(FileCitation(file="src/talker.py", line=3),)).model_copy(
+        update={"timing": True}
+    )
+    found = drop_unrepeated_losses(lab, {name: slow}, {name: slow}, {"talker"})
+    assert found[name].citations == slow.citations
 
 
 def test_what_a_sure_loss_explains_is_not_run_again() -> None:

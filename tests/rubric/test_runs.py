@@ -32,6 +32,10 @@ from tests.rubric.samples import faults, spoiled
             ".values[1]: geometry_msgs/Vector3 has no field w",
         ),
         ("{topic: /x, type: std_msgs/Int8, values: [200]}", ".values[0]: 200 is out of range for int8"),
+        (
+            "{topic: /x, type: std_msgs/Float32, values: [1.0e+39]}",
+            ".values[0]: 1e+39 is out of range for float32",
+        ),
         ("{topic: /x, type: geometry_msgs/Twist, integers: 2}", ".integers: is not for geometry_msgs/Twist"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import random
 import re
 import shutil
@@ -20,8 +21,11 @@ from grader.errors import RubricError
 from grader.ros_packages import STANDINS
 from grader.rubric.find import rubrics_folder
 from grader.rubric.load import load_rubric
+from grader.rubric.standins import FIELD_M, ROBOTS
 from grader.rubric.standins import PROGRAMS as PROGRAMS_KNOWN
 from tests.rubric.samples import faults
+
+SLIPS = Path(__file__).with_name("slips.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -241,6 +245,40 @@ def test_a_slip_is_refused(examples: Path, name: str, old: str, new: str, fault:
     assert faults(_spoiled(examples, name, old, new)) == [f"spoiled.yaml:{fault}"]
 
 
+@pytest.mark.parametrize(
+    "slip", yaml.safe_load(SLIPS.read_text(encoding="utf-8")), ids=lambda slip: slip["fault"]
+)
+def test_a_slip_of_the_list_is_refused(examples: Path, slip: dict[str, str]) -> None:
+    path = _spoiled(examples, slip["lab"], slip["old"], slip["new"])
+    assert faults(path) == [f"spoiled.yaml:{slip['fault']}"]
+
+
+def test_a_goal_outside_of_the_box_that_another_criterion_keeps_the_robot_in(examples: Path) -> None:
+    path = _spoiled(examples, "go-to-goal", "box: [[0.5, 0.5],", "box: [[6, 6],")
+    fault = "is outside of the box that inside keeps it in"
+    assert faults(path) == [
+        f"spoiled.yaml:{line}.with.goal: {fault}" for line in ("37: criteria[3]", "39: criteria[4]")
+    ]
+
+
+def test_what_is_known_of_the_simulators_is_what_they_are() -> None:
+    """They run on ROS's Python alone: their sources are read."""
+    source = ast.parse((STANDINS / "robot_world" / "world_node.py").read_text(encoding="utf-8"))
+    table = next(
+        n.value for n in source.body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "ROBOTS"
+    )
+    robots = eval(ast.unparse(table), {"math": math})  # noqa: S307 - the grader's own source
+    known = {name: {key: robot[key] for key in ("max_linear", "samples")} for name, robot in robots.items()}
+    assert known == ROBOTS
+    field = ast.parse((STANDINS / "turtlesim" / "field.py").read_text(encoding="utf-8"))
+    pixels = {
+        ast.unparse(n.targets[0]): ast.unparse(n.value) for n in field.body if isinstance(n, ast.Assign)
+    }
+    assert math.isclose(
+        (float(pixels["SIZE"]) - 1) / float(pixels["PIXELS_PER_METRE"]), FIELD_M, abs_tol=0.01
+    )
+
+
 @pytest.mark.parametrize(("old", "new", "fault"), COUNTERS)
 def test_a_counter_that_no_message_shows_is_refused(old: str, new: str, fault: str, tmp_path: Path) -> None:
     text = (rubrics_folder() / "leeds-comp3631-lab1.yaml").read_text(encoding="utf-8")
@@ -284,6 +322,15 @@ def test_a_name_that_is_a_letter_off_is_refused(examples: Path, slip: tuple[str,
         ("turtle-square", "topic: /turtle1/pose, points", "topic: /turtle2/pose, points"),
         ("avoid-obstacles", "start, value: [0.6, 0.6, 0.0]", "map, value: package://rooms/room.yaml"),
         ("turtle-square", "/square/side, value: 1.0", "/turtlesim/holonomic, value: true"),
+        ("turtle-square", "/square/side, value: 1.0", '/square/side, value: "one"'),
+        ("turtle-square", "/square/side, value: 1.0", '/square/name, value: "7"'),
+        ("scan-to-cmd-vel", '"ranges[*]", max: 0.5', '"ranges[*]", max: 0.3'),
+        ("avoid-obstacles", 'field: "ranges[0]"', 'field: "ranges[359]"'),
+        ("follow-wall", "least_m: 3}", "least_m: 13}"),
+        ("turtle-square", "topics: [/turtle1/cmd_vel,", 'topics: ["/turtle1/*",'),
+        ("service-client", '"20000000000", "5"', '"20000000000 or so", "5"'),
+        ("record-and-replay", "rows_at_least: 8", "rows_at_least: 80"),
+        ("action-server", "feedback: 5}", "feedback: 50}"),
     ],
 )
 def test_what_may_be_right_is_taken(examples: Path, name: str, old: str, new: str) -> None:

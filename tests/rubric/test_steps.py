@@ -199,6 +199,19 @@ def test_what_a_step_starts_is_not_started_before(steps: list[dict[str, str]], l
 
 
 @pytest.mark.parametrize(
+    ("steps", "again"),
+    [
+        ([{"start": "a"}, {"stop": "b"}], set()),
+        ([{"stop": "a"}, {"start": "a"}], {"a"}),
+        ([{"start": "a"}, {"kill": "a"}, {"start": "a"}], {"a"}),
+        ([{"start": "a"}, {"restart": "b"}], {"b"}),
+    ],
+)
+def test_what_may_be_started_again(steps: list[dict[str, str]], again: set[str]) -> None:
+    assert Scenario.model_validate({"title": "a", "steps": steps}).started_again == again
+
+
+@pytest.mark.parametrize(
     ("given", "total"),
     [
         ({"value": 1}, 1),

@@ -58,6 +58,7 @@ class Arena:
         self._groups = []
         self._stage = Stage(**config["stage"]) if config["stage"] else None
         self._processes = {}
+        self._earlier = {}
         self._students = []
         self._finishing = False
         self._clock = None
@@ -127,8 +128,16 @@ class Arena:
         spec["env"]["ROS_MASTER_URI"] = os.environ.get("ROS_MASTER_URI", "http://127.0.0.1:11311")
         try:
             groups = self._new_groups() if spec["role"] != "grader" else None
+            earlier = self._earlier.pop(spec["name"], None)
             process = Process(
-                self.loop, self._wire, spec, self._limits, self._on_exit, groups=groups, stage=self._stage
+                self.loop,
+                self._wire,
+                spec,
+                self._limits,
+                self._on_exit,
+                groups=groups,
+                stage=self._stage,
+                scratches=earlier.scratches if earlier else (),
             )
             self._processes[process.name] = process
             if process.role == "student":
@@ -277,10 +286,15 @@ class Arena:
 
     def _on_exit(self, process):
         del self._processes[process.name]
+        if process.again:
+            self._earlier[process.name] = process
         self._end_when_empty()
 
     def _end_when_empty(self):
         if self._finishing and not self._processes:
+            for process in self._earlier.values():
+                process.give_up()
+            self._earlier.clear()
             self._lateness.stop()
             if self._master:
                 self._master.finish()

@@ -29,8 +29,9 @@ class Launched:
         self.scratches = scratches
 
 
-def launch(spec, stage, groups):
-    """Start what `spec` says (grader/arena/process_environment.py, `ProcessEnvironment.spec`). Raises OSError."""
+def launch(spec, stage, groups, scratches=()):
+    """Start what `spec` says (grader/arena/process_environment.py, `ProcessEnvironment.spec`), on the files of an
+    earlier life if it had one. Raises OSError."""
     with contextlib.ExitStack() as ours, contextlib.ExitStack() as theirs:
         lifeline, far = socket.socketpair()
         ours.callback(lifeline.close)
@@ -38,9 +39,9 @@ def launch(spec, stage, groups):
         fds = {"lifeline": far.fileno()}
         collect = _pipe(ours, theirs, fds, "collect") if spec["collect"] else None
         fds["words"] = _file(theirs, "words", _words(spec, fds))
-        info, scratches, gate, arguments = None, [], None, []
+        info, gate, arguments = None, None, []
         if spec["wall"] is not None:
-            scratches = _scratches(ours, stage, spec["wall"])
+            scratches = scratches or _scratches(ours, stage, spec["wall"])
             info = _pipe(ours, theirs, fds, "info")
             if spec["filter"]:
                 fds[FILTER] = _file(theirs, FILTER, base64.b64decode(spec["filter"]))

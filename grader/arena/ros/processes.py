@@ -37,14 +37,15 @@ PIPE_READS = 16
 
 class Process:
     """One process tree. `spec` is made by `ProcessEnvironment.spec` (arena/process_environment.py): name,
-    role, argv, env, outer, bwrap, wall, filter, shell, collect, script, repairs, stdin (whether it has one), keeps.
+    role, argv, env, outer, bwrap, wall, filter, shell, collect, script, repairs, stdin (whether it has one), keeps,
+    again (whether it may be started once more: `scratches` are then those of its earlier life).
 
     `keeps` are patterns of files: what the process leaves is listed, and what fits is handed over.
 
     `collect` names a file for what the process writes to `{collect}`, and how many bytes of it are taken.
     """
 
-    def __init__(self, loop, wire, spec, limits, on_exit, *, groups=None, stage=None):
+    def __init__(self, loop, wire, spec, limits, on_exit, *, groups=None, stage=None, scratches=()):
         self.name = spec["name"]
         self.role = spec["role"]
         self.alive = True
@@ -67,7 +68,8 @@ class Process:
         self._stage = stage
         self._collected = None
         self._keeps = spec["keeps"]
-        self._spawn(spec)
+        self.again = spec["again"]
+        self._spawn(spec, scratches)
         self._event("start", argv=spec["argv"], script=spec["script"], repairs=spec["repairs"])
         loop.call_later(WATCH_S, self._watch)
         self._rest, self._rest_told, self._ends_within_s = TreeRest(), (None, 0), 0.0
@@ -135,10 +137,10 @@ class Process:
         self._cpu_s += usage.ru_utime + usage.ru_stime
         self._peak_bytes = max(self._peak_bytes, usage.ru_maxrss * 1024)
 
-    def _spawn(self, spec):
-        launched = launch(spec, self._stage, self._groups)
+    def _spawn(self, spec, scratches):
+        launched = launch(spec, self._stage, self._groups, scratches)
         self._popen = launched.popen
-        self._scratches = launched.scratches
+        self.scratches = launched.scratches
         self._places = _places(spec["wall"] or [], launched.scratches, self._stage)
         self.pid = self._popen.pid
         if launched.info is not None:
@@ -275,7 +277,7 @@ class Process:
     def _holds_too_much(self, tree, resident):
         """Where no control group counts what is no process's resident page: files in memory, and shared memory."""
         shared, maps = shared_memory(tree)
-        written = sum(self._stage.used_bytes(name) for name in self._scratches)
+        written = sum(self._stage.used_bytes(name) for name in self.scratches)
         return resident + written + shared > self._limits["memory_bytes"] or maps > MAPS_MAX
 
     def descriptors(self):
@@ -338,9 +340,8 @@ class Process:
         if self._groups is not None:
             self._cpu_s = max(self._cpu_s, self._groups.cpu_s() or 0.0)
         self._leave_groups()
-        self._tell_left()
-        for name in self._scratches:
-            self._stage.give_up(name)
+        if not self.again:
+            self.give_up()
         if not self._entered and self._stopped_by is None:
             why = "its sandbox was not made: {}".format(self._last_line or "it said nothing")
             self._wire.status("spawn-failed", name=self.name, detail=why)
@@ -356,11 +357,13 @@ class Process:
         )
         self._on_exit(self)
 
-    def _tell_left(self):
-        """Its memory is given up next, and all files with it."""
+    def give_up(self):
+        """Tell which files it left, and give up its memory with them."""
         if self._keeps:
             for file in left_files(self._places, self._keeps, self._limits):
                 self._wire.status("left", name=self.name, **file)
+        for name in self.scratches:
+            self._stage.give_up(name)
 
     def _leave_groups(self):
         if self._groups is None:

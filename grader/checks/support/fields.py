@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeGuard
 
 from pydantic import AfterValidator
 
@@ -185,7 +185,7 @@ def _close(got: float, wanted: float, tolerance: float) -> bool:
     return both_nan or math.isclose(got, wanted, rel_tol=FLOAT32, abs_tol=tolerance)
 
 
-def is_number(value: object) -> bool:
+def is_number(value: object) -> TypeGuard[float]:
     """Return whether it is a number, and no truth value."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 

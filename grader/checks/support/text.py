@@ -92,13 +92,19 @@ def in_one_line(text: str) -> str:
     return shorten(line, SHOWN_CHARS)
 
 
+OTHER_PLACES = re.compile(r"%[-+ 0]*[\d.]*[dfs](?!\w)|\\[dwsS][+*]?|\.\*|\{:[^{}]*\}|\{\d\}")
+"""What stands for a value in Python's texts and in regular expressions."""
+
+
 def refuse_others(place: str) -> AfterValidator:
     """Return what refuses a text with another word in braces that is meant to be `place`."""
 
     def checked(template: str) -> str:
         for word in re.findall(r"\{\w*\}", template):
-            if word != place and (word in PLACES or closest(word, [place], cutoff=0.7)):
+            if word != place and (word in {"{}", *PLACES} or closest(word, [place], cutoff=0.7)):
                 raise ValueError(f"{word} stands for nothing here: write {place}")
+        if other := OTHER_PLACES.search(template):
+            raise ValueError(f"{other[0]} stands for itself here, as the other letters do: write {place}")
         return template
 
     return AfterValidator(checked)

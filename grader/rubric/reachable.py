@@ -1,0 +1,469 @@
+"""What a criterion asks for and no run of its scenario can show: messages, values and places that never come, and
+demands of which one excludes the other."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+from pydantic import ValidationError
+
+from grader.checks.reacts import Condition
+from grader.checks.registry import Check
+from grader.checks.support.fields import Reading, is_number
+from grader.rubric.message_fields import PATH_PARTS
+from grader.rubric.scenario import Action, Scenario, Step, Until
+from grader.rubric.standins import FIELD_M, robot_of
+from grader.rubric.step_faults import given_steps
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
+from grader.wording import plural
+
+WRAPS = {"minimum": 0, "maximum": 127, "wraps": 2}
+"""Of `counter-wrap`, with their defaults."""
+MANY = 3
+"""A recording may hold so many times the messages that a scenario waits for, as it is closed a little later."""
+FEWEST = 2
+"""Of fewer messages than these, nobody sees a rate."""
+FASTEST_HZ = 100
+"""No lab asks for rows of a table, or feedback, more often than this."""
+POSITIONS = ("", "pose", "position", "point", "pose.position", "pose.pose.position")
+"""Where in messages `x` and `y` are."""
+
+
+def reach_faults(
+    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
+) -> Iterator[Fault]:
+    """Yield what the runs of a rubric's scenarios cannot show."""
+    yield from _too_many(rubric, scenarios, checks)
+    yield from _too_few(rubric, scenarios)
+    criteria = list(as_maps(rubric.get("criteria")))
+    for index, criterion in criteria:
+        path, given = ("criteria", index, "with"), as_map(criterion.get("with"))
+        scenario = scenarios.get(str(criterion.get("scenario")), {})
+        others = [
+            one for n, one in criteria if n != index and one.get("scenario") == criterion.get("scenario")
+        ]
+        about = _Asked(path, str(criterion.get("check")), given, str(criterion.get("scenario")), scenario)
+        yield from _too_often(about)
+        yield from _never_sent(about, others)
+        if about.check in {"ends-at", "path", "stays-within"}:
+            yield from _too_far(about, others)
+    yield from _contradictions(criteria)
+
+
+class _Asked(NamedTuple):
+    """A criterion: the place of its parameters, its check, they, its scenario's name, and that."""
+
+    path: KeyPath
+    check: str
+    given: dict[str, Any]
+    name: str
+    scenario: dict[str, Any]
+
+
+def _too_many(
+    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
+) -> Iterator[Fault]:
+    """Yield counts of messages that cannot come before the run's limit, at the rate that a criterion asks for."""
+    rates: dict[str, float] = {}
+    for _, criterion in as_maps(rubric.get("criteria")):
+        given, check = as_map(criterion.get("with")), checks.get(str(criterion.get("check")))
+        topic, rate_hz = given.get("topic"), given.get("rate_hz")
+        of_rate = check is not None and hasattr(check.params, "rate_bounds")
+        if of_rate and isinstance(rate_hz, int | float) and rate_hz > 0:
+            rates[str(topic)] = float(rate_hz)
+    for name, scenario in scenarios.items():
+        until = as_map(scenario.get("until"))
+        limit_s = until.get("limit_s", Until.model_fields["limit_s"].default)
+        warp = scenario.get("warp", Scenario.model_fields["warp"].default)
+        warp = warp if scenario.get("clock") == "warped" else 1
+        for topic, count in as_map(until.get("messages")).items():
+            if not all(isinstance(n, int | float) for n in (limit_s, warp, count)) or topic not in rates:
+                continue
+            takes_s = count / rates[topic] / warp
+            if takes_s > limit_s:
+                fault = f"{count} messages at {rates[topic]:g} Hz take {takes_s:.3g} s, and limit_s is {limit_s:g} s"
+                yield ("scenarios", name, "until", "messages", topic), fault
+
+
+def _too_few(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield wraps, recordings and rates that a scenario with so few messages cannot show."""
+    for index, criterion in as_maps(rubric.get("criteria")):
+        name, path = str(criterion.get("scenario")), ("criteria", index, "with")
+        given, until = as_map(criterion.get("with")), as_map(scenarios.get(name, {}).get("until"))
+        counts = {} if {"window_s", "alive_s", "quiet_s"} & until.keys() else as_map(until.get("messages"))
+        if criterion.get("check") == "counter-wrap":
+            least, most, wraps = (given.get(key, default) for key, default in WRAPS.items())
+            count = counts.get(str(given.get("topic")))
+            numbers = all(isinstance(n, int) for n in (least, most, wraps, count))
+            if numbers and count < (needed := wraps * (most - least + 1) + 1):
+                fault = f"{name} ends after {count} messages, and {plural(wraps, 'wrap')} take {needed}"
+                yield (*path, "wraps"), fault
+        for topic, left in as_map(given.get("topics")).items():
+            count, least = counts.get(topic), as_map(left).get("at_least")
+            if isinstance(count, int) and isinstance(least, int) and least > MANY * count:
+                yield (*path, "topics", topic, "at_least"), f"{name} ends after {count} messages on {topic}"
+        window_s, rate_hz = until.get("window_s"), given.get("rate_hz")
+        if criterion.get("check") == "rate" and is_number(window_s) and is_number(rate_hz):
+            yield from (((*path, "rate_hz"), fault) for fault in _seldom(rate_hz, window_s))
+
+
+def _seldom(rate_hz: float, window_s: float) -> Iterator[str]:
+    if 0 < window_s * rate_hz < FEWEST:
+        each = f"at {rate_hz:g} Hz a message comes each {1 / rate_hz:g} s, and window_s is {window_s:g} s"
+        yield f"{each}: it is messages a second"
+
+
+def _read_step(written: dict[str, Any]) -> Step | None:
+    try:
+        return Step.model_validate_json(json.dumps(written), strict=True)
+    except (ValidationError, TypeError):
+        return None
+
+
+def steps_s(scenario: dict[str, Any]) -> float | None:
+    """Return how long a scenario's steps last; None where something of theirs has to come first."""
+    steps = [_read_step(written) for _, written in as_maps(scenario.get("steps"))]
+    for step in steps:
+        if step is None or step.call or step.action or step.play or (step.wait and step.wait.seconds is None):
+            return None
+        if step.published is not None and step.published.background:
+            return None
+    return sum(step.lasts_s for step in steps if step is not None)
+
+
+def _longest_s(scenario: dict[str, Any]) -> float | None:
+    """Return how long a run lasts at most, in the time of its clock; None where that is not known."""
+    until = as_map(scenario.get("until"))
+    first_s, limit_s = (
+        until.get(key, Until.model_fields[key].default) for key in ("first_message_s", "limit_s")
+    )
+    warp = scenario.get("warp", Scenario.model_fields["warp"].default)
+    warp = warp if scenario.get("clock") == "warped" else 1
+    if {"probes", "calls", "recording"} & scenario.keys() or not all(
+        map(is_number, (first_s, limit_s, warp))
+    ):
+        return None
+    total_s = limit_s * warp if "until" in scenario or "steps" not in scenario else 0.0
+    steps = [_read_step(written) for _, written in as_maps(scenario.get("steps"))]
+    for step in steps:
+        if step is None or step.call or step.action or step.play:
+            return None
+        waits = (step.wait is not None and step.wait.seconds is None) or step.published is not None
+        limit_s = step.wait.limit_s if step.wait is not None else None
+        total_s += step.lasts_s + (warp * (first_s if limit_s is None else limit_s) if waits else 0)
+    return float(total_s)
+
+
+def _too_often(about: _Asked) -> Iterator[Fault]:
+    """Yield rows and feedback of which more are asked for than come in that time, however fast a node is."""
+    rows, longest_s = about.given.get("rows_at_least"), _longest_s(about.scenario)
+    if about.check == "file-left" and is_number(rows) and longest_s and rows > FASTEST_HZ * longest_s:
+        fault = f"{rows} rows in {longest_s:g} s, which {about.name} lasts at most, are more than {FASTEST_HZ} a second"
+        yield (*about.path, "rows_at_least"), fault
+    goals = [
+        one for one in given_steps(about.scenario, "action") if one.get("name") == about.given.get("action")
+    ]
+    number, asked = about.given.get("goal", 1), about.given.get("feedback")
+    if (
+        about.check == "action-result"
+        and is_number(asked)
+        and isinstance(number, int)
+        and 0 < number <= len(goals)
+    ):
+        goal = goals[number - 1]
+        lasting = [goal.get("limit_s", Action.model_fields["limit_s"].default), goal.get("cancel_after_s")]
+        longest_s = min((s for s in lasting if is_number(s)), default=math.inf)
+        if asked > FASTEST_HZ * longest_s:
+            fault = f"{asked} in {longest_s:g} s, which the step gives the goal, are more than {FASTEST_HZ} a second"
+            yield (*about.path, "feedback"), fault
+
+
+class TooShort(ValueError):
+    """A list that is sent has no item of that number."""
+
+
+def _sent_on(topic: str, scenario: dict[str, Any]) -> list[Any] | None:
+    """Return all that is sent on a topic; None where something else may be."""
+    probes = [one for _, one in as_maps(scenario.get("probes")) if one.get("topic") == topic]
+    sent = [*probes, *(one for one in given_steps(scenario, "publish") if one.get("topic") == topic)]
+    if "recording" in scenario or "play" in {
+        key for _, step in as_maps(scenario.get("steps")) for key in step
+    }:
+        return None
+    if any(one.get(key) for one in probes for key in ("text", "integers", "among")):
+        return None
+    values = [
+        value
+        for one in sent
+        for value in (*_items(one.get("values")), *([one["value"]] if "value" in one else []))
+    ]
+    return [value if isinstance(value, dict) else {"data": value} for value in values]
+
+
+def _items(value: object) -> list[Any]:
+    return value if isinstance(value, list) else []
+
+
+def _values_at(value: object, parts: Sequence[str]) -> list[Any] | None:
+    """Return what a value that is sent has at a path; None where a form makes it another each time. Raises TooShort."""
+    from grader.evidence.message_values import ANGLES, FORMS  # noqa: PLC0415 - slow to load, and few rubrics need it
+
+    part = parts[0] if parts else ""
+    if isinstance(value, dict) and value and {*FORMS, ANGLES}.issuperset(value):
+        if (
+            part[:1] == "["
+            and part != "[*]"
+            and isinstance(value.get("count"), int)
+            and int(part[1:-1]) >= value["count"]
+        ):
+            raise TooShort(value["count"])
+        return None
+    if not parts:
+        return [value]
+    if part[0] != "[":
+        inside = value.get(part, {} if parts[1:] else 0) if isinstance(value, dict) else None
+        return None if inside is None else _values_at(inside, parts[1:])
+    items = _items(value)
+    if part == "[*]":
+        each = [_values_at(item, parts[1:]) for item in items]
+        return None if None in each else [one for found in each for one in found or ()]
+    if int(part[1:-1]) >= len(items):
+        raise TooShort(len(items))
+    return _values_at(items[int(part[1:-1])], parts[1:])
+
+
+def _never_sent(about: _Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fault]:
+    """Yield items that no list has which the grader sends, and causes of which none is ever sent."""
+    for key, asked in (("", about.given), ("cause", as_map(about.given.get("cause")))):
+        topic, field = asked.get("topic"), asked.get("field")
+        at = (*about.path, key) if key else about.path
+        if not isinstance(topic, str) or not isinstance(field, str):
+            continue
+        parts = PATH_PARTS.findall(field)
+        yield from (((*at, "field"), fault) for fault in _past_the_end(topic, parts, field, about.scenario))
+        sent = _sent_on(topic, about.scenario)
+        if not sent or any(as_map(one.get("with")).get("topic") == topic for one in others):
+            continue
+        lengths = [_length(value, parts) for value in sent]
+        found = [_values_at(one, parts) if n is None else [] for one, n in zip(sent, lengths, strict=True)]
+        if None not in lengths:
+            most = plural(max(n for n in lengths if n is not None), "item")
+            yield (*at, "field"), f"what {about.name} sends on {topic} has {most} there, counted from 0"
+            continue
+        cause = _condition(asked) if key == "cause" and None not in found else None
+        plain = all(is_number(one) for values in found for one in values or ())
+        if cause and plain and not any(cause.holds(Reading(0, tuple(values or ()), "")) for values in found):
+            yield at, f"nothing that {about.name} sends on {topic} is so: {cause.words}"
+
+
+def _length(value: object, parts: Sequence[str]) -> int | None:
+    """Return how many items a list has that is too short; None where it is long enough."""
+    try:
+        _values_at(value, parts)
+    except TooShort as error:
+        return int(error.args[0])
+    return None
+
+
+def _past_the_end(topic: str, parts: Sequence[str], field: str, scenario: dict[str, Any]) -> Iterator[str]:
+    """Yield an item that the scans of the robot world do not have."""
+    samples = robot_of(scenario).get("samples")
+    if topic not in {"/scan", "/base_scan"} or len(parts) < 2 or parts[0] != "ranges" or parts[1] == "[*]":
+        return
+    if is_number(samples) and int(parts[1][1:-1]) >= samples:
+        yield f"the robot's scans have {samples} ranges, counted from 0: {field} is none of them"
+
+
+def _condition(asked: dict[str, Any]) -> Condition | None:
+    try:
+        return Condition.model_validate(asked)
+    except ValidationError:  # said elsewhere
+        return None
+
+
+def _spot(value: object) -> tuple[float, float] | None:
+    return (
+        (value[0], value[1])
+        if isinstance(value, list | tuple) and len(value) >= 2 and all(map(is_number, value))
+        else None
+    )
+
+
+def _asked_spots(topic: object, scenario: dict[str, Any]) -> list[tuple[float, float] | None]:
+    """Return the places for which the messages on a topic ask, in their order; None for one without a place."""
+    spots: list[tuple[float, float] | None] = []
+    for one in given_steps(scenario, "publish"):
+        if one.get("topic") != topic:
+            continue
+        if {"count", "duration_s", "background", "values"} & one.keys():
+            return []
+        spots.append(_place_in(one.get("value")))
+    return spots
+
+
+def _place_in(value: object) -> tuple[float, float] | None:
+    for where in POSITIONS:
+        inside = as_map(value)
+        for key in where.split(".") if where else ():
+            inside = as_map(inside.get(key))
+        if "x" in inside and "y" in inside:
+            return _spot([inside["x"], inside["y"]])
+    return None
+
+
+class _Robot(NamedTuple):
+    """Where a robot starts, how fast it is, and how far its field reaches, where that is known."""
+
+    start: tuple[float, float] | None
+    fastest_m_s: float | None = None
+    field_m: float | None = None
+
+
+def _robot(about: _Asked, others: Sequence[dict[str, Any]]) -> _Robot:
+    topic = str(about.given.get("topic"))
+    if world := robot_of(about.scenario):
+        fastest = world.get("max_linear")
+        start = _spot(world.get("start"))
+        return _Robot(
+            start if topic == "/base_pose_ground_truth" else (0, 0), fastest if is_number(fastest) else None
+        )
+    if not topic.startswith("/turtle1/"):
+        return _Robot(None)
+    bounds = [as_map(one.get("with")) for one in others if one.get("check") == "field-bounds"]
+    speeds = [b["max"] for b in bounds if b.get("topic") == "/turtle1/cmd_vel" and b.get("field") == "linear.x"
+              and is_number(b.get("max"))]  # fmt: skip
+    is_moved = "calls" in about.scenario or given_steps(about.scenario, "call")
+    middle = None if is_moved else (FIELD_M / 2, FIELD_M / 2)
+    return _Robot(middle, min(speeds, default=None), FIELD_M if topic == "/turtle1/pose" else None)
+
+
+def _too_far(about: _Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fault]:
+    """Yield places that the robot of the scenario cannot come to."""
+    given, robot, longest_s = about.given, _robot(about, others), _longest_s(about.scenario)
+    farthest_m = robot.fastest_m_s * longest_s if robot.fastest_m_s and longest_s else math.inf
+    limit = f"{longest_s or 0:g} s at {robot.fastest_m_s or 0:g} m/s are {farthest_m:.3g} m"
+    least_m, tolerance_m = given.get("least_m"), given.get("tolerance_m")
+    if about.check == "stays-within":
+        if is_number(least_m) and least_m > farthest_m:
+            yield (*about.path, "least_m"), f"it cannot come so far: {limit}"
+        return
+    if not is_number(tolerance_m):
+        return
+    if about.check == "ends-at":
+        yield from _goal_faults(about, others, robot, farthest_m, limit)
+        return
+    way = [spot for point in _items(given.get("points")) if (spot := _spot(point))]
+    relative = given.get("relative", True)
+    length_m = sum(math.dist(a, b) for a, b in pairwise(way))
+    if length_m - 2 * tolerance_m * len(way) > farthest_m:
+        yield (*about.path, "points"), f"it cannot come so far: the way is {length_m:.3g} m, and {limit}"
+    shift = (robot.start or (0, 0)) if relative else (0, 0)
+    if robot.field_m is not None and (robot.start or not relative):
+        for number, (x, y) in enumerate(way):
+            if not _is_inside((x + shift[0], y + shift[1]), robot.field_m, tolerance_m):
+                yield (*about.path, "points", number), _outside(x + shift[0], y + shift[1])
+
+
+def _is_inside(spot: tuple[float, float], field_m: float, tolerance_m: float) -> bool:
+    return all(-tolerance_m <= one <= field_m + tolerance_m for one in spot)
+
+
+def _outside(x: float, y: float) -> str:
+    return f"({x:g}, {y:g}) is outside of the turtle's field, which is {FIELD_M:g} m long on each side"
+
+
+def _goal_faults(
+    about: _Asked, others: Sequence[dict[str, Any]], robot: _Robot, farthest_m: float, limit: str
+) -> Iterator[Fault]:
+    given, goal, tolerance_m = about.given, _spot(about.given.get("goal")), about.given["tolerance_m"]
+    number, within_s = given.get("number", 1), given.get("within_s")
+    if goal is None or given.get("relative") is True:
+        return
+    at = (*about.path, "goal")
+    asked = _asked_spots(given.get("asked_on"), about.scenario)
+    start = robot.start
+    if isinstance(number, int) and 0 < number <= len(asked):
+        start = asked[number - 2] if number > 1 else start
+        meant = asked[number - 1]
+        if meant is not None and math.dist(meant, goal) > tolerance_m:
+            yield at, f"message {number} on {given['asked_on']} asks for {_pair(meant)}, not {_pair(goal)}"
+            return
+    if robot.field_m is not None and not _is_inside(goal, robot.field_m, tolerance_m):
+        yield at, _outside(*goal)
+        return
+    away_m = math.dist(start, goal) - 2 * tolerance_m if start else 0
+    if away_m > farthest_m:
+        yield at, f"it cannot come so far: {limit}"
+    elif robot.fastest_m_s and is_number(within_s) and away_m > robot.fastest_m_s * within_s:
+        needed = f"{away_m:.3g} m from {_pair(start or goal)} at {robot.fastest_m_s:g} m/s"
+        yield (*about.path, "within_s"), f"{needed} take longer than {within_s:g} s"
+    for one in others if not given.get("relative") else ():
+        kept = as_map(one.get("with"))
+        corners = [_spot(corner) for corner in _items(kept.get("box"))]
+        same = one.get("check") == "stays-within" and kept.get("topic") == given.get("topic")
+        known = len(corners) == 2 and None not in corners and not kept.get("relative")
+        if same and known and not _is_between(goal, corners, tolerance_m):
+            yield at, f"is outside of the box that {one.get('id')} keeps it in"
+
+
+def _is_between(spot: tuple[float, float], corners: Sequence[Any], tolerance_m: float) -> bool:
+    return all(
+        min(a, b) - tolerance_m <= one <= max(a, b) + tolerance_m
+        for one, a, b in zip(spot, *corners, strict=True)
+    )
+
+
+def _pair(spot: tuple[float, float]) -> str:
+    return f"({spot[0]:g}, {spot[1]:g})"
+
+
+class _Demand(NamedTuple):
+    """Between which values a criterion wants a field, in every message or in some."""
+
+    low: float
+    high: float
+    every: bool
+
+
+def _contradictions(criteria: Sequence[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+    """Yield criteria that no run passes which passes an earlier one."""
+    before: dict[tuple[str, ...], list[tuple[str, _Demand]]] = {}
+    for index, criterion in criteria:
+        given, check = as_map(criterion.get("with")), str(criterion.get("check"))
+        asked = as_map(given.get("effect")) if check == "reacts" else given
+        at = ("criteria", index, "with", *(("effect",) if check == "reacts" else ()))
+        of = given.get("of", "student")
+        key = tuple(map(str, (criterion.get("scenario"), asked.get("topic"), asked.get("field"), of)))
+        for demand in _demands(check, asked) if criterion.get("scenario") else ():
+            for name, other in before.get(key, ()):
+                if (demand.every or other.every) and (demand.low > other.high or demand.high < other.low):
+                    both = (
+                        f"{name} wants {asked.get('field')} of {asked.get('topic')} otherwise in the same run"
+                    )
+                    yield (
+                        at,
+                        both
+                        if demand.every and other.every
+                        else f"{both}: give one of them when: first, last or any",
+                    )
+            before.setdefault(key, []).append((str(criterion.get("id")), demand))
+
+
+def _demands(check: str, asked: dict[str, Any]) -> Iterator[_Demand]:
+    low, high, value = asked.get("min", -math.inf), asked.get("max", math.inf), asked.get("value")
+    tolerance = asked.get("tolerance", 0)
+    every = check == "field-bounds" and asked.get("share", 1) == 1
+    if check == "field-equals":
+        every = asked.get("when", "every") == "every" and "values" not in asked
+    elif check not in {"field-bounds", "reacts"} or asked.get("items") == "any":
+        return
+    if is_number(tolerance) and "field" in asked:
+        for one in _items(asked.get("values")) if "values" in asked else [value]:
+            if is_number(one):
+                yield _Demand(one - tolerance, one + tolerance, every)
+    if value is None and is_number(low) and is_number(high) and check != "field-equals":
+        yield _Demand(low, high, every)
