@@ -200,8 +200,8 @@ ROLES = (
 
 
 def _has_role_of(one: str, other: str) -> bool:
-    """Return whether two scripts are called by different words for the same kind of node, `talker.py` and
-    `my_publisher.py`. By the same word they are two that a lab asks for."""
+    """Return whether two scripts are called by different words for the same kind of node, "talker" and
+    "publisher". By the same word they are two that a lab asks for."""
     given, wanted = (PurePosixPath(path).stem.casefold().split("_") for path in (one, other))
     return any(
         word in wanted and set(words).intersection(given) - {word} and word not in given

@@ -196,6 +196,15 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
         message = f"{message}: {off[2]} in line {off[1]} leaves the one that is there out"
         hint = f"remove {off[2]} from line {off[1]}, or give its <arg> the other default"
         return failed(message, hint=hint if "$(arg" in off[2] else hint.partition(",")[0], citations=cited)
+    swapped = next(
+        (n for n in file.nodes if n.pkg in {name, PurePosixPath(name).stem} and n.type == pkg), None
+    )
+    if swapped is not None:
+        cited = (FileCitation(file=file.path, line=swapped.line),)
+        message = f"{message}: in line {swapped.line}, pkg and type stand in each other's place"
+        return failed(
+            message, hint=f'write pkg="{pkg}" type="{name}" in line {swapped.line}', citations=cited
+        )
     unknown = (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node")
     for tag, line in unknown:
         cited = (FileCitation(file=file.path, line=line),)
