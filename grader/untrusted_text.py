@@ -88,6 +88,8 @@ def json_text(data: object, *, ascii_only: bool = False) -> str:
 def clipped(data: Any, limit: int) -> Any:  # noqa: ANN401 - JSON
     """Return the data with every text clipped to what JSON writes in `limit` characters, and of citations the first."""
     if isinstance(data, str):
+        if len(data) <= limit and "##" not in data and data.isascii() and data.isprintable():
+            return data
         head = _fitting(data, limit, _json_escaped)
         return _cut(head, len(data) - len(head))
     if isinstance(data, dict):

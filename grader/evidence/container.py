@@ -68,7 +68,7 @@ _OUTSIDE: dict[int, _Read] = {
 
 def records(stream: BinaryIO) -> Iterator[McapRecord | Messages]:
     """Yield every record that carries content, those inside chunks included; indexes are passed over. Messages come
-    many at a time, before any other record that stands behind them.
+    many at a time, behind the schemas and channels that stand before them.
 
     All checksums are verified, and so is the end of the file. Raises ContainerError, and whatever `mcap`,
     `zstandard` and `lz4` raise for a damaged file.
@@ -158,6 +158,7 @@ def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord | Messages]:
     padded = plain + bytes(_WHOLE_HEAD.size)  # so that the head of a message can be read of any record
     read_head, new, message_op = _WHOLE_HEAD.unpack_from, tuple.__new__, int(Opcode.MESSAGE)
     messages: Messages = defaultdict(list)
+    described = _IN_CHUNK.keys()
     while at < size_bytes:
         opcode, length, channel_id, sequence, time_ns, _ = read_head(padded, at)
         begin = at + head_bytes
@@ -169,15 +170,12 @@ def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord | Messages]:
         if opcode == message_op and length >= MESSAGE_HEAD_BYTES:
             row = (time_ns, sequence, plain[begin + MESSAGE_HEAD_BYTES : at])
             messages[channel_id].append(new(Message, row))
-            if count < BATCH:
-                continue
-        described = opcode in _IN_CHUNK
-        if count >= BATCH or (described and messages):
+        elif opcode in described:
+            yield _IN_CHUNK[opcode](plain[begin:at])
+        if count >= BATCH:
             meter.records(count)
             yield messages
             messages, count = defaultdict(list), 0
-        if described:
-            yield _IN_CHUNK[opcode](plain[begin:at])
     meter.records(count)
     yield messages
 

@@ -214,10 +214,23 @@ def _identity(file: Path) -> object:
 
 def _recordings(folder: Path) -> list[Path]:
     with _listable(folder):
-        places = [folder, folder / "evidence"]
-        places += [f for p in places for f in sorted(p.glob("*")) if OTHER_RUNS.fullmatch(f.name)]
-        found = [f for p in places for f in sorted(p.glob("*")) if f.suffix in SUFFIXES]
-        return [f for f in found if f.is_file() and not f.name.startswith(".")]
+        listed = {place: _names(place) for place in (folder, folder / "evidence")}
+        for place, names in list(listed.items()):
+            listed |= {place / name: _names(place / name) for name in names if OTHER_RUNS.fullmatch(name)}
+        found = [place / name for place, names in listed.items() for name in names if _is_recording(name)]
+        return [file for file in found if file.is_file()]
+
+
+def _names(folder: Path) -> list[str]:
+    """Return the names in a folder, in order; none where there is no such folder, or it may not be looked into."""
+    try:
+        return sorted(os.listdir(folder))  # noqa: PTH208 - names alone: Path objects of all take most of the time
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        return []
+
+
+def _is_recording(name: str) -> bool:
+    return not name.startswith(".") and os.path.splitext(name)[1] in SUFFIXES  # noqa: PTH122 - as above
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, wraps
@@ -151,7 +152,8 @@ class Channel:
         """
         try:
             decoder = self.decoder(self.budget)
-            self.budget.decode(sum([decoder.decoded_bytes(len(message.data)) for message in self.messages]))
+            sizes = Counter([len(message.data) for message in self.messages])
+            self.budget.decode(sum(count * decoder.decoded_bytes(size) for size, count in sizes.items()))
         except BudgetExceeded as error:
             raise EvidenceError(f"{self.topic}: {error}", hint="publish less on it") from error
         return tuple([decoder.decode(m.data) for m in self.messages])

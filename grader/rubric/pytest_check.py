@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 from contextlib import suppress
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal, NamedTuple
 
@@ -61,6 +61,7 @@ class TestsBroken(Exception):
     __test__ = False
 
 
+@lru_cache(maxsize=8)
 def pytest_check(folder: Path) -> Check:
     """Return the check `pytest` for the rubric in this folder."""
     title, sections = parts(inspect.getdoc(run_tests) or "")

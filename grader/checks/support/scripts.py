@@ -54,7 +54,7 @@ def find_script(package: PackageFacts, path: str) -> SourceFile | None:
     """Return the file at this path, or one of the same name in another folder (those for nodes first)."""
 
     def rank(file: SourceFile) -> tuple[bool, bool, bool, str]:
-        folder = PurePosixPath(file.path).parts[0]
+        folder = file.path.partition("/")[0]
         return file.path != path, folder not in NODE_FOLDERS, file.executable is False, file.path
 
     return min(copies_of(package, path), key=rank, default=None)
@@ -63,12 +63,12 @@ def find_script(package: PackageFacts, path: str) -> SourceFile | None:
 def copies_of(package: PackageFacts, path: str) -> list[SourceFile]:
     """Return all files of this name in the package, whatever their folder; what a build made is none of them."""
     name = PurePosixPath(path).name
-    return [f for f in package.files if PurePosixPath(f.path).name == name and not is_product(f.path)]
+    return [f for f in package.files if f.path.rpartition("/")[2] == name and not is_product(f.path)]
 
 
 def is_product(path: str) -> bool:
     """Return whether a build made it: nothing of what was handed in counts there."""
-    return PurePosixPath(path).parts[0] in {"build", "devel", "install"}
+    return path.partition("/")[0] in {"build", "devel", "install"}
 
 
 def path_in_package(package: PackageFacts, file: str) -> str | None:
