@@ -67,6 +67,8 @@ def clip(text: str, limit: int) -> str:
 def line(text: str, limit: int) -> str:
     """Return one visible line that is hardly longer than `limit` characters; it says how many of `text` are left
     out."""
+    if len(text) <= limit and len(shown := visible(text)) <= limit:
+        return shown
     head = _fitting(text, limit, visible)
     return _cut(visible(head), len(text) - len(head))
 
