@@ -69,7 +69,7 @@ class CriterionChange:
     why: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Regraded:
     """One submission: its points before and after, what changed, in the new rubric's order, and the scenarios without a
     recording that fits.
