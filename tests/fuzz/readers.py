@@ -15,6 +15,7 @@ from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
 
+from grader.arena.limits import RunLimits
 from grader.arena.sandbox import Sandbox
 from grader.arena.scenario_inputs import settings
 from grader.arena.session import ArenaSession
@@ -58,7 +59,7 @@ PART = b"%%% "
 SMALL = IntakeLimits(total_bytes=8 << 20, entries=500)
 RECORD_BYTES_MAX = 24 << 20
 LINE_MAX = 2000
-PLACE = SimpleNamespace(sandbox=Sandbox(bubblewrap=True, uid=None))
+PLACE = SimpleNamespace(sandbox=Sandbox(bubblewrap=True, uid=None), limits=RunLimits())
 ENVELOPE = {"scenario": "talker", "clock": "real", "warp": 1.0, "metadata": {}}
 
 
