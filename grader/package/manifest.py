@@ -6,47 +6,18 @@ What catkin_pkg refuses is put in plain words.
 from __future__ import annotations
 
 import re
-import sys
 import threading
 import warnings
-from collections.abc import Iterator, Mapping
-from functools import cache
-from importlib.util import find_spec, module_from_spec
+from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 
+from catkin_pkg.condition import evaluate_condition
+from catkin_pkg.package import InvalidPackage, Package, parse_package_string
 from lxml import etree
 
 from grader.model.package import Dependency, Fault, Manifest, Person
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_xml
-
-CONDITION = "catkin_pkg.condition"
-_conditions_spec = find_spec(CONDITION)
-
-
-@cache
-def _conditions() -> ModuleType:
-    """Return catkin_pkg's own module of conditions."""
-    assert _conditions_spec is not None  # noqa: S101 - catkin_pkg has it
-    assert _conditions_spec.loader is not None  # noqa: S101 - it is a file
-    module = module_from_spec(_conditions_spec)
-    _conditions_spec.loader.exec_module(module)
-    return module
-
-
-def evaluate_condition(condition: str | None, context: Mapping[str, str]) -> bool:
-    """Return whether a condition holds (REP 149); none always does."""
-    return condition is None or bool(_conditions().evaluate_condition(condition, context))
-
-
-if CONDITION not in sys.modules:
-    # For conditions, which few manifests have, catkin_pkg loads pyparsing: longer than all the rest of it takes.
-    sys.modules[CONDITION] = ModuleType(CONDITION)
-    sys.modules[CONDITION].__spec__ = _conditions_spec
-    sys.modules[CONDITION].evaluate_condition = evaluate_condition  # type: ignore[attr-defined]
-
-from catkin_pkg.package import InvalidPackage, Package, parse_package_string  # noqa: E402 - it imports that module
 
 MANIFEST = "package.xml"
 _TEXT_CHARS_MAX = 4_000
