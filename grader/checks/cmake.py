@@ -98,7 +98,7 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
 def _fault(fault: Fault | None) -> Iterator[str]:
     if fault is not None:
         line = f"line {fault.line}: " if fault.line else ""
-        yield f"{line}CMake cannot read it: {fault.cause or fault.message}"
+        yield f"{line}CMake cannot read it: {fault.explanation}"
 
 
 def _misspelt(facts: CMakeFacts, name: str) -> CMakeCall | None:

@@ -133,7 +133,7 @@ def _syntax_verdict(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -
     ]
     source = f", {where}: {shown(fault.source.strip())}" if fault.source.strip() else ""
     return failed(
-        f"{file.path} {where}: {fault.kind}: {fault.cause or fault.message}{others}",
+        f"{file.path} {where}: {fault.kind}: {fault.explanation}{others}",
         measured=f"{file.path}: {_mode(file)}, {_first_line(file)}{source}",
         hint="; ".join(fixes),
         citations=(fault.place, *((_cite_shebang(file),) if any(shebang_obstacles(file)) else ())),

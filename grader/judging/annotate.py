@@ -93,11 +93,10 @@ def _points(package: PackageFacts) -> Iterator[tuple[FileCitation, str]]:
     for file in package.files:
         fault = None if file.path.endswith(BACKUPS) else file.python_fault
         if fault is not None and fault.kind in SYNTAX and not is_product(file.path):
-            why = fault.cause or fault.message
+            why = fault.explanation
             hint = syntax_hint(fault)
-            text = f"{file.path} has a syntax error: {why}" + (
-                "" if why.endswith(hint.partition(": ")[2]) else f"; {hint}"
-            )
+            told = "" if hint == fault.advice else f"; {hint}"
+            text = f"{file.path} has a syntax error: {why}{told}"
             yield FileCitation(file=file.path), text
     for slip in package.slips:
         if slip.kind == "misspelt" and not is_product(slip.file):
@@ -105,7 +104,7 @@ def _points(package: PackageFacts) -> Iterator[tuple[FileCitation, str]]:
             yield slip.place, text
     for launch in package.launch_files:
         if launch.fault is not None:
-            why = launch.fault.cause or launch.fault.message
+            why = launch.fault.explanation
             yield launch.fault.place, f"{launch.path}, line {launch.fault.line}, is not well-formed: {why}"
         yield from _nodes(package, launch)
 

@@ -144,8 +144,8 @@ def _unreadable(
     if file.fault is None:
         return None
     line = f", line {file.fault.line}" if file.fault.line else ""
-    message = f"{file.path}{line} is not well-formed: {file.fault.cause or file.fault.message}"
-    hint = file.fault.fix or "close every element, and begin with <launch> and end with </launch>"
+    message = f"{file.path}{line} is not well-formed: {file.fault.explanation}"
+    hint = file.fault.advice or "close every element, and begin with <launch> and end with </launch>"
     return failed(message, hint=hint, citations=(file.fault.place,))
 
 
@@ -215,7 +215,7 @@ def illegal_name(node: LaunchNode) -> Slip | None:
 def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
     """Yield what makes roslaunch start nothing at all."""
     for fault in file.include_faults:
-        yield Slip(fault.file or file.path, fault.line or 1, fault.message, fault.fix)
+        yield Slip(fault.file or file.path, fault.line or 1, fault.message, fault.advice)
     seen: dict[str, LaunchNode] = {}
     for node in file.brings:
         slip = node_slip(package, node)
@@ -492,7 +492,7 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         return Absence(f"it died: {end.cause}", end.hint, True, cited, end.of_machine)
     if script is not None and script.python_fault is not None:
         fault = script.python_fault
-        why = f"it died: {fault.kind}: {fault.cause or fault.message}"
+        why = f"it died: {fault.kind}: {fault.explanation}"
         return Absence(why, syntax_hint(fault), of_script=True, citations=(fault.place,))
     if script is not None and code in NOT_EXECUTED and any(shebang_obstacles(script)):
         return not_started(script)
