@@ -89,29 +89,35 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
     elif one is None or one.end is None:
         verdict = inconclusive(f"rosparam load {source.path} was not run to its end", hint="grade again")
     else:
-        missing = [name for name in wanted if found.get(name) in (None, {})]
-        there = [name for name in wanted if name not in missing]
-        moved = f"the handout puts it at {params.file}; move it there" if source.path != params.file else ""
         verdict = (
             _error(run, one, source.path, build)
-            or (
-                _missing(found, missing, source.path, package, build).in_part(
-                    len(there) / len(wanted), join_words(there)
-                )
-                if missing
-                else None
-            )
+            or _names_missing(found, wanted, source.path, package, build)
             or passed(
                 f"{source.path} loads and sets {join_words(wanted)}",
-                hint="; ".join(
-                    filter(None, (moved, _duplicate_advice(source.path, _keys_of(build, source.path))))
-                ),
+                hint=_advice(params.file, source.path, build),
             )
         )
     measured = f"on the server: {join_words(found)}" if found else "nothing on the server"
     cited: tuple[Citation, ...] = (cite(run, "/grader/param"),)
     place = (FileCitation(file=source.path),) if source and not verdict.citations else ()
     return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, *place, *cited))
+
+
+def _names_missing(
+    found: dict[str, object], wanted: list[str], path: str, package: PackageFacts, build: Run
+) -> Verdict | None:
+    """Return the loss where names of the lab are not on the server once the file is loaded."""
+    missing = [name for name in wanted if found.get(name) in (None, {})]
+    there = [name for name in wanted if name not in missing]
+    if not missing:
+        return None
+    lost = _missing(found, missing, path, package, build)
+    return lost.in_part(len(there) / len(wanted), join_words(there))
+
+
+def _advice(asked: str, path: str, build: Run) -> str:
+    moved = f"the handout puts it at {asked}; move it there" if path != asked else ""
+    return "; ".join(filter(None, (moved, _duplicate_advice(path, _keys_of(build, path)))))
 
 
 def _no_file(package: PackageFacts, build: Run, path: str, wanted: list[str]) -> Verdict:
