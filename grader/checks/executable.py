@@ -114,7 +114,7 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
         verdict = failed(message, hint="; ".join(o.fix for o in obstacles))
         verdict = verdict if found.shebang_fault == "empty-file" else verdict.lost_by(kind, found.path)
     else:
-        message = f"whether {found.path} is executable cannot be seen: the submission carries no file modes"
+        message = f"whether {found.path} is executable cannot be told: the submission has no file modes"
         verdict = inconclusive(
             message, hint="hand in a git repository or a .tar.gz: both keep which files are executable"
         )

@@ -185,7 +185,7 @@ def _missing(
     hint = f"write it so that rosparam list shows exactly {name}"
     root = name.split("/")[1]
     if all(one.removeprefix(f"/{root}") in found for one in missing):
-        hint = f"write `{root}:` above them, and indent them all by two spaces more"
+        hint = f"write `{root}:` above them, and indent them all by two more spaces"
     elif shallow in found:
         readers = join_words(_readers(package, build, shallow, above))
         hint = f"{moved}; then read it there in {readers} too" if readers else moved

@@ -235,7 +235,9 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
         f"{meant} in find_package(…) and in package.xml; a package of your own must be pushed with this one"
     )
     why = f"find_package(…) names {name}, but there is no package of that name"
-    return Explained(f"{why}: the help of catkin_create_pkg calls a package so" if placeholder else why, hint)
+    return Explained(
+        f"{why}: it is only an example in the help of catkin_create_pkg" if placeholder else why, hint
+    )
 
 
 def _missing_library(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
@@ -487,7 +489,8 @@ def _explain_undeclared(found: re.Match[str], _package: PackageFacts, _lines: Se
         return Explained(found.string, f"write std::{name}, and #include <{STANDARD[name]}> at the top")
     declare = f"declare {name} above that line, or include the header that does"
     return Explained(
-        found.string, f"write {near} there, if that is what you mean; else {declare}" if near else declare
+        found.string,
+        f"write {near} there, if that is what you mean; otherwise {declare}" if near else declare,
     )
 
 

@@ -76,7 +76,7 @@ CAUSES = {
     "NameError": ("", "check the spelling, and that it is imported or assigned before it is used"),
     "ROSSerializationException": ("", "publish a value that fits the message's type"),
     "SerializationError": ("", "publish a value that fits the message's type"),
-    "SyntaxError": ("", "compare that line, and the end of the one above it, with the handout's, sign by sign"),
+    "SyntaxError": ("", "compare that line and the end of the one above it with the handout, character by character"),
     "IndentationError": ("", "indent every block by four spaces, each of its lines the same"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }  # fmt: skip
