@@ -81,7 +81,7 @@ _REFUSALS = (
 
 class Slip(NamedTuple):
     """What is wrong with a line of a launch file, and what to write. `of_manifest`: the manifest's name is at fault;
-    `refused`: roslaunch starts nothing at all."""
+    `refused`: roslaunch starts nothing at all; `lacks`: the program that is not there."""
 
     file: str
     line: int
@@ -89,6 +89,7 @@ class Slip(NamedTuple):
     fix: str
     of_manifest: bool = False
     refused: bool = False
+    lacks: str = ""
 
     def verdict(self, said: str = "") -> Verdict:
         """Return the verdict with what roslaunch said (`said`) at the end."""
@@ -195,11 +196,12 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
     if UNRESOLVED in pkg + name:
         return None
     if owner := _owner(package, node):
-        return None if has_program(owner, name) else _no_program(owner, node, (package, *package.also))
+        there = has_program(owner, name)
+        return None if there else _no_program(owner, node, (package, *package.also))._replace(lacks=name)
     if near_names(package.name, [pkg]) or f"[{pkg}/{name}]" in said or _folder(package) == pkg:
         slip = _slip(node, f"there is no {name} in a package {pkg}", f'write pkg="{package.name}"')
         # Where the launch file has the name of the folder or of project(…), the manifest is at fault.
-        return slip._replace(of_manifest=pkg in {_folder(package), *_projects(package)})
+        return slip._replace(of_manifest=pkg in {_folder(package), *_projects(package)}, lacks=name)
     return None
 
 
