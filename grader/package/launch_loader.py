@@ -223,7 +223,7 @@ class _Loader:
             return
         self.loaded.included += 1
         if depth >= DEPTH_MAX or self.loaded.included > INCLUDES_MAX:
-            message = "launch files that include each other without an end"
+            message = "launch files that include each other endlessly"
             self.loaded.faults.append(_fault(element, scope, message))
             return
         root, fault = self._find(path)
