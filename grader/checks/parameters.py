@@ -89,14 +89,9 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
     elif one is None or one.end is None:
         verdict = inconclusive(f"rosparam load {source.path} was not run to its end", hint="grade again")
     else:
-        verdict = (
-            _error(run, one, source.path, build)
-            or _names_missing(found, wanted, source.path, package, build)
-            or passed(
-                f"{source.path} loads and sets {join_words(wanted)}",
-                hint=_advice(params.file, source.path, build),
-            )
-        )
+        lost = _error(run, one, source.path, build)
+        lost = lost or _names_missing(found, wanted, source.path, package, build)
+        verdict = lost or _loaded(wanted, params.file, source.path, build)
     measured = f"on the server: {join_words(found)}" if found else "nothing on the server"
     cited: tuple[Citation, ...] = (cite(run, "/grader/param"),)
     place = (FileCitation(file=source.path),) if source and not verdict.citations else ()
@@ -115,9 +110,10 @@ def _names_missing(
     return lost.in_part(len(there) / len(wanted), join_words(there))
 
 
-def _advice(asked: str, path: str, build: Run) -> str:
+def _loaded(wanted: list[str], asked: str, path: str, build: Run) -> Verdict:
     moved = f"the handout puts it at {asked}; move it there" if path != asked else ""
-    return "; ".join(filter(None, (moved, _duplicate_advice(path, _keys_of(build, path)))))
+    advice = "; ".join(filter(None, (moved, _duplicate_advice(path, _keys_of(build, path)))))
+    return passed(f"{path} loads and sets {join_words(wanted)}", hint=advice)
 
 
 def _no_file(package: PackageFacts, build: Run, path: str, wanted: list[str]) -> Verdict:
