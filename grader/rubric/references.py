@@ -16,11 +16,13 @@ from pydantic import ValidationError
 from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
 from grader.ros_packages import TypeKind, ros_packages
+from grader.rubric.arguments import argument_faults
+from grader.rubric.frames import frame_faults
 from grader.rubric.message_fields import field_faults, services_in
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Scenario, Step, Until
-from grader.rubric.spelling import argument_faults, texts_in
+from grader.rubric.spelling import texts_in
 from grader.rubric.standins import asked_faults, only_publisher, parameter_faults
-from grader.rubric.step_faults import frame_faults, given_steps
+from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import closest, did_you_mean, join_words, plural
 

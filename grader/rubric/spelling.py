@@ -1,18 +1,16 @@
-"""Names in a rubric that one line alone has, those that may be a slip and those that surely are one; and arguments of
-starts that ROS would take for others."""
+"""Names in a rubric that one line alone has: those that may be a slip, and those that surely are one."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
-from typing import Any, NamedTuple
+from typing import Any
 
 from grader.checks.support.topics import SYSTEM_TOPICS
-from grader.rubric.message_fields import slip_of, types_of
-from grader.rubric.standins import PROGRAMS, set_in
+from grader.rubric.message_fields import types_of
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
-from grader.wording import did_you_mean, is_one_edit, join_words
+from grader.wording import is_one_edit
 
 ONE_NAME = re.compile(
     r"/[A-Za-z][\w/]*|[\w./-]*\.(?:py|cpp|launch|ya?ml|csv|txt|bag|pgm|urdf|srv|msg|action)"
@@ -128,83 +126,3 @@ def texts_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, str]]:
     elif isinstance(value, list):
         for index, inner in enumerate(value):
             yield from texts_in((*path, index), inner)
-
-
-# ---- arguments of starts
-
-SPECIAL = ("__name", "__ns", "__log", "__ip", "__hostname", "__master")
-
-
-class Known(NamedTuple):
-    """What the rubric names: topics and services, the last parts of parameters' names, and words of its texts."""
-
-    topics: frozenset[str]
-    params: frozenset[str]
-    words: frozenset[str]
-
-
-def argument_faults(scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the faults of one scenario's arguments."""
-    known: Known | None = None
-    for index, start in as_maps(scenario.get("start")):
-        for number, text in as_texts(start.get("args")):
-            known = known or _known(rubric)
-            fault = _no_colon(text, start) or _fault(text, start, known)
-            if fault:
-                yield ("start", index, "args", number), fault
-
-
-def _no_colon(text: str, start: dict[str, Any]) -> str:
-    """Return that `_rate=5` sets no parameter, and `gui=false` no argument."""
-    name, mark, value = text.partition("=")
-    is_meant = re.fullmatch(r"\w+", name) and (start.get("launch") is not None or name.startswith("_"))
-    return f"ROS reads {name}:={value}, with a colon, and not {text}" if mark and is_meant else ""
-
-
-def _fault(text: str, start: dict[str, Any], known: Known) -> str:
-    name, mark, value = text.partition(":=")
-    if (
-        not mark
-        or start.get("launch") is not None
-        or str(start.get("program")).endswith((".launch", ".test"))
-    ):
-        return ""
-    if name.startswith("__"):
-        return "" if name in SPECIAL else f"ROS has no {name}{did_you_mean(name, SPECIAL)}"
-    spaces = {topic.split("/")[1] for topic in known.topics}
-    if name == "_ns" and value.strip("/") in spaces:
-        return f"ROS reads __ns:={value}, with two underscores"
-    return "" if name.startswith("_") else _remap(name, value, start, known)
-
-
-def _remap(name: str, value: str, start: dict[str, Any], known: Known) -> str:
-    """Return why nothing is remapped that the rubric speaks of."""
-    last = name.rpartition("/")[2]
-    program = PROGRAMS.get(str(start.get("program")))
-    sources = {topic.rpartition("/")[2] for topic in (program.topics if program else known.topics)}
-    if last not in sources and last in known.params:
-        return f"{last} is a parameter, and this remaps a topic: write _{last}:={value}"
-    if last not in sources and (near := slip_of(last, sources)):
-        return f'nothing else in the rubric names {name} (did you mean "{near}:={value}"?)'
-    if program and not program.is_installed and last not in sources:
-        return f"{program.node} has no topic {name}: it has {join_words(sorted(sources))}"
-    targets = {topic.rpartition("/")[2] for topic in known.topics}
-    space = dict(arg.split(":=", 1) for _, arg in as_texts(start.get("args")) if ":=" in arg).get("__ns", "")
-    whole = value if value.startswith("/") else f"/{space.strip('/')}/{value}".replace("//", "/")
-    if whole in known.topics:
-        return ""
-    alike = sorted(t for t in known.topics if t.rpartition("/")[2] == value.rpartition("/")[2])
-    near = (alike[0] if value.startswith("/") and alike else "") or slip_of(whole, known.topics)
-    if near:
-        return f'nothing else in the rubric names {whole} (did you mean "{name}:={near}"?)'
-    is_known = last in sources | known.words or value.rpartition("/")[2] in targets | known.words
-    return "" if is_known else f"nothing else in the rubric names {name} or {value}"
-
-
-def _known(rubric: dict[str, Any]) -> Known:
-    scenarios = [as_map(one) for one in as_map(rubric.get("scenarios")).values()]
-    params = {str(one.get("name")) for scenario in scenarios for _, one in set_in(scenario)}
-    texts = [(path, text) for path, text in texts_in((), rubric) if "args" not in path]
-    topics = {text for path, text in texts if re.fullmatch(r"(/\w+)+", text) and not PROSE & {*path}} - params
-    words = {word for path, text in texts if PROSE & {*path} for word in re.findall(r"\w+", text)}
-    return Known(frozenset(topics), frozenset(name.rpartition("/")[2] for name in params), frozenset(words))
