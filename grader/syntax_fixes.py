@@ -60,97 +60,114 @@ PLAIN = str.maketrans(
 """What web pages and PDF files have in place of plain quotes and spaces."""
 
 
+DELETE_LINE = "delete this line"
+
+
+class Reason(NamedTuple):
+    """What is wrong in a student's words, "" where the parser's own say enough, and what to do, "" where the change
+    itself shows it or nothing is sure."""
+
+    why: str = ""
+    fix: str = ""
+
+    @property
+    def text(self) -> str:
+        """Both in one sentence."""
+        return f"{self.why}: {self.fix}" if self.fix else self.why
+
+
 class _Habit(NamedTuple):
-    """`pattern` is looked for in the line without its comment and its texts' contents; `{0}` in `cause` is its first
-    group. `rewrites` are pairs for `re.sub`, one after the other."""
+    """`pattern` is looked for in the line without its comment and its texts' contents; `{0}` in `why` and `fix` is its
+    first group. `rewrites` are pairs for `re.sub`, one after the other."""
 
     pattern: str
-    cause: str
+    why: str
+    fix: str = ""
     rewrites: tuple[tuple[str, str], ...] = ()
 
 
 _HABITS = (
-    _Habit(MERGE_MARKER.pattern, "git's merge markers (`<<<<<<<`) are still in the file: keep one version"),
+    _Habit(MERGE_MARKER.pattern, "git's merge markers (`<<<<<<<`) are still in the file", "keep one version"),
     _Habit(rf"^\s*(?:{_SHELL})",
-           "this is a command for the terminal, not Python: delete this line"),
-    _Habit(rf"\)\s*(?:{_SHELL}).*$", "a command for the terminal stands behind the code: delete it",
+           "this is a command for the terminal, not Python", DELETE_LINE),
+    _Habit(rf"\)\s*(?:{_SHELL}).*$", "a command for the terminal stands behind the code", "delete it",
            ((rf"\)\s*(?:{_SHELL}).*$", ")"),)),
-    _Habit(r"^\s*(using\s+namespace\b|#\s*include\b)", "this is C++, not Python: delete this line"),
+    _Habit(r"^\s*(using\s+namespace\b|#\s*include\b)", "this is C++, not Python", DELETE_LINE),
     _Habit(r"(?<![\w.])(r[^\w\s]spy|ro[^\w\s]py|ros[^\w\s]y|rosp[^\w\s.])\.", "`rospy` is misspelt as `{0}`",
-           ((r"(?<![\w.])(?:r[^\w\s]spy|ro[^\w\s]py|ros[^\w\s]y|rosp[^\w\s.])(?=\.)", "rospy"),)),
-    _Habit(r"^\s*>>>", "`>>>` is printed by Python's prompt: leave it out", ((r">>>\s?", ""),)),
-    _Habit(r"^\s*//", "a comment begins with `#` in Python", ((r"//+\s*", "# "),)),
+           "", ((r"(?<![\w.])(?:r[^\w\s]spy|ro[^\w\s]py|ros[^\w\s]y|rosp[^\w\s.])(?=\.)", "rospy"),)),
+    _Habit(r"^\s*>>>", "`>>>` is printed by Python's prompt", "leave it out", ((r">>>\s?", ""),)),
+    _Habit(r"^\s*//", "a comment begins with `#` in Python", "", ((r"//+\s*", "# "),)),
     _Habit(r"^\s*/\*", "a comment begins with `#` in Python",
-           ((r"/\*+\s*", "# "), (r"\s*\*+/\s*$", ""))),
-    _Habit(r"\S\s*//\s*\w+\s+\w", "a comment begins with `#` in Python", ((r"\s*;*\s*//\s*", "  # "),)),
+           "", ((r"/\*+\s*", "# "), (r"\s*\*+/\s*$", ""))),
+    _Habit(r"\S\s*//\s*\w+\s+\w", "a comment begins with `#` in Python", "", ((r"\s*;*\s*//\s*", "  # "),)),
     _Habit(r"^\s*(?:\}\s*)?for\s*\(.*;.*;.*\)", "Python's `for` takes its values from a range or a list",
-           ((_FOR, r"\1for \2 in range(\3, \4):"),)),
+           "", ((_FOR, r"\1for \2 in range(\3, \4):"),)),
     _Habit(r"\b(else\s+if|elseif|elsif)\b", "Python writes `elif`, not `{0}`",
-           ((r"^(\s*)\}\s*", r"\1"), (r"\b(?:else\s+if|elseif|elsif)\b", "elif"))),
-    _Habit(r"^\s*except\s+[\w.]+\s*,\s*\w+\s*:", "this is Python 2: write `except Error as name:`",
+           "", ((r"^(\s*)\}\s*", r"\1"), (r"\b(?:else\s+if|elseif|elsif)\b", "elif"))),
+    _Habit(r"^\s*except\s+[\w.]+\s*,\s*\w+\s*:", "this is Python 2", "write `except Error as name:`",
            ((r"^(\s*except\s+[\w.]+)\s*,\s*(\w+\s*:)", r"\1 as \2"),)),
-    _Habit(r"^\s*raise\s+[\w.]+\s*,", 'this is Python 2: write `raise Error("text")`',
+    _Habit(r"^\s*raise\s+[\w.]+\s*,", "this is Python 2", 'write `raise Error("text")`',
            ((r"^(\s*raise\s+[\w.]+)\s*,\s*(.+)$", r"\1(\2)"),)),
-    _Habit(r"^\s*print\s+[^(=\s]", "this is Python 2: `print` needs brackets, `print(...)`",
+    _Habit(r"^\s*print\s+[^(=\s]", "`print` has no brackets, as in Python 2", "write `print(...)`",
            ((r"^(\s*)print\s+([^>(\s](?:.*[^,;\s])?)\s*;*$", r"\1print(\2)"),)),
-    _Habit(r"^\s*exec\s+[^(=\s]", "this is Python 2: `exec` needs brackets, `exec(...)`",
+    _Habit(r"^\s*exec\s+[^(=\s]", "`exec` has no brackets, as in Python 2", "write `exec(...)`",
            ((r"^(\s*)exec\s+(.+)$", r"\1exec(\2)"),)),
-    _Habit(r"`", "backticks are Python 2: write `repr(x)` or `str(x)`", ((r"`([^`]+)`", r"repr(\1)"),)),
-    _Habit(r"<>", "`<>` is Python 2: write `!=`", ((r"\s*<>\s*", " != "),)),
-    _Habit(r"\bur['\"]", '`ur"..."` is Python 2: write `r"..."`', ((r"\bur(?=['\"])", "r"),)),
-    _Habit(r"\b\d+[lL]\b", "a number that ends with `L` is Python 2: leave the `L` out",
+    _Habit(r"`", "backticks are Python 2", "write `repr(x)` or `str(x)`", ((r"`([^`]+)`", r"repr(\1)"),)),
+    _Habit(r"<>", "`<>` is Python 2", "write `!=`", ((r"\s*<>\s*", " != "),)),
+    _Habit(r"\bur['\"]", '`ur"..."` is Python 2', 'write `r"..."`', ((r"\bur(?=['\"])", "r"),)),
+    _Habit(r"\b\d+[lL]\b", "a number that ends with `L` is Python 2", "leave the `L` out",
            ((r"\b(\d+)[lL]\b", r"\1"),)),
-    _Habit(r"\+\+|--\s*;*\s*$", "Python has no `++` and `--`: write `x += 1` in a line of its own",
+    _Habit(r"\+\+|--\s*;*\s*$", "Python has no `++` and `--`", "write `x += 1` in a line of its own",
            ((r"^(\s*)([\w.]+)\s*([+-])\3\s*;*$", r"\1\2 \3= 1"), (r"^(\s*)([+-])\2\s*([\w.]+)\s*;*$", r"\1\3 \2= 1"))),
     _Habit(r"&&|\|\||!(?!=)", "Python writes `and`, `or` and `not`",
-           ((r"\s*&&\s*", " and "), (r"\s*\|\|\s*", " or "), (r"!(?!=)\s*", "not "))),
+           "", ((r"\s*&&\s*", " and "), (r"\s*\|\|\s*", " or "), (r"!(?!=)\s*", "not "))),
     _Habit(r"(===|!==|=<|=>|\bnot\s*=)", "Python compares with `==`, `!=`, `<=` and `>=`, not with `{0}`",
-           ((r"===", "=="), (r"!==", "!="), (r"=<", "<="), (r"=>", ">="), (r"\s*\bnot\s*=+", " !="))),
-    _Habit(rf"^\s*{_BRACE}", "Python has no `{` and `}` around a block: end its first line with `:`",
+           "", ((r"===", "=="), (r"!==", "!="), (r"=<", "<="), (r"=>", ">="), (r"\s*\bnot\s*=+", " !="))),
+    _Habit(rf"^\s*{_BRACE}", "Python has no `{` and `}` around a block", "end its first line with `:`",
            ((rf"^(\s*)(?:\}}\s*)?({BLOCK}.*?)\s*\{{$", r"\1\2:"),)),
-    _Habit(r"^\s*[{}]\s*;?$", "this bracket closes nothing: delete this line"),
+    _Habit(r"^\s*[{}]\s*;?$", "this bracket closes nothing", DELETE_LINE),
     _Habit(r"^\s*(?:if|elif|while)\b.*\b(then|do)\s*:?$", "the line that begins a block ends with `:`, not with `{0}`",
-           ((r"\s+(?:then|do)\s*:?$", ":"),)),
+           "", ((r"\s+(?:then|do)\s*:?$", ":"),)),
     _Habit(r"^\s*(if|elif|while)\b[^=(:]*[^=!<>(:]=[^=]", "`=` gives a value to a name; to compare, write `==`",
-           ((r"(?<![=!<>])=(?!=)", "=="),)),
+           "", ((r"(?<![=!<>])=(?!=)", "=="),)),
     _Habit(rf"^\s*{BLOCK}.*;$", "the line that begins a block ends with `:`, not with `;`",
-           ((r"\s*:?(\s*;)+$", ":"),)),
+           "", ((r"\s*:?(\s*;)+$", ":"),)),
     _Habit(rf"^\s*{BLOCK}.*:\s*[^\s\w'\"()\[\]{{}}:]+$",
-           "something stands behind the `:` that ends the line: delete it",
+           "something stands behind the `:` that ends the line", "delete it",
            ((r":[^:]*$", ":"),)),
     _Habit(r"^\s*(?!lambda\b)(?:\w+(?:\.\w+)+\(.*|[\w.]+\s*=(?!=).*)[^:]:$",
-           "only a line that begins a block ends with `:`: leave it out", ((r"\s*:$", ""),)),
+           "only a line that begins a block ends with `:`", "leave it out", ((r"\s*:$", ""),)),
     _Habit(r"(?<![\w.])0+[1-9]\d*(?![\w.])",
-           "a number may not begin with 0: leave it out, or write 0o for an octal one",
+           "a number may not begin with 0", "leave it out, or write 0o for an octal one",
            ((r"(?<![\w.])0+(?=[1-9]\d*(?![\w.]))", ""),)),
-    _Habit(r";\s*;$", "a line of Python ends without `;`: delete it", ((r"(\s*;)+$", ""),)),
-    _Habit(r"\basync\b(?!\s+(def|for|with)\b)", "`async` is a reserved word since Python 3.7: use another name"),
+    _Habit(r";\s*;$", "a line of Python ends without `;`", "delete it", ((r"(\s*;)+$", ""),)),
+    _Habit(r"\basync\b(?!\s+(def|for|with)\b)", "`async` is a reserved word since Python 3.7", "use another name"),
     _Habit(rf"^\s*(?:self\.)?({_RESERVED})\s*=(?!=)",
-           "`{0}` is a reserved word of Python: use another name"),
-    _Habit(r"^\s*import\s+[\w, ]+\sfrom\s+[\w.]+\s*;*$", "the module comes first: write `from module import name`",
+           "`{0}` is a reserved word of Python", "use another name"),
+    _Habit(r"^\s*import\s+[\w, ]+\sfrom\s+[\w.]+\s*;*$", "the module comes first", "write `from module import name`",
            ((r"^(\s*)import\s+(.+?)\s+from\s+([\w.]+)\s*;*$", r"\1from \3 import \2"),)),
     _Habit(r"^\s*(?:public\s+|private\s+|static\s+)*(void|function|func|fun|fn|sub|define|int|float|double|bool|string)"
            r"\s+\w+\s*\(.*\)", "a function begins with `def`, not with `{0}`",
-           ((r"^(\s*)(?:public\s+|private\s+|static\s+)*\w+\s+(\w+\s*\(.*?\))\s*[:{]?$", r"\1def \2:"),)),
-    _Habit(r"\bnew\s+[A-Za-z_]", "Python has no `new`: leave it out", ((r"\bnew\s+", ""),)),
+           "", ((r"^(\s*)(?:public\s+|private\s+|static\s+)*\w+\s+(\w+\s*\(.*?\))\s*[:{]?$", r"\1def \2:"),)),
+    _Habit(r"\bnew\s+[A-Za-z_]", "Python has no `new`", "leave it out", ((r"\bnew\s+", ""),)),
     _Habit(rf"^\s*(?!(?i:{_RESERVED}|print)\b)({_TYPES})\s+[A-Za-z_]\w*\s*(;*$|=[^=])",
-           "a name has no type in Python: leave `{0}` out, and give it a value",
+           "a name has no type in Python", "leave `{0}` out, and give it a value",
            ((rf"^(\s*)(?:(?:{_TYPES})\s+)+([A-Za-z_]\w*\s*=.*?)\s*;*$", r"\1\2"),
             (rf"^(\s*)(?:{_NUMBERS})\s+([A-Za-z_]\w*)\s*;*$", r"\1\2 = 0"),
             (r"^(\s*)(?:std_msgs::|std_msgs\.msg\.)?([A-Z]\w*)\s+([A-Za-z_]\w*)\s*;*$", r"\1\3 = \2()"))),
     _Habit(r"[\w)](->|::)[A-Za-z_]", "Python writes a dot, `.`, where C++ has `{0}`",
-           ((r"(?<=[\w)])(?:->|::)(?=[A-Za-z_])", "."),)),
+           "", ((r"(?<=[\w)])(?:->|::)(?=[A-Za-z_])", "."),)),
     _Habit(rf"^\s*(?!(?:{_RESERVED}|print)\b)[a-z_]\w*\s+[a-z_]\w*\s*=(?!=)", "a name has no space in it",
-           ((r"^(\s*)(\w+)\s+(\w+)(\s*=)", r"\1\2_\3\4"),)),
+           "", ((r"^(\s*)(\w+)\s+(\w+)(\s*=)", r"\1\2_\3\4"),)),
     _Habit(r"^\s*[A-Za-z_]\w*(?:-\w+)+\s*=(?!=)", "a name has no `-` in it",
-           tuple([(r"^(\s*\w+)-(\w+)", r"\1_\2")] * 3)),
-    _Habit(rf"(?<![\w.])\d+(?:\.\d+)?\s?({_UNITS})\b", "a number has no unit in Python: leave `{0}` out",
+           "", tuple([(r"^(\s*\w+)-(\w+)", r"\1_\2")] * 3)),
+    _Habit(rf"(?<![\w.])\d+(?:\.\d+)?\s?({_UNITS})\b", "a number has no unit in Python", "leave `{0}` out",
            ((rf"(?<![\w.])(\d+(?:\.\d+)?)\s?(?:{_UNITS})\b", r"\1"),)),
-    _Habit(r"^\s*\d+[A-Za-z_]\w*\s*=(?!=)", "a name begins with a letter, not with a digit: use another name"),
-    _Habit(r"[(,=]\s*/\w[\w/]*\s*[,)]", "a topic's name is a string: write it in quotes",
+    _Habit(r"^\s*\d+[A-Za-z_]\w*\s*=(?!=)", "a name begins with a letter, not with a digit", "use another name"),
+    _Habit(r"[(,=]\s*/\w[\w/]*\s*[,)]", "a topic's name is a string", "write it in quotes",
            ((r"([(,=]\s*)(/\w[\w/]*)(?=\s*[,)])", r"\1'\2'"),)),
     _Habit(r"(?<![\"')\]])(?<![\"')\]]\s)%[sdf]\b(?!\s*[.(\[])",
-           'the string has no quotes around it: write `"` before and after it'),
+           "the string has no quotes around it", 'write `"` before and after it'),
 )  # fmt: skip
 
 
@@ -166,24 +183,19 @@ def parsed(source: str) -> ast.Module:
         return ast.parse(source)
 
 
-def cause_of_line(line: str) -> str:
-    """Return what is wrong with a line that does not parse; "" where the table does not know it."""
+def reason_of_line(line: str) -> Reason:
+    """Return what is wrong with a line that does not parse, as far as the table knows it."""
     code, comment, texts = _taken_apart(line[:LINE_CHARS_MAX])
     for habit in _HABITS:
         if found := re.search(habit.pattern, code + comment if "include" in habit.pattern else code):
-            return (
-                habit.cause.replace("{0}", found[1])
-                if found.groups() and "{0}" in habit.cause
-                else habit.cause
-            )
+            word = next(iter(found.groups()), "") or ""
+            return Reason(habit.why.replace("{0}", word), habit.fix.replace("{0}", word))
     if meant := _keyword(code):
-        return f"Python writes `{meant[1]}`, not `{meant[0]}`"
-    apart = next(_with_separator(code, texts), "")
-    return (
-        f"`{'%' if apart.count('%') > code.count('%') else ','}` is missing between two values"
-        if apart
-        else ""
-    )
+        return Reason(f"Python writes `{meant[1]}`, not `{meant[0]}`")
+    if apart := next(_with_separator(code, texts), ""):
+        sign = "%" if apart.count("%") > code.count("%") else ","
+        return Reason(f"`{sign}` is missing between two values")
+    return Reason()
 
 
 def without_brace(line: str) -> str:

@@ -1,9 +1,9 @@
 """The longest files begin first, and the others run beside them (`--dist loadfile --no-loadscope-reorder`).
 
 Examples of properties have no deadline: on a machine that is shared, how long one takes says nothing. All gradings take
-turns with each other, and their locks lie where no test looks for what is left. Where only tests with ROS are asked for
-(`-m "ros …"`), files without any are not imported: they are most of all. What is collected stays to the end, and
-Python looks for garbage neither while it is collected nor in it.
+turns with each other, and their locks lie where no test looks for what is left. Files of which `-m` leaves out every
+test are not imported. What is collected stays to the end, and Python looks for garbage neither while it is collected
+nor in it.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import gc
 import json
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -33,6 +34,7 @@ LONGEST = (
     "test_hostile_ros.py",
     "test_faults.py",
 )
+OF_A_FILE = re.compile(r"^pytestmark = (\[[^]]*\]|.*)", re.MULTILINE)
 LOCKS = Path(tempfile.gettempdir(), f"ros-lab-grader-tests-{os.geteuid()}")
 LOCKS.mkdir(mode=0o700, exist_ok=True)
 os.environ["XDG_RUNTIME_DIR"] = str(LOCKS)
@@ -46,8 +48,15 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """None where others decide."""
-    only_ros = config.option.markexpr.split()[:1] == ["ros"] and collection_path.suffix == ".py"
-    return True if only_ros and "mark.ros" not in collection_path.read_text(encoding="utf-8") else None
+    asked = config.option.markexpr
+    if collection_path.suffix != ".py" or not asked:
+        return None
+    text = collection_path.read_text(encoding="utf-8")
+    if asked.startswith("ros"):
+        return True if "mark.ros" not in text else None
+    marks = OF_A_FILE.search(text)
+    left_out = (f"mark.{mark}" for mark in ("ros", "full") if f"not {mark}" in asked)
+    return True if marks and any(mark in marks[0] for mark in left_out) else None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

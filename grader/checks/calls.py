@@ -43,7 +43,9 @@ class CallsParams(Record):
     @model_validator(mode="after")
     def _some_number(self) -> CallsParams:
         if self.at_most is not None and self.at_most < len(self.wanted):
-            raise ValueError(f"at_most is {self.at_most}, and {plural(len(self.wanted), 'call')} are asked")
+            raise ValueError(
+                f"at_most is {self.at_most}, and {plural(len(self.wanted), 'call')} are asked for"
+            )
         return self
 
     @property
@@ -146,7 +148,9 @@ def _differences(one: Request, wanted: dict[str, Any], params: CallsParams) -> I
 def _too_many(made: Sequence[Request], params: CallsParams) -> Verdict | None:
     if params.at_most is None or len(made) <= params.at_most:
         return None
-    message = f"{params.service} is called {plural(len(made), 'time')}, not {params.at_most} at most"
+    message = (
+        f"{params.service} is called {plural(len(made), 'time')}, and the handout allows {params.at_most}"
+    )
     return failed(message, hint="count the calls, and stop after the last one that is asked")
 
 

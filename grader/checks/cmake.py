@@ -63,13 +63,7 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
     expected = f"project({params.name}), find_package(catkin …), catkin_package(…)"
     facts = package.cmake
     if facts is None:
-        hint = f"create one with project({wanted}), find_package(catkin REQUIRED) and catkin_package()"
-        if slip := misspelt_cmake_lists(package):
-            hint, cited = f"git mv {slip} CMakeLists.txt", (FileCitation(file=slip),)
-            message = f"the file is called {slip}, and CMake looks for CMakeLists.txt"
-            return failed(message, expected=expected, measured=slip, hint=hint, citations=cited)
-        absent = failed(NO_FILE, expected=expected, measured="no file", hint=hint)
-        return absent.model_copy(update={"cause": NO_FILE})
+        return _no_file(package, wanted).about(expected=expected)
     # what is missing may stand behind the line that cannot be read
     wrong = [one for one in _wrong(facts, names) if facts.fault is None or one.line is not None]
     named = [c for c in facts.calls if c.name in {"project", "find_package", "catkin_package"}]
@@ -95,10 +89,20 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
     return verdict.seeking("below", above[0].name) if above and len(above) == len(wrong) else verdict
 
 
+def _no_file(package: PackageFacts, wanted: str) -> Verdict:
+    if slip := misspelt_cmake_lists(package):
+        message = f"the file is called {slip}, and CMake looks for CMakeLists.txt"
+        hint = f"git mv {slip} CMakeLists.txt"
+        return failed(message, measured=slip, hint=hint, citations=(FileCitation(file=slip),))
+    hint = f"create one with project({wanted}), find_package(catkin REQUIRED) and catkin_package()"
+    absent = failed(NO_FILE, measured="no file", hint=hint)
+    return absent.model_copy(update={"cause": NO_FILE})
+
+
 def _fault(fault: Fault | None) -> Iterator[str]:
     if fault is not None:
         line = f"line {fault.line}: " if fault.line else ""
-        yield f"{line}CMake cannot read it: {fault.cause or fault.message}"
+        yield f"{line}CMake cannot read it: {fault.explanation}"
 
 
 def _misspelt(facts: CMakeFacts, name: str) -> CMakeCall | None:
@@ -227,19 +231,20 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
         cited = tuple(dict.fromkeys(calls))
         return passed(message, expected=expected, measured=measured, citations=cited)
     cited = tuple(dict.fromkeys([*(lack.line for lack in lacks.values() if lack.line), *calls]))
+    right = [script for script in params.scripts if script not in lacks]
+    found = _not_installed(facts, lacks).in_part(len(right) / len(params.scripts), join_words(right))
+    return found.about(
+        expected=expected, measured=measured, citations=cited or (FileCitation(file=facts.file),)
+    )
+
+
+def _not_installed(facts: CMakeFacts, lacks: dict[str, Lack]) -> Verdict:
     verdict = inconclusive if any(lack.unsure for lack in lacks.values()) else failed
     follows = all(lack.follows for lack in lacks.values())
     found = (unjudged if facts.fault or follows else verdict)(
-        f"{facts.file}: {'; '.join(_reasons(lacks))}",
-        expected=expected,
-        measured=measured,
-        hint="; ".join(_fixes(lacks)),
-        citations=cited or (FileCitation(file=facts.file),),
+        f"{facts.file}: {'; '.join(_reasons(lacks))}", hint="; ".join(_fixes(lacks))
     )
-    if all(lack.uncalled for lack in lacks.values()):
-        found = found.seeking("call", PYTHON)
-    right = [script for script in params.scripts if script not in lacks]
-    return found.in_part(len(right) / len(params.scripts), join_words(right))
+    return found.seeking("call", PYTHON) if all(lack.uncalled for lack in lacks.values()) else found
 
 
 def _reasons(lacks: dict[str, Lack]) -> Iterator[str]:

@@ -206,7 +206,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
 def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     """There is no counter on the topic."""
     if losses(run, topic):
-        return inconclusive(f"too little was recorded of {topic}", measured="no number", hint="grade again")
+        return inconclusive(f"too little was recorded on {topic}", measured="no number", hint="grade again")
     if any(c.messages for c in run.student_channels(topic)):
         hint = "publish the counter itself, as an Int8"
         return unjudged(f"{topic} carries no numbers", measured="no number", hint=hint)

@@ -114,7 +114,7 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
         verdict = failed(message, hint="; ".join(o.fix for o in obstacles))
         verdict = verdict if found.shebang_fault == "empty-file" else verdict.lost_by(kind, found.path)
     else:
-        message = f"whether {found.path} is executable cannot be seen: the submission carries no file modes"
+        message = f"whether {found.path} is executable cannot be told: the submission has no file modes"
         verdict = inconclusive(
             message, hint="hand in a git repository or a .tar.gz: both keep which files are executable"
         )
@@ -133,7 +133,7 @@ def _syntax_verdict(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -
     ]
     source = f", {where}: {shown(fault.source.strip())}" if fault.source.strip() else ""
     return failed(
-        f"{file.path} {where}: {fault.kind}: {fault.cause or fault.message}{others}",
+        f"{file.path} {where}: {fault.kind}: {fault.explanation}{others}",
         measured=f"{file.path}: {_mode(file)}, {_first_line(file)}{source}",
         hint="; ".join(fixes),
         citations=(fault.place, *((_cite_shebang(file),) if any(shebang_obstacles(file)) else ())),

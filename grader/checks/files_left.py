@@ -104,7 +104,7 @@ class FileLeftParams(Record):
         rows = [plural(self.rows_at_least, "row")] if self.rows_at_least else []
         size = [f"{self.min_bytes} bytes"] if self.min_bytes > 1 else []
         least = join_words([*topics, *columns, *rows, *size])
-        return f"{self.file} with {least} at least" if least else self.file
+        return f"{self.file} with at least {least}" if least else self.file
 
     def fits(self, path: str, ending: str = "") -> bool:
         """Return whether the file lies where it should, by one of the folders that count."""
@@ -119,7 +119,7 @@ class FileLeftParams(Record):
         if len(data) < self.min_bytes:
             wanted = f", not {self.min_bytes}" if data else ""
             what = f"holds only {plural(len(data), 'byte')}{wanted}" if data else "was left empty"
-            return failed(f"{file.path} {what}", hint="write into it, and close it").once()
+            return failed(f"{file.path} {what}", hint="write to it, and close it").once()
         if self.file.endswith(RECORDINGS):
             return _recording(file, self.topics, run)
         if self._is_table:
@@ -293,5 +293,5 @@ def _map(file: LeftFile) -> Verdict | None:
         return failed(f"{file.path} is not a PGM map", hint=hint)
     width, height = int(head[1]), int(head[2])
     if data.startswith(b"P5") and len(data) - head.end() < width * height:
-        return failed(f"{file.path} is cut short: it has less than {width} by {height} cells", hint=hint)
+        return failed(f"{file.path} is cut short: it has fewer than {width} by {height} cells", hint=hint)
     return None

@@ -165,7 +165,7 @@ def _faults(
 
 def _unreadable(found: Interface, fault: Fault, wanted: list[InterfaceField]) -> _Fault:
     """Of a line that is no field, or of a `---` that is missing: it belongs below the last field of the first part."""
-    fix = fault.cause.partition(": ")[2] or "one field per line, type before name"
+    fix = fault.fix or "one field per line, type before name"
     line = fault.line
     if fault.kind == "OtherParts":
         fix = "write `---` alone in a line between the parts"

@@ -161,7 +161,7 @@ def _slip_for(package: PackageFacts, node: LaunchNode, name: str) -> Slip | None
         return Slip(node.file, node.line, why, f'write pkg="{package.name}"')
     written = PurePosixPath(node.type or "")
     if slip is None and written.suffix in SOURCES and written.stem == PurePosixPath(name).stem:
-        why = f'type="{written}" is a source of C++, which nothing can start'
+        why = f'type="{written}" is a C++ source file, which cannot be started'
         return Slip(node.file, node.line, why, f'write type="{name}"')
     return slip
 
@@ -348,7 +348,7 @@ def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> V
     seen = f"; there is {join_words(lying)} in the package" if lying else ""
     name = PurePosixPath(lying[0]).name if lying else "<script>.sh"
     hint = f"below <launch>, add {_node_tag(package.name, name)}"
-    return failed(f"{file.path} has no <node> that is a shell script{seen}", hint=hint)
+    return failed(f"{file.path} has no <node> that starts a shell script{seen}", hint=hint)
 
 
 def _page(

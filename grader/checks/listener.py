@@ -37,7 +37,7 @@ from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 CALLBACK_HINT = (
-    "print the message's .data in the callback, without a condition and nothing slow beside it; "
+    "print the message's .data in the callback, without a condition and with nothing slow beside it; "
     f"end with {SPIN}"
 )
 

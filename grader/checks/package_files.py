@@ -384,9 +384,9 @@ def _unreadable(package: PackageFacts) -> Verdict:
         return failed("there is no package.xml", measured="no file", hint=meant or hint)
     line = f", line {fault.line}" if fault.line else ""
     return failed(
-        f"{fault.file}{line} cannot be read: {fault.cause or fault.message}",
+        f"{fault.file}{line} cannot be read: {fault.explanation}",
         measured=fault.message,
-        hint=fault.fix or "open the file at that line and close or correct the element",
+        hint=fault.advice or "open the file at that line and close or correct the element",
         citations=(fault.place,),
     )
 

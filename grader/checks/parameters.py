@@ -89,29 +89,31 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
     elif one is None or one.end is None:
         verdict = inconclusive(f"rosparam load {source.path} was not run to its end", hint="grade again")
     else:
-        missing = [name for name in wanted if found.get(name) in (None, {})]
-        there = [name for name in wanted if name not in missing]
-        moved = f"the handout puts it at {params.file}; move it there" if source.path != params.file else ""
-        verdict = (
-            _error(run, one, source.path, build)
-            or (
-                _missing(found, missing, source.path, package, build).in_part(
-                    len(there) / len(wanted), join_words(there)
-                )
-                if missing
-                else None
-            )
-            or passed(
-                f"{source.path} loads and sets {join_words(wanted)}",
-                hint="; ".join(
-                    filter(None, (moved, _duplicate_advice(source.path, _keys_of(build, source.path))))
-                ),
-            )
-        )
+        lost = _error(run, one, source.path, build)
+        lost = lost or _names_missing(found, wanted, source.path, package, build)
+        verdict = lost or _loaded(wanted, params.file, source.path, build)
     measured = f"on the server: {join_words(found)}" if found else "nothing on the server"
     cited: tuple[Citation, ...] = (cite(run, "/grader/param"),)
     place = (FileCitation(file=source.path),) if source and not verdict.citations else ()
     return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, *place, *cited))
+
+
+def _names_missing(
+    found: dict[str, object], wanted: list[str], path: str, package: PackageFacts, build: Run
+) -> Verdict | None:
+    """Return the loss where names of the lab are not on the server once the file is loaded."""
+    missing = [name for name in wanted if found.get(name) in (None, {})]
+    there = [name for name in wanted if name not in missing]
+    if not missing:
+        return None
+    lost = _missing(found, missing, path, package, build)
+    return lost.in_part(len(there) / len(wanted), join_words(there))
+
+
+def _loaded(wanted: list[str], asked: str, path: str, build: Run) -> Verdict:
+    moved = f"the handout puts it at {asked}; move it there" if path != asked else ""
+    advice = "; ".join(filter(None, (moved, _duplicate_advice(path, _keys_of(build, path)))))
+    return passed(f"{path} loads and sets {join_words(wanted)}", hint=advice)
 
 
 def _no_file(package: PackageFacts, build: Run, path: str, wanted: list[str]) -> Verdict:
@@ -179,7 +181,7 @@ def _missing(
     hint = f"write it so that rosparam list shows exactly {name}"
     root = name.split("/")[1]
     if all(one.removeprefix(f"/{root}") in found for one in missing):
-        hint = f"write `{root}:` above them, and indent them all by two spaces more"
+        hint = f"write `{root}:` above them, and indent them all by two more spaces"
     elif shallow in found:
         readers = join_words(_readers(package, build, shallow, above))
         hint = f"{moved}; then read it there in {readers} too" if readers else moved

@@ -66,7 +66,7 @@ class PathParams(Record):
     def _is_a_way(self) -> PathParams:
         way = self.way.points
         if len(way) < 2:
-            raise ValueError("points: a way needs two points at least")
+            raise ValueError("points: a path needs at least two points")
         shortest_m = min(math.dist(a, b) for a, b in pairwise(way))
         if self.tolerance_m > shortest_m / 2:
             near = f"two points that follow each other are {shortest_m:g} m apart"

@@ -255,7 +255,7 @@ def not_offered(package: PackageFacts, run: Run, service: str) -> Verdict:
     if absent := no_node(package, run, f"there is no service {service}"):
         return absent
     if (slip := why_unreached(package, run)) and not found:
-        hint = f"write {service_call(service, '…, callback')} where the script comes to: before the loop or {SPIN}"
+        hint = f"write {service_call(service, '…, callback')} where the script gets to: before the loop or {SPIN}"
         return failed(f"no node offers {service}: {slip.message}", hint=hint, citations=(slip.place,))
     others = f"; it offers {join_words(found)}" if found else ""
     hint = f"add {service_call(service, '…, callback')} before the loop or {SPIN}"

@@ -92,7 +92,7 @@ def stamps(package: PackageFacts, run: Run, params: StampsParams) -> Verdict:
         or next((fault for stamped in each if (fault := _backwards(stamped, params))), None)
         or _far(run, found, params)
         or _other_frame(found, params)
-        or passed(f"the stamps of {plural(len(found), 'message')} on {params.topic} are when they were sent")
+        or passed(f"the stamps of {plural(len(found), 'message')} on {params.topic} say when they were sent")
     )
     span = (found[0].time_ns, found[-1].time_ns) if found else (None, None)
     frame = f", frame_id '{params.frame_id}'" if params.frame_id is not None else ""

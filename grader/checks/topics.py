@@ -164,9 +164,9 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
         verdict = _judge_unexpected(unexpected, published, run, params)
     else:
         missing = None if published else no_node(package, run, "no topic was published")
-        verdict = missing or passed("no topic beside those of the lab is published")
+        verdict = missing or passed("no topic besides those of the lab is published")
     return verdict.about(
-        expected=f"no topic beside {join_words(params.topics)}" if params.topics else "no topic at all",
+        expected=f"no topic besides {join_words(params.topics)}" if params.topics else "no topic at all",
         measured=verdict.measured or join_words(published) or "no topic",
         citations=(*verdict.citations, cite(run, "/grader/graph")),
     )

@@ -296,7 +296,7 @@ def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict 
     until_s, last_s = to_s(observed_until_ns(run) or run.end_ns), timed[-1][0]
     if until_s - last_s < slack_s or any(to_s(one.time_ns) >= last_s - order_s for one in seen):
         return None
-    message = f"{params.name} was not sent any more after the last pose on {params.pose_of}"
+    message = f"{params.name} was no longer sent after the last pose on {params.pose_of}"
     verdict = failed(message, hint=f"send it in the callback of {params.pose_of}").once()
     return excused(verdict, run, poses[0][0], run.end_ns, why_late)
 
@@ -344,7 +344,8 @@ def _too_seldom(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verd
     rate_hz = (len(seen) - 1) / span_s if span_s > 0 else 0.0
     if rate_hz >= params.min_hz:
         return None
-    message = f"{params.name} is sent {significant(rate_hz)} times a second, and at least {params.min_hz:g} are asked"
+    asked = f"and the handout asks for at least {params.min_hz:g}"
+    message = f"{params.name} is sent {significant(rate_hz)} times a second, {asked}"
     verdict = failed(message, hint=f"send it in a loop with {RATE}, or in the callback of what it follows")
     return excused(verdict.once(), run, seen[0].time_ns, seen[-1].time_ns, why_late)
 

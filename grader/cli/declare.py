@@ -243,6 +243,17 @@ LocalOption = Annotated[
     Option("--allow-local", "DIR",
            "let the roster name paths below DIR too, not only below its own folder; may be repeated", repeated=True),
 ]  # fmt: skip
+BookForm = Annotated[
+    Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"],
+    Option("--form", "", "its format; canvas, moodle and blackboard import theirs"),
+]
+BookTemplate = Annotated[
+    Path | None, Option("--template", "FILE", "the platform's own export, to be filled in with the points")
+]
+BookColumn = Annotated[str, Option("--column", "NAME", "the platform's name for the column of points")]
+DraftsFlag = Annotated[
+    bool, Flag("--drafts", "take results as they are now, also where others are published")
+]
 STATIC = Flag("--static", "check the files only and run nothing")
 BATCH_FOLDER = "the --out of `grader batch`"
 

@@ -212,6 +212,22 @@ def print_labs(rubrics: Sequence[tuple[Rubric, str]], stream: IO[str]) -> None:
     emit(open_console(stream), shown)
 
 
+def labs_data(rubrics: Sequence[tuple[Rubric, str]]) -> list[dict[str, object]]:
+    """Return the same for programs."""
+    return [
+        {
+            "id": rubric.id,
+            "title": rubric.title,
+            "version": rubric.version,
+            "package": rubric.package,
+            "criteria": len(rubric.criteria),
+            "max_points": rubric.max_points,
+            "source": source,
+        }
+        for rubric, source in rubrics
+    ]
+
+
 def _labs_table(rubrics: Sequence[Rubric]) -> Table:
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="dim")
     for heading in ("lab", "package", "criteria", "points", "title"):

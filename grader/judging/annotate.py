@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
+from typing import NamedTuple
 
 from grader.checks.cmake import NOT_CALLED, below_catkin_package
 from grader.checks.messages import code_of
@@ -81,35 +82,43 @@ def add_advice(
     visible = {c.id for c in rubric.criteria if c.visibility == "visible"}
     good = [c for c in results if c.status is Status.PASS and c.id in visible]
     host = next((c for check in OF_FILES for c in good if c.check == check), None)
-    points = [text for place, text in _points(package) if not _is_told(place, text, results)][:POINTS_MAX]
+    points = [point.text for point in _points(package) if not _is_told(point, results)][:POINTS_MAX]
     if host is None or not points:
         return tuple(results)
     told = host.model_copy(update={"hint": "; ".join(filter(None, (host.hint, *points)))})
     return tuple(told if c is host else c for c in results)
 
 
-def _points(package: PackageFacts) -> Iterator[tuple[FileCitation, str]]:
+class _Point(NamedTuple):
+    """What is wrong at a place, and the program that is not there where it is that."""
+
+    place: FileCitation
+    text: str
+    lacks: str = ""
+
+
+def _points(package: PackageFacts) -> Iterator[_Point]:
     for file in package.files:
         fault = None if file.path.endswith(BACKUPS) else file.python_fault
         if fault is not None and fault.kind in SYNTAX and not is_product(file.path):
-            why = fault.cause or fault.message
+            why = fault.explanation
             hint = syntax_hint(fault)
-            text = f"{file.path} has a syntax error: {why}" + (
-                "" if why.endswith(hint.partition(": ")[2]) else f"; {hint}"
-            )
-            yield FileCitation(file=file.path), text
+            told = "" if hint == fault.advice else f"; {hint}"
+            text = f"{file.path} has a syntax error: {why}{told}"
+            yield _Point(FileCitation(file=file.path), text)
     for slip in package.slips:
         if slip.kind == "misspelt" and not is_product(slip.file):
             text = f"{slip.file}, line {slip.line}: `{slip.name}` is not defined anywhere: {slip.message}"
-            yield slip.place, text
+            yield _Point(slip.place, text)
     for launch in package.launch_files:
         if launch.fault is not None:
-            why = launch.fault.cause or launch.fault.message
-            yield launch.fault.place, f"{launch.path}, line {launch.fault.line}, is not well-formed: {why}"
+            why = launch.fault.explanation
+            text = f"{launch.path}, line {launch.fault.line}, is not well-formed: {why}"
+            yield _Point(launch.fault.place, text)
         yield from _nodes(package, launch)
 
 
-def _nodes(package: PackageFacts, launch: LaunchFile) -> Iterator[tuple[FileCitation, str]]:
+def _nodes(package: PackageFacts, launch: LaunchFile) -> Iterator[_Point]:
     """Yield the nodes whose program is missing or not executable: roslaunch prints an error, and starts the others."""
     for node in launch.brings:
         if node.pkg != package.name or node.uncertain:
@@ -117,11 +126,11 @@ def _nodes(package: PackageFacts, launch: LaunchFile) -> Iterator[tuple[FileCita
         script, slip = own_script(package, node), node_slip(package, node)
         if slip is not None:
             text = f"roslaunch leaves a <node> out: {slip.file}, line {slip.line}: {slip.why}; {slip.fix}"
-            yield FileCitation(file=slip.file, line=slip.line), text
+            yield _Point(FileCitation(file=slip.file, line=slip.line), text, slip.lacks)
         elif script and script.executable is False and not _needs_no_bit(package, script.path):
             why = not_executable(script)
             text = f"{why.why} ({node.file}, line {node.line}); {why.hint}"
-            yield FileCitation(file=script.path), text
+            yield _Point(FileCitation(file=script.path), text)
 
 
 def _needs_no_bit(package: PackageFacts, path: str) -> bool:
@@ -131,13 +140,14 @@ def _needs_no_bit(package: PackageFacts, path: str) -> bool:
     )
 
 
-def _is_told(place: FileCitation, text: str, results: Sequence[CriterionResult]) -> bool:
-    """Return whether a lost criterion cites the place or says that the file is missing, or a hint names the place.
+def _is_told(point: _Point, results: Sequence[CriterionResult]) -> bool:
+    """Return whether a lost criterion cites the place or is lost by the missing file, or a hint names the place.
     Without a line it is the whole file."""
+    place = point.place
     words = place.file if place.line is None else f"{place.file}, line {place.line}"
     lost = [c for c in results if c.status.is_lost]
     absent = (c.mistake.name for c in lost if c.mistake and c.mistake.is_absence)
-    missing = any(f"there is no {PurePosixPath(name).name} " in text for name in absent)
+    missing = point.lacks in {PurePosixPath(name).name for name in absent}
     return missing or any(words in c.hint for c in results) or any(_cites(c, place) for c in lost)
 
 

@@ -174,7 +174,7 @@ class Facts:
         first = faults[0] if faults and all(faults) else None
         if first is None or self._judges({"executable"}, PurePosixPath(first.file).name):
             return None
-        why = f"{first.file} line {first.line}: {first.kind}: {first.cause or first.message}"
+        why = f"{first.file} line {first.line}: {first.kind}: {first.explanation}"
         return unjudged(why, hint=syntax_hint(first), citations=(first.place,))
 
     def unreadable_launch(self, scenario: str) -> Verdict | None:
@@ -201,7 +201,7 @@ class Facts:
         faults = [s.python_fault for s in scripts if s and s.python_fault and s.python_fault.kind in SYNTAX]
         if not faults or len(scripts) - len(faults) > 1:
             return None
-        why = f"{faults[0].kind}: {faults[0].cause or faults[0].message}"
+        why = f"{faults[0].kind}: {faults[0].explanation}"
         message = f"{launch.path} starts {faults[0].file}, line {faults[0].line}: {why}"
         return failed(message, hint=syntax_hint(faults[0]), citations=(faults[0].place,))
 

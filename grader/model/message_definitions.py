@@ -93,17 +93,14 @@ def _no_field(text: str, path: str, line: int) -> Fault:
     )
     if not bare and shown.startswith("//"):
         right = f"# {shown.lstrip('/ ')}"
-    fix = (
-        f": write `{right}`"
-        if (right != shown and _parse_line(right, "", line)) or right.startswith("#")
-        else ""
-    )
+    is_known = (right != shown and _parse_line(right, "", line)) or right.startswith("#")
     return Fault(
         file=path,
         line=line,
         kind="NoField",
         message=message,
-        cause=f"`{shown}` in line {line} is no field{fix}",
+        cause=f"`{shown}` in line {line} is no field",
+        fix=f"write `{right}`" if is_known else "",
     )
 
 

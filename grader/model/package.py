@@ -24,8 +24,10 @@ from grader.wording import is_one_edit
 class Fault(Record):
     """Why a file cannot be read as what it should be.
 
-    `kind` is the parser's own word (`XMLSyntaxError`, `TabError`). `cause` says the same in a student's
-    words, empty where the message says enough. `source` is the text of the line where the column is known.
+    `kind` is the parser's own word (`XMLSyntaxError`, `TabError`). `cause` says the same in a student's words, empty
+    where the message says enough, and `fix` what to do, empty where that is not known. `unclosed` is the bracket that
+    is opened in that line and never closed, `?` where Python does not say which. `source` is the text of the line where
+    the column is known.
     """
 
     file: str
@@ -34,7 +36,15 @@ class Fault(Record):
     kind: str
     message: str
     cause: str = ""
+    fix: str = ""
+    unclosed: str = ""
     source: str = ""
+
+    @property
+    def explanation(self) -> str:
+        """What is wrong, and what to do where that is known."""
+        why = self.cause or self.message
+        return f"{why}: {self.fix}" if self.fix else why
 
     @property
     def place(self) -> FileCitation:
@@ -42,11 +52,10 @@ class Fault(Record):
         return FileCitation(file=self.file, line=self.line, column=self.column, source=self.source)
 
     @property
-    def fix(self) -> str:
-        """What to do in which line, where `cause` says that behind a colon; "" where it does not."""
-        told = self.cause.partition(": ")[2]
+    def advice(self) -> str:
+        """What to do in which line; "" where that is not known."""
         where = f"line {self.line}: " if self.line else ""
-        return f"{where}{told}" if told and not told.endswith("?") else ""
+        return f"{where}{self.fix}" if self.fix else ""
 
 
 class Dependency(Record):

@@ -108,21 +108,25 @@ def as_code(line: str) -> str:
 
 def advice_of(repair: Repair) -> str:
     """Return where and how the repair is done by hand: ``package.xml: below line 9 add `<depend>rospy</depend>` ``."""
+    return ": ".join(_where_and_how(repair))
+
+
+def _where_and_how(repair: Repair) -> tuple[str, str]:
     new, added = repair.after.split("\n"), _added(repair.before, repair.after)
     if repair.fix != "; ".join(added):
         below = len(new) > 1 and new[0] == repair.before and repair.line is not None
         named = re.match(r"(delete|start|indent|remove the `#` of|in place of) lines? \d", repair.fix)
-        place = repair.file if named else place_of(repair)
-        where = f"{repair.file}: below line {repair.line}," if below and not named else f"{place}:"
-        return f"{where} {repair.fix}"
+        if below and not named:
+            return repair.file, f"below line {repair.line}, {repair.fix}"
+        return repair.file if named else place_of(repair), repair.fix
     code = join_words(map(as_code, added))
     replaced, script = repair.before not in (new[0], new[-1]), repair.file.endswith(".py")
     if replaced:
         moved = script and _blanks(new[0]) != _blanks(repair.before)
-        return f"{place_of(repair)}: write {code}{_indentation(new[0]) if moved else ''}"
+        return place_of(repair), f"write {code}{_indentation(new[0]) if moved else ''}"
     where = "below" if repair.before == new[0] else "above"
     depth = _indentation(new[1] if where == "below" else new[0]) if script else ""
-    return f"{repair.file}: {where} line {repair.line} add {code}{depth}"
+    return repair.file, f"{where} line {repair.line} add {code}{depth}"
 
 
 def _blanks(line: str) -> str:
@@ -136,10 +140,10 @@ def advice_on(repairs: Iterable[Repair]) -> list[str]:
     last = [
         one for one, later in zip_longest(made, made[1:]) if later is None or not _is_rewritten(one, later)
     ]
-    split = [advice_of(one).partition(": ") for one in last]
+    each = map(_where_and_how, last)
     return [
-        f"{place}{colon}{', and '.join(fix for _, _, fix in found)}"
-        for (place, colon), found in groupby(split, key=lambda one: one[:2])
+        f"{place}: {', and '.join(how for _, how in found)}"
+        for place, found in groupby(each, key=lambda one: one[0])
     ]
 
 

@@ -227,8 +227,7 @@ def _escape(token: Token) -> Token:
 def parse_tree_of(data: bytes, file: str) -> tuple[list[nodes.AstFileNode], Fault | None]:
     """Return the top-level commands and blocks of a CMake file, up to the fault where there is one. Never raises."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        cause = f"`{file}` is saved as UTF-16: save it as UTF-8"
-        return [], Fault(file=file, line=1, kind="ParseError", message="is UTF-16", cause=cause)
+        return [], _fault(file, 1, "is UTF-16", f"`{file}` is saved as UTF-16", fix="save it as UTF-8")
     text = _readable(data)
     if text is None:
         return [], _fault(file, None, "too many brackets", f"`{file}` holds too many `[[` to be read")
@@ -277,20 +276,22 @@ def _explain_fault(text: str, end: int, file: str, message: str) -> Fault:
     tokens = [t for t in tokenize(text) if t.kind != "COMMENT" and t.span.start >= end]
     first = tokens[0] if tokens else Token("RAW", "", slice(end, end), text.count("\n") + 1, 1)
     unparsed = next((t for t in tokens if t.kind == "UNPARSEABLE"), None)
-    line, cause = first.line, f"`{_word(first)}` is not a command: CMake expects name(...)"
+    line, cause, fix = first.line, f"`{_word(first)}` is not a command", "CMake expects name(...)"
+    unclosed = ""
     half = join_half_comment(text)
     if half is not None:
-        return _fault(file, half.line, message, half.cause)
+        return _fault(file, half.line, message, half.cause, fix=half.fix)
     if unparsed is not None and text[unparsed.span].startswith('"'):
-        line, cause = unparsed.line, 'a quote `"` is opened here and never closed'
+        line, cause, fix = unparsed.line, 'a quote `"` is opened here and never closed', ""
     elif first.kind == "RPAREN":
-        cause = "there is one `)` too many"
+        cause, fix = "there is one `)` too many", ""
     elif "unexpected end of file" in message and len(tokens) > 1 and tokens[1].kind == "LPAREN":
         last = _last_line(text, line)
-        cause = f"the `(` of `{_word(first)}(` is never closed by `)`: write it at the end of line {last}"
+        cause, unclosed = f"the `(` of `{_word(first)}(` is never closed by `)`", "("
+        fix = f"write `)` at the end of line {last}"
     elif end == 0 and len(text) <= _LINK_CHARS_MAX and _LINK_TEXT.fullmatch(text):
-        cause = "the file holds only the path that a link should lead to, no CMake commands"
-    return _fault(file, line, message, cause)
+        cause, fix = "the file holds only the path that a link should lead to, no CMake commands", ""
+    return _fault(file, line, message, cause, fix=fix, unclosed=unclosed)
 
 
 class HalfComment(NamedTuple):
@@ -303,8 +304,8 @@ class HalfComment(NamedTuple):
 
     @property
     def cause(self) -> str:
-        """What is wrong, and what to do."""
-        return f"only a part of `{self.name}(…)` is commented out: {self.fix}"
+        """What is wrong."""
+        return f"only a part of `{self.name}(…)` is commented out"
 
     @property
     def fix(self) -> str:
@@ -389,5 +390,8 @@ def _balance(commands: list[nodes.Command], file: str) -> tuple[list[nodes.Comma
     return commands, None
 
 
-def _fault(file: str, line: int | None, message: str, cause: str) -> Fault:
-    return Fault(file=file, line=line, kind="ParseError", message=message, cause=cause)
+def _fault(
+    file: str, line: int | None, message: str, cause: str, *, fix: str = "", unclosed: str = ""
+) -> Fault:
+    words = {"message": message, "cause": cause, "fix": fix, "unclosed": unclosed}
+    return Fault(file=file, line=line, kind="ParseError", **words)

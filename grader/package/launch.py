@@ -171,8 +171,8 @@ def _wrong_root(path: str, root: str, line: int | None) -> Fault:
 
 
 def _nested_root(path: str, line: int | None) -> Fault:
-    cause = "there is a second `<launch>` inside the first: roslaunch wants exactly one"
-    return Fault(file=path, line=line, kind="WrongRoot", message="more than one <launch>", cause=cause)
+    words = {"message": "more than one <launch>", "cause": "there is a second `<launch>` inside the first"}
+    return Fault(file=path, line=line, kind="WrongRoot", fix="keep only one of the two", **words)
 
 
 def _walk(parent: etree._Element, remaps: Remaps, nodes: list[LaunchNode], includes: list[str]) -> None:

@@ -223,16 +223,12 @@ class _Loader:
             return
         self.loaded.included += 1
         if depth >= DEPTH_MAX or self.loaded.included > INCLUDES_MAX:
-            message = "launch files that include each other without an end"
+            message = "launch files that include each other endlessly"
             self.loaded.faults.append(_fault(element, scope, message))
             return
         root, fault = self._find(path)
         if root is None:
-            reason = (
-                f"it is not well-formed: {fault.cause or fault.message}"
-                if fault
-                else "it is not in the package"
-            )
+            reason = f"it is not well-formed: {fault.explanation}" if fault else "it is not in the package"
             fix = f"first fix {path}" if fault else f"write {path}, or push it"
             self.loaded.faults.append(_fault(element, scope, f"it includes {path}, and {reason}", fix))
         elif wanted(root, scope):
@@ -295,8 +291,10 @@ def _private(param: LaunchParam, inside: Scope) -> LaunchParam:
 def _fault(
     element: etree._Element, scope: Scope, message: str, fix: str = "take this <include> out"
 ) -> Fault:
-    cause = f"this <include> brings nothing: {fix}"
-    return Fault(file=scope.file, line=line_of(element), kind="Include", message=message, cause=cause)
+    cause = "this <include> brings nothing"
+    return Fault(
+        file=scope.file, line=line_of(element), kind="Include", message=message, cause=cause, fix=fix
+    )
 
 
 class Scope(Record):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from catkin_pkg.condition import evaluate_condition
@@ -18,6 +18,7 @@ from lxml import etree
 from grader.model.package import Dependency, Fault, Manifest, Person
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_xml
+from grader.syntax_fixes import Reason
 
 MANIFEST = "package.xml"
 _TEXT_CHARS_MAX = 4_000
@@ -32,36 +33,36 @@ _FILTERS = threading.Lock()
 # What `condition="$ROS_VERSION == 1"` (REP 149) is measured by: the labs are ROS 1 on its last distribution.
 _CONTEXT = {"ROS_VERSION": "1", "ROS_DISTRO": "noetic", "ROS_PYTHON_VERSION": "3"}
 # catkin_pkg's message, the tag whose line is named, and the words ({0}, {1}: the pattern's groups)
-_CAUSES = (
+_CAUSES: tuple[tuple[str, ...], ...] = (
     (r'contain a single "package" root', "", "the file must hold one `<package> ... </package>`"),
     (r'exactly one "(\w+)" tag', "{0}", "there must be exactly one `<{0}>` tag"),
     (r'not contain more than one "(\w+)"', "{0}", "there may be only one `<{0}>` tag"),
     (r'"(\w+)" tag must have the attribute "(\w+)"', "{0}", '`<{0}>` needs {1}="..."'),
     (r'Invalid email ""', "maintainer", '`<maintainer>` needs email="name@place.org"'),
-    (r'Invalid email "(.*?)"', "maintainer", "`{0}` is not an e-mail address: write name@place.org"),
+    (r'Invalid email "(.*?)"', "maintainer", "`{0}` is not an e-mail address", "write name@place.org"),
     (r"must have an email", "maintainer", '`<maintainer>` needs email="name@place.org"'),
     (r"name must not be empty", "name", "`<name>` is empty"),
     (r'Package name "(.*?)" does not follow naming', "name",
-     "`{0}` is not a package name: use letters, digits, `_` and `-`, no spaces, and start with a letter"),
-    (r"version must not be empty", "version", "`<version>` is empty: write 0.0.0"),
-    (r'version "(.*?)" does not follow version', "version", "`{0}` is not a version: write 0.0.0"),
-    (r"description must not be empty", "description", "`<description>` is empty: write a sentence"),
+     "`{0}` is not a package name", "use letters, digits, `_` and `-`, no spaces, and start with a letter"),
+    (r"version must not be empty", "version", "`<version>` is empty", "write 0.0.0"),
+    (r'version "(.*?)" does not follow version', "version", "`{0}` is not a version", "write 0.0.0"),
+    (r"description must not be empty", "description", "`<description>` is empty", "write a sentence"),
     (r"at least one maintainer", "", '`<maintainer email="...">` is missing'),
     (r'at least one "license"', "", "`<license>` is missing"),
     (r"license tag must neither", "license", "`<license>` is empty"),
     (r"must not contain the following tags: (.*)", "{0}", "format {format} has no `<{0}>`"),
     (r"must not contain the following children: (.*)", "",
-     "there is a tag inside another where only text belongs (`<{0}>`): a closing tag is missing before it"),
+     "there is a tag inside another where only text belongs (`<{0}>`)", "a closing tag is missing before it"),
     (r'"(\w+)" tag must not have the following attributes: (.*)', "{0}", "`<{0}>` takes no attribute `{1}`"),
     (r"replace <run_depend> tags with <exec_depend>", "run_depend",
      "in format 2 and 3 `<run_depend>` is written `<exec_depend>`"),
     (r"replace <exec_depend> tags with <run_depend>", "exec_depend",
      'in format 1 `<exec_depend>` is written `<run_depend>`; or begin with `<package format="2">`'),
     (r"generic dependency on '(.*?)' is redundant with: (.*)", "depend",
-     "`<depend>{0}</depend>` says it all: delete `<{1}>{0}</{1}>`"),
+     "`<depend>{0}</depend>` says it all", "delete `<{1}>{0}</{1}>`"),
     (r'test dependency on "(.*?)" is redundant', "test_depend", "delete `<test_depend>{0}</test_depend>`"),
-    (r'must not "\w+" on a package with the same name', "", "the package depends on itself: delete the line"),
-    (r"invalid literal for int|format version", "", 'the format must be 1, 2 or 3: `<package format="2">`'),
+    (r'must not "\w+" on a package with the same name', "", "the package depends on itself", "delete the line"),
+    (r"invalid literal for int|format version", "", "the format must be 1, 2 or 3", '`<package format="2">`'),
     (r"condition '(.*)' failed to parse", "", "the condition `{0}` cannot be read"),
     (r"Only one <build_type>", "export", "there may be only one `<build_type>`"),
 )  # fmt: skip
@@ -93,8 +94,8 @@ def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        cause = f"`package.xml` is not saved as UTF-8 (line {line}): save it as UTF-8"
-        return None, _fault(line, "UnicodeDecodeError", error.reason, cause)
+        cause = f"`package.xml` is not saved as UTF-8 (line {line})"
+        return None, _fault(line, "UnicodeDecodeError", error.reason, cause, "save it as UTF-8")
     # catkin reads the file as UTF-8, whatever its first line says
     root, fault = parse_xml(data, MANIFEST, root="package", encoding="utf-8")
     if root is None:
@@ -106,12 +107,12 @@ def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
             return _manifest(_meaning(root, said), root, said), None
     except (InvalidPackage, AssertionError, ValueError, RecursionError) as error:
         message = str(getattr(error, "msg", error))[:_MESSAGE_CHARS_MAX]
-    place, cause = explain(message, root)
-    return None, _fault(place, "InvalidPackage", "; ".join(message.split("\n")), cause)
+    place, reason = explain(message, root)
+    return None, _fault(place, "InvalidPackage", "; ".join(message.split("\n")), *reason)
 
 
-def _fault(line: int | None, kind: str, message: str, cause: str) -> Fault:
-    return Fault(file=MANIFEST, line=line, kind=kind, message=message, cause=cause)
+def _fault(line: int | None, kind: str, message: str, cause: str, fix: str = "") -> Fault:
+    return Fault(file=MANIFEST, line=line, kind=kind, message=message, cause=cause, fix=fix)
 
 
 def _meaning(root: etree._Element, said: list[str]) -> Package:
@@ -198,18 +199,26 @@ def _advice(package: Package, maintainers: tuple[Person, ...]) -> Iterator[str]:
         yield "there is no <buildtool_depend>catkin</buildtool_depend>"
 
 
-def explain(message: str, root: etree._Element) -> tuple[int | None, str]:
-    """Return the line and the causes, `; ` between them, of catkin_pkg's `message`; "" where it is not known."""
-    known: dict[str, int | None] = {}
+def explain(message: str, root: etree._Element) -> tuple[int | None, Reason]:
+    """Return the line and the reasons, `; ` between them, of catkin_pkg's `message`, as far as they are known."""
+    known: dict[Reason, int | None] = {}
     for text in filter(None, (part.strip("- ") for part in message.split("\n"))):
-        for pattern, tag, cause in _CAUSES:
+        for pattern, tag, *words in _CAUSES:
             if found := re.search(pattern, text):
                 groups = found.groups()
-                said = cause.format(*groups, format=root.get("format", "1"))
-                known.setdefault(said, _line_of(root, tag.format(*groups)))
+                reason = Reason(*(one.format(*groups, format=root.get("format", "1")) for one in words))
+                known.setdefault(reason, _line_of(root, tag.format(*groups)))
                 break
     line = next((number for number in known.values() if number is not None), line_of(root))
-    return line, "; ".join(known)
+    return line, _together(list(known))
+
+
+def _together(reasons: Sequence[Reason]) -> Reason:
+    """Return several as one: its `fix` begins with the first that there is."""
+    first = next((at for at, one in enumerate(reasons) if one.fix), len(reasons) - 1)
+    why = "; ".join(one.why for one in reasons[: first + 1])
+    fixes = [*(one.fix for one in reasons[first : first + 1]), *(one.text for one in reasons[first + 1 :])]
+    return Reason(why, "; ".join(fixes))
 
 
 def _line_of(root: etree._Element, tags: str) -> int | None:

@@ -17,7 +17,7 @@ from grader.limited_child import ChildLimits, run_limited
 from grader.model.package import Fault, PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.package.reading import printable
-from grader.syntax_fixes import BLOCK, COMMENTED_OUT, MERGE_MARKER, cause_of_line, without_texts
+from grader.syntax_fixes import BLOCK, COMMENTED_OUT, MERGE_MARKER, Reason, reason_of_line, without_texts
 
 CHECK = "grader.arena.ros.syntax:check_all"
 MEMORY_BYTES, CPU_S = 1 << 30, 20
@@ -38,53 +38,53 @@ _VAGUE = (
 """Messages that say less than the line itself."""
 _EMPTY_BLOCK = re.compile(r"expected an indented block after .* on line (\d+)")
 _NEXT_BLOCK = re.compile(r"\s*(?:@|(?:def|async def|class|if __name__)\b)")
-_NEVER_CLOSED = "a bracket that is opened in line {} is never closed"
+_UNCLOSED = re.compile(r"'([(\[{])' was never closed")
 _COPIED = "copied from a PDF or a web page"
 
-_MESSAGES = (
-    (r"inconsistent use of tabs", "tabs and spaces are mixed in the indentation: use four spaces everywhere"),
+_MESSAGES: tuple[tuple[str, ...], ...] = (
+    (r"inconsistent use of tabs", "tabs and spaces are mixed in the indentation", "use four spaces everywhere"),
     (r"unindent does not match",
-     "this line's indentation matches none of the lines above it: start it exactly below a line of the same block"),
+     "this line's indentation matches none of the lines above it", "start it exactly below a line of the same block"),
     (r"unexpected indent",
-     "this line is indented further than the one above for no reason: start it exactly below that one"),
+     "this line is indented further than the one above for no reason", "start it exactly below that one"),
     (r"expected an indented block",
-     "the line after a `:` must be indented: start it four spaces further to the right than the one above"),
-    (r"Missing parentheses in call to '(\w+)'", "this is Python 2: `{0}` needs brackets, `{0}(...)`"),
-    (r"multiple exception types", "this is Python 2: write `except Error as name:`"),
-    (r"leading zeros in decimal", "a number may not begin with 0: write 777, or 0o777 for an octal one"),
+     "the line after a `:` must be indented", "start it four spaces further to the right than the one above"),
+    (r"Missing parentheses in call to '(\w+)'", "`{0}` has no brackets, as in Python 2", "write `{0}(...)`"),
+    (r"multiple exception types", "this is Python 2", "write `except Error as name:`"),
+    (r"leading zeros in decimal", "a number may not begin with 0", "write 777, or 0o777 for an octal one"),
     (r"expected ':'", "a colon `:` is missing at the end of the line"),
     (r"'(.)' was never closed", "the bracket `{0}` is opened in this line and never closed"),
     (r"unmatched '(.)'",
-     "there is one `{0}` too many, or its opening bracket is missing: delete it, or write what it closes"),
+     "there is one `{0}` too many, or its opening bracket is missing", "delete it, or write what it closes"),
     (r"closing parenthesis '(.)' does not match opening parenthesis '(.)'",
-     "a `{1}` is closed by `{0}`: the two must match"),
-    (r"triple-quoted", "a triple-quoted string is opened and never closed: write the three quotes where it ends"),
+     "a `{1}` is closed by `{0}`", "make the two match"),
+    (r"triple-quoted", "a triple-quoted string is opened and never closed", "write the three quotes where it ends"),
     (r"EOL while scanning|unterminated (f-)?string",
-     "a quote is opened in this line and never closed: write the same quote where the string ends"),
+     "a quote is opened in this line and never closed", "write the same quote where the string ends"),
     (r"Maybe you meant '=='", "`=` gives a value to a name; to compare, write `==`"),
-    (r"cannot assign to|can't assign to", "what stands on the left of `=` is no name: a value is given to a name"),
-    (r"forgot a comma", "a comma is missing between two values: write `,` between them"),
-    (r"'return' outside function", "`return` is outside every function: indent it like the lines of its function"),
-    (r"'(break|continue)'? .*loop", "`{0}` is outside every loop: indent it like the lines of its loop"),
-    (r"'yield' outside", "`yield` is outside every function: indent it like the lines of its function"),
-    (r"f-string: expecting '}'", "a `{` in the f-string is never closed: write `}` behind its value"),
+    (r"cannot assign to|can't assign to", "what stands on the left of `=` is no name", "write a name there"),
+    (r"forgot a comma", "a comma is missing between two values", "write `,` between them"),
+    (r"'return' outside function", "`return` is outside every function", "indent it like the lines of its function"),
+    (r"'(break|continue)'? .*loop", "`{0}` is outside every loop", "indent it like the lines of its loop"),
+    (r"'yield' outside", "`yield` is outside every function", "indent it like the lines of its function"),
+    (r"f-string: expecting '}'", "a `{` in the f-string is never closed", "write `}` behind its value"),
     (r"expected 'except' or 'finally'",
-     "a `try:` has no `except` below it: write `except rospy.ROSInterruptException:` there, and `pass` below that"),
-    (r"keyword argument repeated", "an argument is given twice: take one of the two out"),
+     "a `try:` has no `except` below it", "write `except rospy.ROSInterruptException:` there, and `pass` below that"),
+    (r"keyword argument repeated", "an argument is given twice", "take one of the two out"),
     (r"positional argument follows keyword",
-     "a value without a name stands behind one with a name: move what has `=` to the end of the call"),
-    (r"UTF-16", "the file is saved as UTF-16: save it as UTF-8"),
+     "a value without a name stands behind one with a name", "move what has `=` to the end of the call"),
+    (r"UTF-16", "the file is saved as UTF-16", "save it as UTF-8"),
     (r"Non-UTF-8 code|codec can't decode byte|invalid or missing encoding",
-     "the file is not saved as UTF-8 (accents of an old encoding): save it as UTF-8"),
-    (r"unicodeescape", r"a backslash in a string is read as `\U...`: write the string as r\"...\""),
+     "the file is not saved as UTF-8 (accents of an old encoding)", "save it as UTF-8"),
+    (r"unicodeescape", r"a backslash in a string is read as `\U...`", r"write the string as r\"...\""),
     (r"name '(\w+)' is .* global declaration", "`global {0}` stands below a line that uses {0}"),
-    (r"encoding", "line 1 or 2 names an encoding that Python does not know: write `# -*- coding: utf-8 -*-`"),
-    (r"null bytes", "the file holds null bytes: it is not text, or was saved as UTF-16; save it as UTF-8"),
+    (r"encoding", "line 1 or 2 names an encoding that Python does not know", "write `# -*- coding: utf-8 -*-`"),
+    (r"null bytes", "the file holds null bytes, so it is not text, or was saved as UTF-16", "save it as UTF-8"),
     (r"after line continuation", r"nothing may follow a backslash `\` at the end of a line"),
     (r"duplicate argument '(\w+)'", "two parameters are both called `{0}`"),
-    (COMMENTED_OUT, "this line begins the block below it, and is commented out: delete its `#`"),
+    (COMMENTED_OUT, "this line begins the block below it, and is commented out", "delete its `#`"),
     (r"unexpected EOF",
-     "the file ends in the middle of something (a bracket, or a block without a body): complete its last lines"),
+     "the file ends in the middle of something (a bracket, or a block without a body)", "complete its last lines"),
     (r"too many nested|overflow|too complex|recursion|^$", "the file is nested too deep for Python"),
 )  # fmt: skip
 
@@ -172,13 +172,14 @@ def _entry(line: bytes | str) -> _RawEntry | None:
 
 
 def _fault(file: str, raw: _RawFault) -> Fault:
-    cause = cause_of(raw.message, raw.text, column=raw.column, opened=raw.opened, mixed=raw.mixed)
+    reason = reason_of(raw.message, raw.text, column=raw.column, opened=raw.opened, mixed=raw.mixed)
     kind = printable(raw.kind[:MESSAGE_CHARS_MAX])
     column = raw.column if raw.line and raw.column and 0 < raw.column <= len(raw.text) + 1 else None
     if kind in {"TabError", "IndentationError"} and raw.text.strip():
         column = len(raw.text) - len(raw.text.lstrip()) + 1  # Python points at the end of the line
     line = raw.line
-    if raw.opened and cause == _NEVER_CLOSED.format(raw.opened):
+    is_open = raw.opened is not None and reason == _never_closed(raw.opened)
+    if is_open:
         line, column = raw.opened, column if raw.opened == raw.line else None
     return Fault(
         file=file,
@@ -186,7 +187,9 @@ def _fault(file: str, raw: _RawFault) -> Fault:
         column=column,
         kind=kind,
         message=printable(raw.message[:MESSAGE_CHARS_MAX]) or kind,
-        cause=printable(cause),
+        cause=printable(reason.why),
+        fix=printable(reason.fix),
+        unclosed=found[1] if (found := _UNCLOSED.search(raw.message)) else "?" if is_open else "",
         source=printable(raw.text[:SOURCE_CHARS_MAX]) if column else "",
     )
 
@@ -244,10 +247,10 @@ def _join_reports(one: SyntaxReport, two: SyntaxReport) -> SyntaxReport:
     )
 
 
-def cause_of(
+def reason_of(
     message: str, text: str = "", *, column: int | None = None, opened: int | None = None, mixed: bool = False
-) -> str:
-    """Return the cause in plain words, "" where Python's `message` says enough.
+) -> Reason:
+    """Return what is wrong in plain words, none where Python's `message` says enough.
 
     `text` is the faulty line, `column` the place in it (from 1), `opened` the line of a bracket that is never
     closed, `mixed` whether the file indents with tabs and with spaces.
@@ -258,23 +261,27 @@ def cause_of(
     if odd or "invalid character" in message or "non-printable" in message:
         return _character(message, text)
     if "unindent does not match" in message and mixed:
-        return "tabs and spaces are mixed in the indentation of this file: use four spaces everywhere"
+        return Reason(
+            "tabs and spaces are mixed in the indentation of this file", "use four spaces everywhere"
+        )
     if (empty := _EMPTY_BLOCK.match(message)) and _NEXT_BLOCK.match(text) and "class" not in message:
-        return f"nothing but comments stands in the block of line {empty[1]}: write below it what it is to do"
-    if vague and (told := cause_of_line(text)):
-        return told
-    if opened is not None and vague:
-        return _NEVER_CLOSED.format(opened)
+        why = f"nothing but comments stands in the block of line {empty[1]}"
+        return Reason(why, "write below it what it is to do")
+    reason = reason_of_line(text) if vague else Reason()
+    if vague and opened is not None and not reason.why:
+        reason = _never_closed(opened)
+    if reason.why:
+        return reason
     if message.startswith("invalid syntax") and _lacks_colon(text, column):
         message = "expected ':'"
-    return _first(_MESSAGES, message)
+    for pattern, *words in _MESSAGES:
+        if found := re.search(pattern, message):
+            return Reason(*(text.format(*found.groups()) if "{0}" in text else text for text in words))
+    return Reason()
 
 
-def _first(table: tuple[tuple[str, str], ...], text: str) -> str:
-    for pattern, cause in table:
-        if found := re.search(pattern, text):
-            return cause.format(*found.groups()) if "{0}" in cause else cause
-    return ""
+def _never_closed(line: int) -> Reason:
+    return Reason(f"a bracket that is opened in line {line} is never closed")
 
 
 def _lacks_colon(text: str, column: int | None) -> bool:
@@ -283,14 +290,16 @@ def _lacks_colon(text: str, column: int | None) -> bool:
     return at_end and not re.search(r":\W*$", code) and _BLOCK.match(code) is not None
 
 
-def _character(message: str, text: str) -> str:
+def _character(message: str, text: str) -> Reason:
     """Python before 3.9 does not name the character; it is then looked for in the line."""
     named = re.search(r"U\+([0-9A-Fa-f]{4,6})", message)
     if named and int(named[1], 16) <= sys.maxunicode:
         return _character_words(chr(int(named[1], 16)))
     strange = sorted(_strange(text), key=lambda c: c.isprintable() and not _is_typographic(c))
     return (
-        _character_words(strange[0]) if strange else "this line holds a character that Python does not know"
+        _character_words(strange[0])
+        if strange
+        else Reason("this line holds a character that Python does not know")
     )
 
 
@@ -302,19 +311,18 @@ def _is_typographic(char: str) -> bool:
     return any(char in group for group, _, _ in _TYPOGRAPHIC)
 
 
-def _character_words(char: str) -> str:
+def _character_words(char: str) -> Reason:
     code = f"U+{ord(char):04X}"
     for group, name, plain in _TYPOGRAPHIC:
         if char in group:
-            return f"a typographic {name} {char} ({code}) was {_COPIED}: type a plain {plain}"
+            return Reason(f"a typographic {name} {char} ({code}) was {_COPIED}", f"type a plain {plain}")
     if unicodedata.category(char) == "Zs":
         name = "no-break space" if char == "\u00a0" else "special space"
-        return (
-            f"an invisible {name} ({code}) was {_COPIED}: delete the spaces of this line and type them again"
-        )
+        why = f"an invisible {name} ({code}) was {_COPIED}"
+        return Reason(why, "delete the spaces of this line and type them again")
     if not char.isprintable():
-        return f"an invisible character ({code}) was {_COPIED}: delete this line and type it again"
+        return Reason(f"an invisible character ({code}) was {_COPIED}", "delete this line and type it again")
     plain = unicodedata.normalize("NFKC", char)
     if plain != char and plain.isascii():
-        return f"`{char}` ({code}) is not the plain `{plain}`: type it again"
-    return f"`{char}` ({code}) cannot appear in Python code outside a string or a comment"
+        return Reason(f"`{char}` ({code}) is not the plain `{plain}`", "type it again")
+    return Reason(f"`{char}` ({code}) cannot appear in Python code outside a string or a comment")

@@ -13,9 +13,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from grader.syntax_fixes import (
+    DELETE_LINE,
     PLAIN,
-    cause_of_line,
     corrections,
+    reason_of_line,
     without_brace,
     without_comment_sign,
     without_texts,
@@ -126,7 +127,7 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
         for changed in corrections(lines[line], *told):
             cause = "characters" if changed == lines[line].translate(PLAIN) else "token"
             yield cause, with_line(lines, line, changed)
-    if cause_of_line(lines[at]).endswith("delete this line"):
+    if reason_of_line(lines[at]).fix == DELETE_LINE:
         yield "token", "\n".join([*lines[:at], *lines[at + 1 :]])
 
 

@@ -11,36 +11,38 @@ from itertools import islice
 from lxml import etree
 
 from grader.model.package import Fault
+from grader.syntax_fixes import Reason
 
 _TYPOGRAPHIC = re.compile("[\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u2033\u00ab\u00bb]")
 
 _NO_END = r"Premature end of data in tag (\S+) line (\d+)"
 _NO_QUOTE = (r"Unescaped '<' not allowed in attr", r"AttValue: ['\"] expected")
 # libxml2's message and what it means ({0}, {1}: the pattern's groups, {root}: the root tag)
-_CAUSES = (
-    (r"Document is empty", "the file is empty: write `<{root}>` and `</{root}>` into it"),
-    (r"Start tag expected", "there is something before the first tag: the file must start with `<{root}>`"),
-    (_NO_END, "`<{0}>` of line {1} is never closed: add `</{0}>`"),
-    (r"hyphen|must not contain '--'", "`--` is not allowed inside a comment `<!-- ... -->`: delete it there"),
-    (r"Comment not terminated", "a comment is opened by `<!--` and never closed: write `-->` where it ends"),
-    (r"Extra content at the end", "text comes after the first block: delete it, since only one `<{root}>` is allowed"),
-    (r"XML declaration allowed only", "something comes before `<?xml ... ?>`: delete it, blank lines too"),
+_CAUSES: tuple[tuple[str, ...], ...] = (
+    (r"Document is empty", "the file is empty", "write `<{root}>` and `</{root}>` into it"),
+    (r"Start tag expected", "there is something before the first tag", "the file must start with `<{root}>`"),
+    (_NO_END, "`<{0}>` of line {1} is never closed", "add `</{0}>`"),
+    (r"hyphen|must not contain '--'", "`--` is not allowed inside a comment `<!-- ... -->`", "delete it there"),
+    (r"Comment not terminated", "a comment is opened by `<!--` and never closed", "write `-->` where it ends"),
+    (r"Extra content at the end",
+     "text comes after the first block", "delete it, since only one `<{root}>` is allowed"),
+    (r"XML declaration allowed only", "something comes before `<?xml ... ?>`", "delete it, blank lines too"),
     (r"Unsupported version '(.*)'|Malformed declaration expecting version",
-     'the only version of XML that is read here is 1.0: write `<?xml version="1.0"?>` for that line'),
-    (r"Attribute (\S+) redefined", "the attribute `{0}` is given twice in one tag: delete one of the two"),
+     "the only version of XML that is read here is 1.0", 'write `<?xml version="1.0"?>` for that line'),
+    (r"Attribute (\S+) redefined", "the attribute `{0}` is given twice in one tag", "delete one of the two"),
     (_NO_QUOTE[0],
-     'a closing quote is missing, so that the value runs on into the next tag: write `"` where it ends'),
-    (_NO_QUOTE[1], 'a closing quote is missing: write `"` where the value ends'),
-    (r"AttValue: \" or ' expected", 'the value of an attribute has no quotes around it: write name="value"'),
-    (r"Specification mandates value for attribute (\S+)", '`{0}` has no value: write {0}="..."'),
-    (r"invalid element name", "a `<` begins no tag: delete the space after it, or write `&lt;` for a plain `<`"),
-    (r"EntityRef|Entity '.*' not defined", "a plain `&` is not allowed: write `&amp;`"),
+     "a closing quote is missing, so that the value runs on into the next tag", 'write `"` where it ends'),
+    (_NO_QUOTE[1], "a closing quote is missing", 'write `"` where the value ends'),
+    (r"AttValue: \" or ' expected", "the value of an attribute has no quotes around it", 'write name="value"'),
+    (r"Specification mandates value for attribute (\S+)", "`{0}` has no value", 'write {0}="..."'),
+    (r"invalid element name", "a `<` begins no tag", "delete the space after it, or write `&lt;` for a plain `<`"),
+    (r"EntityRef|Entity '.*' not defined", "a plain `&` is not allowed", "write `&amp;`"),
     (r"character encoding|not proper UTF-8|Unsupported encoding|switch encoding",
-     "the file is not saved in the encoding that it names: save it as UTF-8"),
-    (r"Invalid character|invalid Char|xmlChar", "an invisible control character: type the line again"),
-    (r"[Ee]ntity", "entities are not read: write the text out"),
+     "the file is not saved in the encoding that it names", "save it as UTF-8"),
+    (r"Invalid character|invalid Char|xmlChar", "an invisible control character", "type the line again"),
+    (r"[Ee]ntity", "entities are not read", "write the text out"),
     (r"Excessive depth", "tags are nested more than 250 deep"),
-    (r"Namespace prefix (\S+)", "`{0}:` is in front of a name: take it out, since names have no colons"),
+    (r"Namespace prefix (\S+)", "`{0}:` is in front of a name", "take it out, since names have no colons"),
 )  # fmt: skip
 
 
@@ -75,8 +77,9 @@ def parse_xml(
         return None, _fault(error, parser, data, file, root)
     dtd = element.getroottree().docinfo.internalDTD
     if dtd is not None and dtd.entities():  # type: ignore[union-attr] # lxml-stubs lack it
-        cause = "`<!ENTITY ...>` is not read: delete the `<!DOCTYPE ...>` block and write the text out"
-        return None, Fault(file=file, line=1, kind="Entity", message="declares entities", cause=cause)
+        words = {"cause": "`<!ENTITY ...>` is not read", "message": "declares entities"}
+        fix = "delete the `<!DOCTYPE ...>` block and write the text out"
+        return None, Fault(file=file, line=1, kind="Entity", fix=fix, **words)
     if sum(1 for _ in element.iter(etree.Element)) > _TAGS_MAX:
         return None, _too_many(file)
     _set_first_lines(element, data)
@@ -143,28 +146,33 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
     text = _line(data, line)
     known = 0 < column <= len(text) + 1
     log = [str(entry.message)[:_MESSAGE_CHARS_MAX] for entry in islice(parser.error_log, _MESSAGES)]
-    cause, opened = _explain(message, log, text, root=root)
+    reason, opened = _explain(message, log, text, root=root)
     if opened and opened != line:
         line, text = opened, _line(data, opened)
         column = text.find("<") + 1
         known = column > 0
+    reason = _opened_again(message, data, text, root) or reason
     return Fault(
         file=file,
         line=line or None,
         column=column if known else None,
         kind="XMLSyntaxError",
         message=message[:_MESSAGE_CHARS_MAX],
-        cause=_opened_again(message, data, text, root) or cause[:_MESSAGE_CHARS_MAX],
+        cause=reason.why[:_MESSAGE_CHARS_MAX],
+        fix=reason.fix[:_MESSAGE_CHARS_MAX],
         source=text.rstrip("\r") if known else "",
     )
 
 
-def _opened_again(message: str, data: bytes, text: str, root: str) -> str:
-    """Return what is to be said where the root's tag stands a second time, in place of the one that closes it."""
+def _opened_again(message: str, data: bytes, text: str, root: str) -> Reason | None:
+    """Return what is to be said where the root's tag stands a second time, in place of the one that closes it; None
+    where it does not."""
     twice = "end of data" in message and text.strip() == f"<{root}>" and f"</{root}>".encode() not in data
     if not twice or len(re.findall(rf"<{re.escape(root)}[\s>]".encode(), data)) < 2:
-        return ""
-    return f"`<{root}>` opens the file a second time here, where it is to end: write `</{root}>` for it"
+        return None
+    return Reason(
+        f"`<{root}>` opens the file a second time here, where it is to end", f"write `</{root}>` for it"
+    )
 
 
 def _line(data: bytes, number: int) -> str:
@@ -174,41 +182,40 @@ def _line(data: bytes, number: int) -> str:
     )
 
 
-def _explain(message: str, log: list[str], line: str, *, root: str) -> tuple[str, int | None]:
+def _explain(message: str, log: list[str], line: str, *, root: str) -> tuple[Reason, int | None]:
     """Return libxml2's message in plain words, with the line of the tag that is not ended where it is that: libxml2
     says where it noticed. `log` holds all its messages, `line` the text of the faulty line."""
     if line.startswith(("<<<<<<<", "=======", ">>>>>>>")):
-        why = "git's merge markers (`<<<<<<<`) are still in the file: keep one version and delete the markers"
-        return why, None
+        why = "git's merge markers (`<<<<<<<`) are still in the file"
+        return Reason(why, "keep one version and delete the markers"), None
     if "AttValue" in message and (quote := _TYPOGRAPHIC.search(line)):
-        why = f'a typographic quote {quote[0]} was copied from a PDF or a web page: type plain quotes (")'
-        return why, None
+        why = f"a typographic quote {quote[0]} was copied from a PDF or a web page"
+        return Reason(why, 'type plain quotes (")'), None
     if mismatch := re.search(r"tag mismatch: (\S+) line (\d+) and (\S+)", message):
         return _mismatch(mismatch[1], int(mismatch[2]), mismatch[3], root)
     begun = next(filter(None, (re.search(r"end of Start Tag (\S+) line (\d+)", m) for m in log)), None)
     at = int(begun[2]) if begun else None
     if begun and re.search("attribute name|attributes construct", message):
-        why = (
-            f"the tag `<{begun[1]}` is not finished properly: it needs a space before each attribute, "
-            "quotes round each value, and `>` or `/>` at its end"
-        )
-        return why, at
-    for pattern, cause in _CAUSES:
+        fix = "it needs a space before each attribute, quotes round each value, and `>` or `/>` at its end"
+        return Reason(f"the tag `<{begun[1]}` is not finished properly", fix), at
+    for pattern, *words in _CAUSES:
         if found := re.search(pattern, message):
-            why = cause.format(*found.groups(), root=root)
-            return why, int(found[2]) if pattern == _NO_END else at if pattern in _NO_QUOTE else None
-    return "", None
+            reason = Reason(*(text.format(*found.groups(), root=root) for text in words))
+            return reason, int(found[2]) if pattern == _NO_END else at if pattern in _NO_QUOTE else None
+    return Reason(), None
 
 
-def _mismatch(opened: str, line: int, closed: str, root: str) -> tuple[str, int | None]:
+def _mismatch(opened: str, line: int, closed: str, root: str) -> tuple[Reason, int | None]:
     tag = f"`<{opened}>` of line {line}"
     if opened.lower() == closed.lower():
-        return f"{tag} is closed by `</{closed}>`, in other letters: write `</{opened}>`", None
+        return Reason(f"{tag} is closed by `</{closed}>`, in other letters", f"write `</{opened}>`"), None
     if get_close_matches(closed, [opened], cutoff=0.7):
-        return f"{tag} is closed by `</{closed}>`: write `</{opened}>`", None
+        return Reason(f"{tag} is closed by `</{closed}>`", f"write `</{opened}>`"), None
     if opened == root:
-        return f"`</{closed}>` closes nothing, since only {tag} is open here: delete `</{closed}>`", None
-    return f"{tag} is still open where `</{closed}>` comes: end it with `/>` or with `</{opened}>`", line
+        why = f"`</{closed}>` closes nothing, since only {tag} is open here"
+        return Reason(why, f"delete `</{closed}>`"), None
+    fix = f"end it with `/>` or with `</{opened}>`"
+    return Reason(f"{tag} is still open where `</{closed}>` comes", fix), line
 
 
 # ---- one edit that makes a file well-formed

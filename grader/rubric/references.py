@@ -47,13 +47,11 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
         yield from _outside_faults(("scenarios", name), scenario, rubric)
         found = (*parameter_faults(scenario), *argument_faults(scenario, rubric))
         yield from ((("scenarios", name, *at), fault) for at, fault in found)
-    criteria = list(as_maps(rubric.get("criteria")))
-    for index, criterion in criteria:
+    for index, criterion, others in _criteria(rubric):
         check = checks.get(str(criterion.get("check")))
         if check is not None:
             judged = scenarios.get(str(criterion.get("scenario")))
             yield from _criterion_faults(("criteria", index), criterion, check, judged, rubric)
-            others = {t for n, one in criteria if n != index for t in _topics_in(one.get("with"))}
             asked = asked_faults(
                 as_map(criterion.get("with")), judged or {}, others | set(_topics_in(judged))
             )
@@ -66,6 +64,7 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
     yield from _unknown_causes(rubric, scenarios, checks)
     yield from _misspelt_nodes(rubric, scenarios)
     yield from _own_types(rubric)
+    criteria = list(as_maps(rubric.get("criteria")))
     yield from _of_grader(criteria, scenarios)
     yield from _forgotten_topics(criteria)
     yield from _same_names(criteria, scenarios)
@@ -390,11 +389,9 @@ def _unknown_causes(
     rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
 ) -> Iterator[Fault]:
     """Yield causes on topics that nothing in the scenario sends on, and that no other criterion names."""
-    criteria = list(as_maps(rubric.get("criteria")))
-    for index, criterion in criteria:
+    for index, criterion, others in _criteria(rubric):
         check, name = checks.get(str(criterion.get("check"))), str(criterion.get("scenario"))
         scenario = scenarios.get(name, {})
-        others = {t for n, one in criteria if n != index for t in _topics_in(one.get("with"))}
         sent = {*SYSTEM_TOPICS, *_topics_in(scenario)}
         open_ = any(start.get("script") is None for start in _starts(scenario)) or "recording" in scenario
         for one in check.references(as_map(criterion.get("with"))) if check else ():
@@ -511,6 +508,14 @@ def _waited_for(until: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     for key in ("topics", "connected"):
         yield from (((key, index), topic) for index, topic in as_texts(until.get(key)))
     yield from ((("messages", topic), topic) for topic in as_map(until.get("messages")))
+
+
+def _criteria(rubric: dict[str, Any]) -> Iterator[tuple[int, dict[str, Any], set[str]]]:
+    """Yield each criterion with its place, and the topics that the others name."""
+    criteria = list(as_maps(rubric.get("criteria")))
+    named = [set(_topics_in(criterion.get("with"))) for _, criterion in criteria]
+    for place, (index, criterion) in enumerate(criteria):
+        yield index, criterion, set().union(*named[:place], *named[place + 1 :])
 
 
 def _topics_in(value: object) -> Iterator[str]:

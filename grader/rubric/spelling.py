@@ -85,7 +85,8 @@ def _count(word: str, name: str, texts: list[tuple[KeyPath, str]]) -> int:
     end = rf"{re.escape(word)}(?!\w)"
     whole = re.compile(rf"(?<!\w){end}")
     in_prose = re.compile(rf"[/~`_]{end}") if name.startswith("/") and not word.startswith("/") else whole
-    return sum(len((in_prose if PROSE & {*at} else whole).findall(one)) for at, one in texts)
+    there = [(at, one) for at, one in texts if word in one]
+    return sum(len((whole if PROSE.isdisjoint(at) else in_prose).findall(one)) for at, one in there)
 
 
 def is_slip(word: str, other: str) -> bool:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -122,65 +123,57 @@ def test_who_works_in_the_same_memory_computes(program: str, kinds: set[str | No
             process.kill()
 
 
-WAITS = "import threading\nthreading.Thread(target=lambda: [sum([0]) or time.sleep(0.1) for _ in range(9000)]).start()"
-
-
-def _looks_until(kind: str | None, pid: int) -> list[str | None]:
-    """Return how a program rests, look by look, until it has been so five times, for a minute at most."""
-    rest, begun_s = TreeRest(), time.monotonic()
-    found: list[str | None] = []
-    while time.monotonic() < begun_s + 60 and (len(found) < 20 or found[-5:] != [kind] * 5):
-        time.sleep(LOOK_S)
-        found.append(rest.look([pid], time.monotonic())[0])
-    return found
-
-
-@pytest.mark.parametrize(("compiled", "kind"), [(True, "loops"), (False, None)])
-def test_a_compiled_program_rests_while_it_waits_for_its_threads(
-    compiled: bool, kind: str | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("process_tree._is_compiled", lambda _: compiled)
-    with subprocess.Popen([sys.executable, "-c", f"import time\n{WAITS}"]) as process:
-        try:
-            found = _looks_until(kind, process.pid)
-            assert found[-5:] == [kind] * 5, found
-        finally:
-            process.kill()
-
-
+WAITS = "threading.Thread(target=lambda: [sum([0]) or time.sleep(0.1) for _ in range(9000)]).start()"
 TWICE = "lock = threading.Lock()\nlock.acquire()\nlock.acquire()"
 IN_TIME = "threading.Thread(target=lambda: threading.Event().wait(100), daemon=True).start()"
+WAITING = {
+    "compiled, for its threads": (WAITS, "loops"),
+    "for its threads": (WAITS, None),
+    "for itself": (TWICE, "loops"),
+    "for itself, a thread in vain": (
+        f"threading.Thread(target=lambda: [threading.Event().wait(0.5) for _ in range(99)]).start()\n{TWICE}",
+        "loops",
+    ),
+    "with a limit": ("threading.Event().wait(100)", None),
+    "for itself, a thread with a limit": (f"{IN_TIME}\n{TWICE}", None),
+    "for itself, a thread that works": (f"{WAITS}\n{TWICE}", None),
+    "for itself, a thread that looks": (
+        f"threading.Thread(target=lambda: select.select([], [], [], 0.1), daemon=True).start()\n{TWICE}",
+        "loops",
+    ),
+    "for itself, a thread that looks later": (
+        f"threading.Thread(target=lambda: select.select([], [], [], 99), daemon=True).start()\n{TWICE}",
+        None,
+    ),
+}
+"""Programs that wait, and how they rest: one that sets itself a limit may do anything after it."""
 
 
-@pytest.mark.parametrize(
-    ("program", "kind"),
-    [
-        (TWICE, "loops"),
-        (
-            f"threading.Thread(target=lambda: [threading.Event().wait(0.5) for _ in range(99)]).start()\n{TWICE}",
-            "loops",
-        ),
-        ("threading.Event().wait(100)", None),
-        (f"{IN_TIME}\n{TWICE}", None),
-        (f"import time\n{WAITS}\n{TWICE}", None),
-        (
-            f"threading.Thread(target=lambda: select.select([], [], [], 0.1), daemon=True).start()\n{TWICE}",
-            "loops",
-        ),
-        (
-            f"threading.Thread(target=lambda: select.select([], [], [], 99), daemon=True).start()\n{TWICE}",
-            None,
-        ),
-    ],
-)
-def test_a_program_rests_whose_threads_all_wait_for_each_other(program: str, kind: str | None) -> None:
-    """One that sets itself a limit may do anything after it."""
-    with subprocess.Popen([sys.executable, "-c", f"import select, threading\n{program}"]) as process:
-        try:
-            found = _looks_until(kind, process.pid)
-            assert found[-5:] == [kind] * 5, found
-        finally:
-            process.kill()
+@pytest.fixture(scope="module")
+def found() -> Iterator[dict[str, list[str | None]]]:
+    """How each of them rests, look by look, until all have been so five times, for a minute at most."""
+    command = [sys.executable, "-c", "import select, sys, threading, time\nexec(sys.argv[1])"]
+    with ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
+        programs = {}
+        for name, (program, _) in WAITING.items():
+            programs[name] = stack.enter_context(subprocess.Popen([*command, program]))
+            stack.callback(programs[name].kill)
+        compiled = programs["compiled, for its threads"].pid
+        patch.setattr("process_tree._is_compiled", lambda pid: pid == compiled)
+        rests = {name: TreeRest() for name in programs}
+        looks: dict[str, list[str | None]] = {name: [] for name in programs}
+        for _ in range(round(60 / LOOK_S)):
+            time.sleep(LOOK_S)
+            for name, rest in rests.items():
+                looks[name].append(rest.look([programs[name].pid], time.monotonic())[0])
+            if len(looks[name]) >= 20 and all(looks[one][-5:] == [WAITING[one][1]] * 5 for one in looks):
+                break
+        yield looks
+
+
+@pytest.mark.parametrize("program", WAITING)
+def test_a_program_rests_while_nothing_can_wake_it(program: str, found: dict[str, list[str | None]]) -> None:
+    assert found[program][-5:] == [WAITING[program][1]] * 5, found[program]
 
 
 NOT_WAITED_FOR = """

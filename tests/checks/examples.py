@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -49,12 +50,14 @@ class Example:
         return judge_example(self.check, self.data)
 
 
-def examples() -> list[Example]:
-    return [
+@cache
+def examples() -> tuple[Example, ...]:
+    """Every case: read once, changed by nobody."""
+    return tuple(
         Example(check=path.stem, name=name, data=data)
         for path in sorted(TIMELINES.glob("*.yaml"))
         for name, data in _read(path).items()
-    ]
+    )
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -67,7 +67,12 @@ SLASH = 'a name of the graph begins with a slash: "/x"'
         ),
         ("path", {"topic": "/x", "points": [], "tolerance_m": 1}, ("points",), "needs at least 1, has 0"),
         ("path", {"topic": "/x", "points": SQUARE, "tolerance_m": 0}, ("tolerance_m",), "more than 0, not 0"),
-        ("path", {"topic": "/x", "points": [[0, 0]], "tolerance_m": 0.1}, (), "a way needs two points"),
+        (
+            "path",
+            {"topic": "/x", "points": [[0, 0]], "tolerance_m": 0.1},
+            (),
+            "a path needs at least two points",
+        ),
         ("path", {"topic": "/x", "points": SQUARE, "tolerance_m": 1.5}, (), "two points .* are 2 m apart"),
         ("path", {"topic": "/x", "points": [[1, 0], [1, 0]], "tolerance_m": 0.1}, (), "are 0 m apart"),
         (

@@ -43,7 +43,7 @@ from grader.package.cmake import read_cmake, refine_cmake
 from grader.package.facts import _text_facts
 from grader.package.launch import parse_launch, parse_launch_files
 from grader.package.manifest import parse_manifest, read_manifest
-from grader.package.python import cause_of, read_syntax_report
+from grader.package.python import read_syntax_report, reason_of
 from grader.rubric.load import load_rubric
 from grader.rubric.model import Rubric
 from grader.rubric.scenario import Param
@@ -152,7 +152,7 @@ def syntax_report(data: bytes) -> None:
 
 def python_causes(data: bytes) -> None:
     message, _, text = data.decode("utf-8", "replace").partition("\n")
-    cause_of(
+    reason_of(
         message, text, column=len(text) or None, opened=len(message) % 3 or None, mixed=len(text) % 2 == 0
     )
 

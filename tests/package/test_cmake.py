@@ -93,8 +93,8 @@ def test_included_files_of_the_package_count_and_no_others(tmp_path):
         ("project(lab1)\n)\n", 2, "`)` too many", 1),
         ("project(lab1)\n# set(\n  a\n  b\n)\n", 2, "`set(…)` is commented out: remove the `#` of line 2", 1),
         ("project(lab1)\nset(\n#  a\n#  b)\nset(c d)\n", 3, "remove the `#` of lines 3 to 4", 1),
-        ("project(lab1)\nset(a\n# set(b c)\nset(c d)\n", 2, "write it at the end of line 2", 1),
-        ("project(lab1)\nset(a\n\n# and more)\nset(c d)\n", 2, "write it at the end of line 2", 1),
+        ("project(lab1)\nset(a\n# set(b c)\nset(c d)\n", 2, "write `)` at the end of line 2", 1),
+        ("project(lab1)\nset(a\n\n# and more)\nset(c d)\n", 2, "write `)` at the end of line 2", 1),
         ('project(lab1)\n\nset(a "b)\n', 3, "a quote", 1),
         ("project(lab1)\nhello world\n", 2, "`hello` is not a command", 1),
         ("project(lab1)\nif(x)\nset(a b)\n", 2, "`if()` is never closed by `endif()`", 1),
@@ -111,7 +111,7 @@ def test_included_files_of_the_package_count_and_no_others(tmp_path):
 def test_faults_keep_what_comes_before(tmp_path, text, line, cause, kept):
     facts = facts_of(tmp_path, text)
     assert facts.fault.line == line
-    assert cause in facts.fault.cause
+    assert cause in facts.fault.explanation
     assert len(facts.calls) == kept
 
 
@@ -134,7 +134,7 @@ def test_odd_but_good_files(tmp_path, text):
 def test_missing_files_and_links(tmp_path):
     assert read_cmake(tmp_path, "lab1") is None
     (tmp_path / "CMakeLists.txt").symlink_to("/opt/ros/none/toplevel.cmake")
-    assert "link" in read_cmake(tmp_path, "lab1").fault.cause
+    assert "link" in read_cmake(tmp_path, "lab1").fault.explanation
     (tmp_path / "CMakeLists.txt").unlink()
     (tmp_path / "CMakeLists.txt").symlink_to("/etc/passwd")
     assert read_cmake(tmp_path, "lab1").fault.kind == "OutsideLink"

@@ -16,7 +16,7 @@ from grader.package.cmake import read_trace
 from grader.package.facts import read_shebang
 from grader.package.launch import parse_launch, parse_launch_files
 from grader.package.manifest import parse_manifest
-from grader.package.python import REPORT_BYTES_MAX, cause_of, check_syntax, read_syntax_report
+from grader.package.python import REPORT_BYTES_MAX, check_syntax, read_syntax_report, reason_of
 from tests.intake.samples import lab, write
 from tests.package.trees import CMAKE, MANIFEST, NODE, make_package
 
@@ -225,7 +225,7 @@ def test_a_trace_of_a_gigabyte(tmp_path):
 )
 def test_lines_that_keep_patterns_busy(line, message):
     with bounded(1.0):
-        assert len(cause_of(message, line, column=3)) < 500
+        assert len(reason_of(message, line, column=3).text) < 500
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def test_attributes_that_are_not_there_are_none():
 def test_faults_in_plain_words(text, line, cause):
     launch = parse_launch(text.encode(), "a.launch")
     assert launch.nodes == ()
-    assert cause in launch.fault.cause
+    assert cause in launch.fault.explanation
     assert line in {None, launch.fault.line}
 
 
@@ -88,7 +88,7 @@ def test_encodings_and_line_ends():
     text = '<?xml version="1.0" encoding="{}"?>\r\n<launch>\r\n<!-- \xe9 -->\r\n<node name="x"/></launch>'
     assert parse_launch(text.format("ISO-8859-1").encode("latin-1"), "a.launch").nodes[0].line == 4
     broken = parse_launch(text.format("UTF-8").encode("latin-1"), "a.launch")
-    assert (broken.fault.line, "UTF-8" in broken.fault.cause) == (3, True)
+    assert (broken.fault.line, "UTF-8" in broken.fault.explanation) == (3, True)
     assert parse_launch(b"\xef\xbb\xbf<launch/>", "a.launch").fault is None
 
 

@@ -99,7 +99,7 @@ def test_pass_all_args(tmp_path: Path) -> None:
         (
             "c.launch",
             '<launch><include file="$(dirname)/a.launch"/></launch>',
-            "include each other without an end",
+            "include each other endlessly",
         ),
     ],
 )

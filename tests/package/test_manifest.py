@@ -77,7 +77,7 @@ def test_what_catkin_refuses_is_a_fault(old, new, line, cause):
     manifest, fault = parse_manifest(changed(old, new))
     assert manifest is None
     assert (fault.file, fault.line) == ("package.xml", line)
-    assert cause in fault.cause
+    assert cause in fault.explanation
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_what_is_no_manifest_at_all(data, kind, cause):
     manifest, fault = parse_manifest(data)
     assert manifest is None
     assert fault.kind == kind
-    assert cause in fault.cause
+    assert cause in fault.explanation
 
 
 def test_declared_encoding_does_not_matter_as_catkin_reads_utf8():
@@ -121,13 +121,13 @@ def test_format_1_and_conditions_of_format_3():
     assert [d.name for d in manifest.dependencies] == ["catkin", "rospy"]
     manifest, fault = parse_manifest(three.replace("$ROS_VERSION == 1", "= =").encode())
     assert manifest is None
-    assert "condition" in fault.cause
+    assert "condition" in fault.explanation
 
 
 def test_two_faults_are_both_named():
     _, fault = parse_manifest(changed("0.0.0", "1").replace(b"The lab1 package", b""))
-    assert "version" in fault.cause
-    assert "description" in fault.cause
+    assert "version" in fault.explanation
+    assert "description" in fault.explanation
 
 
 @pytest.mark.parametrize("where", ["<description>&x;</description>", '<description a="&x;">d</description>'])

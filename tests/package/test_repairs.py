@@ -139,7 +139,7 @@ CASES = {
     "tabs-of-4": Case(swapped(TALKER, ("    rate = ", "\trate = ")), ["python-syntax"],
         "line 8 of src/talker.py: tabs"),
     "print": Case(swapped(TALKER, ("        rate.sleep()", "        print 'a', 1\n        rate.sleep()")),
-              ["python-syntax"], "line 11 of src/talker.py: this is Python 2: `print`"),
+              ["python-syntax"], "line 11 of src/talker.py: `print` has no brackets, as in Python 2"),
     "colon": Case(swapped(TALKER, ("is_shutdown():", "is_shutdown()")), ["python-syntax"], "line 9"),
     "bracket": Case(swapped(TALKER, ("queue_size=10)", "queue_size=10")), ["python-syntax"], "never closed"),
     "quote": Case(swapped(TALKER, ("'talker')", "'talker)")), ["python-syntax"], "line 6 of src/talker.py: a quote"),

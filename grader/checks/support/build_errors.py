@@ -123,14 +123,13 @@ def unreadable_file(package: PackageFacts) -> Explained | None:
     if fault is None:
         return None
     line = f", line {fault.line}" if fault.line else ""
-    why = f"{fault.file}{line} cannot be read: {fault.cause or fault.message}"
+    why = f"{fault.file}{line} cannot be read: {fault.explanation}"
     return Explained(why, repair_of_file(fault), place=fault.place)
 
 
 def repair_of_file(fault: Fault) -> str:
     """Return what to do where `package.xml` or `CMakeLists.txt` cannot be read."""
-    unclosed = re.search(r": write it (at the end of line \d+)$", fault.cause)
-    return f"write `)` {unclosed[1]}" if unclosed else fault.fix or "correct that line, then run catkin_make"
+    return (fault.fix if fault.unclosed else fault.advice) or "correct that line, then run catkin_make"
 
 
 def _unreadable(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -238,7 +237,9 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
         f"{meant} in find_package(…) and in package.xml; a package of your own must be pushed with this one"
     )
     why = f"find_package(…) names {name}, but there is no package of that name"
-    return Explained(f"{why}: the help of catkin_create_pkg calls a package so" if placeholder else why, hint)
+    return Explained(
+        f"{why}: it is only an example in the help of catkin_create_pkg" if placeholder else why, hint
+    )
 
 
 def _missing_library(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
@@ -290,9 +291,8 @@ def no_types(package: PackageFacts) -> Explained | None:
         if (right := meant_type(field.type, own, noetic_messages())) != field.type
     ]
     if faults:
-        why, _, fix = faults[0].cause.partition(": ")
-        hint = fix or "write each line as a type and a name: `float64 speed`"
-        return Explained(f"{faults[0].file}: {why}", hint, place=faults[0].place)
+        hint = faults[0].fix or "write each line as a type and a name: `float64 speed`"
+        return Explained(f"{faults[0].file}: {faults[0].cause}", hint, place=faults[0].place)
     if not wrong:
         return None
     place, first, _ = wrong[0]
@@ -491,7 +491,8 @@ def _explain_undeclared(found: re.Match[str], _package: PackageFacts, _lines: Se
         return Explained(found.string, f"write std::{name}, and #include <{STANDARD[name]}> at the top")
     declare = f"declare {name} above that line, or include the header that does"
     return Explained(
-        found.string, f"write {near} there, if that is what you mean; else {declare}" if near else declare
+        found.string,
+        f"write {near} there, if that is what you mean; otherwise {declare}" if near else declare,
     )
 
 

@@ -71,7 +71,7 @@ SLIPS = {
      "leave the keys out: publish in the loop by itself, or read keys in a node of their own"),
     "Invalid number of arguments, args should be": (
      "the message gets a different number of values than it has fields",
-     'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not by a comma'),
+     'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not with a comma'),
 }  # fmt: skip
 
 
@@ -135,8 +135,8 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
         hint = f"look at how many there are before you take them apart: {NUMBER_OF_PARTS}"
         return f"{plural(int(found[2]), 'value')} are expected on the right of `=`{came}", hint
     if found := _NO_NUMBER.search(message):
-        hint = "turn into a number only what is one; print a text as it is"
-        return f"{shown(found[1])} is a text, and no number", hint
+        hint = "convert only what is a number, and print text as it is"
+        return f"{shown(found[1])} is text, not a number", hint
     return None
 
 
@@ -169,7 +169,7 @@ def _nested_index(message: str, source: str) -> Meaning | None:
     cause = f"`{shown(flat)}` is one list of numbers, row after row"
     return (
         cause,
-        f"write `{shown(f'{flat}[{row} * width + {column}]')}`, width being how many there are in a row",
+        f"write `{shown(f'{flat}[{row} * width + {column}]')}`, where `width` is how many there are in a row",
     )
 
 
@@ -189,7 +189,7 @@ def _no_number(message: str, source: str) -> Meaning | None:
             "take its field, as in `msg.data`" if data else "take one of its fields",
         )
     if re.search(r" of (?:'str' and '(?:int|float)|'(?:int|float)' and 'str)'", message):
-        return "a text is compared with a number", "turn the text into a number first, or leave out `str(…)`"
+        return "text is compared with a number", "turn the text into a number first, or leave out `str(…)`"
     if wanted := _WANTS_NUMBER.search(message):
         hint = "write %s for %d or %f" if "%" in source else "turn the text into a number: `float(…)`"
         return f"a number is wanted here, and it is of the type {wanted[1] or wanted[2]}", hint
@@ -209,7 +209,7 @@ def _call(message: str, source: str) -> Meaning | None:
             cause = f"`{hidden}` is a variable here, and hides Python's `{hidden}`"
             return cause, f"give the variable `{hidden}` another name"
         return (
-            f"what is called is a value ({called[1]}), no function",
+            f"what is called is a value ({called[1]}), not a function",
             "give the variable another name than the function",
         )
     given = _ONE_TOO_MANY.search(message)
@@ -240,7 +240,7 @@ def _ros_call(message: str, source: str) -> Meaning | None:
     if serialized := re.match(r"(\w+)\.serialize\(\) missing", message):
         name = serialized[1]
         return (
-            f"`{name}` is the type of the messages, and no message",
+            f"`{name}` is the type of the messages, not a message",
             f"publish a value: `{name}(…)`, or the value alone",
         )
     if asks_for_rate := _calls(source, "Rate"):
@@ -329,13 +329,13 @@ def _no_type(message: str, source: str, topic: ast.expr, type_: ast.expr) -> Mea
             source, (type_, re.sub(r".*[./]", "", str(type_.value)))
         )
     if isinstance(type_, ast.Call):
-        return f"`{shown(ast.unparse(type_))}` is a message, and no type", rewritten(
+        return f"`{shown(ast.unparse(type_))}` is a message, not a type", rewritten(
             source, (type_, type_.func)
         )
     if "topic name" in message and not is_text(topic):
-        return "the topic's name is no text", "write the topic's name in quotes"
+        return "the topic's name is not text", "write the topic's name in quotes"
     hint = "import the type of the messages, as in `from std_msgs.msg import String`"
-    return f"`{shown(ast.unparse(type_))}` is no type of messages", hint
+    return f"`{shown(ast.unparse(type_))}` is not a message type", hint
 
 
 def rewritten(source: str, *changes: tuple[ast.expr, ast.expr | str], span_to: ast.expr | None = None) -> str:
@@ -352,10 +352,10 @@ def _rate(call: ast.Call) -> Meaning | None:
     value = call.args[0].value if call.args and isinstance(call.args[0], ast.Constant) else None
     if isinstance(value, str):
         number = re.match(r"\s*(\d+(?:\.\d+)?)", value)
-        hint = f"write `rospy.Rate({number[1]})`" if number else "write the number of rounds in a second"
-        return "a rate is a number, and this is a text", hint
+        hint = f"write `rospy.Rate({number[1]})`" if number else "write how many times a second the loop runs"
+        return "a rate is a number, and this is text", hint
     if value == 0:
-        return "0 Hz is no rate", "write how often the loop goes round in a second, as in `rospy.Rate(10)`"
+        return "0 Hz is no rate", "write how many times a second the loop runs, as in `rospy.Rate(10)`"
     return None
 
 
@@ -399,7 +399,7 @@ def _local(message: str, _source: str, _marked: tuple[int, int] | None) -> Meani
 
 def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
     if message == "'Duration' object has no attribute 'sleep'":
-        hint = "make it with `rospy.Rate(…)`, which takes how often the loop goes round in a second"
+        hint = "make it with `rospy.Rate(…)`, which takes how many times a second the loop runs"
         return "a Duration is a length of time, and only a Rate sleeps", hint
     if (twice := _IN_ITSELF.search(message)) and re.search(rf"\b{twice[1]}\.{twice[1]}\b", source):
         name = twice[1]
@@ -411,7 +411,7 @@ def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Me
     if "'member_descriptor' object" in message:
         name = source.partition(".")[0].strip()
         return (
-            f"`{name}` is the type of the messages, and no message",
+            f"`{name}` is the type of the messages, not a message",
             f"write brackets where it is made: `{name} = …()`",
         )
     return _none() if "'NoneType' object" in message else None
@@ -472,7 +472,7 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
     "ServiceException": _service,
     "ZeroDivisionError": _zero,
     "RecursionError": lambda *_: (
-        "a function calls itself without an end",
+        "a function calls itself endlessly",
         "call another function there, or loop",
     ),
 }

@@ -76,7 +76,7 @@ CAUSES = {
     "NameError": ("", "check the spelling, and that it is imported or assigned before it is used"),
     "ROSSerializationException": ("", "publish a value that fits the message's type"),
     "SerializationError": ("", "publish a value that fits the message's type"),
-    "SyntaxError": ("", "compare that line, and the end of the one above it, with the handout's, sign by sign"),
+    "SyntaxError": ("", "compare that line and the end of the one above it with the handout, character by character"),
     "IndentationError": ("", "indent every block by four spaces, each of its lines the same"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }  # fmt: skip
@@ -97,14 +97,13 @@ def syntax_hint(fault: Fault) -> str:
     """Return how to repair a file that Python cannot parse: the line as it has to be where that is known."""
     where = f"line {fault.line}: " if fault.line else ""
     right = corrected(fault.source, fault.message, fault.column)
-    bracket = re.match(r"the bracket `(.)`|(a bracket)", fault.cause)
-    if bracket and not right:
-        closing = {"(": "`)`", "[": "`]`", "{": "`}`"}.get(bracket[1], "the bracket that closes it")
+    if fault.unclosed and not right:
+        closing = {"(": "`)`", "[": "`]`", "{": "`}`"}.get(fault.unclosed, "the bracket that closes it")
         return f"{where}write {closing} at the end of what is opened there"
-    if below := re.match(r"(`global \w+`) stands below", fault.cause):
+    if below := re.search(r"name '(\w+)' is .* global declaration", fault.message):
         inside = fault.source[:1].isspace()
         return (
-            f"{where}move {below[1]} up, as the first line of the function"
+            f"{where}move `global {below[1]}` up, as the first line of the function"
             if inside
             else f"{where}delete this line"
         )
@@ -112,7 +111,7 @@ def syntax_hint(fault: Fault) -> str:
         braces = ", and delete the `}` that closes the block" if without_brace(fault.source) else ""
         begin = fault.message.partition(f"{COMMENTED_OUT}: ")[2]
         return f"{where}write `{shown(right.strip())}`{braces}" + (f", and {begin}" if begin else "")
-    return fault.fix or CAUSES.get(fault.kind, ("", "save the file as plain UTF-8 text"))[1]
+    return fault.advice or CAUSES.get(fault.kind, ("", "save the file as plain UTF-8 text"))[1]
 
 
 class Ending(NamedTuple):
@@ -259,7 +258,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         return Ending(cause, hint, (place,) if place else (), of_machine=True)
     source = package.file(place.file) if place and found.kind in SYNTAX else None
     if place is not None and source is not None and source.python_fault is not None:
-        cause = source.python_fault.cause or cause
+        cause = source.python_fault.explanation if source.python_fault.cause else cause
         hint = syntax_hint(source.python_fault)
         place = source.python_fault.place
     if place is not None and misplaced is None:

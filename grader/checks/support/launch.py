@@ -81,7 +81,7 @@ _REFUSALS = (
 
 class Slip(NamedTuple):
     """What is wrong with a line of a launch file, and what to write. `of_manifest`: the manifest's name is at fault;
-    `refused`: roslaunch starts nothing at all."""
+    `refused`: roslaunch starts nothing at all; `lacks`: the program that is not there."""
 
     file: str
     line: int
@@ -89,6 +89,7 @@ class Slip(NamedTuple):
     fix: str
     of_manifest: bool = False
     refused: bool = False
+    lacks: str = ""
 
     def verdict(self, said: str = "") -> Verdict:
         """Return the verdict with what roslaunch said (`said`) at the end."""
@@ -144,8 +145,8 @@ def _unreadable(
     if file.fault is None:
         return None
     line = f", line {file.fault.line}" if file.fault.line else ""
-    message = f"{file.path}{line} is not well-formed: {file.fault.cause or file.fault.message}"
-    hint = file.fault.fix or "close every element, and begin with <launch> and end with </launch>"
+    message = f"{file.path}{line} is not well-formed: {file.fault.explanation}"
+    hint = file.fault.advice or "close every element, and begin with <launch> and end with </launch>"
     return failed(message, hint=hint, citations=(file.fault.place,))
 
 
@@ -189,11 +190,12 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
     if UNRESOLVED in pkg + name:
         return None
     if owner := _owner(package, node):
-        return None if has_program(owner, name) else _no_program(owner, node, (package, *package.also))
+        there = has_program(owner, name)
+        return None if there else _no_program(owner, node, (package, *package.also))._replace(lacks=name)
     if near_names(package.name, [pkg]) or f"[{pkg}/{name}]" in said or _folder(package) == pkg:
         slip = _slip(node, f"there is no {name} in a package {pkg}", f'write pkg="{package.name}"')
         # Where the launch file has the name of the folder or of project(…), the manifest is at fault.
-        return slip._replace(of_manifest=pkg in {_folder(package), *_projects(package)})
+        return slip._replace(of_manifest=pkg in {_folder(package), *_projects(package)}, lacks=name)
     return None
 
 
@@ -209,7 +211,7 @@ def illegal_name(node: LaunchNode) -> Slip | None:
 def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
     """Yield what makes roslaunch start nothing at all."""
     for fault in file.include_faults:
-        yield Slip(fault.file or file.path, fault.line or 1, fault.message, fault.fix)
+        yield Slip(fault.file or file.path, fault.line or 1, fault.message, fault.advice)
     seen: dict[str, LaunchNode] = {}
     for node in file.brings:
         slip = node_slip(package, node)
@@ -486,7 +488,7 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         return Absence(f"it died: {end.cause}", end.hint, True, cited, end.of_machine)
     if script is not None and script.python_fault is not None:
         fault = script.python_fault
-        why = f"it died: {fault.kind}: {fault.cause or fault.message}"
+        why = f"it died: {fault.kind}: {fault.explanation}"
         return Absence(why, syntax_hint(fault), of_script=True, citations=(fault.place,))
     if script is not None and code in NOT_EXECUTED and any(shebang_obstacles(script)):
         return not_started(script)

@@ -52,7 +52,7 @@ _CAUSES = (
     (r"scanning a quoted scalar|found unexpected end of stream", "a closing quote is missing near line {line}",
      'close every " on its own line'),
     (r"expected <block end>|unindent does not match|expected ',' or '[\]}}]'|could not find expected ':'",
-     "line {line} does not fit those above it: names of one level begin in the same column", _INDENT),
+     "line {line} does not line up with those above it: names of one level begin in the same column", _INDENT),
     (r"cannot start any token", "line {line} has a character that needs quotes", 'write the value in "quotes"'),
     (r"can only be set to a dictionary", "it holds no `name: value`", "write `details:` and its values below it"),
     (r"UnicodeDecodeError|codec can't decode|special characters are not allowed", "it is not saved as UTF-8",

@@ -178,7 +178,7 @@ def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Calla
         answering = f"publish in the callback of {join_words(heard)}, or in the loop"
         hint = both(
             answering,
-            f"{answering}, and call ros::spinOnce() in it, or ros::spin(): else no callback is ever called",
+            f"{answering}, and call ros::spinOnce() in it, or ros::spin(): otherwise no callback is ever called",
         )
         return of_node(
             f"{message}: nothing follows what the run publishes on {join_words(heard)}",
@@ -346,7 +346,7 @@ def all_lost(run: Run, topic: str) -> Verdict | None:
     lost = losses(run, topic)
     if lost is None or lost.kept:
         return None
-    return inconclusive(f"nothing was recorded of {topic}", measured="no message", hint="grade again")
+    return inconclusive(f"nothing was recorded on {topic}", measured="no message", hint="grade again")
 
 
 def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> Verdict:

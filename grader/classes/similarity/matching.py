@@ -39,7 +39,7 @@ COMMON_FROM = 6
 MATRIX_COLUMNS = 4096
 CANDIDATES_MAX = 20_000
 NEAR = 0.25
-"""The share of fingerprints from which two submissions are looked at sign by sign."""
+"""The share of fingerprints from which two submissions are looked at character by character."""
 _NONE = np.zeros(0, dtype=np.int64)
 
 

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from grader.cli.declare import (
     BATCH_FOLDER,
@@ -14,6 +14,10 @@ from grader.cli.declare import (
     RUBRIC,
     STATIC,
     Argument,
+    BookColumn,
+    BookForm,
+    BookTemplate,
+    DraftsFlag,
     Flag,
     JobsOption,
     JsonFlag,
@@ -233,20 +237,12 @@ def overrides_merge(
 def gradebook(
     *,
     folder: Annotated[Path, CLASS],
-    form: Annotated[
-        Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"],
-        Option("--form", "", "its format; canvas, moodle and blackboard import theirs"),
-    ],
+    form: BookForm,
     out: Annotated[str, Option("--out", "FILE", "where to write it; - is stdout (default: in DIR)")] = "",
-    template: Annotated[
-        Path | None,
-        Option("--template", "FILE", "the platform's own export, to be filled in with the points"),
-    ] = None,
-    column: Annotated[str, Option("--column", "NAME", "the platform's name for the column of points")] = "",
+    template: BookTemplate = None,
+    column: BookColumn = "",
     per_criterion: Annotated[bool, Flag("--per-criterion", "add a column for each criterion")] = False,
-    drafts: Annotated[
-        bool, Flag("--drafts", "take results as they are now, also where others are published")
-    ] = False,
+    drafts: DraftsFlag = False,
 ) -> ExitCode:
     """Write a class's gradebook for people, programs or a learning platform.
 

@@ -1,7 +1,7 @@
 """The commands for a whole course: grade and publish its labs, see how far they are, and write its gradebook."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from grader.cli.declare import (
     CLASS_EXIT_CODES,
@@ -9,6 +9,10 @@ from grader.cli.declare import (
     PUBLISH_EXIT_CODES,
     STATIC,
     Argument,
+    BookColumn,
+    BookForm,
+    BookTemplate,
+    DraftsFlag,
     Flag,
     JobsOption,
     JsonFlag,
@@ -80,22 +84,14 @@ def publish(
 def gradebook(
     *,
     course: Annotated[Path, COURSE],
-    form: Annotated[
-        Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"],
-        Option("--form", "", "its format; canvas, moodle and blackboard import theirs"),
-    ],
+    form: BookForm,
     out: Annotated[
         str, Option("--out", "FILE", "where to write it; - is stdout (default: beside the course file)")
     ] = "",
-    template: Annotated[
-        Path | None,
-        Option("--template", "FILE", "the platform's own export, to be filled in with the points"),
-    ] = None,
-    column: Annotated[str, Option("--column", "NAME", "the platform's name for the column of points")] = "",
+    template: BookTemplate = None,
+    column: BookColumn = "",
     per_lab: Annotated[bool, Flag("--per-lab", "add a column for each lab, on a platform")] = False,
-    drafts: Annotated[
-        bool, Flag("--drafts", "take results as they are now, also where others are published")
-    ] = False,
+    drafts: DraftsFlag = False,
 ) -> ExitCode:
     """Write a course's gradebook: each lab's points, and 0 to 100 for all labs by their weights.
 

@@ -44,7 +44,7 @@ def labs(
     Those are the grader's own, and rubrics in the folders that --add has named or $GRADER_RUBRICS lists.
     """
     with loading():
-        from grader.cli.labs import print_labs
+        from grader.cli.labs import labs_data, print_labs
         from grader.cli.output import say, say_json
         from grader.rubric.find import add_folder, example_labs, known_labs, own_folders, remove_folder
         from grader.rubric.load import load_rubric
@@ -60,25 +60,12 @@ def labs(
             rows.append((load_rubric(str(lab.path)).rubric, lab.source))
         except RubricError:  # noqa: PERF203 - one that is faulty hides no other
             faulty.append(f"{lab.path} is faulty: grader rubric validate {lab.path}")
-    if not as_json:
-        print_labs(rows, sys.stdout)
-        for line in faulty:
-            say(line)
+    if as_json:
+        say_json(labs_data(rows))
         return ExitCode.PASSED
-    say_json(
-        [
-            {
-                "id": rubric.id,
-                "title": rubric.title,
-                "version": rubric.version,
-                "package": rubric.package,
-                "criteria": len(rubric.criteria),
-                "max_points": rubric.max_points,
-                "source": source,
-            }
-            for rubric, source in rows
-        ]
-    )
+    print_labs(rows, sys.stdout)
+    for line in faulty:
+        say(line)
     return ExitCode.PASSED
 
 

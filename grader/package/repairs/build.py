@@ -183,7 +183,9 @@ def _close_bracket(files: Files) -> None:
     if commands_of(text.encode()) is not None:
         return
     if half := join_half_comment(text):
-        files.change("build-line", CMAKE, half.text, f"line {half.line} of {CMAKE}: {half.cause}", half.fix)
+        files.change(
+            "build-line", CMAKE, half.text, f"line {half.line} of {CMAKE}: {half.cause}: {half.fix}", half.fix
+        )
         return
     lines = text.rstrip().split("\n")
     last = max((i for i, line in enumerate(lines) if line.split("#", maxsplit=1)[0].strip()), default=0)

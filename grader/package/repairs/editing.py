@@ -122,11 +122,11 @@ def repair_xml(files: Files, file: str, root: str, kind: RepairKind) -> bool:
         before = files.text(file) or ""
         _, fault = parse_xml(before.encode(), file, root=root)
         line, old, new = changed_lines(before, after)
-        cause = fault.cause or fault.message if fault is not None else ""
+        why = fault.explanation if fault is not None else ""
         taken = " ".join(one.strip() for one in old.split("\n") if one not in new.split("\n"))
         fix = f"write `{added_lines(old, new)}`" if added_lines(old, new) else f"delete `{taken}`"
         place = f"line {fault.line if fault is not None and fault.line else line} of {file}"
-        files.change(kind, file, after, f"{place}: {cause}", fix)
+        files.change(kind, file, after, f"{place}: {why}", fix)
     return text is not None and files.text(file) != text
 
 

@@ -15,9 +15,9 @@ from typing import Literal
 from grader.limited_child import ChildLimits, run_limited
 from grader.model.record import Record
 from grader.model.repair import RepairKind, as_code
-from grader.package.python import cause_of
+from grader.package.python import reason_of
 from grader.package.repairs.editing import Files
-from grader.syntax_fixes import COMMENTED_OUT
+from grader.syntax_fixes import COMMENTED_OUT, DELETE_LINE, Reason
 from grader.wording import join_words, plural
 
 EXAMINE = "grader.package.source_repair:examine"
@@ -170,13 +170,13 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     first, after = steps[0], steps[-1].text
     error, word, place = first.error, first.word, f"line {first.line} of {file}"
     if cause not in WORDS:
-        told = cause_of(error.message, error.text, column=error.column) if error else ""
+        reason = reason_of(error.message, error.text, column=error.column) if error else Reason()
         fix = _rewritten(before, after) if cause == "python2" else ""
-        fix = f"delete line {first.line}" if told.endswith("delete this line") else fix
-        return f"{place}: {told or (error.message if error else 'not Python 3')}", fix
+        fix = f"delete line {first.line}" if reason.fix == DELETE_LINE else fix
+        return f"{place}: {reason.text or (error.message if error else 'not Python 3')}", fix
     names = ", ".join(dict.fromkeys(step.word for step in steps))
     calls = ", ".join(f"{one}()" for one in word.split(", "))
-    told = cause_of(COMMENTED_OUT if cause == "commented" else error.message if error else "")
+    told = reason_of(COMMENTED_OUT if cause == "commented" else error.message if error else "").text
     said, fix = (
         words.format(file=file, place=place, line=first.line, word=word, names=names, calls=calls, told=told)
         for words in WORDS[cause]
