@@ -179,7 +179,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     seen = f"; there is {alike[0]}" if len(alike) == 1 else seen
     hint = f"git mv {movable[0]} {path}" if movable else add_hint(package, path)
     hint = f"{hint}, or git mv {alike[0]} {path} if that is meant to be it" if len(alike) == 1 else hint
-    kind: MistakeKind = "file-elsewhere" if movable else "file-missing"
+    kind: MistakeKind = "file-elsewhere" if movable or len(alike) == 1 else "file-missing"
     if not movable and (elsewhere := package.hints_on(wanted.name)):
         where, _, hint = elsewhere[0].partition(": ")
         seen, kind = f"; {where}", "file-elsewhere"

@@ -343,6 +343,8 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         and one.line is not None
         and (one not in told or not any(one.file == file and line is not None for file, line in cited))
     ]
+    if verdict.mistake and any(one.kind == "file-name" for one in repairs):
+        verdict = verdict.lost_by("file-elsewhere", verdict.mistake.name)
     update = {
         "message": "; ".join(words),
         "hint": "; ".join(hints),

@@ -78,11 +78,12 @@ def _repair_words(repairs: list[Repair], criteria: list[CriterionResult]) -> str
     ]
     words = f"{join_words(wrong)}: this costs you {plural(cost, 'point')}"
     words += f" ({', '.join(c.id for c in charged)})" if charged else ""
-    if others:
-        share = min(c.repaired.share for c in others if c.repaired)
+    shares = {c.repaired.share for c in others if c.repaired}
+    for share in sorted(shares, reverse=True):
+        names = [c.id for c in others if c.repaired and c.repaired.share == share]
         earned = "" if share == 1 else f", for {share:.0%} of the points"
-        were = "was" if len(others) == 1 else "were"
-        words += f"; {join_words(c.id for c in others)} {were} judged with this repaired{earned}"
+        were = "was" if len(names) == 1 else "were"
+        words += f"; {join_words(names)} {were} judged with this repaired{earned}"
     return words if words.startswith(repairs[0].file) else f"{words[:1].upper()}{words[1:]}"
 
 

@@ -205,6 +205,21 @@ def test_repairs_of_one_loss_are_told_together():
     assert repair_words(result(criteria=(free,))) == ()
 
 
+def test_criteria_that_earn_other_shares_of_a_repaired_copy_are_told_apart():
+    repair = Repair(kind="file-name", file="a.py", message="a.py should be b.py", fix="")
+    use = Repaired(repairs=(repair,), share=1, charged=True)
+    free = use.model_copy(update={"charged": False})
+    criteria = (
+        criterion("file", Status.FAIL, 0, 10, repaired=use),
+        criterion("node", Status.PASS, 10, 10, repaired=free),
+        criterion("build", Status.PARTIAL, 5, 10, repaired=free.model_copy(update={"share": 0.5})),
+    )
+    assert repair_words(result(criteria=criteria)) == (
+        "a.py should be b.py: this costs you 10 points (file); node was judged with this repaired; "
+        "build was judged with this repaired, for 50% of the points",
+    )
+
+
 def test_a_blocked_criterion_whose_cause_is_not_there_is_told_by_itself():
     alone = result(criteria=(criterion("counter-step", Status.BLOCKED, 0, 5),))
     assert [loss.criterion.id for loss in arrange(alone, rubric()).lost] == ["counter-step"]
