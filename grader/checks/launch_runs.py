@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import Annotated, NamedTuple
 
@@ -37,6 +38,7 @@ from grader.checks.support.processes import GlobalName, early_end
 from grader.checks.support.scripts import shebang_obstacles
 from grader.checks.support.text import SPIN, near_names
 from grader.checks.support.topics import cite, nodes_on, topics_with
+from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
@@ -458,13 +460,28 @@ def _in_namespaces(file: LaunchFile, verdict: Verdict, nodes: list[LaunchNode], 
     return verdict.model_copy(update=update)
 
 
+CONNECTED_WITHIN_S = 3.0
+"""Nodes that were on a topic together for longer, and not connected, differ in its type."""
+
+
+def _together_s(run: Run, topic: str) -> float:
+    """Return how long the topic had a publisher and a subscriber of the student's at the same time."""
+
+    def has_both(event: GraphEvent) -> bool:
+        ends = (event.publishers.get(topic, ()), event.subscribers.get(topic, ()))
+        return all(any(map(run.is_student_node, nodes)) for nodes in ends)
+
+    return sum(after - at for (at, event), (after, _) in pairwise(run.graph) if has_both(event)) / 1e9
+
+
 def _not_connected(
     package: PackageFacts, file: LaunchFile, run: Run, wanted: list[Wanted], topic: str
 ) -> Verdict:
     """A node that died, the launch file's remaps and namespaces, or the scripts' own topics."""
     if dead := _judge_deaths(package, run, wanted, "came up, but before it was connected"):
         return dead
-    if ended := [w.node for w in wanted if finished(run, w.node)]:
+    ended = [w.node for w in wanted if finished(run, w.node)]
+    if ended and _together_s(run, topic) < CONNECTED_WITHIN_S:
         names, places = join_words(n.full_name for n in ended), [(n.file or file.path, n.line) for n in ended]
         cited = tuple(FileCitation(file=path, line=line) for path, line in places)
         alone = "itself before it was" if len(ended) == 1 else "themselves before they were"

@@ -157,17 +157,17 @@ def find_renames(package: PackageFacts, wanted: Wanted) -> dict[str, str]:
 
 
 def _meant_script(package: PackageFacts, wanted: Wanted, name: str, others: set[str]) -> str:
-    """Return the only script that makes the lab's node, or has its topic, as the one of this name has to; "" if there
-    is none."""
-    does = {(kind, used.lstrip("/")) for path, kind, used in wanted.does if PurePosixPath(path).name == name}
-    found = {
-        slip.file
-        for slip in package.slips
-        if (slip.kind, slip.message.lstrip("/")) in does
-        and slip.file not in others
-        and PurePosixPath(slip.file).name not in others
-    }
-    return found.pop() if len(found) == 1 else ""
+    """Return the only script that makes the lab's node and has all of the topics of the one of this name; "" if there
+    is none. One that has some of them, such as a handed out one, may be another."""
+    does = [(kind, used.lstrip("/")) for path, kind, used in wanted.does if PurePosixPath(path).name == name]
+    topics = {one for one in does if one[0] != "node-name"}
+    nodes = {one for one in does if one[0] == "node-name"}
+    found: dict[str, set[tuple[str, str]]] = {}
+    for slip in package.slips:
+        if slip.file not in others and PurePosixPath(slip.file).name not in others:
+            found.setdefault(slip.file, set()).add((slip.kind, slip.message.lstrip("/")))
+    meant = [path for path, done in found.items() if does and topics <= done and (not nodes or nodes & done)]
+    return meant[0] if len(meant) == 1 else ""
 
 
 def _meant_launch(package: PackageFacts, wanted: Wanted, name: str, others: set[str]) -> str:
