@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from graphlib import TopologicalSorter
 from pathlib import PurePosixPath
 
@@ -335,22 +335,24 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         untold = [clause for clause in copy.message.split("; ") if clause not in said]
         words += [f"with that repaired, {'; '.join(untold)}"] if untold else []
         hints += [f"then {_at_its_line(copy)}"] if copy.hint else []
-    cited = {(c.file, c.line) for c in verdict.citations if isinstance(c, FileCitation)}
-    lines = [
-        FileCitation(file=one.file, line=one.line)
-        for one in repairs
-        if (one.file, one.line) not in cited
-        and one.line is not None
-        and (one not in told or not any(one.file == file and line is not None for file, line in cited))
-    ]
     if verdict.mistake and any(one.kind == "file-name" for one in repairs):
         verdict = verdict.lost_by("file-elsewhere", verdict.mistake.name)
     update = {
         "message": "; ".join(words),
         "hint": "; ".join(hints),
-        "citations": (*lines, *verdict.citations),
+        "citations": (*_uncited(verdict, repairs, told), *verdict.citations),
     }
     return verdict.model_copy(update=update)
+
+
+def _uncited(verdict: Verdict, repairs: Sequence[Repair], told: Collection[Repair]) -> Iterator[FileCitation]:
+    """Yield the lines of the repairs that the verdict does not cite; of one that it tells, only in another file."""
+    cited = {(c.file, c.line) for c in verdict.citations if isinstance(c, FileCitation)}
+    with_lines = {file for file, line in cited if line is not None}
+    for one in repairs:
+        is_new = one.line is not None and (one.file, one.line) not in cited
+        if is_new and not (one in told and one.file in with_lines):
+            yield FileCitation(file=one.file, line=one.line)
 
 
 def _at_its_line(copy: Verdict) -> str:

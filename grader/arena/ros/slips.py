@@ -268,19 +268,18 @@ def waiting_callbacks(tree):
         own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
         inside = list(ast.walk(own)) if own is not None else []
         for inner in inside if node not in inside else ():
-            words = (own.name, inner.lineno) if hasattr(inner, "lineno") else ()
             if isinstance(inner, ast.While) and is_endless(inner):
                 message, fix = "the loop in the callback `%s`, line %d, never ends", "take the loop out of it"
             elif is_call(inner, "spin"):
-                message, fix = (
-                    "the callback `%s` calls spin() in line %d",
-                    "move line %d out of it" % inner.lineno,
-                )
+                message, fix = "the callback `%s` calls spin() in line %d", "move line %d out of it"
             elif called_name(inner) == "sleep" and not is_short(inner):
-                message, fix = "the callback `%s` sleeps in line %d", "delete line %d" % inner.lineno
+                message, fix = "the callback `%s` sleeps in line %d", "delete line %d"
             else:
                 continue
-            yield slip(inner.lineno, "callback-waits", message % words, fix=fix, name=own.name)
+            fix = fix % inner.lineno if "%" in fix else fix
+            yield slip(
+                inner.lineno, "callback-waits", message % (own.name, inner.lineno), fix=fix, name=own.name
+            )
             break
 
 

@@ -52,8 +52,7 @@ OF_CATKIN = ("catkin_package", "catkin_install_python", "catkin_python_setup")
 STANDARD = {
     **dict.fromkeys(("cout", "cin", "cerr", "endl"), "iostream"),
     **dict.fromkeys(("string", "to_string", "stoi"), "string"),
-    "vector": "vector",
-    "map": "map",
+    **{name: name for name in ("vector", "map")},
 }
 """Names of C++'s standard library that are written without `std::`, with their headers."""
 
@@ -233,13 +232,10 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
             lacks=name,
         )
     meant = f"write {near[0]}" if near else "correct its name or remove it"
-    hint = (
-        f"{meant} in find_package(…) and in package.xml; a package of your own must be pushed with this one"
-    )
+    hint = f"{meant} in find_package(…) and package.xml; a package of your own must be pushed with this one"
     why = f"find_package(…) names {name}, but there is no package of that name"
-    return Explained(
-        f"{why}: it is only an example in the help of catkin_create_pkg" if placeholder else why, hint
-    )
+    example = ": it is only an example in the help of catkin_create_pkg" if placeholder else ""
+    return Explained(f"{why}{example}", hint)
 
 
 def _missing_library(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
@@ -544,17 +540,15 @@ def _unknown_command(found: re.Match[str], package: PackageFacts, _lines: Sequen
     has_catkin = any(one.args[:1] == ("catkin",) for one in cmake_calls(package, "find_package"))
     if name.lower() in OF_GENERATION and has_catkin:
         why = f"{name}(…) comes with message_generation, which find_package(catkin …) does not name"
-        return Explained(why, _generation_fix(name, package), by_itself=True)
+        call = next(iter(cmake_calls(package, name.lower())), None)
+        fix = "write find_package(catkin REQUIRED COMPONENTS … message_generation)"
+        if call is not None and not package.interfaces:
+            fix = f"delete {name}(…), line {call.line}: the package has no messages, services or actions of its own"
+        return Explained(why, fix, by_itself=True)
     if name.lower() in {*OF_CATKIN, *OF_GENERATION}:
         why = f"{name}(…) is catkin's, and find_package(catkin …) is not called above it"
         return Explained(why, f"call find_package(catkin REQUIRED COMPONENTS …) above {name}(…)")
     return Explained(f"there is no command {name}(…)", "check the spelling of the command")
-
-
-def _generation_fix(name: str, package: PackageFacts) -> str:
-    if not package.interfaces and (calls := list(cmake_calls(package, name.lower()))):
-        return f"delete {name}(…), line {calls[0].line}: the package has no messages, services or actions of its own"
-    return "write find_package(catkin REQUIRED COMPONENTS … message_generation)"
 
 
 def _not_catkin(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
