@@ -19,6 +19,7 @@ from grader.judging.repeats_and_repairs import (
     BUILD,
     DONE_BEFORE_RUNS,
     concerns,
+    is_unmade,
     is_used_by,
     launched_in,
     needs_build,
@@ -54,7 +55,7 @@ def choose_repairs(
     lost = {c.scenario for c in criteria if c.status.is_lost and c.scenario is not None}
     by_id = {c.id: c for c in criteria}
     of_files = [c for c in rubric.criteria if c.scenario is None and by_id[c.id].status.is_lost]
-    blocked = [c for c in of_files if by_id[c.id].blocked_by or c.check == BUILD]
+    blocked = [c for c in of_files if by_id[c.id].blocked_by or c.check == BUILD or is_unmade(by_id[c.id])]
     if not lost and not blocked:
         return (), ()
     found = list(find_repairs(submission.package.folder, facts, wanted_of(rubric)))
@@ -84,7 +85,9 @@ def choose_repairs(
     unblocks = any(
         concerns(one, c, rubric, by_id, built=built, launched=launched) for c in blocked for one in chosen
     )
-    before = [one for one in counting if one.kind in DONE_BEFORE_RUNS]
+    # of a script that the build makes a program of, neither its bit nor its first line is used
+    made = {c.mistake.name for c in criteria if c.mistake is not None and is_unmade(c)}
+    before = [one for one in counting if one.kind in DONE_BEFORE_RUNS and one.file not in made]
     return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios or unblocks else ((), ())
 
 

@@ -101,12 +101,9 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
             measured=f"{found.path}: made a program by catkin_install_python",
             hint=hint,
         )
-    elif obstacles and (undecided := _undecided_wrapper(package, build, found.path)):
+    elif obstacles and (unmade := _unmade_wrapper(package, build, found.path)):
         why = "; it also ".join(o.why for o in obstacles)
-        message = (
-            f"{found.path} {why}; catkin_install_python would make a program of it, but {undecided.message}"
-        )
-        verdict = inconclusive(message, hint=undecided.hint, citations=undecided.citations)
+        verdict = _judge_unmade(f"{found.path} {why}", found.path, unmade)
     elif obstacles:
         why = "; it also ".join(o.why for o in obstacles)
         message = f"{found.path} {why}{_rosrun_answer(build, found.path)}"
@@ -160,11 +157,19 @@ def _asks_for_wrapper(package: PackageFacts, path: str) -> bool:
     return any(names_script(i, path) and is_found(i.destination or "", package) for i in named)
 
 
-def _undecided_wrapper(package: PackageFacts, build: Run, path: str) -> Verdict | None:
-    """Return why the build did not come to the wrapper that the package asks for, where the machine is the reason."""
+def _unmade_wrapper(package: PackageFacts, build: Run, path: str) -> Verdict | None:
+    """Return why the build did not come to the wrapper that the package asks for; None where it was not tried."""
     tried = any(e.event == "exit" and e.name == CATKIN_MAKE for _, e in build.processes)
-    built = judge_build(package, build) if tried and _asks_for_wrapper(package, path) else None
-    return built if built is not None and built.status.is_open else None
+    return judge_build(package, build) if tried and _asks_for_wrapper(package, path) else None
+
+
+def _judge_unmade(why: str, path: str, build: Verdict) -> Verdict:
+    """The build's own criterion is what a build that failed costs: here it is the reason."""
+    message = f"{why}; catkin_install_python would make a program of it, but {build.message}"
+    if build.status.is_open:
+        return inconclusive(message, hint=build.hint, citations=build.citations)
+    hint = "get the build to pass: catkin_make then makes a program of the script"
+    return failed(message, hint=hint, citations=build.citations).lost_by("not-made", path)
 
 
 def _missing(package: PackageFacts, path: str) -> Verdict:

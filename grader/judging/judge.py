@@ -41,6 +41,7 @@ from grader.judging.facts import NOT_RUN, Facts, try_facts, views_of
 from grader.judging.repeats_and_repairs import (
     apply_repaired_copy,
     drop_unrepeated_losses,
+    is_unmade,
     launched_in,
     needs_build,
     repairs_of,
@@ -305,8 +306,8 @@ class Requirements:
         is_missing = bool(verdict.sought_name("call") or verdict.sought_name("below"))
         same_line = not is_missing and bool(_lines(verdict) & _lines(found))
         same_run = self._criteria[required].scenario == criterion.scenario
-        if not verdict.status.is_lost:
-            return False
+        if not verdict.status.is_lost or is_unmade(verdict):
+            return False  # a program that the build did not make is no reason for the build to fail
         named = verdict.unjudged and any(text in found.message for text in _paths(self._criteria[required]))
         if same_run and found.cause not in {"", verdict.cause} and not named and not same_line:
             return False  # its process ended of something else

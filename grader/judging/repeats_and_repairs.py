@@ -165,7 +165,7 @@ def concerns(
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         wrong = _words(repair.before) - _words(repair.after)
         return bool(wrong & _words(found[criterion.id].message)) or _cites(found[criterion.id], repair)
-    if criterion.check == BUILD and repair.kind in OF_BUILDS:
+    if repair.kind in OF_BUILDS and (criterion.check == BUILD or is_unmade(found[criterion.id])):
         return True
     seen = f"{found[criterion.id].message} {found[criterion.id].measured}"
     if repair.kind == "file-name" and PurePosixPath(repair.before).name in seen:
@@ -173,6 +173,11 @@ def concerns(
     if found[criterion.id].blocked_by:
         return any(_asks_for(found[name], repair) for name in criterion.requires)
     return repair.kind not in OF_BUILDS and _asks_for(found[criterion.id], repair)
+
+
+def is_unmade(found: Verdict | CriterionResult) -> bool:
+    """Return whether a script is lost because the build failed that was to make a program of it."""
+    return found.mistake is not None and found.mistake.kind == "not-made"
 
 
 def launched_in(package: PackageFacts | None) -> frozenset[str]:
@@ -284,6 +289,8 @@ def _asks_for(found: Verdict | CriterionResult, repair: Repair) -> bool:
         lines = {(getattr(c, "file", None), getattr(c, "line", None)) for c in found.citations}
         return lost and (repair.file, repair.line) in lines
     absent = found.mistake.name if found.mistake and found.mistake.is_absence else ""
+    if is_unmade(found):
+        return False  # the build's own criterion asks for it
     is_it = repair.kind == "file-name" and PurePosixPath(absent).name == PurePosixPath(repair.after).name
     return lost and (is_it or _cites(found, repair))
 

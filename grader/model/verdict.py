@@ -77,7 +77,7 @@ Citation = FileCitation | EvidenceCitation
 Citations = tuple[Citation, ...]
 
 
-MistakeKind = Literal["file-missing", "file-elsewhere", "not-executable", "cannot-be-run"]
+MistakeKind = Literal["file-missing", "file-elsewhere", "not-executable", "cannot-be-run", "not-made"]
 
 
 class Mistake(Record):
@@ -85,7 +85,7 @@ class Mistake(Record):
 
     kind: MistakeKind
     """A file is not in the package, or only under another path; a script has no executable bit, or its first line keeps
-    the system from running it."""
+    the system from running it, or the build that was to make a program of it failed."""
     name: str
     """The file that the lab asks for, or the script, from the package's root."""
 

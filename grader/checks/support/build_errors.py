@@ -270,8 +270,9 @@ def _missing_source(found: re.Match[str], package: PackageFacts, _lines: Sequenc
     named = [word for call in made for word in call.args if posixpath.splitext(word)[1] in CPP_SUFFIXES]
     absent = [word for word in dict.fromkeys(named) if package.file(word) is None]
     if len(absent) > 1 and found[1] in absent:
-        words = f"targets are made of {join_words(absent)}, which are not in the package"
-        return Explained(words, "add these files and push them, or remove the calls that name them")
+        return _missing_files(
+            absent, package, f"targets are made of {join_words(absent)}", "the calls that name them"
+        )
     return _missing_file(found[1], package, f"a target is made of {found[1]}")
 
 
@@ -339,9 +340,21 @@ def _missing_script(found: re.Match[str], package: PackageFacts, _lines: Sequenc
         if one not in there and one.removeprefix("./") not in there
     ]
     if len(absent) > 1:
-        words = f"catkin_install_python(…) names {join_words(absent)}, which are not in the package"
-        return Explained(words, "add them and push them, or take them out of that call")
+        return _missing_files(
+            absent, package, f"catkin_install_python(…) names {join_words(absent)}", "that call"
+        )
     return _missing_file(path, package, f"catkin_install_python(…) names {path}")
+
+
+def _missing_files(paths: Sequence[str], package: PackageFacts, words: str, where: str) -> Explained:
+    """Several that one edit puts right: with the paths of those that lie elsewhere in the package."""
+    near = {path: found[0] for path in paths if (found := near_names(path, (f.path for f in package.files)))}
+    hints = [f"write {right} for {path}" for path, right in near.items()]
+    if rest := [path for path in paths if path not in near]:
+        them = "them" if len(rest) > 1 else "it"
+        hints.append(f"add {join_words(rest)} and push {them}, or take {them} out of {where}")
+    seen = f"; there is {join_words(dict.fromkeys(near.values()))}" if near else ""
+    return Explained(f"{words}, which are not in the package{seen}", "; ".join(hints))
 
 
 def _missing_file(path: str, package: PackageFacts, words: str) -> Explained:

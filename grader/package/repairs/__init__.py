@@ -126,12 +126,14 @@ def _rename_package(folder: Path, repair: Repair) -> None:
 def _scripts(
     files: Files, package: PackageFacts, wanted: Wanted, renames: dict[str, str]
 ) -> list[SourceFile]:
-    """Return the files that are run: those of the lab in its order, then those of launch files, then what they
+    """Return the files that are run: those of the lab in its order, then those of its launch files, then what they
     import."""
     own = [f for f in package.files if is_own(f.path) and not f.link_problem]
     python = [f for f in own if f.python_fault is None or f.python_fault.kind not in UNREAD]
     named = [PurePosixPath(path).name for path in (*wanted.scripts, *wanted.installed)]
-    named += [node.type or "" for launch in package.launch_files for node in launch.nodes]
+    asked = {PurePosixPath(path).name for path in wanted.launch_files}
+    launches = [f for f in package.launch_files if PurePosixPath(renames.get(f.path, f.path)).name in asked]
+    named += [node.type or "" for launch in launches for node in (*launch.nodes, *launch.brings)]
     named += [f"{name}.py" for name in named]
     names = dict.fromkeys(PurePosixPath(file.path).name for file in python)
     named += [right for name in named if name not in names for right in names if is_near(name, right)]

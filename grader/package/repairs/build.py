@@ -141,6 +141,7 @@ def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted)
         _add_call(files, "catkin_package()", "catkin_package()", below)
     _make_interfaces(files, package, name)
     _install(files, package, wanted)
+    _correct_paths(files, package)
     _link_programs(files)
     _correct_include(files)
     _declare_exported(files)
@@ -441,6 +442,26 @@ def _install(files: Files, package: PackageFacts, wanted: Wanted) -> None:
         return
     _name_scripts(files, own, missing)
     _correct_destination(files, there)
+
+
+def _correct_paths(files: Files, package: PackageFacts) -> None:
+    """Of files that a call names and that lie elsewhere in the package, each by its name alone: where they lie."""
+    own = [f.path for f in package.files if is_own(f.path)]
+    for call in _commands(files, INSTALL, "add_executable", "add_library"):
+        moved: list[tuple[Token, str]] = []
+        for token in _words(call):
+            path = PurePosixPath(_plain(token.value))
+            copies = [one for one in own if PurePosixPath(one).name == path.name]
+            is_file = path.suffix in (".py", *CPP) and "$" not in str(path)
+            if is_file and len(copies) == 1 and not (files.folder / path).exists():
+                moved.append((token, copies[0]))
+        text = _cmake(files)
+        for token, right in reversed(moved):
+            text = _replace_token(text, token, right)
+        named, there = join_words(t.value for t, _ in moved), join_words(right for _, right in moved)
+        message = f"line {call.line} of {CMAKE}: {call.identifier}(…) names {named}, which the package has as {there}"
+        fix = " and ".join(f"write {right} for {token.value}" for token, right in moved)
+        files.change("build-line", CMAKE, text, message, fix)
 
 
 def _place(own: Sequence[str], files: Files, script: str) -> str:
