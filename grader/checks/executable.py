@@ -182,7 +182,11 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     seen = f"; there is {join_words(near)}" if near else ""
     alike = [p for p in scripts if not near and _has_role_of(p, path)]
     seen = f"; there is {alike[0]}" if len(alike) == 1 else seen
-    hint = f"git mv {movable[0]} {path}" if movable else add_hint(package, path)
+    hint = (
+        f"git mv {movable[0]} {path}{_where_named(package, movable[0])}"
+        if movable
+        else add_hint(package, path)
+    )
     hint = f"{hint}, or git mv {alike[0]} {path} if that is meant to be it" if len(alike) == 1 else hint
     kind: MistakeKind = "file-elsewhere" if movable or len(alike) == 1 else "file-missing"
     if not movable and (elsewhere := package.hints_on(wanted.name)):
@@ -194,6 +198,19 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
         hint=hint,
         citations=tuple(FileCitation(file=p) for p in near[:3]),
     ).lost_by(kind, path)
+
+
+def _where_named(package: PackageFacts, path: str) -> str:
+    """Return where else the name of a script that is renamed stands, to put behind the command."""
+    calls = (one.call for one in installed(package) if names_script(one, path))
+    places = [f"{call.file}, line {call.line}" for call in calls]
+    nodes = (node for launch in package.launch_files for node in launch.nodes)
+    places += [
+        f"{n.file}, line {n.line}"
+        for n in nodes
+        if n.type == PurePosixPath(path).name and n.pkg == package.name
+    ]
+    return f"; write the new name in {join_words(dict.fromkeys(places))} too" if places else ""
 
 
 ROLES = (

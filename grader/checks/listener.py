@@ -88,8 +88,11 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
         message = "it prints so many numbers that there is no telling which of them it heard"
         verdict = failed(message, hint="print each number once, in the callback")
     elif missing:
-        verdict = _other_words(probes, missing, lines, params) or not_printed(
-            package, run, probes, missing, lines
+        verdict = (
+            _other_words(probes, missing, lines, params)
+            or _likely_reason(package, run, probes, missing, lines)
+            or _some_in_other_words(probes, missing, lines, params)
+            or _by_number(probes, missing, lines, _print_in_comment(package, run))
         )
     elif not in_order(places):
         message = f"what came on {params.topic} is printed, but not in the order in which it was sent"
@@ -129,6 +132,22 @@ def _other_words(
     measured = f"{len(probes)} of {all_of} printed, {len(missing)} of them in other words"
     verdict = failed(message, hint=hint, measured=measured).in_part(share, "what is printed of each message")
     return verdict.about(said="".join(said[:1]))
+
+
+def _some_in_other_words(
+    probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line], params: HearsParams
+) -> Verdict | None:
+    """Some of what is missing is printed, with other words around it. None where nothing is."""
+    if params.template == VALUE or any(isinstance(p.value, int) for p in missing):
+        return None
+    lost = [p for p, found in zip(missing, text_places(missing, lines, VALUE), strict=True) if not found]
+    if len(lost) == len(missing):
+        return None
+    message = (
+        f"{len(lost)} of {plural(len(probes), 'message')} not printed, the first of them {lost[0].value!r}; "
+        f"what is printed is not '{in_words(params.template)}'"
+    )
+    return failed(message, hint=f"{CALLBACK_HINT}; print '{in_words(params.template)}'")
 
 
 def _how_many(missing: Sequence[Probe], probes: Sequence[Probe]) -> str:
@@ -175,16 +194,15 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))
 
 
-def not_printed(
+def _likely_reason(
     package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]
-) -> Verdict:
+) -> Verdict | None:
     """Some or all of what was sent was not printed: the likeliest reason that shows."""
     return (
         _judge_error(package, run)
         or _some_numbers(probes, missing, lines)
         or _only_again(probes, missing)
         or _waiting(package, run, probes, missing)
-        or _by_number(probes, missing, lines, _print_in_comment(package, run))
     )
 
 

@@ -278,17 +278,18 @@ SlipKind = Literal[
 
 
 class PythonSlip(Record):
-    """What is remarkable in a Python file that compiles, most of it slips that show only when the node runs.
+    """What is remarkable in a Python file, most of it slips that show only when the node runs. Of one that does not
+    compile only names, types and rates are known.
 
     `message` says what is wrong in that line, `fix` what to do where that is always the same, and `name` is the
     function or variable that both speak of. Of a kind that is no slip, `message` is what is written there: a name, a
     number or a text.
 
-    `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and nodes get
-    none. `misspelt`: a name that the file does not define, beside one that it does. `no-clock`: it publishes and
+    `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and nodes
+    get none. `misspelt`: a name that the file does not define, beside one that it does. `no-clock`: it publishes and
     counts, and nothing in what it sends tells the time, but at most the value that it counts on from: a slip only
-    where its messages are to tell it. `rate-parameter` and `rate-number`: no slip, but a loop or a timer whose rate is
-    a parameter or a number, in Hz. `reset-value` and `reset-limit`: where a counter goes back, to the number
+    where its messages are to tell it. `rate-parameter` and `rate-number`: no slip, but a loop or a timer whose rate
+    is a parameter or a number, in Hz. `reset-value` and `reset-limit`: where a counter goes back, to the number
     `message`, or when it reaches it. `set-in-loop` and `reset-early`: a counter that is set in each turn of its loop,
     or goes back before one is added. `never-called`: a function that makes a node, publishes or waits, which nothing
     names; `main-guard`: `__name__` beside another word than `__main__`. `never-reached`: an endless loop before the
@@ -296,18 +297,18 @@ class PythonSlip(Record):
     first turn, or after a number of them; `sleep-outside`: the `sleep()` that one lacks stands outside of it;
     `sleep-twice`: one that waits twice in each turn. `callback-called`, `callback-values`, `callback-missing`: a
     callback that is called where it is to be named, that takes another number of values than ROS has for it, or that
-    is not there. `callback-waits`: one of a topic that sleeps, or never ends. `queue-size`: one that is a text,
-    with which rospy sends nothing. `clock-value`: the values of the topic `message` are read from a clock, and
-    nothing is counted. `deaf`: why the node goes on after Ctrl-C. `outside-method`: a call in a class that stands
-    in none of its methods and uses a name that is not there. `object`: why an object of a class lacks an attribute
-    where it is read, or that the class stands in its place. `undefined`:
-    why a name has no value where it is read. `commented-out`: a call of ROS in a comment; `name` is `sleep`, or `pub =
-    Publisher`. `no-effect` and `compared`: a statement such as `++i`, or `i == 0`. `no-init`: a script with topics
-    that never calls `init_node`. `publishes` and `prints`: no slips, but a text that is published or printed, `{}` for
-    a value in it and `{data}` for that of a message. `node-name`, `publisher` and `subscriber`: no slips, but where
-    the script names its node, or a topic; `name` is the variable that is given the publisher, or `anonymous`.
-    `publisher-type` and `subscriber-type`: the message type in that line. `argument-text`: no slip, but where an
-    argument of the command line is kept as a text; `fix` is the line with a number in its place.
+    is not there. `callback-waits`: one of a topic that sleeps, or never ends. `queue-size`: one that is a text, with
+    which rospy sends nothing. `clock-value`: the values of the topic `message` are read from a clock, and nothing is
+    counted. `deaf`: why the node goes on after Ctrl-C. `outside-method`: a call in a class that stands in none of its
+    methods and uses a name that is not there. `object`: why an object of a class lacks an attribute where it is read,
+    or that the class stands in its place. `undefined`: why a name has no value where it is read. `commented-out`: a
+    call of ROS in a comment; `name` is `sleep`, or `pub = Publisher`. `no-effect` and `compared`: a statement such as
+    `++i`, or `i == 0`. `no-init`: a script with topics, or that does more than define names, never calls `init_node`.
+    `publishes` and `prints`: no slips, but a text that is published or printed, `{}` for a value in it and `{data}`
+    for that of a message. `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node,
+    or a topic; `name` is the variable that is given the publisher, or `anonymous`. `publisher-type` and
+    `subscriber-type`: the message type in that line. `argument-text`: no slip, but where an argument of the command
+    line is kept as a text; `fix` is the line with a number in its place.
     """
 
     file: str

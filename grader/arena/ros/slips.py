@@ -69,9 +69,20 @@ def slips(tree):
         if message:
             found.append(slip(published.lineno, "no-clock", message))
     calls = {called_name(n): n.lineno for n in walk(tree) if isinstance(n, ast.Call)}
-    if "init_node" not in calls and ("Publisher" in calls or "Subscriber" in calls):
-        found.append(slip(1, "no-init", "nothing in the script calls `rospy.init_node(…)`"))
+    if "init_node" not in calls and ("Publisher" in calls or "Subscriber" in calls or does_something(tree)):
+        fix = "make it a node: `rospy.init_node(…)`, then its topics, then `rospy.spin()` or a loop"
+        found.append(slip(1, "no-init", "nothing in the script calls `rospy.init_node(…)`", fix=fix))
     return sorted(found, key=lambda one: one["line"])[:SLIPS_LIMIT]
+
+
+def does_something(tree):
+    """Return whether a file does more when it is run than to define names for others."""
+    calls = any(isinstance(n, (ast.While, ast.For)) or is_call_alone(n) for n in tree.body)
+    return calls or any(getattr(n, "id", "") == "__name__" for n in walk(tree))
+
+
+def is_call_alone(node):
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)
 
 
 def loop_rates(tree):

@@ -40,6 +40,9 @@ BRACE = re.compile(
 """A block that begins as in C++: what Python says of it is said of a line below."""
 COMMENTED = re.compile(r"\s*#[#\s]*((?:if|while|for|def|class|try|with)\b.*:)\s*$")
 """The first line of a block, commented out: Python speaks of the line below, which stands too far in."""
+REFUSED_LIMIT = 20
+OF_NAMES = ("node-name", "publisher", "publisher-type", "subscriber", "subscriber-type", "rate-number")
+MARKER = re.compile(r"(<<<<<<<|=======|>>>>>>>|\|\|\|\|\|\|\|)( |$)")
 ENCODINGS = (SyntaxError, LookupError, UnicodeDecodeError)
 
 
@@ -91,6 +94,7 @@ def check(root, name):
         compile(data, os.path.basename(name), "exec", dont_inherit=True)
     except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError) as error:
         report["faults"].append(syntax_fault(error, data))
+        report["slips"] = slips_of_the_rest(data.decode("utf-8", "replace"))
         return report
     with contextlib.suppress(
         RecursionError, MemoryError
@@ -103,6 +107,41 @@ def check(root, name):
         text = data.decode("utf-8", "replace")
         report["slips"] = [*slips(tree), *argument_texts(text), *commented_calls(text)]
     return report
+
+
+def slips_of_the_rest(text):
+    """Return which names a file that does not parse gives to its node and topics, as far as the rest of it says."""
+    lines = first_version(text.splitlines())
+    for _ in range(REFUSED_LIMIT):
+        tree, at = parse_lines(lines)
+        if tree is not None:
+            return [one for one in slips(tree) if one["kind"] in OF_NAMES]
+        if not 0 <= at < len(lines) or not lines[at].strip():
+            break
+        indentation = re.match(r"\s*", lines[at]).group()
+        lines[at] = "" if lines[at].lstrip() == "pass" else indentation + "pass"
+    return []
+
+
+def parse_lines(lines):
+    """Return the tree, or the place (from 0) of the line that Python refuses; -1 where that is not known."""
+    try:
+        return ast.parse("\n".join(lines)), -1
+    except SyntaxError as error:
+        return None, (error.lineno or 0) - 1
+    except (ValueError, RecursionError, MemoryError):
+        return None, -1
+
+
+def first_version(lines):
+    """Return the lines with those blank that git's merge markers give for the other version, and the markers."""
+    kept, version = [], 0
+    for line in lines:
+        marker = MARKER.match(line)
+        if marker:
+            version = {"<": 1, "=": 2 * (version == 1), ">": 0, "|": 2}[line[0]]
+        kept.append("" if marker or version == 2 else line)
+    return kept
 
 
 ARGUMENT = re.compile(
