@@ -146,7 +146,20 @@ def _why_unconnected(
     if len(nodes) < 2:
         message = f"{_comes_up(nodes)}; the file declares {plural(len(file.nodes), 'node')}{quoted(run)}"
         return failed(message, hint="give the talker and the listener a <node> each")
-    return over_another_topic(run, params.topic, quoted(run))
+    other = over_another_topic(run, params.topic, quoted(run))
+    return _by_renaming(package, run, file.brings, params.topic, other) or other
+
+
+def _by_renaming(
+    package: PackageFacts, run: Run, nodes: Sequence[LaunchNode], topic: str, verdict: Verdict
+) -> Verdict | None:
+    """Return the verdict with the lines of the launch file that give the topic another name, if it has some."""
+    renaming = find_renaming(package, nodes, topic, run)
+    if renaming is None:
+        return None
+    message = f"{verdict.message}: it {renaming.why}"
+    update = {"message": message, "hint": renaming.fix, "citations": renaming.citations}
+    return verdict.model_copy(update=update)
 
 
 def _comes_up(nodes: Sequence[str]) -> str:
@@ -237,8 +250,9 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     How it is measured
         `roslaunch` runs the file; names come from the master, connections from both nodes and the kernel.
         `<arg>`, `ns` and `<group>` are worked out, and `$(anon x)` may be followed by anything. Names given to
-        `init_node` do not matter. Parameters are read as they were when the node started. Nodes, connection and
-        parameters count alike, and of several nodes or parameters each earns its share.
+        `init_node` do not matter. If the lab names only one node, it may be connected to any other of the package's.
+        Parameters are read as they were when the node started. Nodes, connection and parameters count alike, and of
+        several nodes or parameters each earns its share.
 
     How to fix
         `roslaunch <package> <file>` prints in red what it could not start; `rosnode list`, `rostopic info
@@ -275,7 +289,7 @@ def _judge_nodes(package: PackageFacts, file: LaunchFile, run: Run, params: Laun
     if lacking is not None:
         return _not_up(package, file, run, lacking)
     names = [name for w in wanted for name in nodes_up(run, w.node)]
-    if params.topic and not _are_connected(run, params.topic, names):
+    if params.topic and not _are_connected(run, params.topic, names, alone=len(wanted) < 2):
         return _not_connected(package, file, run, wanted, params.topic)
     if dead := _judge_deaths(package, run, wanted, "came up, but then"):
         return dead
@@ -433,8 +447,12 @@ def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) 
     return verdict.about(citations=(FileCitation(file=node.file or file.path, line=node.line),))
 
 
-def _are_connected(run: Run, topic: str, names: list[str]) -> bool:
-    return any({*pair} <= {*names} for pair in connections(run, topic))
+def _are_connected(run: Run, topic: str, names: list[str], *, alone: bool) -> bool:
+    """Return whether two of the nodes are connected; where the lab names one `alone`, or none, it with any other."""
+    pairs = list(connections(run, topic))
+    if alone:
+        return any(not names or {*pair} & {*names} for pair in pairs)
+    return any({*pair} <= {*names} for pair in pairs)
 
 
 def _judge_deaths(package: PackageFacts, run: Run, wanted: list[Wanted], when: str) -> Verdict | None:
@@ -489,13 +507,9 @@ def _not_connected(
         return failed(message, hint=f"keep it alive: end with {SPIN}", citations=cited)
     other = over_another_topic(run, topic)
     moved = [w.node for w in wanted if w.node.remaps or w.node.namespace != "/"]
-    if renaming := find_renaming(package, [w.node for w in wanted], topic, run):
-        update = {
-            "message": f"{other.message}: it {renaming.why}",
-            "hint": renaming.fix,
-            "citations": renaming.citations,
-        }
-        return other.model_copy(update=update)
+    nodes = [w.node for w in wanted] if len(wanted) > 1 else file.brings
+    if renamed := _by_renaming(package, run, nodes, topic, other):
+        return renamed
     if len({node.namespace for node in moved} - {"/"}) > 1:
         return _in_namespaces(file, other, moved, topic)
     if moved:

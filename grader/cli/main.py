@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import os
 import platform
+import re
 import signal
 import sys
 import threading
@@ -120,9 +121,18 @@ class Parser(argparse.ArgumentParser):
         for word in self.given:
             name = word.partition("=")[0]
             if name.startswith("--") and name not in self._option_string_actions:
-                message = f"unrecognized arguments: {word}{did_you_mean(name, self._option_string_actions)}"
+                meant = did_you_mean(name, self._option_string_actions) or self._without_option(name)
+                message = f"unrecognized arguments: {word}{meant}"
                 break
         raise UsageError(message, hint=f"see {self.prog} --help")
+
+    def _without_option(self, name: str) -> str:
+        """Return how an argument is given that the command takes without an option; "" where there is none of it."""
+        for action in self._get_positional_actions():
+            words = re.findall(r"[a-z]+", f"{action.metavar} {action.help}".lower())
+            if name.strip("-") in words:
+                return f" (write {action.metavar} without an option: {self.prog} {action.metavar})"
+        return ""
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None

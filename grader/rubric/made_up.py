@@ -188,8 +188,9 @@ def tell_made_up(rubric: Rubric, criterion: Criterion, hint: str, seen: str) -> 
     written, scenario = _written_criterion(rubric, criterion)
     told = []
     for name in sorted(names_in(written.get("with"))):
-        value = as_text(rubric.values[name])
-        of_value = re.compile(rf"(?<![\w.:-])(?<!line ){re.escape(value)}(?!\w|\.\d)")
+        value = _as_shown(rubric.values[name])
+        written_as = "|".join(map(re.escape, (as_text(rubric.values[name]), value)))
+        of_value = re.compile(rf"(?<![\w.:-])(?<!line )(?:{written_as})(?!\w|\.\d)")
         if of_value.search(seen):
             continue
         hint = of_value.sub(f"<{name}>", hint)
@@ -237,6 +238,11 @@ def place(part: Any, values: Mapping[str, Value]) -> Any:  # noqa: ANN401 - any 
 def is_place(part: object) -> bool:
     """Return whether a made-up value stands there."""
     return isinstance(part, dict) and part.keys() == {KEY} and isinstance(part[KEY], str)
+
+
+def _as_shown(value: Value) -> str:
+    """Return a value as verdicts have it: seven digits of `2.3333333333333335`."""
+    return f"{value:.7g}" if isinstance(value, float) else as_text(value)
 
 
 def as_text(value: Value) -> str:

@@ -461,13 +461,12 @@ def types_of(topic: str, rubric: dict[str, Any], scenario: dict[str, Any] | None
         yield from (one.get("type") for one in sent if one.get("topic") == topic)
 
 
-def _expected(
-    path: KeyPath, criterion: dict[str, Any], known: Definitions, scenario: dict[str, Any]
-) -> Iterator[Fault]:
-    """Yield fields of requests, answers, goals and results that their types do not have."""
+def _asked(criterion: dict[str, Any], scenario: dict[str, Any]) -> tuple[str, dict[str, Any] | None, bool]:
+    """Return the part of a service or action that a criterion judges, what the scenario says of that, None where it
+    has nothing of the name, and whether it is an action."""
     given, check = as_map(criterion.get("with")), criterion.get("check")
     part = {"calls": "request", "service-answers": "response", "action-result": "result"}.get(str(check), "")
-    key, name = ("result", given.get("action")) if part == "result" else ("expect", given.get("service"))
+    name = given.get("action" if part == "result" else "service")
     services = [(one.get("service"), one) for _, _, one in services_in(scenario)]
     actions = [
         (one.get("name") or one.get("action"), one)
@@ -478,7 +477,24 @@ def _expected(
     ]
     of_action = part == "request" and any(name == called for called, _ in actions)
     about = next((one for called, one in (*services, *actions) if called == name and name), None)
-    if not part or about is None:
+    return part, about if part else None, of_action
+
+
+def type_judged(criterion: dict[str, Any], rubric: dict[str, Any]) -> str:
+    """Return the type of the service or action whose fields a criterion judges; "" where the rubric says none."""
+    scenario = as_map(as_map(rubric.get("scenarios")).get(str(criterion.get("scenario"))))
+    _, about, _ = _asked(criterion, scenario)
+    return str((about or {}).get("type") or "")
+
+
+def _expected(
+    path: KeyPath, criterion: dict[str, Any], known: Definitions, scenario: dict[str, Any]
+) -> Iterator[Fault]:
+    """Yield fields of requests, answers, goals and results that their types do not have."""
+    given = as_map(criterion.get("with"))
+    part, about, of_action = _asked(criterion, scenario)
+    key = "result" if part == "result" else "expect"
+    if about is None:
         return
     shape = known.shape(str(about.get("type")), "goal" if of_action else part)
     expected = given.get(key)

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from grader.checks.support.topics import SYSTEM_TOPICS
-from grader.rubric.message_fields import types_of
+from grader.rubric.message_fields import type_judged, types_of
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import is_one_edit
 
@@ -114,18 +114,34 @@ def _last_word(path: KeyPath, text: str, rubric: dict[str, Any]) -> str:
     """Return the part of a name by which others would know it; "" for a text that is no name of the student's."""
     if ONE_NAME.fullmatch(text) or (path[-1] in PLAIN_NAMES and text != path[-1]):
         return PurePosixPath(text).stem
-    is_field = FIELDS & {*path[:-1]} and text == path[-1]
+    is_field = FIELDS & {*path[:-1]} and text == path[-1] and not _is_known_field(path, rubric)
     return text.rpartition(".")[2].partition("[")[0] if is_field or _is_own_field(path, rubric) else ""
+
+
+def _is_known_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
+    """Return whether a field is of a type that neither students nor the course write: that is looked up elsewhere."""
+    about: Any = rubric
+    kinds = list[str]()
+    for key in path[:-1]:
+        about = about[key]
+        if isinstance(about, dict):
+            kinds.append(
+                type_judged(about, rubric) if path[0] == "criteria" else str(about.get("type") or "")
+            )
+    return any(kind and kind.partition("/")[0] not in _own_packages(rubric) for kind in kinds)
+
+
+def _own_packages(rubric: dict[str, Any]) -> set[str]:
+    return {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
 
 
 def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
     """Return whether a field of a message type is meant that the student or the course defines."""
     if len(path) != 4 or path[-2:] != ("with", "field"):
         return False
-    own = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
     criterion = next((one for index, one in as_maps(rubric.get("criteria")) if index == path[1]), {})
     topic = as_map(criterion.get("with")).get("topic")
-    return any(str(kind).partition("/")[0] in own for kind in types_of(str(topic), rubric))
+    return any(str(kind).partition("/")[0] in _own_packages(rubric) for kind in types_of(str(topic), rubric))
 
 
 def texts_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, str]]:

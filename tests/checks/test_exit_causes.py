@@ -328,6 +328,32 @@ def test_a_module_of_the_students_own_is_told_from_one_that_is_not_there(tmp_pat
 
 
 @pytest.mark.parametrize(
+    ("file", "line", "error", "cause"),
+    [
+        ("scripts/lab.py", "from lab.msg import Reading",
+         "ModuleNotFoundError: No module named 'lab.msg'; 'lab' is not a package", "the package lab is meant"),
+        ("scripts/std_msgs.py", "from std_msgs.msg import String",
+         "ModuleNotFoundError: No module named 'std_msgs.msg'; 'std_msgs' is not a package",
+         "the package std_msgs is meant"),
+        ("scripts/turtle.py", "import turtle",
+         "AttributeError: partially initialized module 'turtle' has no attribute 'Turtle' (most likely due to …)",
+         "the module turtle is meant"),
+    ],
+)  # fmt: skip
+def test_a_script_with_the_name_of_what_it_imports_is_told(tmp_path, file, line, error, cause):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "msg").mkdir()
+    (tmp_path / "msg/Reading.msg").write_text("int32 level\n")
+    (tmp_path / "scripts").mkdir()
+    (tmp_path / file).write_text(SCRIPT)
+    package = facts_of(tmp_path)
+    end = explain_traceback(said(package, (file, 1, line), error=error), package)
+    assert f"Python finds {file} where {cause}" in end.cause
+    assert end.hint == f"give {file} another name, everywhere it is named"
+    assert not end.unbuilt
+
+
+@pytest.mark.parametrize(
     ("setup", "calls", "hint"),
     [
         (False, "", "write setup.py as http"),

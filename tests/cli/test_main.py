@@ -58,6 +58,15 @@ def test_version(capsys):
         (["grade", "x", "--rub", "y"], 'unrecognized arguments: --rub (did you mean "--rubric"?)'),
         (["--vresion"], 'unrecognized arguments: --vresion (did you mean "--version"?)'),
         (["grade", "--ouput=x"], 'unrecognized arguments: --ouput=x (did you mean "--out"?)'),
+        (
+            ["export", "gradescope", "--rubric", "x"],
+            "unrecognized arguments: --rubric (write LAB|FILE without an option: grader export gradescope LAB|FILE)",
+        ),
+        (
+            ["export", "bag", "--evidence=x"],
+            "unrecognized arguments: --evidence=x (write EVIDENCE without an option: grader export bag EVIDENCE)",
+        ),
+        (["export", "bag", "--rubric", "x"], "unrecognized arguments: --rubric"),
         (["chekc"], 'there is no command "chekc" (did you mean "check"?)'),
         (["rubric", "tset"], 'there is no command "rubric tset" (did you mean "test"?)'),
         (["rubric"], "the following arguments are required: COMMAND"),

@@ -331,3 +331,13 @@ def test_reports_name_the_values_of_the_criteria_that_they_show() -> None:
     criteria = json.loads(result_bytes(whole))["criteria"]
     assert criteria[0]["made_up"] == {"rate": 14, "on": True}
     assert made_up_words(made_result("bob", (shown.model_copy(update={"made_up": {}}),))) == ()
+
+
+def test_a_quotient_is_told_as_verdicts_show_it(tmp_path):
+    declared = "{by: {one_of: [3, 7]}, rate: {quotient: [50, by]}}"
+    path = making_up(tmp_path, declared, ("rate_hz: 10}", "rate_hz: {made_up: rate}}"))
+    lab = with_values(load_rubric(str(path)).rubric, {"by": 3, "rate": 50 / 3})
+    (criterion, _) = lab.criteria
+    told = tell_made_up(lab, criterion, "write 16.66667 there", "10 Hz")
+    assert told.startswith("write <rate> there; <rate> is made up for each submission, 16.66667 here, and ")
+    assert tell_made_up(lab, criterion, "write it", "16.66667 Hz") == "write it"

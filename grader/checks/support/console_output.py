@@ -10,6 +10,7 @@ import re
 from bisect import bisect_right
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from functools import partial
 from itertools import accumulate
 from typing import Literal, NamedTuple
 
@@ -87,12 +88,14 @@ def printed_lines(run: Run) -> tuple[Line, ...]:
     )
 
 
-def stream_lines(run: Run, process: str) -> tuple[tuple[Line, ...], ...]:
-    """Return what one process printed on stdout and on stderr, and what its nodes logged, each by time."""
+def stream_lines(run: Run, process: str, *, with_names: bool = False) -> tuple[tuple[Line, ...], ...]:
+    """Return what one process printed on stdout and on stderr, and what its nodes logged, each by time. Names of
+    anonymous nodes and of its own are left out, unless the lines are wanted `with_names`."""
     nodes = run.student_nodes(process)[:NAMES_MAX]
     console = ([(t, c.line) for t, c in run.lines(process) if c.stream == s] for s in ("stdout", "stderr"))
     streams = (*console, _logged_lines(run, nodes))
-    return tuple(tuple(Line(t, _bare(text, nodes)) for t, text in stream) for stream in streams)
+    plain = without_colours if with_names else partial(_bare, names=nodes)
+    return tuple(tuple(Line(t, plain(text)) for t, text in stream) for stream in streams)
 
 
 def _logged_lines(run: Run, nodes: Collection[str] | None = None) -> list[tuple[int, str]]:
@@ -273,10 +276,13 @@ def _texts_of(run: Run, topic: str, nodes: Collection[str]) -> Iterator[tuple[in
 def printed_times(run: Run, process: str, texts: Collection[str], template: str) -> Counter[str]:
     """Return how many times a process printed each text: by the stream, stdout, stderr or /rosout, that shows it most.
 
-    Of a flood of texts, some that seem to have been printed are enough to look at.
+    A text may hold the name of an anonymous node, as `rospy.get_name()` gives it. Of a flood of texts, some that seem
+    to have been printed are enough to look at.
     """
+    named = any(_ANONYMOUS_END.search(text) for text in texts)
     streams = [
-        [(" ".join(line.text.split()), line.text) for line in lines] for lines in stream_lines(run, process)
+        [(" ".join(line.text.split()), line.text) for line in lines]
+        for lines in stream_lines(run, process, with_names=named)
     ]
     printed_chars = sum(len(line) for lines in streams for _, line in lines)
     most = min(LOOKED_AT, max(LOOKED_AT_LEAST, SEARCHED_CHARS_MAX // (1 + printed_chars)))

@@ -25,6 +25,7 @@ from grader.checks.support.missing_names import (
     IMPORT_ERRORS,
     NO_MODULE,
     fields_of,
+    hiding_file,
     name_slip,
     other_name,
     own_message,
@@ -240,11 +241,12 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     """Explain one traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
     misplaced = wrong_class(found.own_frames[-1].source) if found.own_frames else None
-    slip = misplaced or _slip(found, package) or _asks_for_input(found, place, package)
+    hiding = hiding_file(found, package)
+    slip = hiding or misplaced or _slip(found, package) or _asks_for_input(found, place, package)
     cause, hint = slip or CAUSES.get(
         found.kind, ("", "look at that line: the last words say what Python cannot do there")
     )
-    unbuilt = unmade(found, package)
+    unbuilt = None if hiding else unmade(found, package)
     cause, hint = unbuilt or (cause, hint)
     if lacking := _lacking(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""

@@ -29,6 +29,7 @@ _FROM_PACKAGE = re.compile(r"cannot import name '(\w+)' from '(\w+)'")
 _IN_MODULE = re.compile(r"No module named '(\w+\.(?:msg|srv))\.(\w+)'")
 _KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
 NO_MODULE = re.compile(r"No module named '(\w+)'$")
+_HIDDEN = re.compile(r"'(\w+)\.[\w.]+'; '\1' is not a package|partially initialized module '(\w+)'")
 KEYWORDS = (
     *("anonymous", "log_level", "disable_signals", "argv", "queue_size", "latch", "tcp_nodelay", "headers"),
     *(
@@ -81,6 +82,21 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
         return (f"it is called {near[0]}", f"write {near[0]}= for {wrong[1]}=") if near else None
     is_import = found.kind in IMPORT_ERRORS
     return (_own_module(found, package) or _other_module(found, package)) if is_import else None
+
+
+def hiding_file(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """Return the cause and the hint where a file beside the script has the name of the module that is imported."""
+    wanted = _HIDDEN.search(found.message)
+    script = path_in_package(package, found.own_frames[-1].file) if found.own_frames else None
+    if wanted is None or script is None:
+        return None
+    name = wanted[1] or wanted[2]
+    path = PurePosixPath(script).with_name(f"{name}.py")
+    if package.file(str(path)) is None:
+        return None
+    what = f"the package {name}" if name in {package.name, *noetic_messages()} else f"the module {name}"
+    cause = f"Python finds {path} where {what} is meant, because it looks beside the script first"
+    return cause, f"give {path} another name, everywhere it is named"
 
 
 def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
