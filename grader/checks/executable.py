@@ -70,6 +70,8 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
         a syntax error: fix that line, or the one above it.
     """
     found = find_script(package, params.path)
+    if found is not None and found.link_problem:
+        return _dangling(found)
     verdict = _missing(package, params.path) if found is None else _judge_file(package, build, found, params)
     whole = ", all of it valid Python" if found is not None and syntax_fault(found) else ""
     return verdict.about(
@@ -170,6 +172,13 @@ def _judge_unmade(why: str, path: str, build: Verdict) -> Verdict:
         return inconclusive(message, hint=build.hint, citations=build.citations)
     hint = "get the build to pass: catkin_make then makes a program of the script"
     return failed(message, hint=hint, citations=build.citations).lost_by("not-made", path)
+
+
+def _dangling(file: SourceFile) -> Verdict:
+    """Return the verdict on a link in place of the script, which leads to no file that was handed in."""
+    target = f"{file.path} is a link to {shown(file.link)}; " if file.link else ""
+    verdict = unjudged(f"{target}{file.link_problem}", hint="hand in the file itself, in place of the link")
+    return verdict.about(citations=(FileCitation(file=file.path),)).lost_by("file-missing", file.path)
 
 
 def _missing(package: PackageFacts, path: str) -> Verdict:

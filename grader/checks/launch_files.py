@@ -209,7 +209,11 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     for tag, line in unknown:
         cited = (FileCitation(file=file.path, line=line),)
         message = f"{message}: roslaunch skips the tag <{tag}> of line {line}"
-        return failed(message, hint="the tag is <node …>, in lower case", citations=cited)
+        hint = "the tag is <node …>, in lower case"
+        if tag == "node":
+            message = f"{message}, which stands inside of another <node>"
+            hint = f"end the <node> above line {line} before it begins: with `/>`, or with </node> above line {line}"
+        return failed(message, hint=hint, citations=cited)
     return failed(message, hint=f"below <launch>, add {_node_tag(pkg, name)}")
 
 

@@ -33,7 +33,7 @@ from grader.checks.support.launch import (
     why_died,
     why_not_up,
 )
-from grader.checks.support.launch_names import find_renaming, names_in_scripts
+from grader.checks.support.launch_names import RENAMES, find_renaming, names_in_scripts
 from grader.checks.support.processes import GlobalName, early_end
 from grader.checks.support.scripts import shebang_obstacles
 from grader.checks.support.text import SPIN, near_names
@@ -395,7 +395,7 @@ def _twins(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
         first = seen.setdefault(node.full_name, node)
         wanted = [f"/{name.lstrip('/')}" for name in params.nodes if name.endswith(f"/{node.name}")]
         lacking = [name for name in wanted if name not in {one.full_name for one in file.brings}]
-        spaces = [line for line in node.renaming if line.tag != "remap"]
+        spaces = [line for line in node.renaming if line.tag not in RENAMES]
         if first is node or not is_exact(node) or len(lacking) != 1 or len(spaces) != 1:
             continue
         lines = (spaces[0].line, first.line)
@@ -467,7 +467,7 @@ def _judge_deaths(package: PackageFacts, run: Run, wanted: list[Wanted], when: s
 def _in_namespaces(file: LaunchFile, verdict: Verdict, nodes: list[LaunchNode], topic: str) -> Verdict:
     """Name the namespaces of a launch file that starts the same nodes in several, and the lines that make them."""
     spaces = list(dict.fromkeys(node.namespace.strip("/") for node in nodes if node.namespace != "/"))
-    found = [line for n in nodes for line in n.renaming if line.tag != "remap"]
+    found = [line for n in nodes for line in n.renaming if line.tag not in RENAMES]
     places = {(line.file, line.line) for line in found} or {(n.file or file.path, n.line) for n in nodes}
     update = {
         "message": f"{verdict.message}: it puts its nodes in the namespaces {join_words(spaces)}",
@@ -492,6 +492,18 @@ def _together_s(run: Run, topic: str) -> float:
     return sum(after - at for (at, event), (after, _) in pairwise(run.graph) if has_both(event)) / 1e9
 
 
+def _ended_before(package: PackageFacts, file: LaunchFile, ended: Sequence[LaunchNode]) -> Verdict:
+    """Return that nodes ended before they were connected, and the loop that let them, where one is seen."""
+    alone = "itself before it was" if len(ended) == 1 else "themselves before they were"
+    message = f"{join_words(n.full_name for n in ended)} came up, and ended by {alone} connected"
+    scripts = {one.path for n in ended if (one := own_script(package, n)) is not None}
+    left = next((s for s in package.slips if s.kind == "loop-left" and s.file in scripts), None)
+    if left is not None:
+        return failed(f"{message}: {left.message}", hint=left.fix, citations=(left.place,))
+    cited = tuple(FileCitation(file=n.file or file.path, line=n.line) for n in ended)
+    return failed(message, hint=f"keep it alive: end with {SPIN}", citations=cited)
+
+
 def _not_connected(
     package: PackageFacts, file: LaunchFile, run: Run, wanted: list[Wanted], topic: str
 ) -> Verdict:
@@ -500,11 +512,7 @@ def _not_connected(
         return dead
     ended = [w.node for w in wanted if finished(run, w.node)]
     if ended and _together_s(run, topic) < CONNECTED_WITHIN_S:
-        names, places = join_words(n.full_name for n in ended), [(n.file or file.path, n.line) for n in ended]
-        cited = tuple(FileCitation(file=path, line=line) for path, line in places)
-        alone = "itself before it was" if len(ended) == 1 else "themselves before they were"
-        message = f"{names} came up, and ended by {alone} connected"
-        return failed(message, hint=f"keep it alive: end with {SPIN}", citations=cited)
+        return _ended_before(package, file, ended)
     other = over_another_topic(run, topic)
     moved = [w.node for w in wanted if w.node.remaps or w.node.namespace != "/"]
     nodes = [w.node for w in wanted] if len(wanted) > 1 else file.brings

@@ -201,6 +201,7 @@ def _likely_reason(
     return (
         _judge_error(package, run)
         or _some_numbers(probes, missing, lines)
+        or _subscribed_again(package, run, probes, missing)
         or _only_again(probes, missing)
         or _waiting(package, run, probes, missing)
     )
@@ -215,6 +216,10 @@ def _judge_error(package: PackageFacts, run: Run) -> Verdict | None:
     """An error in the callback, which rospy reports and outlives, or the node's end."""
     if end := explain_early_end(package, run):
         return end.verdict(failed, f"the node ended before it had printed everything: {end.cause}")
+    if twice := run_slip(package, run, "defined-twice"):
+        return failed(
+            f"a callback is never called: {twice.message}", hint=twice.fix, citations=(twice.place,)
+        )
     if end := explain_error(package, run):
         return end.verdict(failed, f"an error stops the node from printing: {end.cause}")
     if slip := run_slip(package, run, "callback-called", "callback-missing"):
@@ -246,6 +251,17 @@ def _only_again(probes: Sequence[Probe], missing: Sequence[Probe]) -> Verdict | 
         return None
     message = f"{missing[0].value!r} came twice but was printed only once"
     return failed(message, hint="print every message in the callback, even one that came before")
+
+
+def _subscribed_again(
+    package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe]
+) -> Verdict | None:
+    """Some were lost while a loop made the Subscriber anew in each of its turns."""
+    slip = run_slip(package, run, "subscribed-again")
+    if slip is None:
+        return None
+    message = f"{len(missing)} of {plural(len(probes), 'message')} not printed: {slip.message}"
+    return failed(message, hint=slip.fix, citations=(slip.place,))
 
 
 def _waiting(

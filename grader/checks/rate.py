@@ -304,9 +304,9 @@ def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdic
     """Return the verdict with the line that asks for another rate."""
     where = f"{slip.file}, line {slip.line}"
     message = f"{verdict.message}; {where} asks for {slip.message} Hz"
-    hint = (
-        f"make it {significant(params.rate_hz)} Hz in {where}: use {loop_rate(significant(params.rate_hz))}"
-    )
+    right = f"{slip.name}({significant(1 / params.rate_hz)})" if slip.name else ""
+    right = right or loop_rate(significant(params.rate_hz))
+    hint = f"make it {significant(params.rate_hz)} Hz in {where}: use {right}"
     return _explained(verdict, slip, message, hint)
 
 

@@ -271,6 +271,7 @@ SlipKind = Literal[
     "not-called", "input", "no-clock", "misspelt", "rate-parameter", "rate-number", "reset-value", "reset-limit",
     "set-in-loop", "reset-early", "never-called", "main-guard", "never-reached", "spin-in-loop", "loop-left",
     "sleep-outside", "sleep-twice", "callback-called", "callback-missing", "callback-values", "callback-waits",
+    "defined-twice", "subscribed-again",
     "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
     "prints", "argument-text",
@@ -308,7 +309,9 @@ class PythonSlip(Record):
     for that of a message. `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node,
     or a topic; `name` is the variable that is given the publisher, or `anonymous`. `publisher-type` and
     `subscriber-type`: the message type in that line. `argument-text`: no slip, but where an argument of the command
-    line is kept as a text; `fix` is the line with a number in its place.
+    line is kept as a text; `fix` is the line with a number in its place. `defined-twice`: a callback that a second
+    function of its name hides, or a call of an imported name that a class hides. `subscribed-again`: a
+    `Subscriber(…)` that a loop makes in each of its turns.
     """
 
     file: str
@@ -325,7 +328,8 @@ class PythonSlip(Record):
 
 
 class LaunchLine(Record):
-    """A tag that gives the topics of nodes other names: a `<remap>`, `value` its `from`; any other by its `ns`."""
+    """A tag that gives the topics of nodes other names: a `<remap>`, `value` its `from`; `args`, the `args` of a
+    `<node>` with `old:=new` in them, `value` the old name; any other by its `ns`."""
 
     tag: str
     value: str

@@ -162,6 +162,8 @@ def _unknown(parent: etree._Element) -> Iterator[tuple[str, int]]:
                 yield child.tag, line_of(child) or 0
             elif child.tag == "group":
                 yield from _unknown(child)
+            elif child.tag == "node":
+                yield from (("node", line_of(inner) or 0) for inner in child.iterchildren("node"))
 
 
 def _wrong_root(path: str, root: str, line: int | None) -> Fault:

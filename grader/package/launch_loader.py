@@ -91,8 +91,17 @@ def load(root: etree._Element, scope: Scope, find: Find) -> Loaded:
 def node_of(element: etree._Element, scope: Scope, remapping: Sequence[etree._Element] = ()) -> LaunchNode:
     """Return one `<node>` as it stands in this scope, with its own `<remap>`s."""
     below = scope.below(scope.get(element, "ns"), element)
-    remaps = (*scope.remaps, *(_remap(one, scope) for one in remapping))
-    renaming = (*below.renaming, *(_line(one, scope, scope.get(one, "from")) for one in remapping))
+    given = [word.split(":=", 1) for word in (scope.get(element, "args") or "").split() if ":=" in word]
+    given = [[old, new] for old, new in given if old and new and not old.startswith("_")]
+    by_args = [
+        LaunchLine(tag="args", value=old, file=scope.file, line=line_of(element) or 0) for old, _ in given
+    ]
+    remaps = (*scope.remaps, *(_remap(one, scope) for one in remapping), *((old, new) for old, new in given))
+    renaming = (
+        *below.renaming,
+        *(_line(one, scope, scope.get(one, "from")) for one in remapping),
+        *by_args,
+    )
     return LaunchNode(
         pkg=scope.get(element, "pkg"),
         type=scope.get(element, "type"),

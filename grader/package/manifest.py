@@ -5,6 +5,7 @@ What catkin_pkg refuses is put in plain words.
 
 from __future__ import annotations
 
+import difflib
 import re
 import threading
 import warnings
@@ -68,6 +69,14 @@ _CAUSES: tuple[tuple[str, ...], ...] = (
 )  # fmt: skip
 
 
+_KNOWN_TAGS = (
+    *("name", "version", "description", "author", "maintainer", "license", "url", "export"),
+    *("depend", "build_depend", "build_export_depend", "buildtool_depend", "buildtool_export_depend"),
+    *("exec_depend", "test_depend", "doc_depend"),
+)
+_ALIKE = 0.8
+
+
 def read_manifest(folder: Path) -> tuple[Manifest | None, Fault | None]:
     """Return the manifest of the package in `folder`, or None and why `catkin_make` would not take it."""
     data = read_markup(folder, MANIFEST)
@@ -108,6 +117,11 @@ def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
     except (InvalidPackage, AssertionError, ValueError, RecursionError) as error:
         message = str(getattr(error, "msg", error))[:_MESSAGE_CHARS_MAX]
     place, reason = explain(message, root)
+    strange = re.search(r"must not contain the following tags: (\w+)", message)
+    if strange and (near := difflib.get_close_matches(strange[1], _KNOWN_TAGS, 1, _ALIKE)):
+        reason = reason._replace(
+            fix=f"write `<{near[0]}>` for `<{strange[1]}>`, and the same in its closing tag"
+        )
     return None, _fault(place, "InvalidPackage", "; ".join(message.split("\n")), *reason)
 
 

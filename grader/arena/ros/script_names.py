@@ -111,6 +111,10 @@ def misspelt(tree):
         elif node.id not in known and (near := spelt_alike(node.id, own, attributes)):
             fix = "write %s instead of %s" % (near, node.id)
             yield slip(node.lineno, "misspelt", "did you mean %s?" % near, fix=fix, name=node.id)
+        elif node.id not in known and (argument := unread_argument(node, tree)):
+            message = "the argument of `%s` is called `%s`" % argument
+            fix = "write %s instead of %s" % (argument[1], node.id)
+            yield slip(node.lineno, "misspelt", message, fix=fix, name=node.id)
         elif id(node) in unbound:
             message, fix = undefined(node, tree) if node.id not in known else known_elsewhere(node, tree)
             if message:
@@ -185,6 +189,45 @@ def spelt_alike(name, own, attributes):
         return "__name__"
     near = difflib.get_close_matches(name[:TEXT_LIMIT], sorted(own), 1, 0.8)
     return next(iter(near or [one for one in sorted(own) if sorted(one) == sorted(name)]), "")
+
+
+def unread_argument(node, tree):
+    """Return a function and its only argument, which it never reads, where it takes a field of `node` instead."""
+    for function in walk(tree):
+        inside = list(ast.walk(function)) if isinstance(function, ast.FunctionDef) else []
+        if not any(isinstance(n, ast.Attribute) and n.value is node for n in inside):
+            continue
+        given = [one.arg for one in function.args.args if one.arg != "self"]
+        if len(given) == 1 and not any(isinstance(n, ast.Name) and n.id == given[0] for n in inside):
+            return function.name, given[0]
+    return None
+
+
+def assigned_late(tree):
+    """Names that a function reads above the line that first gives them a value, and that nothing outside of it has."""
+    outside = bound_names(tree) | {n for one in walk(tree) if isinstance(one, ast.Global) for n in one.names}
+    for function in walk(tree):
+        if not isinstance(function, ast.FunctionDef):
+            continue
+        taken = {one.arg for one in ast.walk(function.args) if isinstance(one, ast.arg)} | outside
+        names = [n for n in ast.walk(function) if isinstance(n, ast.Name) and n.id not in taken]
+        stored = {}
+        for statement in function.body:
+            for n in ast.walk(statement):
+                if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store):
+                    stored.setdefault(n.id, statement)
+        for n in names:
+            given = stored.get(n.id)
+            if (
+                not isinstance(n.ctx, ast.Load)
+                or not isinstance(given, ast.Assign)
+                or given.lineno <= n.lineno
+            ):
+                continue
+            above = next(s for s in function.body if s.end_lineno >= n.lineno)
+            message = "line %d, which gives `%s` its value, comes after it" % (given.lineno, n.id)
+            fix = "move line %d above line %d" % (given.lineno, above.lineno)
+            yield slip(n.lineno, "undefined", message, fix=fix, name=n.id)
 
 
 def outside_methods(tree):
@@ -301,6 +344,8 @@ def undefined(node, tree):
 def known_elsewhere(node, tree):
     """Return why a name is not there that only a function or a class has, and what to do; "" where none has it."""
     name = node.id
+    if name == "self":  # what calls the method says what it lacks
+        return "", ""
     for one in walk(tree):
         if isinstance(one, ast.ClassDef) and name in bound_names(one):
             owner = "self" if any(n is node for n in ast.walk(one)) else "%s()" % one.name

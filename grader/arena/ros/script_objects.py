@@ -188,6 +188,47 @@ def callbacks(tree):
                 yield slip(own.lineno, "callback-values", message, fix=fix, name=own.name)
 
 
+def subscribed_again(tree):
+    """Yield each `Subscriber(…)` in a loop that goes on until the node ends: it is made anew in each turn."""
+    for loop in walk(tree):
+        if isinstance(loop, ast.While) and any(is_call(n, "is_shutdown") for n in ast.walk(loop.test)):
+            made = next((n for n in ast.walk(loop) if called_name(n) == "Subscriber"), None)
+            if made is not None:
+                message = "the loop of line %d makes the Subscriber of line %d again and again"
+                fix = "move line %d above line %d, and write `rospy.spin()` in place of the loop if that is all it does"
+                lines = (made.lineno, loop.lineno)
+                yield slip(made.lineno, "subscribed-again", message % lines[::-1], fix=fix % lines)
+
+
+def hidden_names(tree):
+    """Yield callbacks that are defined twice, so that the first one is never called; and calls of a name that a line
+    imports and a class below it takes."""
+    functions, classes = {}, {n.name: n for n in walk(tree) if isinstance(n, ast.ClassDef)}
+    for node in getattr(tree, "body", ()):
+        if isinstance(node, ast.FunctionDef):
+            functions.setdefault(node.name, []).append(node)
+    imports = [(n, a) for n in walk(tree) if isinstance(n, ast.ImportFrom) for a in n.names]
+    imported = {a.asname or a.name: "%s.%s" % (n.module, a.name) for n, a in imports}
+    for node in walk(tree):
+        name = called_name(node)
+        given = node.args[2:3] if name == "Subscriber" else []
+        twice = functions.get(dotted(given[0]), []) if given else []
+        if len(twice) > 1:
+            lines = (twice[1].lineno, twice[0].name, twice[0].lineno)
+            message = "line %d defines `%s` again, so that the one of line %d is never called" % lines
+            fix = "give the function of line %d another name, also in the Subscriber(…) that is to call it"
+            yield slip(
+                twice[1].lineno, "defined-twice", message, fix=fix % twice[1].lineno, name=twice[0].name
+            )
+        if isinstance(getattr(node, "func", None), ast.Name) and name in classes and name in imported:
+            message = "the class of line %d is called %s too, and hides what is imported"
+            fix = "write `%s(…)` in line %d, and `import %s` at the top if it is not there"
+            fix %= (imported[name], node.lineno, imported[name].partition(".")[0])
+            yield slip(
+                node.lineno, "defined-twice", message % (classes[name].lineno, name), fix=fix, name=name
+            )
+
+
 def wrong_callback(own, call, functions, bound, values):
     """Return why a function does not fit as a callback, "" where only its arguments do not, and what to write."""
     given = [one.arg for one in own.args.args]

@@ -11,6 +11,7 @@ import sys
 # `-I` leaves this folder out
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
 from script_names import (
+    assigned_late,
     called_name,
     counter_slips,
     dotted,
@@ -23,7 +24,7 @@ from script_names import (
     slip,
     walk,
 )
-from script_objects import callbacks, object_slips, queue_sizes
+from script_objects import callbacks, hidden_names, object_slips, queue_sizes, subscribed_again
 
 SLIPS_LIMIT = 100
 """Of a file."""
@@ -58,7 +59,7 @@ def slips(tree):
     finders = (
         misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice, callbacks,
         waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
-        without_effect,
+        without_effect, assigned_late, hidden_names, subscribed_again,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
@@ -114,7 +115,8 @@ def loop_rates(tree):
             yield slip(value.lineno, "rate-parameter", name)
         elif number:
             hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
-            yield slip(value.lineno, "rate-number", hz)
+            pause = dotted(node.func) if timed == "sleep" else ""
+            yield slip(value.lineno, "rate-number", hz, name=pause)
 
 
 WORKS = ("init_node", "publish", "spin", "sendTransform", "send_goal")
@@ -192,6 +194,10 @@ def stopped_loops(tree):
             message = "the `if` in line %d runs what follows it once" % loop.lineno
             fix = "write `while` for `if` in line %d" % loop.lineno
             yield slip(loop.lineno, "loop-left", message, fix=fix)
+        if isinstance(loop, ast.While) and is_call(loop.test, "is_shutdown"):
+            message = "the loop of line %d runs only once the node is to end: it lacks a `not`" % loop.lineno
+            fix = "in line %d, write `while not %s():`" % (loop.lineno, dotted(loop.test.func))
+            yield slip(loop.lineno, "loop-left", message, fix=fix)
         inside = list(ast.walk(loop)) if isinstance(loop, (ast.While, ast.For)) else []
         if not any(is_call(n, "publish") for n in inside):
             continue
@@ -243,6 +249,7 @@ def sleepless_loops(tree):
         ]
         before = [n for n in sleeps if n.lineno < loop.lineno and dotted(n.func) not in PAUSES]
         outside = [n for n in sleeps if n.lineno > loop.lineno] or before
+        yield from sleeps_in_if(loop)
         if waits or inner or not outside or not any(is_call(n, "publish") for n in inside):
             continue
         name = dotted(outside[0].func) or "sleep"
@@ -251,6 +258,21 @@ def sleepless_loops(tree):
         fix = "move it into that loop, below line %d, with the same spaces or tabs before it as line %d has"
         fix %= (last.end_lineno, last.lineno)
         yield slip(outside[0].lineno, "sleep-outside", message, fix=fix, name=name)
+
+
+def sleeps_in_if(loop):
+    """Yield the only `sleep()` of a loop that publishes in each of its turns, where it stands in an `if`."""
+    inside = [n for one in loop.body for n in ast.walk(one)]
+    plain = [one for one in loop.body if isinstance(one, ast.Expr) and is_call(one.value, "publish")]
+    sleeps = [n for n in inside if any(is_call(n, name) for name in WAITS)]
+    for one in loop.body:
+        within = one.body if isinstance(one, ast.If) and not one.orelse else []
+        own = [n for n in within if isinstance(n, ast.Expr) and is_call(n.value, "sleep")]
+        if plain and len(sleeps) == len(own) == 1 and own[0] is within[-1] and one is loop.body[-1]:
+            name, line = dotted(own[0].value.func), own[0].lineno
+            message = "`%s()` stands in the `if` of line %d" % (name, one.lineno)
+            fix = "write line %d with the same spaces or tabs before it as line %d has" % (line, one.lineno)
+            yield slip(line, "sleep-outside", message, fix=fix, name=name)
 
 
 def sleeps_twice(tree):

@@ -409,7 +409,7 @@ def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -
     message = (
         f"the node stops publishing after {significant(count.values[-1])}, although it keeps running{cause}"
     )
-    verdict = failed(message, hint=params.reset_hint)
+    verdict = failed(message, hint=params.reset_hint) if len(count.values) > 1 else unjudged(message)
     return verdict if found else verdict.once()
 
 

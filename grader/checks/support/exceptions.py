@@ -215,7 +215,8 @@ def _call(message: str, source: str) -> Meaning | None:
     given = _ONE_TOO_MANY.search(message)
     if given and int(given[3]) == int(given[2]) + 1 and f".{given[1]}(" in source:
         method = given[1]
-        return f"`{method}` is called on an object, and takes no `self`", f"write `def {method}(self, …):`"
+        taken = "self, …" if int(given[2]) else "self"
+        return f"`{method}` is called on an object, and takes no `self`", f"write `def {method}({taken}):`"
     if (lacks := _TOO_FEW.match(message)) and re.search(rf"\b{lacks[1]}\(", source):
         name, values = lacks.groups()
         hint = f"put {values} into its brackets, or remove the call: ROS calls a callback by itself"
@@ -235,16 +236,25 @@ def _ros_call(message: str, source: str) -> Meaning | None:
         elif slept is not None and isinstance(slept.func, ast.Attribute):
             rate = ast.unparse(slept.func.value)
         return "a Rate knows by itself how long it sleeps", f"write `{shown(rate)}.sleep()`"
-    if meaning := _init_node(message, source):
+    if meaning := _init_node(message, source) or _parameter(message, source) or _sent_class(message, source):
         return meaning
+    if asks_for_rate := _calls(source, "Rate"):
+        return _rate(asks_for_rate[0])
+    return None
+
+
+def _sent_class(message: str, source: str) -> Meaning | None:
+    """Of `publish(…)` with the class of the messages, or with a name that was given it."""
     if serialized := re.match(r"(\w+)\.serialize\(\) missing", message):
         name = serialized[1]
+        sent = [ast.unparse(one) for call in _calls(source, "publish") for one in call.args[:1]]
+        if sent and re.fullmatch(r"\w+", sent[0]) and sent[0] != name:
+            cause = f"`{shown(sent[0])}` is the type `{name}` itself, and not a message"
+            return cause, f"write brackets where it is made: `{shown(sent[0])} = {name}()`"
         return (
             f"`{name}` is the type of the messages, not a message",
             f"publish a value: `{name}(…)`, or the value alone",
         )
-    if asks_for_rate := _calls(source, "Rate"):
-        return _rate(asks_for_rate[0])
     return None
 
 
@@ -277,10 +287,27 @@ def _init_node(message: str, source: str) -> Meaning | None:
     if message == "init_node() missing 1 required positional argument: 'name'":
         return "a node needs a name", "write the node's name into the brackets, as a text"
     called = next(iter(_calls(source, "init_node")), None)
+    if called is not None and len(called.args) > 1 and message == "'bool' object is not iterable":
+        flag = called.args[1]
+        cause = "the second value of `init_node(…)` is no flag, unless it has its name"
+        return cause, rewritten(source, (flag, f"anonymous={ast.unparse(flag)}"))
     if called is None or not called.args or not message.startswith("argument of type"):
         return None
     given = called.args[0]
     return "a node's name is a text", rewritten(source, (given, f"'{ast.unparse(given)}'"))
+
+
+def _parameter(message: str, source: str) -> Meaning | None:
+    """Of `set_param(…)` with the value before the name."""
+    call = next(iter(_calls(source, "set_param")), None)
+    if call is None or len(call.args) != 2 or "expected string" not in message:
+        return None
+    value, name = call.args
+    if is_text(name) and not is_text(value):
+        return "the parameter's name comes first, then its value", rewritten(
+            source, (value, name), (name, value)
+        )
+    return None
 
 
 def _calls(source: str, *names: str) -> list[ast.Call]:
@@ -478,6 +505,23 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
 }
 
 
+def _decimal(value: ast.expr) -> Meaning | None:
+    """Return why a calculation gives no whole number, and the one that does; None where it need not be so."""
+    if isinstance(value, ast.BinOp) and isinstance(value.op, ast.Div):
+        whole = f"{ast.unparse(value.left)} // {ast.unparse(value.right)}"
+        return "the message takes a whole number, and `/` makes one with a decimal point", whole
+    parts = list(ast.walk(value))
+    if isinstance(value, ast.Call) and getattr(value.func, "id", "") == "float" and len(value.args) == 1:
+        return "the message takes a whole number, and `float(…)` makes one with a decimal point", ast.unparse(
+            value.args[0]
+        )
+    decimal = any(isinstance(one, ast.Constant) and isinstance(one.value, float) for one in parts)
+    clock = any(getattr(one, "attr", "") in {"get_time", "to_sec", "time"} for one in parts)
+    if decimal or clock:
+        return "the message takes a whole number, and this has a decimal point", f"int({ast.unparse(value)})"
+    return None
+
+
 def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     """Return why a message does not take the value that is published: a text for a number, a number for a text, or the
     publisher of another topic."""
@@ -499,6 +543,9 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     if texts and not wants_text:
         why = f"the message takes a {kind}, and `str(…)` makes a string of it"
         return why, rewritten(frame.source, (texts[0], texts[0].args[0]))
+    point = _decimal(sent.args[0]) if sent is not None and sent.args and not wants_text else None
+    if point is not None:
+        return point[0], rewritten(frame.source, (sent.args[0], point[1])) if sent is not None else ""
     here = owners.get(owner)
     others = [s for s in owners.values() if (types[s.line] == "String") is not wants_text]
     if here is not None and here not in others and len(others) == 1:

@@ -282,6 +282,11 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
     """Return the cause and the hint of an error that other lines of the file explain."""
     if found.kind in {"NameError", "UnboundLocalError"}:
         return _misspelt(found, place, package)
+    hidden = (
+        s for s in package.slips if (s.kind, s.file, s.line) == ("defined-twice", place.file, place.line)
+    )
+    if found.kind == "TypeError" and (slip := next(hidden, None)):
+        return slip.message, slip.fix
     if found.kind == "AttributeError" or "missing 1 required positional argument: 'self'" in found.message:
         here = (
             s

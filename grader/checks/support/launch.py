@@ -53,6 +53,8 @@ _REQUIRED = re.compile(r"REQUIRED process (\[[^\s\[\]]+-\d+\]) has died")
 NO_PACKAGE = r"Resource not found: (\S+)"
 NO_FILE = r"file does not exist \[([^\[\]\n]+)\]"
 BAD_FILE = r"error loading <rosparam> tag"
+IGNORE = "CATKIN_IGNORE"
+_NO_LAUNCH_FILE = "is neither a launch file in package"
 NOT_STARTED = r"Unable to launch \[([^\s\[\]]+)-\d+\]"
 # what roslaunch says when it starts nothing, what it means, and what to do ({0}: the pattern's group)
 _REFUSALS = (
@@ -75,6 +77,10 @@ _REFUSALS = (
      "write $(find <package>)/…"),
     (BAD_FILE, "<rosparam> cannot load its file",
      "rosparam load <file> shows what is wrong with the file"),
+    (r"Invalid roslaunch XML syntax: \[Errno 2\] No such file or directory: '([^'\n]+)'",
+     "the file {0} that <include> names does not exist", "push {0}, or start its nodes here, with a <node> for each"),
+    (r"invalid bool value for (\w+): (\S+?)\.?(?:\s|$)", '{0}="{1}" is neither true nor false',
+     'write {0}="true" or {0}="false"'),
     (r"Invalid roslaunch XML syntax", "it is not well-formed", "close every element"),
 )  # fmt: skip
 
@@ -132,6 +138,8 @@ def _unreadable(
         others = [f.path for f in package.launch_files]
         names = paths_by_name(package)
         near = [names[n] for n in near_names(launch, names)]
+        stem = PurePosixPath(launch).stem
+        near += [p for n, p in names.items() if n == f"{stem}.xml" and p not in near]
         seen = f"; there is {join_words(dict.fromkeys([*near, *others]))}" if near or others else ""
         seen += f", and {full[0]} starts {join_words(sorted(wanted))}" if len(others) > 1 and full else ""
         seen += f", which starts {join_words(sorted(wanted))}" if full and full == others else ""
@@ -364,14 +372,30 @@ def refusal(run: Run, package: PackageFacts | None = None) -> Absence | None:
     text = "\n".join(line for line in _lines(run))
     if unset := _unset_args(text, package):
         return unset
+    if package is not None and package.file(IGNORE) is not None and _NO_LAUNCH_FILE in text:
+        why = f"{IGNORE} hides the package from catkin and roslaunch"
+        return Absence(why, f"git rm {IGNORE}", citations=(FileCitation(file=IGNORE),))
     for pattern, why, hint in _REFUSALS:
         if match := re.search(pattern, text):
             words = [shown(PurePosixPath(g).name if "/" in g.strip("/") else g) for g in match.groups()]
             fix = hint.format(*words)
             fix = fix.replace("<package>", package.name) if package is not None else fix
+            if package is not None and pattern == NO_FILE and (meant := _file_meant(package, words[0])):
+                fix = f"write $(find {package.name})/{meant}"
             said = f"roslaunch starts nothing: {why.format(*words)}"
             return Absence(said, fix, refused=pattern, about="".join(words[:1]))
     return None
+
+
+def _file_meant(package: PackageFacts, name: str) -> str:
+    """Return the path of the only file of that kind, or of the one that is spelt alike; "" for none."""
+    names = {
+        n: p
+        for n, p in paths_by_name(package).items()
+        if PurePosixPath(n).suffix == PurePosixPath(name).suffix
+    }
+    near = near_names(name, names) or (tuple(names) if len(names) == 1 else ())
+    return names[near[0]] if near else ""
 
 
 def _unset_args(text: str, package: PackageFacts | None) -> Absence | None:

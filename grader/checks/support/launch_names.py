@@ -12,6 +12,8 @@ from grader.model.verdict import FileCitation
 from grader.wording import join_words
 
 UNRESOLVED = "$("
+RENAMES = ("remap", "args")
+"""Where a launch file gives a topic another name by itself; any other line does it by a namespace."""
 
 
 class Renaming(NamedTuple):
@@ -38,7 +40,7 @@ class _Use(NamedTuple):
     @property
     def remaps(self) -> Iterator[tuple[str, LaunchLine | None]]:
         """The new names that `<remap>`s give the topic, with their lines where they are known."""
-        lines = [line for line in self.node.renaming if line.tag == "remap"]
+        lines = [line for line in self.node.renaming if line.tag in RENAMES]
         known = len(lines) == len(self.node.remaps)
         for index, (old, new) in enumerate(self.node.remaps):
             if _whole(old, self.node.namespace) == _whole(self.name, self.node.namespace):
@@ -112,7 +114,7 @@ def _described(uses: Sequence[_Use], topic: str, *, drop_ns: bool, drop_remaps: 
     why, fixes, lines = list[str](), list[str](), list[LaunchLine]()
     if drop_ns:
         spaces = dict.fromkeys(use.node.namespace.strip("/") for use in uses if use.node.namespace != "/")
-        found = [line for use in uses for line in use.node.renaming if line.tag != "remap"]
+        found = [line for use in uses for line in use.node.renaming if line.tag not in RENAMES]
         why.append(f"puts its nodes in the namespace{'s' * (len(spaces) > 1)} {join_words(spaces)}")
         values = dict.fromkeys(line.value for line in found) or spaces
         given = [f'ns="{value}"' for value in values]
@@ -122,7 +124,11 @@ def _described(uses: Sequence[_Use], topic: str, *, drop_ns: bool, drop_remaps: 
         remaps = [remap for use in uses for remap in use.remaps]
         found = [line for _, line in remaps if line is not None]
         why.append(f"remaps {name} to {join_words(dict.fromkeys(new for new, _ in remaps))}")
-        fixes.append(f"the <remap>{'s' * (len(set(found)) != 1)} of {name}{_in_lines(found)}")
+        if found and all(line.tag == "args" for line in found):
+            words = join_words(dict.fromkeys(f"{name}:={new}" for new, _ in remaps))
+            fixes.append(f"{words} from the args{_in_lines(found)}")
+        else:
+            fixes.append(f"the <remap>{'s' * (len(set(found)) != 1)} of {name}{_in_lines(found)}")
         lines += found
     moved = (use.node for use in uses if use.topic() != topic)
     places = sorted({(one.file, one.line) for one in (lines or moved)})

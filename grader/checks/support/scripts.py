@@ -94,7 +94,8 @@ def can_be_moved(path: str, wanted: str) -> bool:
         or one == other
         or not one
         or not other
-        or (other == ".launch" and one.startswith(other))
+        or (other == ".launch" and (one.startswith(other) or one == ".xml"))
+        or PurePosixPath(path).name == f"{PurePosixPath(wanted).name}.txt"
     )
 
 

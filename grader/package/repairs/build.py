@@ -133,6 +133,7 @@ def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted)
         return
     _spell_commands(files)
     needs = " ".join(wanted.dependencies or ("rospy", "std_msgs"))
+    _spell_catkin(files)
     if not _calls_catkin(files, package):
         line = f"find_package(catkin REQUIRED COMPONENTS {needs})"
         _add_call(files, "find_package(catkin …)", line, ("project",))
@@ -171,6 +172,17 @@ def _calls_catkin(files: Files, package: PackageFacts) -> bool:
     written = [[t.value for t in _words(c)] for c in _commands(files, "find_package")]
     known = [list(c.args) for c in told if c.name == "find_package"]
     return any(words[:1] == ["catkin"] for words in (*written, *known))
+
+
+def _spell_catkin(files: Files) -> None:
+    """Write the name of catkin in lower case in find_package(…)."""
+    for command in _commands(files, "find_package"):
+        name = next(iter(_words(command)), None)
+        if name is not None and name.value != "catkin" and name.value.lower() == "catkin":
+            message = f"line {command.line} of {CMAKE}: find_package(…) names {name.value}, and not catkin"
+            fix = f"write catkin for {name.value}"
+            files.change("build-line", CMAKE, _replace_token(_cmake(files), name, "catkin"), message, fix)
+            return
 
 
 def _replace_token(text: str, token: Token, new: str) -> str:

@@ -125,6 +125,7 @@ def repair_xml(files: Files, file: str, root: str, kind: RepairKind) -> bool:
         why = fault.explanation if fault is not None else ""
         taken = " ".join(one.strip() for one in old.split("\n") if one not in new.split("\n"))
         fix = f"write `{added_lines(old, new)}`" if added_lines(old, new) else f"delete `{taken}`"
+        fix = fix if taken or added_lines(old, new) else "delete the blank lines above the first tag"
         place = f"line {fault.line if fault is not None and fault.line else line} of {file}"
         files.change(kind, file, after, f"{place}: {why}", fix)
     return text is not None and files.text(file) != text

@@ -214,6 +214,8 @@ def _is_slip(path: str, name: str) -> bool:
         return given.name == path and is_near(path, name)
     return (
         is_near(given.name, name)
+        or given.name == f"{name}.txt"
+        or (right.suffix == ".launch" and given.name == f"{right.stem}.xml")
         or given.name == right.stem
         or (given.suffix == right.suffix and is_near(given.stem, right.stem))
     )
