@@ -64,7 +64,8 @@ def choose_repairs(
             one.with_paths(partial(posixpath.join, way))
             for one in find_repairs(package.folder, own, wanted_of(rubric, own.asked))
         ]
-    counting = [one for one in found if rubric.share_of(one.kind) > 0 and not _asks_nobody(one, rubric)]
+    typed = any(step.type is not None for scenario in rubric.scenarios.values() for step in scenario.steps)
+    counting = [one for one in found if rubric.share_of(one.kind) > 0 and (typed or not one.asks_input)]
     built, launched = built or not needs_build(facts), launched_in(facts)
 
     def helps(one: Repair) -> bool:
@@ -86,12 +87,6 @@ def choose_repairs(
     )
     before = [one for one in counting if one.kind in DONE_BEFORE_RUNS]
     return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios or unblocks else ((), ())
-
-
-def _asks_nobody(repair: Repair, rubric: Rubric) -> bool:
-    """Return whether `raw_input` would become an `input` that nothing answers: no scenario types a line."""
-    typed = any(step.type is not None for scenario in rubric.scenarios.values() for step in scenario.steps)
-    return "raw_input(" in repair.before and not typed
 
 
 @contextmanager

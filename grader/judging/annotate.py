@@ -14,7 +14,7 @@ from typing import NamedTuple
 from grader.checks.cmake import NOT_CALLED, below_catkin_package
 from grader.checks.messages import code_of
 from grader.checks.support.console_output import probes_on
-from grader.checks.support.exit_causes import NO_INPUT, RATE, syntax_hint
+from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch import (
     NOT_STARTED,
     find_launch,
@@ -42,10 +42,12 @@ from grader.checks.support.scripts import (
     names_script,
 )
 from grader.checks.support.text import (
+    RATE_SLOT,
     SAID_DATA,
     SAID_VALUE,
     SECONDS,
     VALUE,
+    VALUE_SLOT,
     could_say,
     in_language,
     in_source,
@@ -69,6 +71,7 @@ NAMES_SHOWN = 3
 OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
+USUAL_RATE_HZ = 10
 RATE_SHARE = 0.05
 """By so much a rate that a script asks for may differ from the right one."""
 OF_FILES = ("build", "cmake", "manifest")
@@ -395,20 +398,20 @@ def choose_hint_language(verdict: Verdict, criterion: Criterion, facts: Facts) -
     return verdict.model_copy(update={"hint": hint})
 
 
-def fill_input_hint(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:
-    """Return the verdict; a hint on a node that asks for input has the text and the rate that the lab wants of it."""
-    if NO_INPUT not in verdict.hint:
+def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:
+    """Return the verdict; its hint has the text and the rate that the lab wants of the node, where it has slots for
+    them."""
+    if VALUE_SLOT not in verdict.hint:
         return verdict
     asked = {
         one.check: one.parameters
         for one in rubric.criteria
         if one.scenario == criterion.scenario and one.visibility == "visible"
     }
-    hint = verdict.hint
-    if template := str(asked.get("message", {}).get("template", "")):
-        hint = hint.replace("a value in the code", f"`{in_language(code_of(template), 'python')}`")
-    if hz := asked.get("rate", {}).get("rate_hz"):
-        hint = hint.replace(RATE, f"rospy.Rate({significant(float(str(hz)))})")
+    template = str(asked.get("message", {}).get("template", ""))
+    value = f"`{in_language(code_of(template), 'python')}`" if template else "a value in the code"
+    hz = float(str(asked.get("rate", {}).get("rate_hz", USUAL_RATE_HZ)))
+    hint = verdict.hint.replace(VALUE_SLOT, value).replace(RATE_SLOT, f"rospy.Rate({significant(hz)})")
     return verdict.model_copy(update={"hint": hint})
 
 
@@ -457,11 +460,9 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
     in which it is commented out."""
     if not verdict.status.is_lost or package is None or package.cmake is None:
         return verdict
-    if f"{CMAKE} line" in verdict.hint or f"{CMAKE}: " in verdict.hint:
-        return verdict  # how the line is repaired is told
     if called := verdict.sought_name("call"):
         return _cite_install(verdict, package, build, called)
-    found = commented_calls(package, build.file_lines(CMAKE)[:_LINES_READ], verdict.hint)
+    found = commented_calls(package, build.file_lines(CMAKE)[:_LINES_READ], verdict.sought_names("uncalled"))
     if not found:
         return verdict
     told = "; ".join(f"{name}(…) is commented out in {lines_text(*place)}" for name, place in found.items())

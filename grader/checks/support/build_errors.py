@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.support.scripts import cmake_calls, installed, path_in_package
+from grader.checks.support.scripts import OF_INTERFACES, cmake_calls, installed, path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
     LIBRARIES,
@@ -45,7 +45,6 @@ CALLERS_MAX = 40
 SYSTEM = ("/usr/", "/opt/")
 _QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
 """As compilers and linkers write them."""
-OF_GENERATION = ("add_message_files", "add_service_files", "add_action_files", "generate_messages")
 CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
 OF_CATKIN = ("catkin_package", "catkin_install_python", "catkin_python_setup")
 """Commands that `find_package(catkin …)` defines."""
@@ -71,7 +70,7 @@ class BuildError(NamedTuple):
 class Explained(NamedTuple):
     """The error in a student's words, and what to do; `of_machine`: the grading machine lacks something; `place`: the
     line that is wrong, where that is not the one that the build names; `lacks`: the package that it lacks; `by_itself`:
-    a command that CMake does not know, and no line of catkin's own is why."""
+    a command that CMake does not know, and no line of catkin's own is why; `uncalled`: a command to call."""
 
     why: str
     hint: str
@@ -79,6 +78,7 @@ class Explained(NamedTuple):
     place: FileCitation | None = None
     lacks: str = ""
     by_itself: bool = False
+    uncalled: str = ""
 
 
 def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | None:
@@ -378,7 +378,8 @@ def _missing_dependency(found: re.Match[str], _package: PackageFacts, _lines: Se
     why = f"add_dependencies({found[2]} {found[1]}) names the target {found[1]}, which does not exist"
     targets = "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"
     hint = f"write add_dependencies({found[2]} {targets})"
-    return Explained(why, f"{hint}; messages of your own need generate_messages(…) above it")
+    hint = f"{hint}; messages of your own need generate_messages(…) above it"
+    return Explained(why, hint, uncalled="generate_messages")
 
 
 def _missing_target(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -538,16 +539,17 @@ def _unknown_command(found: re.Match[str], package: PackageFacts, _lines: Sequen
     if right := meant_command(name.lower()):
         return Explained(f"there is no command {name}(…)", f"write {right} for {name}")
     has_catkin = any(one.args[:1] == ("catkin",) for one in cmake_calls(package, "find_package"))
-    if name.lower() in OF_GENERATION and has_catkin:
+    if name.lower() in OF_INTERFACES and has_catkin:
         why = f"{name}(…) comes with message_generation, which find_package(catkin …) does not name"
         call = next(iter(cmake_calls(package, name.lower())), None)
         fix = "write find_package(catkin REQUIRED COMPONENTS … message_generation)"
         if call is not None and not package.interfaces:
             fix = f"delete {name}(…), line {call.line}: the package has no messages, services or actions of its own"
         return Explained(why, fix, by_itself=True)
-    if name.lower() in {*OF_CATKIN, *OF_GENERATION}:
+    if name.lower() in {*OF_CATKIN, *OF_INTERFACES}:
         why = f"{name}(…) is catkin's, and find_package(catkin …) is not called above it"
-        return Explained(why, f"call find_package(catkin REQUIRED COMPONENTS …) above {name}(…)")
+        hint = f"call find_package(catkin REQUIRED COMPONENTS …) above {name}(…)"
+        return Explained(why, hint, uncalled="find_package")
     return Explained(f"there is no command {name}(…)", "check the spelling of the command")
 
 

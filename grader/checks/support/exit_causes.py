@@ -33,8 +33,8 @@ from grader.checks.support.missing_names import (
     unmade,
 )
 from grader.checks.support.processes import Life, early_end, lives
-from grader.checks.support.scripts import SYNTAX, path_in_package
-from grader.checks.support.text import LOOP, SPIN, shown
+from grader.checks.support.scripts import OF_INTERFACES, SYNTAX, path_in_package
+from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
 from grader.installable import ON_THE_MACHINE, exists_somewhere, install_hint, known_packages
@@ -51,9 +51,8 @@ RACE = "publish() to a closed topic"
 ARGUMENT_HINT = (
     "put the value in the code, or use a default where `len(sys.argv)` is 1: nothing passes arguments"
 )
-NO_INPUT = "write a value in the code in place of `input()`"
-RATE = "rospy.Rate(10)"
-PAUSE = f"write `rate = {RATE}` above it and `rate.sleep()` as its last line"
+NO_INPUT = f"write {VALUE_SLOT} in place of `input()`"
+PAUSE = f"write `rate = {RATE_SLOT}` above it and `rate.sleep()` as its last line"
 LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
 CAUSES = {
     "EOFError": ("it waits for input (`input()`), and a graded node gets no input",
@@ -133,7 +132,8 @@ class Ending(NamedTuple):
         `inconclusive` where the machine is at fault."""
         kind = machine_lacks if self.of_machine else kind
         verdict = kind(message, measured=measured, hint=self.hint, citations=self.citations)
-        return verdict.model_copy(update={"cause": self.cause, "unbuilt": self.unbuilt})
+        verdict = verdict.model_copy(update={"cause": self.cause, "unbuilt": self.unbuilt})
+        return verdict.seeking("uncalled", *(OF_INTERFACES if self.unbuilt else ()))
 
 
 def explain_early_end(package: PackageFacts, run: Run) -> Ending | None:

@@ -103,7 +103,16 @@ class Files:
         """Remember a repair that changes no line of a text."""
         self.repairs.append(repair)
 
-    def change(self, kind: RepairKind, file: str, after: str, message: str, fix: str = "") -> None:
+    def change(
+        self,
+        kind: RepairKind,
+        file: str,
+        after: str,
+        message: str,
+        fix: str = "",
+        *,
+        asks_input: bool = False,
+    ) -> None:
         """Remember that the file's text becomes `after`. Without a `fix`, the changed lines say it."""
         file = self._renamed.get(file, file)
         before = self.text(file)
@@ -112,7 +121,8 @@ class Files:
         line, old, new = changed_lines(before, after)
         self._texts[file] = after
         words = {"message": message, "fix": fix or added_lines(old, new)}
-        self.repairs.append(Repair(kind=kind, file=file, line=line, before=old, after=new, **words))
+        made = Repair(kind=kind, file=file, line=line, before=old, after=new, asks_input=asks_input, **words)
+        self.repairs.append(made)
 
 
 def repair_xml(files: Files, file: str, root: str, kind: RepairKind) -> bool:

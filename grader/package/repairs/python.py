@@ -130,7 +130,8 @@ def _join_steps(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
 def _change(files: Files, file: str, cause: Cause, steps: list[_Step]) -> None:
     kind = KINDS.get(cause, "python-syntax")
     message, fix = _words(file, cause, steps, files.text(file) or "")
-    files.change(kind, file, steps[-1].text, message, fix)
+    asks = any("raw_input" in step.word.split(", ") for step in steps if step.cause == "old-name")
+    files.change(kind, file, steps[-1].text, message, fix, asks_input=asks)
 
 
 def _required_indentation(before: str, after: str, first: str) -> str:
