@@ -11,8 +11,8 @@ from grader.checks.support.build_errors import (
     FIRST_ERROR_HINT,
     UNKNOWN_COMMAND,
     explain_error_of_build,
-    first_error,
 )
+from grader.checks.support.build_output import first_error
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.processes import Life, lives
 from grader.checks.support.scripts import (

@@ -312,7 +312,7 @@ def _why_unnamed(
         other = f"install({hits[0].kind} …)"
         why = f"line {hits[0].call.line}: {other} names {{}}, where catkin_install_python(PROGRAMS …) should"
         return Lack(
-            why, f"replace {other} by catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(hits[0])
+            why, f"replace {other} with catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(hits[0])
         )
     of_python = [one for one in all_named if one.call.name == PYTHON]
     if not of_python and package.cmake and (slip := _misspelt(package.cmake, PYTHON)):

@@ -280,14 +280,14 @@ class Later:
         if own[0].message.lstrip("/") not in names:
             yield f"name the node {names[0]} in {_line(own[0])}, not {own[0].message}"
         if own[0].name == "anonymous" and self._wanted.get("anonymous") == "forbidden":
-            yield f"take anonymous=True out of {_line(own[0])}"
+            yield f"remove anonymous=True from {_line(own[0])}"
 
     def _copied(self) -> Iterator[str]:
         started = [one.script for one in self._rubric.scenarios[self._criterion.scenario or ""].start]
         twice = {PurePosixPath(one).name for one in started if one and started.count(one) > 1}
         for slip in self._of("node-name"):
             if PurePosixPath(slip.file).name in twice and not slip.name:
-                yield f"write anonymous=True in {_line(slip)}, for two of it at once"
+                yield f"write anonymous=True in {_line(slip)}, since two of it run at once"
 
     def _published(self) -> Iterator[str]:
         published, kind = self._of("publisher"), str(self._wanted.get("type", ""))
@@ -361,7 +361,7 @@ class Later:
             words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code
             yield f"publish `{words}` in {_line(said[0])}, not '{in_source(text)}'"
         elif SECONDS in template and self._of("no-clock"):
-            yield f"publish the time in {_line(said[0])}, `{code}`: the script counts"
+            yield f"publish the time in {_line(said[0])}, `{code}`: the script only counts"
 
     def _logged(self) -> Iterator[str]:
         text, said = str(self._wanted.get("text", "")), self._of("prints")
@@ -507,7 +507,7 @@ def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | No
     if not lines:
         return verdict
     where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))}"
-    hint = f"write the package's exact name in {where}, push {absent} if it is your own, or leave that out"
+    hint = f"write the package's exact name in {where}, push {absent} if it is your own, or remove it"
     cited = tuple(FileCitation(file=file.path, line=n) for n in lines)
     return verdict.model_copy(update={"hint": hint, "citations": cited})
 

@@ -227,7 +227,7 @@ def _with_package_name(verdict: Verdict, criterion: Criterion, facts: Facts) -> 
 def _sound(verdict: object) -> Verdict:
     """Raise TypeError or ValueError for what an instructor's own check must not return."""
     if not isinstance(verdict, Verdict):
-        raise TypeError(f"it returned {type(verdict).__name__}, no verdict: return passed(…) or failed(…)")
+        raise TypeError(f"it returned {type(verdict).__name__}, not a verdict: return passed(…) or failed(…)")
     if not 0 <= verdict.score <= 1:
         raise ValueError(f"its score is {verdict.score:g}: a score is 0 to 1")
     return verdict

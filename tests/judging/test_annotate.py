@@ -334,7 +334,7 @@ def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
         "line 1: write `print('a')`",
         f'{OUT} there is no talker in the package: type="talker" lacks the .py of src/talker.py',
         'write type="talker.py"',
-        "src/plain.py is not executable, so that roslaunch does not find it (launch/x.launch, line 3)",
+        "src/plain.py is not executable, so roslaunch does not find it (launch/x.launch, line 3)",
         "chmod +x src/plain.py, then git add --chmod=+x src/plain.py, commit and push",
     ]
     assert add_advice([told], package, rubric(CMAKE_CHECK)) == (told,)

@@ -64,7 +64,7 @@ CAUSES = {
     "ROSInitException": ("it uses ROS before `rospy.init_node(…)`",
      "call `rospy.init_node(…)` before the first publish, Rate or sleep"),
     **dict.fromkeys(("LookupException", "ExtrapolationException", "ConnectivityException"), (
-        "at that moment tf does not know the transform, as always at the start",
+        "tf does not know the transform yet, as always at the start",
         "catch it, `try: … except tf2_ros.TransformException:`, or give `lookup_transform(…)` a time to wait")),
     "KeyboardInterrupt": ("Ctrl-C came at a point where nothing handles it",
      "loop with `while not rospy.is_shutdown():` and sleep with `rospy.Rate`"),
@@ -76,7 +76,7 @@ CAUSES = {
     "ROSSerializationException": ("", "publish a value that fits the message's type"),
     "SerializationError": ("", "publish a value that fits the message's type"),
     "SyntaxError": ("", "compare that line and the end of the one above it with the handout, character by character"),
-    "IndentationError": ("", "indent every block by four spaces, each of its lines the same"),
+    "IndentationError": ("", "indent every block by four spaces, all of its lines alike"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }  # fmt: skip
 _NUMBER_WANTED = re.compile(r"must be (?:an integer|unsigned integer|float) type")
@@ -303,7 +303,7 @@ def _no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> 
             if kind == "int"
             else read.fix.replace("map(int, ", "map(float, ").replace("= int(", "= float(")
         )
-        return "an argument of the command line is a text", f"in line {read.line}, write `{fix}`"
+        return "a command-line argument is a string", f"in line {read.line}, write `{fix}`"
     if ".publish(" in found.own_frames[-1].source:
         return None
     return "it takes a number but gets something else", f"turn the value into one first: `{kind}(…)`"

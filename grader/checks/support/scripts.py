@@ -200,7 +200,7 @@ def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
     if file.link_problem:
         yield Obstacle(f"cannot be run: {file.link_problem}", "hand in the file itself")
     elif file.shebang is not None and file.shebang.crlf:
-        problem = file.shebang_problem or "its #! line ends with Windows' CRLF"
+        problem = file.shebang_problem or "its #! line has a Windows line ending (CRLF)"
         yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}{_then_push(file)}")
     elif file.shebang_fault == "empty-file":
         yield Obstacle("is empty", f"write the node in {file.path}, with {RIGHT_SHEBANG} as its first line")
