@@ -35,7 +35,7 @@ _CAUSES: tuple[tuple[str, ...], ...] = (
     (_NO_QUOTE[1], "a closing quote is missing", 'write `"` where the value ends'),
     (r"AttValue: \" or ' expected", "the value of an attribute has no quotes around it", 'write name="value"'),
     (r"Specification mandates value for attribute (\S+)", "`{0}` has no value", 'write {0}="..."'),
-    (r"invalid element name", "a `<` does not begin a tag", "delete the space after it, or write `&lt;` for a plain `<`"),
+    (r"invalid element name", "a `<` does not begin a tag", "delete the space after it, or write `&lt;` for `<`"),
     (r"EntityRef|Entity '.*' not defined", "a plain `&` is not allowed", "write `&amp;`"),
     (r"character encoding|not proper UTF-8|Unsupported encoding|switch encoding",
      "the file is not saved in the encoding that it names", "save it as UTF-8"),

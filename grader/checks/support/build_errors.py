@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.support.build_output import BuildError
+from grader.checks.support.build_output import BuildError, folder_names
 from grader.checks.support.scripts import OF_INTERFACES, cmake_calls, installed
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
@@ -269,7 +269,7 @@ def _missing_file(path: str, package: PackageFacts, words: str) -> Explained:
 
 def _below(path: str, package: PackageFacts) -> str:
     """An absolute path in the build's workspace, from the package's folder."""
-    folders = "|".join(re.escape(name) for name in _folders(package) if name)
+    folders = "|".join(re.escape(name) for name in folder_names(package) if name)
     return re.sub(rf"^/.*/src/(?:.*/)?(?:{folders})/", "", path, count=1) if folders else path
 
 
@@ -349,7 +349,8 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
             return _missing_package(found, package, lines)
         if any(found[1] in call.args for call in cmake_calls(package, "find_package")):
             # found, and so built beside this package: its messages come too late
-            why = f"{text}: nothing makes it wait for the messages of {found[1]}, so a parallel build (-j) sometimes fails"
+            late = f"nothing makes it wait for the messages of {found[1]}"
+            why = f"{text}: {late}, so a parallel build (-j) sometimes fails"
             program = next(iter(_programs_without(package, "add_dependencies")), "<program>")
             return Explained(
                 why, f"write {_call_below(program, 'add_dependencies', '${catkin_EXPORTED_TARGETS}')}"

@@ -73,11 +73,11 @@ def _own_line(package: PackageFacts, file: str, line: int) -> FileCitation | Non
     outside = not line or "/" not in file or file.startswith(SYSTEM)
     path = None if outside else path_in_package(package, file)
     folder = posixpath.basename(posixpath.dirname(file))
-    of_another = path == "CMakeLists.txt" and folder not in _folders(package)
+    of_another = path == "CMakeLists.txt" and folder not in folder_names(package)
     return FileCitation(file=path, line=line) if path and not of_another else None
 
 
-def _folders(package: PackageFacts) -> set[str]:
+def folder_names(package: PackageFacts) -> set[str]:
     """The names that the package's folder may have in the build's workspace."""
     manifest = {package.manifest.name} if package.manifest else set()
     return {package.name, posixpath.basename(package.path), *manifest}

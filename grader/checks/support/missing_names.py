@@ -209,7 +209,8 @@ def _own_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | No
         cause = f"{file} is in another folder, and Python looks beside {script}"
         place = f"os.path.join({place}, '{posixpath.relpath(str(file.parent), str(folder))}')"
     elif any("/devel/lib/" in frame.file for frame in found.frames):
-        cause = f"{file} is there, and the program that catkin_install_python makes from {script} does not look beside it"
+        program = f"the program that catkin_install_python makes from {script}"
+        cause = f"{file} is there, and {program} does not look beside it"
     else:
         return None
     return cause, f"write `import os, sys; sys.path.insert(0, {place})` above the import"
