@@ -320,7 +320,11 @@ def _why_unnamed(
         return Lack(f"{why}, so nothing installs {{}}", fix, FileCitation(file=slip.file, line=slip.line))
     if not of_python:
         return _without_call(package, all_named, path)
-    names = {PurePosixPath(one.path).name: one for one in of_python if not _is_there(package, one)}
+    names = {
+        PurePosixPath(one.path).name: one
+        for one in of_python
+        if not any(names_script(one, file.path) for file in package.files)
+    }
     wanted = PurePosixPath(path).name
     near = [wanted] if wanted in names else list(near_names(wanted, names))
     if near:
@@ -335,11 +339,6 @@ def _why_unnamed(
         return Lack(why, fix, None, path)
     fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN}){_below(of_python[-1].call)}"
     return Lack(why, fix, None, path)
-
-
-def _is_there(package: PackageFacts, one: Installed) -> bool:
-    """Return whether the call names a file of the package."""
-    return any(names_script(one, file.path) for file in package.files)
 
 
 def _without_call(package: PackageFacts, all_named: Sequence[Installed], path: str) -> Lack:

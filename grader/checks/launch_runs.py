@@ -275,7 +275,7 @@ def _judge_nodes(package: PackageFacts, file: LaunchFile, run: Run, params: Laun
     if lacking is not None:
         return _not_up(package, file, run, lacking)
     names = [name for w in wanted for name in nodes_up(run, w.node)]
-    if params.topic and not _are_connected(run, params.topic, names):
+    if params.topic and not any({*pair} <= {*names} for pair in connections(run, params.topic)):
         return _not_connected(package, file, run, wanted, params.topic)
     if dead := _judge_deaths(package, run, wanted, "came up, but then"):
         return dead
@@ -431,10 +431,6 @@ def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) 
     name = node.full_name if is_exact(node) else f"the node of {node.type}"
     verdict = absence.verdict(f"{name} did not come up: {absence.why}", judged=not lacking.own)
     return verdict.about(citations=(FileCitation(file=node.file or file.path, line=node.line),))
-
-
-def _are_connected(run: Run, topic: str, names: list[str]) -> bool:
-    return any({*pair} <= {*names} for pair in connections(run, topic))
 
 
 def _judge_deaths(package: PackageFacts, run: Run, wanted: list[Wanted], when: str) -> Verdict | None:

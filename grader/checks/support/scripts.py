@@ -190,10 +190,6 @@ class Obstacle(NamedTuple):
     fix: str
 
 
-def _then_push(file: SourceFile) -> str:
-    return ", then commit and push" if file.mode_source == "git" else ""
-
-
 def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
     """Yield what keeps the system from starting the file, the package facts' own words first."""
     fix = f"write {RIGHT_SHEBANG} as the very first line, with nothing above it"
@@ -201,7 +197,8 @@ def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
         yield Obstacle(f"cannot be run: {file.link_problem}", "hand in the file itself")
     elif file.shebang is not None and file.shebang.crlf:
         problem = file.shebang_problem or "its #! line has a Windows line ending (CRLF)"
-        yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}{_then_push(file)}")
+        push = ", then commit and push" if file.mode_source == "git" else ""
+        yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}{push}")
     elif file.shebang_fault == "empty-file":
         yield Obstacle("is empty", f"write the node in {file.path}, with {RIGHT_SHEBANG} as its first line")
     elif file.bom:
