@@ -173,7 +173,7 @@ def read_untrusted(path: Path, limit_bytes: int = READ_MAX) -> bytes | None:
 def open_untrusted(path: Path, *below: str) -> BinaryIO:
     """Open a regular file that others may have written, named by its folder and the names `below` it.
 
-    No link is followed from `path` on, and no pipe waited for. Raises OSError, also for what is no regular file.
+    No link is followed from `path` on, and no pipe waited for. Raises OSError, also for what is not a regular file.
     """
     descriptor = os.open(path, READ | NOFOLLOW | (DIRECTORY if below else 0))
     try:

@@ -65,7 +65,8 @@ def choose_repairs(
             one.with_paths(partial(posixpath.join, way))
             for one in find_repairs(package.folder, own, wanted_of(rubric, own.asked))
         ]
-    counting = [one for one in found if rubric.share_of(one.kind) > 0 and not _asks_nobody(one, rubric)]
+    typed = any(step.type is not None for scenario in rubric.scenarios.values() for step in scenario.steps)
+    counting = [one for one in found if rubric.share_of(one.kind) > 0 and (typed or not one.asks_input)]
     built, launched = built or not needs_build(facts), launched_in(facts)
 
     def helps(one: Repair) -> bool:
@@ -89,12 +90,6 @@ def choose_repairs(
     made = {c.mistake.name for c in criteria if c.mistake is not None and is_unmade(c)}
     before = [one for one in counting if one.kind in DONE_BEFORE_RUNS and one.file not in made]
     return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios or unblocks else ((), ())
-
-
-def _asks_nobody(repair: Repair, rubric: Rubric) -> bool:
-    """Return whether `raw_input` would become an `input` that nothing answers: no scenario types a line."""
-    typed = any(step.type is not None for scenario in rubric.scenarios.values() for step in scenario.steps)
-    return "raw_input(" in repair.before and not typed
 
 
 @contextmanager

@@ -87,7 +87,7 @@ def test_a_bag_is_judged_by_what_it_holds(tmp_path, compression):
     assert {name for name, status in statuses(result).items() if status == "pass"} == IN_MESSAGES
     assert set(statuses(result).values()) == {"pass", "inconclusive"}
     assert (result["submission"]["package"], result["status"]) == ("", "inconclusive")
-    assert "holds messages, and nothing of the processes" in message(result, "talker-node")
+    assert "holds messages, but nothing about the processes" in message(result, "talker-node")
     assert "without the package's files" in message(result, "manifest")
     assert len(list((folder / "evidence").iterdir())) == 1
     assert ", a recording." in (folder / "report.md").read_text()

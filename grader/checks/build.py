@@ -11,8 +11,8 @@ from grader.checks.support.build_errors import (
     FIRST_ERROR_HINT,
     UNKNOWN_COMMAND,
     explain_error_of_build,
-    first_error,
 )
+from grader.checks.support.build_output import first_error
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.processes import Life, lives
 from grader.checks.support.scripts import (
@@ -181,8 +181,9 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
         hint=told.hint if told else FIRST_ERROR_HINT,
         citations=(place or cite(build, "/grader/console"),),
     )
-    if told and told.lacks:
-        verdict = verdict.seeking("component", told.lacks)
+    if told:
+        verdict = verdict.seeking("component", *filter(None, [told.lacks]))
+        verdict = verdict.seeking("uncalled", *filter(None, [told.uncalled]))
     # what the package lacks of catkin's own lines shows as a command that CMake does not know
     if not line or told is None or error is None:
         return verdict

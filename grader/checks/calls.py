@@ -151,7 +151,7 @@ def _too_many(made: Sequence[Request], params: CallsParams) -> Verdict | None:
     message = (
         f"{params.service} is called {plural(len(made), 'time')}, and the handout allows {params.at_most}"
     )
-    return failed(message, hint="count the calls, and stop after the last one that is asked")
+    return failed(message, hint="count the calls, and stop after the last one that is asked for")
 
 
 def _too_soon(made: Sequence[Request], run: Run, params: CallsParams) -> Verdict | None:

@@ -85,6 +85,7 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         ),
         citations=tuple(dict.fromkeys(lines)),
     )
+    verdict = verdict.seeking("uncalled", *(one.uncalled for one in wrong if one.uncalled))
     above = [one.below for one in wrong if one.below is not None]
     return verdict.seeking("below", above[0].name) if above and len(above) == len(wrong) else verdict
 
@@ -111,12 +112,14 @@ def _misspelt(facts: CMakeFacts, name: str) -> CMakeCall | None:
 
 
 class Wrong(NamedTuple):
-    """What is wrong, how to fix it, and in which line; or what is missing, and the call below which it goes."""
+    """What is wrong, how to fix it, and in which line; or the command that is `uncalled`, and the call below which it
+    goes."""
 
     why: str
     fix: str
     line: int | None = None
     below: CMakeCall | None = None
+    uncalled: str = ""
 
     @property
     def place(self) -> int | None:
@@ -136,7 +139,7 @@ def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
     if project is None and (slip := _misspelt(facts, "project")):
         yield _respell(slip, "project")
     elif project is None:
-        yield Wrong("project(…) is missing", f"add project({wanted})")
+        yield Wrong("project(…) is missing", f"add project({wanted})", uncalled="project")
     elif not project.args or project.args[0] not in names:
         name = project.args[0] if project.args else ""
         message = f"line {project.line}: project({name}) differs from the package's name {wanted}"
@@ -148,7 +151,7 @@ def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
         slip = next((c for c in packages if c.args and c.args[0].casefold() == "catkin"), None)
         why = "find_package(catkin …) is missing"
         if slip is None:
-            yield Wrong(why, "add find_package(catkin REQUIRED)", below=project)
+            yield Wrong(why, "add find_package(catkin REQUIRED)", below=project, uncalled="find_package")
         else:
             why = f"{why} (line {slip.line} says {slip.args[0]})"
             yield Wrong(why, f"write catkin in place of {slip.args[0]}", slip.line)
@@ -156,7 +159,8 @@ def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
         yield _respell(slip, "catkin_package")
     elif _first(facts, "catkin_package") is None:
         above = next((c for c in packages if c.args[:1] == ("catkin",)), project)
-        yield Wrong("catkin_package(…) is missing", "add catkin_package()", below=above)
+        why = "catkin_package(…) is missing"
+        yield Wrong(why, "add catkin_package()", below=above, uncalled="catkin_package")
 
 
 def _below(call: CMakeCall | None) -> str:
@@ -244,6 +248,8 @@ def _not_installed(facts: CMakeFacts, lacks: dict[str, Lack]) -> Verdict:
     found = (unjudged if facts.fault or follows else verdict)(
         f"{facts.file}: {'; '.join(_reasons(lacks))}", hint="; ".join(_fixes(lacks))
     )
+    if any(lack.follows for lack in lacks.values()):
+        found = found.seeking("uncalled", "catkin_package")
     return found.seeking("call", PYTHON) if all(lack.uncalled for lack in lacks.values()) else found
 
 
@@ -306,7 +312,7 @@ def _why_unnamed(
         other = f"install({hits[0].kind} …)"
         why = f"line {hits[0].call.line}: {other} names {{}}, where catkin_install_python(PROGRAMS …) should"
         return Lack(
-            why, f"replace {other} by catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(hits[0])
+            why, f"replace {other} with catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(hits[0])
         )
     of_python = [one for one in all_named if one.call.name == PYTHON]
     if not of_python and package.cmake and (slip := _misspelt(package.cmake, PYTHON)):
@@ -314,7 +320,11 @@ def _why_unnamed(
         return Lack(f"{why}, so nothing installs {{}}", fix, FileCitation(file=slip.file, line=slip.line))
     if not of_python:
         return _without_call(package, all_named, path)
-    names = {PurePosixPath(one.path).name: one for one in of_python if not _is_there(package, one)}
+    names = {
+        PurePosixPath(one.path).name: one
+        for one in of_python
+        if not any(names_script(one, file.path) for file in package.files)
+    }
     wanted = PurePosixPath(path).name
     near = [wanted] if wanted in names else list(near_names(wanted, names))
     if near:
@@ -329,11 +339,6 @@ def _why_unnamed(
         return Lack(why, fix, None, path)
     fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN}){_below(of_python[-1].call)}"
     return Lack(why, fix, None, path)
-
-
-def _is_there(package: PackageFacts, one: Installed) -> bool:
-    """Return whether the call names a file of the package."""
-    return any(names_script(one, file.path) for file in package.files)
 
 
 def _without_call(package: PackageFacts, all_named: Sequence[Installed], path: str) -> Lack:

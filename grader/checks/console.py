@@ -232,7 +232,7 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
 ALIKE = 0.7
 WRONG_ANSWERS = {
     "service handler returned None": "nothing",
-    "handler returned wrong number of values": "something that is no response",
+    "handler returned wrong number of values": "something that is not a response",
 }
 """What rospy tells a client whose server's callback returns nothing that it can send."""
 

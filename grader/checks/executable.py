@@ -70,9 +70,10 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
         a syntax error: fix that line, or the one above it.
     """
     found = find_script(package, params.path)
-    if found is not None and found.link_problem:
-        return _dangling(found)
-    verdict = _missing(package, params.path) if found is None else _judge_file(package, build, found, params)
+    if found is None:
+        verdict = _missing(package, params.path)
+    else:
+        verdict = _dangling(found) if found.link_problem else _judge_file(package, build, found, params)
     whole = ", all of it valid Python" if found is not None and syntax_fault(found) else ""
     return verdict.about(
         expected=f"{params.path}, executable, beginning with {_asked_first_line(found)}{whole}"

@@ -168,7 +168,7 @@ def _unreadable(found: Interface, fault: Fault, wanted: list[InterfaceField]) ->
     fix = fault.fix or "one field per line, type before name"
     line = fault.line
     if fault.kind == "OtherParts":
-        fix = "write `---` alone in a line between the parts"
+        fix = "write `---` on a line of its own between the parts"
         first = [one.name for one in wanted if one.part == wanted[0].part]
         lines = [one.line for one in found.fields if one.name in first]
         if lines and len(lines) == len(first):
@@ -245,5 +245,5 @@ def _other_order(
             first = next(b for a, b in pairwise(own) if b.line < a.line)
             names = join_words([one.name for one in own], "then")
             count = plural(len(own), "field")
-            message = f"the {count} come in another order: the handout has {names}"
+            message = f"the {count} are in a different order: the handout has {names}"
             yield _Fault(message, first.line, f"order the {count} as the handout does")

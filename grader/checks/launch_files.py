@@ -157,7 +157,7 @@ def _slip_for(package: PackageFacts, node: LaunchNode, name: str) -> Slip | None
     """The slip in a node that is meant to run this script."""
     slip = node_slip(package, node)
     if slip is None and node.type == name and node.pkg != package.name:
-        why = f'pkg="{node.pkg}" is another package than that of {name}'
+        why = f'pkg="{node.pkg}" is not the package of {name}'
         return Slip(node.file, node.line, why, f'write pkg="{package.name}"')
     written = PurePosixPath(node.type or "")
     if slip is None and written.suffix in SOURCES and written.stem == PurePosixPath(name).stem:
@@ -180,12 +180,12 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     message = f"{file.path} has no <node> for {name}"
     if test := next((t for t in file.tests if t.type == name), None):
         cited = (FileCitation(file=test.file, line=test.line),)
-        message = f"{message}: a <test> is started by rostest only"
+        message = f"{message}: only rostest starts a <test>"
         return failed(message, hint=f"write {_node_tag(pkg, name)} in place of the <test>", citations=cited)
     commented = (line for kind, line in file.commented if kind in {name, PurePosixPath(name).stem})
     if line := next(commented, None):
         cited = (FileCitation(file=file.path, line=line),)
-        message = f"{message}: the one in line {line} stands in a comment, which roslaunch skips"
+        message = f"{message}: the one in line {line} is in a comment, which roslaunch skips"
         kind = "" if (name, line) in file.commented else f', and write type="{name}" in it'
         hint = f"take the <node> of line {line} out of the comment: remove `<!--` before it and `-->` after it{kind}"
         return failed(message, hint=hint, citations=cited)
@@ -201,7 +201,7 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     )
     if swapped is not None:
         cited = (FileCitation(file=file.path, line=swapped.line),)
-        message = f"{message}: in line {swapped.line}, pkg and type stand in each other's place"
+        message = f"{message}: in line {swapped.line}, pkg and type are swapped"
         return failed(
             message, hint=f'write pkg="{pkg}" type="{name}" in line {swapped.line}', citations=cited
         )

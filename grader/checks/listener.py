@@ -239,8 +239,12 @@ def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequ
         return None
     printed = {n for line in lines for n in numbers_in(line.text)}
     as_unsigned = all(v + 256 in printed for v in values)
-    how = f"are printed as {values[0] + 256} and the like" if as_unsigned else "are not printed at all"
-    message = f"negative numbers {how}, {values[0]} for instance"
+    how = (
+        f"are printed as positive ones, {values[0]} as {values[0] + 256}"
+        if as_unsigned
+        else "are not printed at all"
+    )
+    message = f"negative numbers {how}" + ("" if as_unsigned else f", {values[0]} for instance")
     return failed(message, hint="print the message's .data as it is: an Int8 goes from -128 to 127")
 
 

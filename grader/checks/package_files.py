@@ -89,7 +89,11 @@ def layout(package: PackageFacts, params: LayoutParams) -> Verdict:
 def _slips(package: PackageFacts, params: LayoutParams) -> Iterator[Slip]:
     """Folders, files, scripts; a script that moves with its folder is not named once more."""
     folders = {parent.as_posix() for f in package.files for parent in PurePosixPath(f.path).parents}
-    lost = [_lost_folder(package, f, params) for f in map(_plain, params.folders) if f not in folders]
+    lost = [
+        _lost_folder(package, f, params)
+        for f in (one.strip("/") for one in params.folders)
+        if f not in folders
+    ]
     yield from lost
     for name in params.files:
         if package.file(name) is None:
@@ -107,10 +111,6 @@ def _is_below(path: str, script: str) -> bool:
     """`src/nodes/a.py` for `src/a.py`: `rosrun` finds both, and both are in `src/`."""
     folder = PurePosixPath(script).parent
     return path == script or (folder.name != "" and folder in PurePosixPath(path).parents)
-
-
-def _plain(folder: str) -> str:
-    return folder.strip("/")
 
 
 def _lost_folder(package: PackageFacts, folder: str, params: LayoutParams) -> Slip:

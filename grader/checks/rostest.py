@@ -119,7 +119,7 @@ def _results(run: Run, params: RostestParams) -> Results:
             else:
                 found.ends[str(fields["test"])] = Course.model_validate(fields)
         except ValidationError:
-            return found._replace(fault="what it printed is no result")
+            return found._replace(fault="what it printed is not a result")
     return found
 
 

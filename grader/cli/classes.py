@@ -282,7 +282,7 @@ def write_course_gradebook(path: Path, wanted: WantedBook) -> ExitCode:
     marks = marks_of(course, drafts=wanted.drafts)
     if not marks:
         raise UsageError(
-            f"{path}: no lab of it is graded so far", hint=f"grader course status {path} lists them"
+            f"{path}: none of its labs has been graded so far", hint=f"grader course status {path} lists them"
         )
     suffix = wanted.template.suffix if wanted.template else ENDINGS.get(wanted.form, f"-{wanted.form}.csv")
     usual = path.with_name(f"gradebook{suffix}")
@@ -341,7 +341,7 @@ def _drafts(course: CourseFile, marks: Sequence[LabMarks], *, drafts: bool) -> I
     for one in marks:
         if one.drafts and not drafts:
             command = f"grader course publish {course.path} {one.name}"
-            yield f"{one.name}: these are drafts: nothing of it is published yet ({command})"
+            yield f"{one.name}: these are drafts: none of it is published yet ({command})"
 
 
 def reviewer(named: str | None) -> str:

@@ -220,7 +220,7 @@ def _whole(text: str, least: int, most: int, otherwise: str) -> int:
 
 
 RUBRIC = Option(
-    "--rubric", "ID|FILE", "a lab's id, a rubric's file or https:// address; #sha256:DIGEST behind it pins it"
+    "--rubric", "ID|FILE", "a lab's id, a rubric's file or https:// address; #sha256:DIGEST after it pins it"
 )
 SandboxOption = Annotated[
     SandboxMode, Option("--sandbox", "", "run students' code in a sandbox: if possible, always, or never")

@@ -255,7 +255,7 @@ def rubric_of(given: str | None, folder: Path, batch: BatchFolder | None = None)
     if given is None and batch is None:
         given = result_in(folder).rubric.id
         if not named_labs(given):
-            message = f'{folder}: its rubric "{given}" is none of the labs that are known here'
+            message = f'{folder}: its rubric "{given}" is not one of the labs that are known here'
             raise UsageError(message, hint="name its file with --rubric")
     return load_rubric(given or (batch.run.rubric_source if batch else ""))
 

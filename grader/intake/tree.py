@@ -145,7 +145,7 @@ def is_there(path: Path) -> bool:
 
 
 def read_file(path: Path, limit_bytes: int) -> bytes | None:
-    """Return the file's first bytes; None for what is no regular file. A pipe is never waited for.
+    """Return the file's first bytes; None for what is not a regular file. A pipe is never waited for.
 
     Raises OSError where it cannot be read.
     """

@@ -131,7 +131,7 @@ class Unpacker:
             self.refuse(f"the entry '{brief(path)}' is a link and a folder at once")
         place = self._free(path)
         if place.parent.resolve() != self._root.resolve().joinpath(*path.split("/")[:-1]):
-            self.refuse(f"the entry '{brief(path)}' lies behind a link")
+            self.refuse(f"the entry '{brief(path)}' is behind a link")
         place.symlink_to(target)
 
     def refuse(self, why: str) -> None:

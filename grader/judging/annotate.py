@@ -14,7 +14,7 @@ from typing import NamedTuple
 from grader.checks.cmake import NOT_CALLED, below_catkin_package
 from grader.checks.messages import code_of
 from grader.checks.support.console_output import probes_on
-from grader.checks.support.exit_causes import NO_INPUT, RATE, syntax_hint
+from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch import (
     NOT_STARTED,
     find_launch,
@@ -42,10 +42,12 @@ from grader.checks.support.scripts import (
     names_script,
 )
 from grader.checks.support.text import (
+    RATE_SLOT,
     SAID_DATA,
     SAID_VALUE,
     SECONDS,
     VALUE,
+    VALUE_SLOT,
     could_say,
     in_language,
     in_source,
@@ -69,6 +71,7 @@ NAMES_SHOWN = 3
 OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
+USUAL_RATE_HZ = 10
 RATE_SHARE = 0.05
 """By so much a rate that a script asks for may differ from the right one."""
 OF_FILES = ("build", "cmake", "manifest")
@@ -277,14 +280,14 @@ class Later:
         if own[0].message.lstrip("/") not in names:
             yield f"name the node {names[0]} in {_line(own[0])}, not {own[0].message}"
         if own[0].name == "anonymous" and self._wanted.get("anonymous") == "forbidden":
-            yield f"take anonymous=True out of {_line(own[0])}"
+            yield f"remove anonymous=True from {_line(own[0])}"
 
     def _copied(self) -> Iterator[str]:
         started = [one.script for one in self._rubric.scenarios[self._criterion.scenario or ""].start]
         twice = {PurePosixPath(one).name for one in started if one and started.count(one) > 1}
         for slip in self._of("node-name"):
             if PurePosixPath(slip.file).name in twice and not slip.name:
-                yield f"write anonymous=True in {_line(slip)}, for two of it at once"
+                yield f"write anonymous=True in {_line(slip)}, since two of it run at once"
 
     def _published(self) -> Iterator[str]:
         published, kind = self._of("publisher"), str(self._wanted.get("type", ""))
@@ -358,7 +361,7 @@ class Later:
             words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code
             yield f"publish `{words}` in {_line(said[0])}, not '{in_source(text)}'"
         elif SECONDS in template and self._of("no-clock"):
-            yield f"publish the time in {_line(said[0])}, `{code}`: the script counts"
+            yield f"publish the time in {_line(said[0])}, `{code}`: the script only counts"
 
     def _logged(self) -> Iterator[str]:
         text, said = str(self._wanted.get("text", "")), self._of("prints")
@@ -395,20 +398,20 @@ def choose_hint_language(verdict: Verdict, criterion: Criterion, facts: Facts) -
     return verdict.model_copy(update={"hint": hint})
 
 
-def fill_input_hint(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:
-    """Return the verdict; a hint on a node that asks for input has the text and the rate that the lab wants of it."""
-    if NO_INPUT not in verdict.hint:
+def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:
+    """Return the verdict; its hint has the text and the rate that the lab wants of the node, where it has slots for
+    them."""
+    if VALUE_SLOT not in verdict.hint:
         return verdict
     asked = {
         one.check: one.parameters
         for one in rubric.criteria
         if one.scenario == criterion.scenario and one.visibility == "visible"
     }
-    hint = verdict.hint
-    if template := str(asked.get("message", {}).get("template", "")):
-        hint = hint.replace("a value in the code", f"`{in_language(code_of(template), 'python')}`")
-    if hz := asked.get("rate", {}).get("rate_hz"):
-        hint = hint.replace(RATE, f"rospy.Rate({significant(float(str(hz)))})")
+    template = str(asked.get("message", {}).get("template", ""))
+    value = f"`{in_language(code_of(template), 'python')}`" if template else "a value in the code"
+    hz = float(str(asked.get("rate", {}).get("rate_hz", USUAL_RATE_HZ)))
+    hint = verdict.hint.replace(VALUE_SLOT, value).replace(RATE_SLOT, f"rospy.Rate({significant(hz)})")
     return verdict.model_copy(update={"hint": hint})
 
 
@@ -457,11 +460,9 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
     in which it is commented out."""
     if not verdict.status.is_lost or package is None or package.cmake is None:
         return verdict
-    if f"{CMAKE} line" in verdict.hint or f"{CMAKE}: " in verdict.hint:
-        return verdict  # how the line is repaired is told
     if called := verdict.sought_name("call"):
         return _cite_install(verdict, package, build, called)
-    found = commented_calls(package, build.file_lines(CMAKE)[:_LINES_READ], verdict.hint)
+    found = commented_calls(package, build.file_lines(CMAKE)[:_LINES_READ], verdict.sought_names("uncalled"))
     if not found:
         return verdict
     told = "; ".join(f"{name}(…) is commented out in {lines_text(*place)}" for name, place in found.items())
@@ -506,7 +507,7 @@ def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | No
     if not lines:
         return verdict
     where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))}"
-    hint = f"write the package's exact name in {where}, push {absent} if it is your own, or leave that out"
+    hint = f"write the package's exact name in {where}, push {absent} if it is your own, or remove it"
     cited = tuple(FileCitation(file=file.path, line=n) for n in lines)
     return verdict.model_copy(update={"hint": hint, "citations": cited})
 

@@ -137,7 +137,7 @@ class Facts:
         failure = failed_program(run, programs)
         if not failure:
             return None
-        message = f"a program of the grader's failed in the run {scenario!r}: {failure}"
+        message = f"one of the grader's programs failed in the run {scenario!r}: {failure}"
         hint = "`grader doctor --rubric RUBRIC` shows what this machine lacks for it; then grade again"
         return inconclusive(message, hint=hint)
 
@@ -227,7 +227,9 @@ def _launch_names(package: PackageFacts) -> set[str]:
 
 
 def _not_in_messages(run: Run) -> Verdict:
-    message = f"{run.evidence} holds messages, and nothing of the processes and nodes that this is about"
+    message = (
+        f"{run.evidence} holds messages, but nothing about the processes and nodes that this criterion judges"
+    )
     return inconclusive(message, hint="hand in the package too, so that its nodes can be run")
 
 

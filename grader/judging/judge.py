@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from collections.abc import Collection, Mapping
 from graphlib import TopologicalSorter
@@ -34,7 +33,7 @@ from grader.judging.annotate import (
     cite_find,
     cite_name,
     cite_words,
-    fill_input_hint,
+    fill_slots,
     show_lines,
 )
 from grader.judging.facts import NOT_RUN, Facts, try_facts, views_of
@@ -51,7 +50,7 @@ from grader.judging.repeats_and_repairs import (
 from grader.judging.summary import leave_out, name_unchanged_files, round_half_up
 from grader.model.package import PackageFacts
 from grader.model.result import CriterionResult, EarlyVerdict, Repaired
-from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive, share_text
+from grader.model.verdict import FileCitation, Status, Verdict, cited_lines, inconclusive, share_text
 from grader.rubric.made_up import Value, tell_made_up, values_of, with_recorded_values
 from grader.rubric.model import Criterion, Rubric
 
@@ -202,7 +201,7 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
             for explain in (explain_by_exception, explain_by_unheard_topic, explain_by_unread_parameter):
                 found = explain(check, package, run, found)
             found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found)
-        found = fill_input_hint(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
+        found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
         found = _with_package_name(found, criterion, facts)
         hint = without_git(found.hint, facts.package)
         return found if hint == found.hint else found.model_copy(update={"hint": hint})
@@ -229,7 +228,7 @@ def _with_package_name(verdict: Verdict, criterion: Criterion, facts: Facts) -> 
 def _sound(verdict: object) -> Verdict:
     """Raise TypeError or ValueError for what an instructor's own check must not return."""
     if not isinstance(verdict, Verdict):
-        raise TypeError(f"it returned {type(verdict).__name__}, no verdict: return passed(…) or failed(…)")
+        raise TypeError(f"it returned {type(verdict).__name__}, not a verdict: return passed(…) or failed(…)")
     if not 0 <= verdict.score <= 1:
         raise ValueError(f"its score is {verdict.score:g}: a score is 0 to 1")
     return verdict
@@ -272,8 +271,8 @@ class Requirements:
         same = same or [r for r in lost if _cause(self.verdicts[r]) in verdict.message]
         if lost:
             # what is not there at all explains most, then what is said of the same topics and nodes
-            names = _graph_names(verdict)
-            shared = {r: len(names & _graph_names(self.verdicts[r])) for r in lost}
+            names = _graph_names(criterion)
+            shared = {r: len(names & _graph_names(self._criteria[r])) for r in lost}
             blocking = min(same or lost, key=lambda r: (not self.verdicts[r].unjudged, -shared[r]))
             root = self._roots[criterion.id] = self._roots.get(blocking, blocking)
             message = f"blocked by {root}: {self.verdicts[root].message}"
@@ -304,7 +303,9 @@ class Requirements:
         verdict = self.verdicts[required]
         # the line below which a call that is missing goes is no fault
         is_missing = bool(verdict.sought_name("call") or verdict.sought_name("below"))
-        same_line = not is_missing and bool(_lines(verdict) & _lines(found))
+        same_line = not is_missing and not cited_lines(verdict.citations).isdisjoint(
+            cited_lines(found.citations)
+        )
         same_run = self._criteria[required].scenario == criterion.scenario
         if not verdict.status.is_lost or is_unmade(verdict):
             return False  # a program that the build did not make is no reason for the build to fail
@@ -349,14 +350,9 @@ class Requirements:
         return any(start.built or (start.script and not PurePath(start.script).suffix) for start in about)
 
 
-def _graph_names(verdict: Verdict) -> set[str]:
-    """Return the topics, services and nodes that the message names."""
-    return set(re.findall(r"(?<!\S)/[\w/]+", verdict.message))
-
-
-def _lines(verdict: Verdict) -> set[Citation]:
-    """Return the lines of files that the verdict cites."""
-    return {one for one in verdict.citations if isinstance(one, FileCitation) and one.line is not None}
+def _graph_names(criterion: Criterion) -> set[str]:
+    """Return the topics, services and nodes that the criterion asks for."""
+    return {text for text in texts_in(criterion.parameters) if text.startswith("/")}
 
 
 def _paths(criterion: Criterion) -> list[str]:

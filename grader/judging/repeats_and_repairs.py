@@ -22,7 +22,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.repair import Repair, advice_on, place_of
 from grader.model.result import CriterionResult, Repaired
-from grader.model.verdict import FileCitation, Status, Verdict, failed, share_text
+from grader.model.verdict import FileCitation, Status, Verdict, cited_lines, failed, share_text
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Scenario
 from grader.wording import join_words
@@ -36,7 +36,8 @@ SEEN_IN_RUNS = {"missing-import", "missing-call", "topic-name", "node-name", "pa
 DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
 """The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
-OF_PACKAGES = {"package.xml", "CMakeLists.txt"}
+CMAKE = "CMakeLists.txt"
+OF_PACKAGES = {"package.xml", CMAKE}
 GENERATION = re.compile(r"generate_messages|message_generation|add_(message|service|action)_files")
 """Without these in CMakeLists.txt, a build can succeed that makes nothing of the package's own definitions."""
 NUMBER = re.compile(r"\d+(\.\d+)?")
@@ -261,7 +262,8 @@ def _charges(
             new = _words(repair.after) - _words(repair.before)
             asking = [c for c in asking if c.id in better or new & _words(first[c.id].message)]
         asking = [c for c in asking if _names(c, repair)] or asking
-        asking = [c for c in asking if repair.message.partition(": ")[2] in first[c.id].message] or asking
+        place = (repair.file, repair.line)
+        asking = [c for c in asking if place in cited_lines(first[c.id].citations)] or asking
         if asking:
             charges[repair] = {asking[0].id}
             continue
@@ -286,8 +288,7 @@ def _asks_for(found: Verdict | CriterionResult, repair: Repair) -> bool:
     node's name, one of a launch file can refuse at its very line."""
     lost = found.status.is_lost and found.status is not Status.BLOCKED
     if repair.kind in SEEN_IN_RUNS:
-        lines = {(getattr(c, "file", None), getattr(c, "line", None)) for c in found.citations}
-        return lost and (repair.file, repair.line) in lines
+        return lost and (repair.file, repair.line) in cited_lines(found.citations)
     absent = found.mistake.name if found.mistake and found.mistake.is_absence else ""
     if is_unmade(found):
         return False  # the build's own criterion asks for it
@@ -344,11 +345,13 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         hints += [f"then {_at_its_line(copy)}"] if copy.hint else []
     if verdict.mistake and any(one.kind == "file-name" for one in repairs):
         verdict = verdict.lost_by("file-elsewhere", verdict.mistake.name)
-    update = {
+    update: dict[str, object] = {
         "message": "; ".join(words),
         "hint": "; ".join(hints),
         "citations": (*_uncited(verdict, repairs, told), *verdict.citations),
     }
+    if any(PurePosixPath(one.file).name == CMAKE for one in repairs):  # how the call is written is told
+        update["sought"] = tuple(one for one in verdict.sought if one.kind not in {"call", "uncalled"})
     return verdict.model_copy(update=update)
 
 

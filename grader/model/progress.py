@@ -13,13 +13,7 @@ StepState = Literal["waiting", "running", "done", "failed", "skipped"]
 class Progress(Protocol):
     """A display of a grading's progress. Safe to call from any thread, cheap enough to call often."""
 
-    def step(
-        self,
-        name: str,
-        state: StepState,
-        detail: str = "",
-        expected_s: float | None = None,
-    ) -> None:
+    def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:
         """Show that one step (`intake`, `build`, a scenario's name) is now in `state`.
 
         `detail` says what it does or waits for; `expected_s` is how long the whole step is likely to take.
@@ -32,13 +26,7 @@ class Progress(Protocol):
 class Silence:
     """Shows nothing."""
 
-    def step(
-        self,
-        name: str,
-        state: StepState,
-        detail: str = "",
-        expected_s: float | None = None,
-    ) -> None:
+    def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:
         """Show that one step (`intake`, `build`, a scenario's name) is now in `state`."""
 
     def early(self, verdicts: Callable[[], tuple[EarlyVerdict, ...]]) -> None:

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable
 from itertools import groupby, zip_longest
 from typing import Literal, get_args
 
+from pydantic import Field
+
 from grader.model.record import Record
 from grader.model.submission import chmod_hint
 from grader.wording import join_words, plural
@@ -79,6 +81,8 @@ class Repair(Record):
     """What is wrong."""
     fix: str
     """How it is repaired by hand: a command, or the line as it should be."""
+    asks_input: bool = Field(default=False, exclude_if=lambda value: not value)
+    """Whether the repaired line waits for typed input. Only there if it does."""
 
     def with_paths(self, path: Callable[[str], str]) -> Repair:
         """Return the repair with other paths of the file, and of what it is renamed to."""

@@ -60,6 +60,12 @@ class FileCitation(Record):
         return self.model_copy(update={"file": posixpath.normpath(f"{folder}/{self.file}")})
 
 
+def cited_lines(citations: Sequence[Citation]) -> set[tuple[str, int]]:
+    """Return the files and lines that are cited, without those that are cited whole."""
+    files = (one for one in citations if isinstance(one, FileCitation))
+    return {(one.file, one.line) for one in files if one.line is not None}
+
+
 class EvidenceCitation(Record):
     """A stretch of an evidence file: `from_ns` to `to_ns` are its `log_time`s, both included."""
 
@@ -95,16 +101,16 @@ class Mistake(Record):
         return self.kind in {"file-missing", "file-elsewhere"}
 
 
-SoughtKind = Literal["call", "below", "component", "dependency", "package"]
+SoughtKind = Literal["call", "uncalled", "below", "component", "dependency", "package"]
 
 
 class Sought(Record):
     """A name whose lines are looked up in the sources once all is judged, and then cited: checks see few of them."""
 
     kind: SoughtKind
-    """A command that `CMakeLists.txt` does not call, or the one below which that goes, and is cited; a package
-    that the machine lacks and `find_package(…)` names, that `package.xml` does not declare, or that roslaunch does not
-    find."""
+    """The command that installs scripts, where `CMakeLists.txt` does not call it; another one that it does not call;
+    the one below which that goes, and is cited; a package that the machine lacks and `find_package(…)` names, that
+    `package.xml` does not declare, or that roslaunch does not find."""
     name: str
 
 
@@ -118,7 +124,7 @@ class Verdict(Record):
     open until the machine has what it lacks, and grading again before changes nothing. `cause` is what a
     process ended of, in words that are the same in every verdict that rests on it. `blocked_by` is the criterion that
     explains the absence, `right` what earned a part of the points, `mistake` the kind of what was done wrong. `said` is
-    what a node printed, logged or published in place of what was asked, `sought` a name: the lines of both are cited.
+    what a node printed, logged or published in place of what was asked, `sought` names: the lines of both are cited.
     """
 
     status: Status
@@ -138,7 +144,7 @@ class Verdict(Record):
     right: str = ""
     mistake: Mistake | None = None
     said: str = ""
-    sought: Sought | None = None
+    sought: tuple[Sought, ...] = ()
 
     def about(
         self,
@@ -170,13 +176,18 @@ class Verdict(Record):
         """Return the verdict with the kind of mistake that it is lost by."""
         return self.model_copy(update={"mistake": Mistake(kind=kind, name=name)})
 
-    def seeking(self, kind: SoughtKind, name: str) -> Verdict:
-        """Return the verdict with a name to cite the lines of."""
-        return self.model_copy(update={"sought": Sought(kind=kind, name=name)})
+    def seeking(self, kind: SoughtKind, *names: str) -> Verdict:
+        """Return the verdict with these names too to cite the lines of."""
+        new = (Sought(kind=kind, name=name) for name in names)
+        return self.model_copy(update={"sought": (*self.sought, *new)})
+
+    def sought_names(self, kind: SoughtKind) -> list[str]:
+        """Return the names of this kind to cite the lines of."""
+        return [one.name for one in self.sought if one.kind == kind]
 
     def sought_name(self, kind: SoughtKind) -> str:
-        """Return the name of this kind to cite the lines of; "" where none is sought."""
-        return self.sought.name if self.sought is not None and self.sought.kind == kind else ""
+        """Return the first name of this kind to cite the lines of; "" where none is sought."""
+        return next(iter(self.sought_names(kind)), "")
 
     def once(self) -> Verdict:
         """Return the verdict marked as a loss that one run's timing could have made."""

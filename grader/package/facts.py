@@ -199,7 +199,7 @@ def read_shebang(
     found = not problem and (program in _PYTHONS or (interpreters or on_system)(program))
     if crlf:
         problem = (
-            f"line 1 ends with Windows' CRLF, and there is no `{interpreter}\\r`: save with LF line endings"
+            f"line 1 has a Windows line ending (CRLF), and there is no `{interpreter}\\r`: save it with LF"
         )
     elif not problem and not found:
         problem = f"there is no `{program}` on a ROS machine"

@@ -297,9 +297,7 @@ def _private(param: LaunchParam, inside: Scope) -> LaunchParam:
     return param.model_copy(update={"name": inside.resolved(param.name.lstrip("~/"))})
 
 
-def _fault(
-    element: etree._Element, scope: Scope, message: str, fix: str = "take this <include> out"
-) -> Fault:
+def _fault(element: etree._Element, scope: Scope, message: str, fix: str = "remove this <include>") -> Fault:
     cause = "this <include> brings nothing"
     return Fault(
         file=scope.file, line=line_of(element), kind="Include", message=message, cause=cause, fix=fix

@@ -62,22 +62,22 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
     (r"EOL while scanning|unterminated (f-)?string",
      "a quote is opened in this line and never closed", "write the same quote where the string ends"),
     (r"Maybe you meant '=='", "`=` gives a value to a name; to compare, write `==`"),
-    (r"cannot assign to|can't assign to", "what stands on the left of `=` is no name", "write a name there"),
+    (r"cannot assign to|can't assign to", "what is on the left of `=` is not a name", "write a name there"),
     (r"forgot a comma", "a comma is missing between two values", "write `,` between them"),
     (r"'return' outside function", "`return` is outside every function", "indent it like the lines of its function"),
     (r"'(break|continue)'? .*loop", "`{0}` is outside every loop", "indent it like the lines of its loop"),
     (r"'yield' outside", "`yield` is outside every function", "indent it like the lines of its function"),
-    (r"f-string: expecting '}'", "a `{` in the f-string is never closed", "write `}` behind its value"),
+    (r"f-string: expecting '}'", "a `{` in the f-string is never closed", "write `}` after its value"),
     (r"expected 'except' or 'finally'",
      "a `try:` has no `except` below it", "write `except rospy.ROSInterruptException:` there, and `pass` below that"),
-    (r"keyword argument repeated", "an argument is given twice", "take one of the two out"),
+    (r"keyword argument repeated", "an argument is given twice", "remove one of the two"),
     (r"positional argument follows keyword",
-     "a value without a name stands behind one with a name", "move what has `=` to the end of the call"),
+     "a value without a name comes after one with a name", "move what has `=` to the end of the call"),
     (r"UTF-16", "the file is saved as UTF-16", "save it as UTF-8"),
     (r"Non-UTF-8 code|codec can't decode byte|invalid or missing encoding",
      "the file is not saved as UTF-8 (accents of an old encoding)", "save it as UTF-8"),
     (r"unicodeescape", r"a backslash in a string is read as `\U...`", r"write the string as r\"...\""),
-    (r"name '(\w+)' is .* global declaration", "`global {0}` stands below a line that uses {0}"),
+    (r"name '(\w+)' is .* global declaration", "`global {0}` comes after a line that uses {0}"),
     (r"encoding", "line 1 or 2 names an encoding that Python does not know", "write `# -*- coding: utf-8 -*-`"),
     (r"null bytes", "the file holds null bytes, so it is not text, or was saved as UTF-16", "save it as UTF-8"),
     (r"after line continuation", r"nothing may follow a backslash `\` at the end of a line"),
@@ -265,7 +265,7 @@ def reason_of(
             "tabs and spaces are mixed in the indentation of this file", "use four spaces everywhere"
         )
     if (empty := _EMPTY_BLOCK.match(message)) and _NEXT_BLOCK.match(text) and "class" not in message:
-        why = f"nothing but comments stands in the block of line {empty[1]}"
+        why = f"there are only comments in the block of line {empty[1]}"
         return Reason(why, "write below it what it is to do")
     reason = reason_of_line(text) if vague else Reason()
     if vague and opened is not None and not reason.why:

@@ -35,14 +35,14 @@ _CAUSES: tuple[tuple[str, ...], ...] = (
     (_NO_QUOTE[1], "a closing quote is missing", 'write `"` where the value ends'),
     (r"AttValue: \" or ' expected", "the value of an attribute has no quotes around it", 'write name="value"'),
     (r"Specification mandates value for attribute (\S+)", "`{0}` has no value", 'write {0}="..."'),
-    (r"invalid element name", "a `<` begins no tag", "delete the space after it, or write `&lt;` for a plain `<`"),
+    (r"invalid element name", "a `<` does not begin a tag", "delete the space after it, or write `&lt;` for `<`"),
     (r"EntityRef|Entity '.*' not defined", "a plain `&` is not allowed", "write `&amp;`"),
     (r"character encoding|not proper UTF-8|Unsupported encoding|switch encoding",
      "the file is not saved in the encoding that it names", "save it as UTF-8"),
     (r"Invalid character|invalid Char|xmlChar", "an invisible control character", "type the line again"),
     (r"[Ee]ntity", "entities are not read", "write the text out"),
     (r"Excessive depth", "tags are nested more than 250 deep"),
-    (r"Namespace prefix (\S+)", "`{0}:` is in front of a name", "take it out, since names have no colons"),
+    (r"Namespace prefix (\S+)", "`{0}:` is in front of a name", "remove it, since names have no colons"),
 )  # fmt: skip
 
 
@@ -171,7 +171,7 @@ def _opened_again(message: str, data: bytes, text: str, root: str) -> Reason | N
     if not twice or len(re.findall(rf"<{re.escape(root)}[\s>]".encode(), data)) < 2:
         return None
     return Reason(
-        f"`<{root}>` opens the file a second time here, where it is to end", f"write `</{root}>` for it"
+        f"`<{root}>` opens the file a second time here, where it should end", f"write `</{root}>` for it"
     )
 
 
@@ -208,7 +208,9 @@ def _explain(message: str, log: list[str], line: str, *, root: str) -> tuple[Rea
 def _mismatch(opened: str, line: int, closed: str, root: str) -> tuple[Reason, int | None]:
     tag = f"`<{opened}>` of line {line}"
     if opened.lower() == closed.lower():
-        return Reason(f"{tag} is closed by `</{closed}>`, in other letters", f"write `</{opened}>`"), None
+        return Reason(
+            f"{tag} is closed by `</{closed}>`, with other capital letters", f"write `</{opened}>`"
+        ), None
     if get_close_matches(closed, [opened], cutoff=0.7):
         return Reason(f"{tag} is closed by `</{closed}>`", f"write `</{opened}>`"), None
     if opened == root:

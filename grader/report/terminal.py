@@ -352,11 +352,7 @@ def wrap(text: str, width: int) -> list[str]:
 
 def mark(status: Status, encoding: str) -> str:
     """The sign of a status, a plain one where the encoding has no ✓."""
-    return (SIGNS if _has_marks(encoding) else PLAIN_MARKS)[status]
-
-
-def _has_marks(encoding: str) -> bool:
-    return _can_encode("".join(SIGNS.values()), encoding)
+    return (SIGNS if _can_encode("".join(SIGNS.values()), encoding) else PLAIN_MARKS)[status]
 
 
 def _can_encode(text: str, encoding: str) -> bool:

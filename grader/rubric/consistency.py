@@ -149,7 +149,7 @@ def _names(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
             if name not in first:
                 yield path, f'there is no criterion "{name}"{did_you_mean(name, first)}'
             elif any(name == other for earlier, other in required if earlier < position):
-                yield path, f'"{name}" stands there already'
+                yield path, f'"{name}" is listed already'
 
 
 def _circles(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:

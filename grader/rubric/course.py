@@ -120,7 +120,7 @@ def load_course(path: Path) -> CourseFile:
     if faults:
         told = sorted(dict.fromkeys(faults), key=lambda fault: source.line(fault[0]))
         raise RubricError(
-            [source.fault(*fault) for fault in told], hint="grader schema course says what may stand there"
+            [source.fault(*fault) for fault in told], hint="grader schema course lists what it may contain"
         )
     return CourseFile(Course.model_validate_json(json.dumps(source.data), strict=True), path)
 
@@ -140,7 +140,5 @@ def _cross_faults(source: Source) -> Iterator[Fault]:
         if folders.setdefault(folder, name) != name:
             yield ("labs", name, "results"), f"{folder} is the folder of {folders[folder]} already"
         if data.get("late_days") and not (lab.get("late") or data.get("late")):
-            message = (
-                "with late days it must be said what later work costs: late: {lost: 100} for nothing at all"
-            )
+            message = "late days need a rule for what later work costs: late: {lost: 100} for nothing at all"
             yield ("labs", name), message

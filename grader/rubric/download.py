@@ -37,7 +37,7 @@ def fetch_rubric(url: str, digest: str) -> Path:
     if not digest:
         raise UsageError(
             f"{_printable(url)}: a rubric's address needs the rubric's digest",
-            hint="write #sha256: and the digest behind it, as `grader rubric validate` prints it",
+            hint="write #sha256: and the digest after it, as `grader rubric validate` prints it",
         )
     name = re.sub(r"[^\w.-]", "", urlsplit(url).path.rpartition("/")[2]).removesuffix(".yaml").strip(".")
     file = _cache() / digest / f"{name or 'rubric'}.yaml"
@@ -76,7 +76,9 @@ def _download(url: str) -> bytes:
             while block := answer.read1(BLOCK_BYTES):
                 data += block
                 if len(data) > BYTES_MAX:
-                    raise UsageError(f"{_printable(url)} has more than {BYTES_MAX >> 20} MB: it is no rubric")
+                    raise UsageError(
+                        f"{_printable(url)} has more than {BYTES_MAX >> 20} MB: it is not a rubric"
+                    )
                 if time.monotonic() > end:
                     raise HostError(
                         f"{_printable(url)} did not come within {WHOLE_S:g} s", hint="try it again"

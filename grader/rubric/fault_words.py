@@ -104,7 +104,7 @@ def _holds(data: object, part: str | int) -> bool:
 def _unknown(key: str, value: object, keys: Collection[str]) -> str:
     """Return what an unknown key may be: a slip, or the rest of a text that YAML has cut off at a comma."""
     cut = value is None and " " in key
-    return ": between { and }, a text with a comma needs quotes" if cut else did_you_mean(key, keys)
+    return ": between { and }, text with a comma needs quotes" if cut else did_you_mean(key, keys)
 
 
 def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str:

@@ -109,7 +109,7 @@ def _load_file(path: Path, name: str) -> LoadedRubric:
         digest=digest,
         own=own,
         handed_out=beside.handed_out,
-        origin="grader" if _comes_with_grader(path) else "elsewhere",
+        origin="grader" if path.resolve().is_relative_to(rubrics_folder().resolve()) else "elsewhere",
     )
 
 
@@ -129,10 +129,6 @@ def split_pin(text: str) -> tuple[str, str]:
             f"{text}: {PIN} is followed by 64 hexadecimal digits", hint="`grader rubric validate` prints them"
         )
     return name, digest.lower()
-
-
-def _comes_with_grader(path: Path) -> bool:
-    return path.resolve().is_relative_to(rubrics_folder().resolve())
 
 
 def _load_of_course(file: Path, name: str) -> LoadedRubric:

@@ -355,9 +355,9 @@ def made_up_faults(data: Mapping[str, Any]) -> Iterator[Fault]:
         if name not in declared:
             yield path, f'made_up declares no value "{name}"{did_you_mean(name, declared)}'
         elif not _PLACE.match(dotted(path)):
-            yield path, "made-up values stand in scenarios, and in with, hint and reproduce of criteria"
+            yield path, "made-up values belong in scenarios, and in with, hint and reproduce of criteria"
     yield from (
-        ((KEY, name), "stands nowhere: remove it, or use it") for name in declared if name not in used
+        ((KEY, name), "is used nowhere: remove it, or use it") for name in declared if name not in used
     )
     for index, criterion in as_maps(data.get("criteria")):
         scenario = as_map(as_map(data.get("scenarios")).get(str(criterion.get("scenario"))))

@@ -111,7 +111,7 @@ class Shape(NamedTuple):
 
     def _item(self, field: Field, part: str, done: str) -> Field:
         if not field.array:
-            raise Misfit(f"{self.what}: {done} is no list")
+            raise Misfit(f"{self.what}: {done} is not a list")
         if part != "[*]" and field.size is not None and int(part[1:-1]) >= field.size:
             raise Misfit(f"{self.what}: {done} has {field.size} items, counted from 0")
         return replace(field, array=False)
@@ -369,9 +369,9 @@ def _has_field(shape: Shape | None, path: object) -> bool:
 def _quoted(path: KeyPath, value: object, topic: str = "") -> Iterator[Fault]:
     """Yield truth values in quotes where nothing is known of the type; of a topic's field, numbers too."""
     if isinstance(value, str) and value.lower() in {"true", "false"}:
-        yield path, f'"{value}" in quotes is a text: write {value.lower()}{_or_type(topic)}'
+        yield path, f'"{value}" in quotes is text: write {value.lower()}{_or_type(topic)}'
     elif isinstance(value, str) and topic and _NUMBER.fullmatch(value):
-        yield path, f'"{value}" in quotes is a text: write {value}{_or_type(topic)}'
+        yield path, f'"{value}" in quotes is text: write {value}{_or_type(topic)}'
     elif isinstance(value, dict | list):
         for key, one in value.items() if isinstance(value, dict) else enumerate(value):
             yield from _quoted((*path, key), one, topic)
@@ -397,7 +397,7 @@ def _quoted_params(rubric: dict[str, Any]) -> Iterator[Fault]:
     for at, param, value in given:
         yield from _quoted(at, value)
         if isinstance(value, str) and _NUMBER.fullmatch(value) and str(param).strip("/") in numbers:
-            yield at, f'"{value}" in quotes is a text, and elsewhere {param} is a number: write {value}'
+            yield at, f'"{value}" in quotes is text, and elsewhere {param} is a number: write {value}'
 
 
 def _other_type(path: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -429,7 +429,7 @@ def _no_such(shape: Shape, path: object, given: dict[str, Any]) -> str:
 def _no_bounds(field: Field, given: dict[str, Any], what: str) -> str:
     """Return why a field is no stamp, or is never within the bounds."""
     if STAMPED in given and field.type not in {"std_msgs/Header", "time"}:
-        return f"{what} {field.type}, no Header and no time"
+        return f"{what} {field.type}, neither a Header nor a time"
     bounds = {key: given[key] for key in ("min", "max") if isinstance(given.get(key), int | float)}
     if not bounds:
         return ""

@@ -215,7 +215,7 @@ def _judge_tests(outcome: SessionOutcome, params: PytestParams) -> Verdict:
     total = sum(t.points for t in counted)
     reached = sum(t.points for t in counted if t.outcome == "passed")
     if total <= 0:
-        raise TestsBroken(f"the tests of {params.file} that count have 0 points together")
+        raise TestsBroken(f"the tests of {params.file} that count have 0 points in total")
     return _score_tests(counted, reached / total)
 
 

@@ -105,7 +105,7 @@ def _file_fault(file: str, rubric: dict[str, Any]) -> str:
     if path.suffix in {".cpp", ".cc", ".cxx"}:
         return f"is a source: write the name of the program that add_executable makes of it, {path.stem}"
     if file in PROGRAMS:
-        return f"is no file of the student's: write program: {file}"
+        return f"is not one of the student's files: write program: {file}"
     whole = _with_ending(file, rubric)
     return f"the rubric names {whole} elsewhere: write it with its ending" if whole else ""
 

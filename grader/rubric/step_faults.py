@@ -109,7 +109,7 @@ def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
             yield from _faults_of((*at, kind), kind, as_map(step[kind]), types)
     lasting_s = sum(_seconds(step) for _, step in as_maps(scenario.get("steps")))
     if lasting_s > RUN_S_MAX:
-        yield (*path, "steps"), f"last {lasting_s:g} s together, at most {RUN_S_MAX} s"
+        yield (*path, "steps"), f"last {lasting_s:g} s in total, at most {RUN_S_MAX} s"
 
 
 def _faults_of(at: KeyPath, kind: str, given: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
@@ -128,7 +128,7 @@ def _faults_of(at: KeyPath, kind: str, given: dict[str, Any], types: dict[str, s
     elif kind == "wait":
         yield from _wait(at, given)
     elif kind == "set_param" and (given.get("value", "") is None or given.get("value") in NOT_FINITE):
-        yield (*at, "value"), "is no value that the parameter server takes"
+        yield (*at, "value"), "is not a value that the parameter server takes"
     elif kind == "transform":
         yield from _transform(at, given)
     elif kind == "play":
@@ -249,7 +249,7 @@ def _processes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
             if name not in starts:
                 yield at, f'there is no start "{name}"{did_you_mean(name, starts)}'
             elif kind == "type" and not {"script", "program", "launch"} & starts[name].keys():
-                yield at, f'"{name}" is no script, program or launch file'
+                yield at, f'"{name}" is not a script, program or launch file'
             elif kind == "start" and runs.get(name, False):
                 yield at, f'"{name}" runs already: stop it before, or restart it'
             elif kind in {"stop", "kill", "type"} and not runs.get(name, True):

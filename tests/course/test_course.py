@@ -320,7 +320,7 @@ def test_a_lab_of_a_course_is_a_rubric(course: Path) -> None:
         (
             "late: {lost: 10}\n",
             "",
-            "course.yaml:5: labs.lab1: with late days it must be said what later work costs",
+            "course.yaml:5: labs.lab1: late days need a rule for what later work costs",
         ),
         (
             "    weight: 3",

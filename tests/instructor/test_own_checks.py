@@ -183,7 +183,7 @@ def test_a_file_that_is_not_there(tmp_path):
     ("lines", "hint"),
     [
         ("return run.nothing", "AttributeError: 'Run' object has no attribute 'nothing'"),
-        ("return True", "TypeError: it returned bool, no verdict"),
+        ("return True", "TypeError: it returned bool, not a verdict"),
         ("from grader.checks import partial\nreturn partial(2, '')", "ValueError: its score is 2"),
         ("import sys\nsys.exit(0)", "RuntimeError: it called sys.exit"),
     ],

@@ -10,6 +10,7 @@ import pytest
 
 from grader.checks import CHECKS
 from grader.checks.support.exit_causes import CAUSES
+from grader.checks.support.scripts import OF_INTERFACES
 from grader.checks.support.text import LOOP, in_language, init, publisher, set_param
 from grader.evidence.run import Run
 from grader.integrations.bundle import Bundle, add_lab
@@ -22,7 +23,7 @@ from grader.judging.annotate import (
     cite_find,
     cite_name,
     cite_words,
-    fill_input_hint,
+    fill_slots,
     show_lines,
 )
 from grader.judging.facts import Facts, try_facts
@@ -79,7 +80,13 @@ def criterion(
                 "write `rate = rospy.Rate(5)` above it and `rate.sleep()` as its last line"
             ),
         ),
-        ("hidden", CAUSES["EOFError"][1]),
+        (
+            "hidden",
+            (
+                "write a value in the code in place of `input()`, and pause in the loop: "
+                "write `rate = rospy.Rate(10)` above it and `rate.sleep()` as its last line"
+            ),
+        ),
     ],
 )
 def test_a_node_that_asks_for_input_is_told_what_the_lab_wants_of_it(visibility: str, hint: str) -> None:
@@ -93,9 +100,9 @@ def test_a_node_that_asks_for_input_is_told_what_the_lab_wants_of_it(visibility:
     )
     lost = failed("talker ended before", hint=CAUSES["EOFError"][1])
     chatter = next(c for c in lab.criteria if c.id == "chatter")
-    assert fill_input_hint(lost, chatter, lab).hint == hint
+    assert fill_slots(lost, chatter, lab).hint == hint
     other = failed("no message came", hint="publish in the loop")
-    assert fill_input_hint(other, chatter, lab) == other
+    assert fill_slots(other, chatter, lab) == other
 
 
 @pytest.mark.parametrize(
@@ -262,6 +269,7 @@ def test_calls_that_make_messages_and_are_commented_out_are_named(
     build, package = commented(text, interface)
     hint = "list them in add_message_files(…) or add_service_files(…), and call generate_messages(…)"
     lost = failed("talker ended: the build makes the package's own messages", hint=hint)
+    lost = lost.seeking("uncalled", *OF_INTERFACES)
     found = cite_commented_call(lost, package, build)
     assert found.message == f"{lost.message}; {told}"
     assert found.hint.startswith("remove the # from line")
@@ -276,7 +284,7 @@ def test_calls_that_make_messages_and_are_commented_out_are_named(
 )
 def test_a_call_of_catkins_that_is_commented_out_is_named(call: str, cited: bool) -> None:
     build, package = commented(f"project(lab1)\n  #{call}\n")
-    lost = failed(f"{call} is missing", hint=f"add {call}")
+    lost = failed(f"{call} is missing", hint=f"add {call}").seeking("uncalled", call.partition("(")[0])
     found = cite_commented_call(lost, package, build)
     assert (found.citations == (FileCitation(file="CMakeLists.txt", line=2),)) == cited
     assert ("is commented out in line 2" in found.message) == cited
@@ -326,7 +334,7 @@ def test_what_does_not_start_is_told_where_nothing_is_lost(tmp_path) -> None:
         "line 1: write `print('a')`",
         f'{OUT} there is no talker in the package: type="talker" lacks the .py of src/talker.py',
         'write type="talker.py"',
-        "src/plain.py is not executable, so that roslaunch does not find it (launch/x.launch, line 3)",
+        "src/plain.py is not executable, so roslaunch does not find it (launch/x.launch, line 3)",
         "chmod +x src/plain.py, then git add --chmod=+x src/plain.py, commit and push",
     ]
     assert add_advice([told], package, rubric(CMAKE_CHECK)) == (told,)

@@ -126,7 +126,7 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
         f"; then in line 5 of {FILE}, write `rate.sleep()`"),
     "a count where the time belongs": (
         "node", DIES, TALKER, [slip("publishes", "hello world {}"), slip("no-clock", "the script counts")],
-        f'; then publish the time in line 5 of {FILE}, `"hello world %s" % rospy.get_time()`: the script counts'),
+        f'; then publish the time in line 5 of {FILE}, `"hello world %s" % rospy.get_time()`: the script only counts'),
     "text behind another topic": (
         "message", ELSEWHERE, TALKER, [],
         'publish "hello world %s" % rospy.get_time()'),
@@ -146,7 +146,7 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
         f"; then print 'I heard <message>' in line 7 of {FILE}, not '<value>got <message>'"),
     "two copies of one name behind an error": (
         "node", DIES, [NODE | ROOT, COPIES], [slip("node-name", "talker", 11)],
-        f"write anonymous=True in line 11 of {FILE}, for two of it at once"),
+        f"write anonymous=True in line 11 of {FILE}, since two of it run at once"),
     "other words that are logged, behind an error": (
         "node", DIES, [NODE | ROOT, LOGS], [slip("prints", "Hello ROS")],
         f"; then log 'Hello World!' in line 5 of {FILE}, not 'Hello ROS'"),

@@ -30,7 +30,7 @@ CASES = {
     "colon_if": ("if x\n  pass\n", 1, "a colon"),
     "colon_def": ("def f()  # why\n  pass\n", 1, "a colon"),
     "colon_main": ('if __name__ == "__main__"\n  pass\n', 1, "a colon"),
-    "colon_and_more": ("while x < 3:-\n  pass\n", 1, "behind the `:`"),
+    "colon_and_more": ("while x < 3:-\n  pass\n", 1, "after the `:`"),
     "else_if": ("if x:\n  pass\nelse if y:\n  pass\n", 3, "`elif`"),
     "assign": ("if x = 1:\n  pass\n", 1, "write `==`"),
     "bracket": ("x = f(1\ny = 2\n", None, "never closed"),

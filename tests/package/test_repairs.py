@@ -92,7 +92,7 @@ class Case:
 
 
 CASES = {
-    "crlf": Case({TALKER: SCRIPT.replace("\n", "\r\n")}, ["line-ends"], "end as on Windows"),
+    "crlf": Case({TALKER: SCRIPT.replace("\n", "\r\n")}, ["line-ends"], "has Windows line endings"),
     "bom": Case({TALKER: b"\xef\xbb\xbf" + SCRIPT.encode()}, ["byte-order-mark"], "byte order mark"),
     "utf-16": Case({TALKER: SCRIPT.encode("utf-16")}, ["encoding"], "saved as UTF-16"),
     "latin-1": Case({TALKER: SCRIPT.replace("import rospy\n", "import rospy  # caf\u00e9\n").encode("latin-1")},
@@ -227,9 +227,9 @@ CASES = {
         ["missing-call"],
                     "rospy.Rate is given a value with `=`"),
     "global": Case(swapped(TALKER, ("        rate.sleep()", "        print(count)\n        global count"),
-                       ("def main", "count = 0\ndef main")), ["python-syntax"], "`global count` stands below a line"),
+                       ("def main", "count = 0\ndef main")), ["python-syntax"], "`global count` comes after a line"),
     "global-outside": Case(swapped(TALKER, ("\nmain()", "\ncount = 0\nglobal count\nmain()")), ["python-syntax"],
-                       "`global count` stands below a line that uses count"),
+                       "`global count` comes after a line that uses count"),
     "beside-a-global": Case(swapped(TALKER, ("def main():", "count = 0\ndef main():\n    global count"),
                                 ("rate.sleep()", "rate.sleep")), ["missing-call"], "rate.sleep is named but not"),
     "include": Case(swapped(CMAKELISTS, ("catkin_package()", "catkin_package(\n  INCLUDE_DIRS include\n)")),

@@ -73,7 +73,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("loop-left", 4, "write `while not rospy.is_shutdown():` in line 4")]),
         (node("    for i in range(9):\n        p.publish(i)\n") + CALLED, [("loop-left", 4, "put it inside a `while")]),
         (node("    while not rospy.is_shutdown() and n < 9:\n        p.publish(1)\n") + CALLED,
-         [("loop-left", 4, "the loop of line 4 ends after a number of rounds")]),
+         [("loop-left", 4, "the loop of line 4 ends after a fixed number of rounds")]),
         (node(LOOP + "        p.publish(1)\n        # p.publish(2)\n        #rate.sleep()  # b\n        # sleep( a\n")
          + CALLED,
          [("commented-out", 6, "remove the `#` from line 6"), ("commented-out", 7, "`sleep(…)` is commented out")]),
@@ -341,7 +341,7 @@ def test_values_that_a_clock_gives_are_not_counted(tmp_path, code, told):
 @pytest.mark.parametrize(
     ("code", "told"),
     [
-        ("while True:\n    time.sleep(1)\n", "the loop in line 1 never asks"),
+        ("while True:\n    time.sleep(1)\n", "the loop in line 1 never checks"),
         ("while not rospy.is_shutdown():\n    time.sleep(1)\n", ""),
         ("while True:\n    rate.sleep()\n", ""),
         ("while True:\n    try:\n        rate.sleep()\n    except rospy.ROSInterruptException:\n        pass\n",

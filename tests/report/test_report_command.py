@@ -107,7 +107,7 @@ def test_the_rubric_is_the_batchs_or_the_one_of_that_id(lab, tmp_path, capsys):
     assert run(["report", str(alone)]) == 0
     changed(alone, rubric={"id": "somebodys-own", "version": "0", "digest": "f" * 64})
     assert run(["report", str(alone)]) == 2
-    assert 'its rubric "somebodys-own" is none of the labs that are known here' in capsys.readouterr().err
+    assert 'its rubric "somebodys-own" is not one of the labs that are known here' in capsys.readouterr().err
     assert run(["report", str(alone), "--rubric", str(LAB)]) == 2
     assert "a result of somebodys-own, not of leeds-comp3631-lab1" in capsys.readouterr().err
     own = tmp_path / "own.yaml"

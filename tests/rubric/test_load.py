@@ -80,7 +80,7 @@ def test_three_faults_are_all_named_with_file_and_line(tmp_path):
         (
             "with: {topic: /chatter, rate_hz: 10}",
             "with: {topic: /chatter, rate_hz: 10, in real time}",
-            "17: criteria[0].with.in real time: is not known here: between { and }, a text with a comma needs quotes",
+            "17: criteria[0].with.in real time: is not known here: between { and }, text with a comma needs quotes",
         ),
         (
             "title: 10 Hz\n",
@@ -185,7 +185,7 @@ def test_a_circle_is_named_once(tmp_path):
 
 def test_a_criterion_that_requires_another_twice(tmp_path):
     path = spoiled(tmp_path, ("[talker-node]", "[talker-node, talker-node]"))
-    assert faults(path) == ['lab.yaml:27: criteria[1].requires[1]: "talker-node" stands there already']
+    assert faults(path) == ['lab.yaml:27: criteria[1].requires[1]: "talker-node" is listed already']
 
 
 def test_a_criterion_that_requires_itself(tmp_path):

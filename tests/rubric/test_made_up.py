@@ -189,14 +189,14 @@ def test_only_numbers_above_are_counted_with(tmp_path: Path) -> None:
         (
             "title: The talker runs",
             'title: "At {made_up: rate} Hz"',
-            "criteria[0].title: made-up values stand in",
+            "criteria[0].title: made-up values belong in",
         ),
         (
             "title: The talker in real time",
             'title: "{made_up: rate}"',
-            "scenarios.real.title: made-up values stand in",
+            "scenarios.real.title: made-up values belong in",
         ),
-        ("{made_up: rate}", "5", "made_up.rate: stands nowhere: remove it, or use it"),
+        ("{made_up: rate}", "5", "made_up.rate: is used nowhere: remove it, or use it"),
         ("rate_hz: 10}", "rate_hz: {made_up: rat}}", 'made_up declares no value "rat"'),
         (
             "topic: /chatter,",

@@ -56,7 +56,7 @@ FIELDS = [
     ("own-message", "field: temperature", "field: temprature",
      '39: criteria[6].with.field: thermometer/Reading has no field temprature (did you mean "temperature"?)'),
     ("own-message", "within_s: 0.1", "within_s: 0.1, field: temperature",
-     "37: criteria[5].with.field: temperature of thermometer/Reading is float64, no Header and no time"),
+     "37: criteria[5].with.field: temperature of thermometer/Reading is float64, neither a Header nor a time"),
     ("own-message", "field: temperature, min: 10, max: 30", "field: state, min: 256",
      "39: criteria[6].with.field: state of thermometer/Reading is uint8, 0 to 255: none of these is within the bounds"),
     ("own-message", "field: temperature", "field: header.frame_id",

@@ -98,7 +98,7 @@ def test_what_is_not_finite_stays_as_it_is_written(tmp_path: Path) -> None:
         ("{set_param: {name: gain, value: 1}}", '.set_param.name: a parameter begins with a slash: "/gain"'),
         (
             "{set_param: {name: /gain, value: .inf}}",
-            ".set_param.value: is no value that the parameter server takes",
+            ".set_param.value: is not a value that the parameter server takes",
         ),
         (
             "{transform: {parent: a, child: b, translation: [1, 2]}}",
@@ -131,7 +131,7 @@ def test_steps_that_last_too_long_or_mix_types(tmp_path: Path) -> None:
     found = faults(
         _with_steps(tmp_path, *["{wait: {seconds: 600}}"] * 3, go.format("Int8"), go.format("Int16"))
     )
-    assert any("scenarios.real.steps: last 1800 s together, at most 1200 s" in line for line in found), found
+    assert any("scenarios.real.steps: last 1800 s in total, at most 1200 s" in line for line in found), found
     assert any(
         "steps[4].publish.type: an earlier step publishes std_msgs/Int8 on /go" in line for line in found
     ), found

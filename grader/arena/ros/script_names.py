@@ -101,11 +101,11 @@ def misspelt(tree):
     keys = without_quotes(tree, known)
     for node in names:
         if id(node) in outside and (node.id == "self" or node.id not in known):
-            message = "line %d stands in the class and in none of its methods, so it runs before them"
+            message = "line %d is in the class, but in none of its methods, so it runs before them"
             fix = "indent line %d like the lines of the method above it, or delete it" % node.lineno
             yield slip(node.lineno, "outside-method", message % node.lineno, fix=fix)
         elif id(node) in keys:
-            message = "the key `%s` stands here without quotes" % node.id
+            message = "the key `%s` is written here without quotes" % node.id
             fix = "in line %d, write `%s`" % (node.lineno, keys[id(node)])
             yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
         elif node.id not in known and (near := spelt_alike(node.id, own, attributes)):
@@ -338,7 +338,7 @@ def undefined(node, tree):
     if sent or (isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)):
         kind = types.pop() if len(types) == 1 else "<Type>"
         return why, "above line %d, create the message: `%s = %s()`" % (line, name, kind)
-    return why, "above line %d, write `%s = …`, with the value that it is to have" % (line, name)
+    return why, "above line %d, write `%s = …`, with the value that it should have" % (line, name)
 
 
 def known_elsewhere(node, tree):

@@ -101,7 +101,7 @@ def never_given(own, name, line):
         fix = "in line %d, write `self.%s` for `self.%s`" % (line, near[0], name)
         return "did you mean self.%s?" % near[0], fix
     why = "nothing in the file gives `self.%s` a value" % name
-    return why, "in `__init__`, write `self.%s = …`, with the value that it is to have" % name
+    return why, "in `__init__`, write `self.%s = …`, with the value that it should have" % name
 
 
 def classes_as_objects(classes, tree):
@@ -123,7 +123,7 @@ def classes_as_objects(classes, tree):
         made = "%s(%s)" % (name, "…" if init is not None and len(init.args.args) > 1 else "")
         right = "%s = %s" % (owner, made) if given else "%s.%s()" % (made, method.name)
         line = given[0].lineno if given else n.lineno
-        message = "`%s` is the class itself, and no object of it" % owner
+        message = "`%s` is the class itself, not an object of it" % owner
         yield slip(
             n.lineno, "object", message, fix="in line %d, write `%s`" % (line, right), name=method.name
         )
@@ -165,7 +165,7 @@ def callbacks(tree):
         for one in given[:1]:
             text = one.value if isinstance(one, ast.Constant) and isinstance(one.value, str) else ""
             if text.isidentifier():
-                message, fix = "'%s' is a text, and no function" % text, "write `%s`, without quotes" % text
+                message, fix = "'%s' is a string, not a function" % text, "write `%s`, without quotes" % text
                 yield slip(one.lineno, "callback-called", message, fix=fix, name=text)
             called = isinstance(one, ast.Call)
             meant = one.func if called else one
@@ -248,7 +248,7 @@ def gives_value(function):
 
 
 def queue_sizes(tree):
-    """Publishers whose `queue_size` is a text: rospy takes it, and sends nothing."""
+    """Publishers whose `queue_size` is a string: rospy takes it, and sends nothing."""
     for node in walk(tree):
         for one in node.keywords if is_call(node, "Publisher") else ():
             if (
@@ -258,7 +258,7 @@ def queue_sizes(tree):
             ):
                 size = one.value.value[:TEXT_LIMIT]
                 fix = "write `queue_size=%s`, without quotes" % (size or "10")
-                yield slip(one.value.lineno, "queue-size", "`queue_size` is a text", fix=fix)
+                yield slip(one.value.lineno, "queue-size", "`queue_size` is a string", fix=fix)
 
 
 def takes(function, bound):

@@ -207,7 +207,7 @@ def stopped_loops(tree):
             fix = "remove spin(): the loop keeps the node alive"
             yield slip(spin.lineno, "spin-in-loop", message, fix=fix)
         if is_counted(loop) and not turned[loop][1]:
-            message = "the loop of line %d ends after a number of rounds" % loop.lineno
+            message = "the loop of line %d ends after a fixed number of rounds" % loop.lineno
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
             fix = "write `while not rospy.is_shutdown():` in line %d" % loop.lineno
             if isinstance(loop, ast.For) and dotted(loop.target) in used:
@@ -496,14 +496,14 @@ def deaf_loops(tree):
             continue
         caught = [h for n in inside if isinstance(n, ast.Try) for h in n.handlers if goes_on(h)]
         wakes = any(is_call(n, "sleep") and dotted(n.func) != "time.sleep" for n in inside)
-        asks = "ask `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
+        asks = "check `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
         for handler in caught[:1]:
             message = "the `except` in line %d catches what Ctrl-C raises, and the loop in line %d goes on"
             message %= (handler.lineno, loop.lineno)
             catching.append(slip(loop.lineno, "deaf", message, fix=asks))
         if not caught and not wakes:
             known = isinstance(loop, ast.While) and isinstance(loop.test, ast.Constant)
-            message = "the loop in line %d never asks whether the node is to end" % loop.lineno
+            message = "the loop in line %d never checks whether the node should end" % loop.lineno
             (endless if known else others).append(slip(loop.lineno, "deaf", message, fix=asks))
     for node in walk(tree):
         if is_call(node, "init_node") and any(k.arg == "disable_signals" for k in node.keywords):

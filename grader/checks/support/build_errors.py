@@ -1,4 +1,4 @@
-"""The first error that a build printed, at the student's own line and in a student's words."""
+"""A build's first error in a student's words, and what to do."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from difflib import get_close_matches
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.support.scripts import cmake_calls, installed, path_in_package
+from grader.checks.support.build_output import BuildError, folder_names
+from grader.checks.support.scripts import OF_INTERFACES, cmake_calls, installed
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
     LIBRARIES,
@@ -32,20 +33,8 @@ SLIP = 0.8
 """How alike a name is that is written for one that every machine has: `pospy` for `rospy`."""
 UNKNOWN_COMMAND = "Unknown CMake command"
 FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error that it prints"
-_CMAKE_ERROR = re.compile(
-    r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+)(?: \((?P<call>\w+)\))?)?:?\s*(?P<text>.*)"
-)
-_COMPILER_ERROR = re.compile(r"^(?P<file>[^:\s][^:]*):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: (?P<text>.*)")
-_OTHER_ERROR = re.compile(
-    r"(?P<text>.*(?:\b[Ee]rror:|Error\(s\)|undefined reference|cannot find -l|No rule to make|[A-Za-z]Error:|\*\*\*).*)"
-)
-_CALLER = re.compile(r"^\s+(?P<file>[^:()]+):(?P<line>\d+) \(\w+\)$")
-CALL_STACK = "Call Stack (most recent call first):"
-CALLERS_MAX = 40
-SYSTEM = ("/usr/", "/opt/")
 _QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
 """As compilers and linkers write them."""
-OF_GENERATION = ("add_message_files", "add_service_files", "add_action_files", "generate_messages")
 CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
 OF_CATKIN = ("catkin_package", "catkin_install_python", "catkin_python_setup")
 """Commands that `find_package(catkin …)` defines."""
@@ -57,21 +46,10 @@ STANDARD = {
 """Names of C++'s standard library that are written without `std::`, with their headers."""
 
 
-class BuildError(NamedTuple):
-    """The first error that the build printed; `kind` is `cmake`, `compiler` or `other`.
-
-    `place` is the line of the package's own that it comes from.
-    """
-
-    kind: str
-    text: str
-    place: FileCitation | None
-
-
 class Explained(NamedTuple):
     """The error in a student's words, and what to do; `of_machine`: the grading machine lacks something; `place`: the
     line that is wrong, where that is not the one that the build names; `lacks`: the package that it lacks; `by_itself`:
-    a command that CMake does not know, and no line of catkin's own is why."""
+    a command that CMake does not know, and no line of catkin's own is why; `uncalled`: a command to call."""
 
     why: str
     hint: str
@@ -79,30 +57,7 @@ class Explained(NamedTuple):
     place: FileCitation | None = None
     lacks: str = ""
     by_itself: bool = False
-
-
-def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | None:
-    """Return the first line that fits: a compiler's error comes before make's summary of it."""
-    for index, line in enumerate(lines):
-        if match := _CMAKE_ERROR.match(line):
-            below = lines[index + 1 :]
-            called = [(match["file"] or "", int(match["line"] or 0)), *_callers(below)]
-            places = (_own_line(package, file, number) for file, number in called)
-            text = match["text"] or _paragraph(below)
-            place = next(filter(None, places), None)
-            named = place is None and match["file"] and not match["file"].startswith(SYSTEM)
-            text = f"{match['file']}:{match['line']}: {text}" if named else text
-            return BuildError("cmake", shown(text), place)
-        if match := _COMPILER_ERROR.match(line):
-            place = _own_line(package, match["file"], int(match["line"]))
-            name = (
-                ""
-                if match["file"].startswith(SYSTEM)
-                else f"{posixpath.basename(match['file'])}:{match['line']}: "
-            )
-            return BuildError("compiler", shown(name + match["text"]), place)
-    other = next((m["text"] for m in map(_OTHER_ERROR.match, lines) if m), None)
-    return BuildError("other", shown(other), None) if other else None
+    uncalled: str = ""
 
 
 def explain_error_of_build(error: BuildError, package: PackageFacts, lines: Sequence[str]) -> Explained:
@@ -133,45 +88,6 @@ def repair_of_file(fault: Fault) -> str:
 
 def _unreadable(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     return unreadable_file(package) or Explained(found.string, FIRST_ERROR_HINT)
-
-
-def _callers(lines: Sequence[str]) -> list[tuple[str, int]]:
-    """The call stack below an error, the innermost call first."""
-    end = next((i for i, line in enumerate(lines[:CALLERS_MAX]) if line.startswith("CMake ")), CALLERS_MAX)
-    begin = next((i for i, line in enumerate(lines[:end]) if line.startswith(CALL_STACK)), end)
-    found = (_CALLER.match(line) for line in lines[begin + 1 : end])
-    return [(match["file"], int(match["line"])) for match in found if match]
-
-
-def _own_line(package: PackageFacts, file: str, line: int) -> FileCitation | None:
-    """The line if it lies in the package. A bare `CMakeLists.txt` is the workspace's own."""
-    outside = not line or "/" not in file or file.startswith(SYSTEM)
-    path = None if outside else path_in_package(package, file)
-    folder = posixpath.basename(posixpath.dirname(file))
-    of_another = path == "CMakeLists.txt" and folder not in _folders(package)
-    return FileCitation(file=path, line=line) if path and not of_another else None
-
-
-def _folders(package: PackageFacts) -> set[str]:
-    """The names that the package's folder may have in the build's workspace."""
-    manifest = {package.manifest.name} if package.manifest else set()
-    return {package.name, posixpath.basename(package.path), *manifest}
-
-
-def _paragraph(lines: Sequence[str]) -> str:
-    """The text of a CMake error: the first paragraph after its heading, and the one that its colon announces."""
-    words: list[str] = []
-    for line in lines:
-        ends = bool(words) and not line.strip() and not _goes_on(words)
-        if ends or line.startswith((CALL_STACK, "CMake ")):
-            break
-        words += line.split()
-    return " ".join(words)
-
-
-def _goes_on(words: Sequence[str]) -> bool:
-    """CMake sets a path apart by blank lines in the middle of this sentence."""
-    return words[-1].endswith(":") or (words[:3] == ["The", "source", "directory"] and words[-1][-1] != ".")
 
 
 def _misspelt_components(package: PackageFacts) -> dict[str, str]:
@@ -208,7 +124,7 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
     name = found[1]
     near = get_close_matches(name, (*ALWAYS_THERE, *known_packages()), 1, ONE_EDIT)
     if name in SLIPS_OF_COMPONENTS:
-        why = f"find_package(…) takes {name} for the name of a package: the word is COMPONENTS"
+        why = f"find_package(…) reads {name} as the name of a package: the keyword is COMPONENTS"
         return Explained(why, f"write COMPONENTS for {name}")
     if slips := _misspelt_components(package):
         wrong, right = join_words(slips), "; ".join(f"write {new} for {old}" for old, new in slips.items())
@@ -234,7 +150,7 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
     meant = f"write {near[0]}" if near else "correct its name or remove it"
     hint = f"{meant} in find_package(…) and package.xml; a package of your own must be pushed with this one"
     why = f"find_package(…) names {name}, but there is no package of that name"
-    example = ": it is only an example in the help of catkin_create_pkg" if placeholder else ""
+    example = ": it is only a placeholder in the help text of catkin_create_pkg" if placeholder else ""
     return Explained(f"{why}{example}", hint)
 
 
@@ -271,9 +187,9 @@ def _missing_source(found: re.Match[str], package: PackageFacts, _lines: Sequenc
     absent = [word for word in dict.fromkeys(named) if package.file(word) is None]
     if len(absent) > 1 and found[1] in absent:
         return _missing_files(
-            absent, package, f"targets are made of {join_words(absent)}", "the calls that name them"
+            absent, package, f"targets are built from {join_words(absent)}", "the calls that name them"
         )
-    return _missing_file(found[1], package, f"a target is made of {found[1]}")
+    return _missing_file(found[1], package, f"a target is built from {found[1]}")
 
 
 def no_types(package: PackageFacts) -> Explained | None:
@@ -298,7 +214,7 @@ def no_types(package: PackageFacts) -> Explained | None:
     named = f", and {join_words(sorted(others))} after DEPENDENCIES in generate_messages(…)" if others else ""
     if len(wrong) == 1 and not others:
         fixes = [f"write `{wrong[0][2]} {first.name}`"]
-    why = f"line {place.line} of {place.file}: there is no type `{shown(first.type)}` of a field"
+    why = f"line {place.line} of {place.file}: there is no field type `{shown(first.type)}`"
     return Explained(why, join_words(fixes) + named, place=place)
 
 
@@ -366,7 +282,7 @@ def _missing_file(path: str, package: PackageFacts, words: str) -> Explained:
 
 def _below(path: str, package: PackageFacts) -> str:
     """An absolute path in the build's workspace, from the package's folder."""
-    folders = "|".join(re.escape(name) for name in _folders(package) if name)
+    folders = "|".join(re.escape(name) for name in folder_names(package) if name)
     return re.sub(rf"^/.*/src/(?:.*/)?(?:{folders})/", "", path, count=1) if folders else path
 
 
@@ -391,7 +307,8 @@ def _missing_dependency(found: re.Match[str], _package: PackageFacts, _lines: Se
     why = f"add_dependencies({found[2]} {found[1]}) names the target {found[1]}, which does not exist"
     targets = "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"
     hint = f"write add_dependencies({found[2]} {targets})"
-    return Explained(why, f"{hint}; messages of your own need generate_messages(…) above it")
+    hint = f"{hint}; messages of your own need generate_messages(…) above it"
+    return Explained(why, hint, uncalled="generate_messages")
 
 
 def _missing_target(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -445,13 +362,14 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
             return _missing_package(found, package, lines)
         if any(found[1] in call.args for call in cmake_calls(package, "find_package")):
             # found, and so built beside this package: its messages come too late
-            why = f"{text}: nothing makes it wait for the messages of {found[1]}, so with -j it fails in some runs"
+            late = f"nothing makes it wait for the messages of {found[1]}"
+            why = f"{text}: {late}, so a parallel build (-j) sometimes fails"
             program = next(iter(_programs_without(package, "add_dependencies")), "<program>")
             return Explained(
                 why, f"write {_call_below(program, 'add_dependencies', '${catkin_EXPORTED_TARGETS}')}"
             )
         return Explained(f"{text}: there is no such header", "check the #include and find_package(…)")
-    why = f"{text}: nothing makes it wait for its message, so with -j it fails in some runs and not in others"
+    why = f"{text}: nothing makes it wait for its message, so a parallel build (-j) sometimes fails"
     waiting = _programs_without(package, "add_dependencies")
     fixes = [
         f"below the add_executable(…) of line {call.line}, write "
@@ -508,7 +426,7 @@ def _explain_undeclared(found: re.Match[str], _package: PackageFacts, _lines: Se
 def _no_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     """A service's type has two parts, and nothing else."""
     near = near_names(found[2], ("Request", "Response"))
-    hint = f"write {found[1]}::{near[0]}" if near else f"look up how the part of {found[1]} is called"
+    hint = f"write {found[1]}::{near[0]}" if near else f"look up the name of that part of {found[1]}"
     return Explained(f"there is no {found[2]} in {found[1]}", hint)
 
 
@@ -551,16 +469,17 @@ def _unknown_command(found: re.Match[str], package: PackageFacts, _lines: Sequen
     if right := meant_command(name.lower()):
         return Explained(f"there is no command {name}(…)", f"write {right} for {name}")
     has_catkin = any(one.args[:1] == ("catkin",) for one in cmake_calls(package, "find_package"))
-    if name.lower() in OF_GENERATION and has_catkin:
+    if name.lower() in OF_INTERFACES and has_catkin:
         why = f"{name}(…) comes with message_generation, which find_package(catkin …) does not name"
         call = next(iter(cmake_calls(package, name.lower())), None)
         fix = "write find_package(catkin REQUIRED COMPONENTS … message_generation)"
         if call is not None and not package.interfaces:
             fix = f"delete {name}(…), line {call.line}: the package has no messages, services or actions of its own"
         return Explained(why, fix, by_itself=True)
-    if name.lower() in {*OF_CATKIN, *OF_GENERATION}:
+    if name.lower() in {*OF_CATKIN, *OF_INTERFACES}:
         why = f"{name}(…) is catkin's, and find_package(catkin …) is not called above it"
-        return Explained(why, f"call find_package(catkin REQUIRED COMPONENTS …) above {name}(…)")
+        hint = f"call find_package(catkin REQUIRED COMPONENTS …) above {name}(…)"
+        return Explained(why, hint, uncalled="find_package")
     return Explained(f"there is no command {name}(…)", "check the spelling of the command")
 
 

@@ -303,7 +303,7 @@ def _is_bad(step: Step, params: WrapParams) -> bool:
 def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: WrapParams) -> Verdict:
     whose = whose_turn(step, count, run, params)
     if whose == "flood":
-        message = f"{params.topic} is flooded, so its publisher drops values, also around the wrap"
+        message = f"{params.topic} is flooded, so its publisher drops values, around the wrap too"
         return unjudged(
             message, hint=f"first publish at {significant(params.rate_hz)} Hz, then look at the counter again"
         )

@@ -96,7 +96,7 @@ def _index(_message: str, source: str, marked: tuple[int, int] | None) -> Meanin
     if found is None:
         return (
             "the index is beyond the end",
-            f"look at the length before you take an element: {NUMBER_OF_PARTS}",
+            f"check the length before you access an element: {NUMBER_OF_PARTS}",
         )
     name, index = (shown(ast.unparse(part)) for part in (found.value, found.slice))
     if index.isdecimal():
@@ -123,7 +123,7 @@ def _key(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning:
         return f"the parameter {message} is not set", f"give it a default: `rospy.get_param({message}, …)`"
     return (
         f"there is no key {message}",
-        f"look at which keys there are, or take `.get({message}, …)` with a default",
+        f"check which keys there are, or use `.get({message}, …)` with a default",
     )
 
 
@@ -132,7 +132,7 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
         return meaning
     if found := _UNPACKED.search(message):
         came = f"; {found[3]} came" if found[3] else ""
-        hint = f"look at how many there are before you take them apart: {NUMBER_OF_PARTS}"
+        hint = f"check how many there are before you unpack them: {NUMBER_OF_PARTS}"
         return f"{plural(int(found[2]), 'value')} are expected on the right of `=`{came}", hint
     if found := _NO_NUMBER.search(message):
         hint = "convert only what is a number, and print text as it is"
@@ -192,7 +192,7 @@ def _no_number(message: str, source: str) -> Meaning | None:
         return "text is compared with a number", "turn the text into a number first, or leave out `str(…)`"
     if wanted := _WANTS_NUMBER.search(message):
         hint = "write %s for %d or %f" if "%" in source else "turn the text into a number: `float(…)`"
-        return f"a number is wanted here, and it is of the type {wanted[1] or wanted[2]}", hint
+        return f"a number is needed here, but it is of the type {wanted[1] or wanted[2]}", hint
     return None
 
 
@@ -210,7 +210,7 @@ def _call(message: str, source: str) -> Meaning | None:
             return cause, f"give the variable `{hidden}` another name"
         return (
             f"what is called is a value ({called[1]}), not a function",
-            "give the variable another name than the function",
+            "give the variable and the function different names",
         )
     given = _ONE_TOO_MANY.search(message)
     if given and int(given[3]) == int(given[2]) + 1 and f".{given[1]}(" in source:
@@ -235,7 +235,7 @@ def _ros_call(message: str, source: str) -> Meaning | None:
             rate = ast.unparse(slept.args[0])
         elif slept is not None and isinstance(slept.func, ast.Attribute):
             rate = ast.unparse(slept.func.value)
-        return "a Rate knows by itself how long it sleeps", f"write `{shown(rate)}.sleep()`"
+        return "a Rate already knows how long to sleep", f"write `{shown(rate)}.sleep()`"
     if meaning := _init_node(message, source) or _parameter(message, source) or _sent_class(message, source):
         return meaning
     if asks_for_rate := _calls(source, "Rate"):
@@ -285,7 +285,7 @@ def wrong_class(source: str) -> Meaning | None:
 def _init_node(message: str, source: str) -> Meaning | None:
     """Of `init_node(…)` without a name, or with one that is no text."""
     if message == "init_node() missing 1 required positional argument: 'name'":
-        return "a node needs a name", "write the node's name into the brackets, as a text"
+        return "a node needs a name", "write the node's name in the brackets, as a string"
     called = next(iter(_calls(source, "init_node")), None)
     if called is not None and len(called.args) > 1 and message == "'bool' object is not iterable":
         flag = called.args[1]
@@ -294,7 +294,7 @@ def _init_node(message: str, source: str) -> Meaning | None:
     if called is None or not called.args or not message.startswith("argument of type"):
         return None
     given = called.args[0]
-    return "a node's name is a text", rewritten(source, (given, f"'{ast.unparse(given)}'"))
+    return "a node's name is a string", rewritten(source, (given, f"'{ast.unparse(given)}'"))
 
 
 def _parameter(message: str, source: str) -> Meaning | None:
@@ -325,11 +325,11 @@ def _topic(message: str, source: str) -> Meaning:
     if "<module " in message:
         module = shown(message.partition("<module '")[2].partition("'")[0])
         return (
-            "the type's name stands for a whole module",
+            "the type's name refers to a whole module",
             f"import the type itself: `from {module} import …`",
         )
     if len(args) < 2:
-        hint = "write the type of the messages behind the topic's name, without quotes"
+        hint = "write the type of the messages after the topic's name, without quotes"
         return (
             "the type of the messages is missing" if found else "a topic's name comes first, then its type",
             hint,
@@ -352,7 +352,7 @@ def is_text(node: ast.expr) -> bool:
 def _no_type(message: str, source: str, topic: ast.expr, type_: ast.expr) -> Meaning:
     """Of what stands in the place of the messages' type."""
     if isinstance(type_, ast.Constant) and is_text(type_):
-        return "the type is given as a text", rewritten(
+        return "the type is given as a string", rewritten(
             source, (type_, re.sub(r".*[./]", "", str(type_.value)))
         )
     if isinstance(type_, ast.Call):
@@ -382,7 +382,7 @@ def _rate(call: ast.Call) -> Meaning | None:
         hint = f"write `rospy.Rate({number[1]})`" if number else "write how many times a second the loop runs"
         return "a rate is a number, and this is text", hint
     if value == 0:
-        return "0 Hz is no rate", "write how many times a second the loop runs, as in `rospy.Rate(10)`"
+        return "0 Hz is not a rate", "write how many times a second the loop runs, as in `rospy.Rate(10)`"
     return None
 
 
@@ -405,7 +405,7 @@ def _operands(left: str, right: str, source: str) -> Meaning | None:
             )
         return f"one side is the whole message ({message})", "take its field: `msg.data`"
     if "str" in (left, right):
-        return "one side is a text", "turn the text into a number first: `float(…)`"
+        return "one side is a string", "turn the text into a number first: `float(…)`"
     return None
 
 
@@ -433,8 +433,8 @@ def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Me
         cause = f"`from {name} import {name}` makes `{name}` what is in the module, and not the module"
         return cause, f"write `{name}` for `{name}.{name}`"
     if found := re.match(r"'(tuple|list|dict)' object has no attribute 'encode'", message):
-        hint = 'put the values into the text with `%`: `"… %s" % value`, not behind a comma'
-        return f"a text is published here, and this is a {found[1]}", hint
+        hint = 'put the values into the text with `%`: `"… %s" % value`, not after a comma'
+        return f"a string is published here, and this is a {found[1]}", hint
     if "'member_descriptor' object" in message:
         name = source.partition(".")[0].strip()
         return (
@@ -473,17 +473,17 @@ def _command(message: str, _source: str, _marked: tuple[int, int] | None) -> Mea
     cause = f"the command `{shown(found[1])}` fails (exit code {found[2]})"
     return (
         cause,
-        "leave it out, or catch the error: where a node is started there is neither your folder nor a network",
+        "leave it out, or catch the error: a node that is started here has neither your folder nor a network",
     )
 
 
 def _service(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
     if absent := re.match(r"service \[(\S+)\] unavailable", message):
         hint = f"wait for it before the call: `rospy.wait_for_service('{shown(absent[1])}')`"
-        return "nobody offers the service yet, or under another name", hint
+        return "no node offers the service yet, or only under another name", hint
     if "md5sum" in message:
         hint = "give both the same .srv, with the names and types of the handout, and build again"
-        return "the service has another type than the one that is called", hint
+        return "the service's type differs from the type that is called", hint
     return None
 
 
@@ -528,7 +528,7 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     made = re.match(r"(\w+)\(\) takes no arguments", found.message)
     if made and any(one.path.endswith(f"/{made[1]}.srv") for one in package.interfaces):
         fix = f"write `{made[1]}Response(…)`, and import it beside {made[1]}"
-        return f"`{made[1]}` is the service's type, and its answer is another one", fix
+        return f"`{made[1]}` is the service's type, and its response has another type", fix
     frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
     wants_text = "must be of type bytes or an ascii string" in found.message
     if not wants_text and "must be an integer type" not in found.message:

@@ -34,8 +34,8 @@ from grader.checks.support.missing_names import (
     unmade,
 )
 from grader.checks.support.processes import Life, early_end, lives
-from grader.checks.support.scripts import SYNTAX, path_in_package
-from grader.checks.support.text import LOOP, SPIN, shown
+from grader.checks.support.scripts import OF_INTERFACES, SYNTAX, path_in_package
+from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
 from grader.installable import ON_THE_MACHINE, exists_somewhere, install_hint, known_packages
@@ -52,9 +52,8 @@ RACE = "publish() to a closed topic"
 ARGUMENT_HINT = (
     "put the value in the code, or use a default where `len(sys.argv)` is 1: nothing passes arguments"
 )
-NO_INPUT = "write a value in the code in place of `input()`"
-RATE = "rospy.Rate(10)"
-PAUSE = f"write `rate = {RATE}` above it and `rate.sleep()` as its last line"
+NO_INPUT = f"write {VALUE_SLOT} in place of `input()`"
+PAUSE = f"write `rate = {RATE_SLOT}` above it and `rate.sleep()` as its last line"
 LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
 CAUSES = {
     "EOFError": ("it waits for input (`input()`), and a graded node gets no input",
@@ -66,7 +65,7 @@ CAUSES = {
     "ROSInitException": ("it uses ROS before `rospy.init_node(…)`",
      "call `rospy.init_node(…)` before the first publish, Rate or sleep"),
     **dict.fromkeys(("LookupException", "ExtrapolationException", "ConnectivityException"), (
-        "at that moment tf does not know the transform, as always at the start",
+        "tf does not know the transform yet, as always at the start",
         "catch it, `try: … except tf2_ros.TransformException:`, or give `lookup_transform(…)` a time to wait")),
     "KeyboardInterrupt": ("Ctrl-C came at a point where nothing handles it",
      "loop with `while not rospy.is_shutdown():` and sleep with `rospy.Rate`"),
@@ -78,7 +77,7 @@ CAUSES = {
     "ROSSerializationException": ("", "publish a value that fits the message's type"),
     "SerializationError": ("", "publish a value that fits the message's type"),
     "SyntaxError": ("", "compare that line and the end of the one above it with the handout, character by character"),
-    "IndentationError": ("", "indent every block by four spaces, each of its lines the same"),
+    "IndentationError": ("", "indent every block by four spaces, all of its lines alike"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }  # fmt: skip
 _NUMBER_WANTED = re.compile(r"must be (?:an integer|unsigned integer|float) type")
@@ -134,7 +133,8 @@ class Ending(NamedTuple):
         `inconclusive` where the machine is at fault."""
         kind = machine_lacks if self.of_machine else kind
         verdict = kind(message, measured=measured, hint=self.hint, citations=self.citations)
-        return verdict.model_copy(update={"cause": self.cause, "unbuilt": self.unbuilt})
+        verdict = verdict.model_copy(update={"cause": self.cause, "unbuilt": self.unbuilt})
+        return verdict.seeking("uncalled", *(OF_INTERFACES if self.unbuilt else ()))
 
 
 def explain_early_end(package: PackageFacts, run: Run) -> Ending | None:
@@ -310,7 +310,7 @@ def _no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> 
             if kind == "int"
             else read.fix.replace("map(int, ", "map(float, ").replace("= int(", "= float(")
         )
-        return "an argument of the command line is a text", f"in line {read.line}, write `{fix}`"
+        return "a command-line argument is a string", f"in line {read.line}, write `{fix}`"
     if ".publish(" in found.own_frames[-1].source:
         return None
     return "it takes a number but gets something else", f"turn the value into one first: `{kind}(…)`"

@@ -70,7 +70,7 @@ _REFUSALS = (
      'write <arg name="{0}" default="…"/>'),
     (r"output must be one of", 'output is "screen" or "log", in lower case', 'write output="screen"'),
     (r"multiple files named", "the package has two launch files of that name",
-     "delete one of them, also one in a folder of old files: find . -name '*.launch' lists them"),
+     "delete one of them, even one in a folder of old files: find . -name '*.launch' lists them"),
     (NOT_STARTED, "the system cannot start the script of {0}",
      "its first line has to be #!/usr/bin/env python3, or #!/bin/bash for a shell script"),
     (r"Unknown substitution command \[([^\[\]\n]+)\]", "roslaunch does not know $({0})",
@@ -193,7 +193,9 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
     pkg, name = str(node.pkg), str(node.type)
     if path := next((a for a in ("pkg", "type") if "$(find" in str(getattr(node, a))), None):
         return _slip(
-            node, f"{path} is a path", f'write pkg="{package.name}" and type="<file>.py": names alone'
+            node,
+            f"{path} is a path",
+            f'write pkg="{package.name}" and type="<file>.py": names only, without folders',
         )
     if UNRESOLVED in pkg + name:
         return None
@@ -212,7 +214,7 @@ def illegal_name(node: LaunchNode) -> Slip | None:
     name = node.name or ""
     if UNRESOLVED in name or re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
         return None
-    why = f'name="{name}" is not a legal name in ROS, and other tools stumble over it'
+    why = f'name="{name}" is not a legal name in ROS, and other tools fail on it'
     return _slip(node, why, "begin it with a letter, and use letters, digits and _ only")
 
 
@@ -479,7 +481,7 @@ def not_executable(*scripts: SourceFile) -> Absence:
     """Return the absence of nodes whose scripts are not executable."""
     paths = tuple(dict.fromkeys(script.path for script in scripts))
     are, them = ("is", "it") if len(paths) == 1 else ("are", "them")
-    why = f"{join_words(paths)} {are} not executable, so that roslaunch does not find {them}"
+    why = f"{join_words(paths)} {are} not executable, so roslaunch does not find {them}"
     hint = chmod_hint(scripts[0].mode_source, *paths)
     return Absence(why, hint, True, tuple(FileCitation(file=path) for path in paths))
 
@@ -516,7 +518,7 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         return Absence(why, syntax_hint(fault), of_script=True, citations=(fault.place,))
     if script is not None and code in NOT_EXECUTED and any(shebang_obstacles(script)):
         return not_started(script)
-    hint = 'write output="screen" into the <node>, and read what it prints last'
+    hint = 'write output="screen" in the <node>, and read what it prints last'
     return Absence(f"it died with exit code {code}", hint, of_script=True)
 
 

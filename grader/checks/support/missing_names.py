@@ -160,7 +160,7 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
             return f"the build makes {made}", f"write the one that you mean for {wanted[1]}"
         kind = own.path.rpartition(".")[2].replace("msg", "message").replace("srv", "service")
         hint = f"list {own.path.rpartition('/')[2]} in add_{kind}_files(…)"
-        return f"the build has not made it of {own.path}", hint
+        return f"the build has not made it from {own.path}", hint
     whose = "the package's own messages" if maker is package else f"the messages of {maker.name}"
     hint = "first get the build to pass: catkin_make"
     if not cmake_calls(maker, "generate_messages"):
@@ -188,12 +188,12 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
         return f"{inner[2]} is a class in {inner[1]}", f"write `from {inner[1]} import {inner[2]}`"
     asked, wanted = NO_MODULE.search(message), _FROM_PACKAGE.search(message)
     if asked and asked[1] in ROS_2:
-        return f"{asked[1]} is of ROS 2", "this lab is for ROS 1: write the node with rospy"
+        return f"{asked[1]} is from ROS 2", "this lab is for ROS 1: write the node with rospy"
     if asked and asked[1] in PYTHON_2:
-        return f"{asked[1]} is a module of Python 2", f"write {PYTHON_2[asked[1]]} for {asked[1]}"
+        return f"{asked[1]} is a Python 2 module", f"write {PYTHON_2[asked[1]]} for {asked[1]}"
     if asked and asked[1] in TUTORIALS - {package.name}:
         fix = f"write your package's name for {asked[1]}, or leave the line out"
-        return "tutorials call the reader's own package so", fix
+        return "tutorials use that name for the reader's own package", fix
     meant = unimported_module(found, package)
     near = near_names(asked[1], noetic_messages()) if asked and asked[1] not in known_packages() else ()
     near = () if meant else near
@@ -225,7 +225,8 @@ def _own_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | No
         cause = f"{file} is in another folder, and Python looks beside {script}"
         place = f"os.path.join({place}, '{posixpath.relpath(str(file.parent), str(folder))}')"
     elif any("/devel/lib/" in frame.file for frame in found.frames):
-        cause = f"{file} is there, and the program that catkin_install_python makes of {script} does not look beside it"
+        program = f"the program that catkin_install_python makes from {script}"
+        cause = f"{file} is there, and {program} does not look beside it"
     else:
         return None
     return cause, f"write `import os, sys; sys.path.insert(0, {place})` above the import"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
@@ -191,18 +191,15 @@ class Obstacle(NamedTuple):
     fix: str
 
 
-def _then_push(file: SourceFile) -> str:
-    return ", then commit and push" if file.mode_source == "git" else ""
-
-
 def shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
     """Yield what keeps the system from starting the file, the package facts' own words first."""
     fix = f"write {RIGHT_SHEBANG} as the very first line, with nothing above it"
     if file.link_problem:
         yield Obstacle(f"cannot be run: {file.link_problem}", "hand in the file itself")
     elif file.shebang is not None and file.shebang.crlf:
-        problem = file.shebang_problem or "its #! line ends with Windows' CRLF"
-        yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}{_then_push(file)}")
+        problem = file.shebang_problem or "its #! line has a Windows line ending (CRLF)"
+        push = ", then commit and push" if file.mode_source == "git" else ""
+        yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}{push}")
     elif file.shebang_fault == "empty-file":
         yield Obstacle("is empty", f"write the node in {file.path}, with {RIGHT_SHEBANG} as its first line")
     elif file.bom:
@@ -265,18 +262,17 @@ def lines_that_set(lines: Sequence[SourceLine], field: str) -> list[SourceLine]:
     return [line for line in lines if sets.search(line.text)]
 
 
-CALLS = ("project", "find_package", "catkin_package", "add_message_files", "add_service_files", "add_action_files",
-         "generate_messages")  # fmt: skip
-"""Of CMake, what a hint may tell to call, beside the call that installs scripts."""
 OF_FILES = {"add_message_files": ".msg", "add_service_files": ".srv", "add_action_files": ".action"}
+OF_INTERFACES = (*OF_FILES, "generate_messages")
+"""The commands of CMake by which messages, services and actions are made."""
 
 
-def commented_calls(package: PackageFacts, lines: Sequence[str], hint: str) -> dict[str, tuple[int, int]]:
-    """Return the calls that the hint tells to write, of files that the package has, and that are commented out."""
-    called = {call.name for call in package.cmake.calls} if package.cmake is not None else set[str]()
-    kinds = {PurePosixPath(one.path).suffix for one in package.interfaces}
-    asked = [name for name in CALLS if f"{name}(" in hint and name not in called]
-    asked = [name for name in asked if OF_FILES.get(name) in {None, *kinds}]
+def commented_calls(
+    package: PackageFacts, lines: Sequence[str], names: Iterable[str]
+) -> dict[str, tuple[int, int]]:
+    """Return of these commands those that are not called, are of files that the package has, and are commented out."""
+    kinds = {None, *(PurePosixPath(one.path).suffix for one in package.interfaces)}
+    asked = [name for name in names if not cmake_calls(package, name) and OF_FILES.get(name) in kinds]
     return {name: place for name in asked if (place := commented_call(lines, name))}
 
 

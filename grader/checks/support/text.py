@@ -144,6 +144,10 @@ def both(python: str, cpp: str) -> str:
     return f"\ue000{python}\ue001{cpp}\ue002"
 
 
+VALUE_SLOT, RATE_SLOT = "\ue003", "\ue004"
+"""Parts of a hint in whose place the judge writes what the lab asks for: a node's text, and the rate of its loop."""
+
+
 def in_language(hint: str, language: Language | None) -> str:
     """Return the hint for a node in this language. None, where it may be either, keeps both."""
     if language is None:

@@ -60,7 +60,7 @@ def fill_template(
     students = [record for record in sheet.records[1:] if _is_student(record)]
     _find_columns(work, named=named)
     work.remarks += _maxima(work, students)
-    theirs = [_identity(record, work) for record in students]
+    theirs = [row_identity(_fields(record, work), work.known) for record in students]
     found = match([entry_identity(mark.entry, platform) for mark in marks], theirs)
     for place, mark in enumerate(marks):
         if place in found.rows:
@@ -75,10 +75,6 @@ def fill_template(
 def _is_student(record: TemplateRow) -> bool:
     values = [record.value(column) for column in range(len(record.cells))]
     return "Points Possible" not in values[0] and not all(_POSTING.fullmatch(value) for value in values)
-
-
-def _identity(record: TemplateRow, work: _Work) -> Identity:
-    return row_identity(_fields(record, work), work.known)
 
 
 def _fields(record: TemplateRow, work: _Work) -> dict[str, str]:

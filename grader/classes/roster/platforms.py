@@ -228,7 +228,10 @@ def unpack_download(path: Path, out: Path) -> Path:
     try:
         with zipfile.ZipFile(path) as download:
             members = [member for member in download.infolist() if not member.is_dir()]
-            if any(member.filename.count("/") <= 1 and _name(member) == "package.xml" for member in members):
+            if any(
+                member.filename.count("/") <= 1 and member.filename.rpartition("/")[2] == "package.xml"
+                for member in members
+            ):
                 raise UsageError(
                     f"{path}: this is one package, not a download of submissions",
                     hint="grader grade takes one submission",
@@ -243,10 +246,6 @@ def unpack_download(path: Path, out: Path) -> Path:
     except OSError as error:
         raise unwritable(out, error) from error
     return folder
-
-
-def _name(member: zipfile.ZipInfo) -> str:
-    return member.filename.rpartition("/")[2]
 
 
 def _digest(members: list[zipfile.ZipInfo]) -> str:

@@ -73,8 +73,7 @@ def batch(
     ] = False,
     static: Annotated[bool, STATIC] = False,
     cluster: Annotated[
-        str | None,
-        Option("--cluster", "ADDRESS", "grade on a Dask cluster: tls://HOST:8786, or local"),
+        str | None, Option("--cluster", "ADDRESS", "grade on a Dask cluster: tls://HOST:8786, or local")
     ] = None,
     cluster_insecure: Annotated[
         bool,
@@ -176,8 +175,7 @@ def review(
         Option("--marker", "NAME", "who reviews, as --author; with --of, only that marker's share"),
     ] = None,
     of: Annotated[
-        str | None,
-        Option("--of", "N|NAMES", "how many markers share the class, or their names: ann,bob,cyd"),
+        str | None, Option("--of", "N|NAMES", "how many markers share the class, or their names: ann,bob,cyd")
     ] = None,
     group: Annotated[str | None, Option("--group", "NAME", "only the submissions of one group")] = None,
     blind: Annotated[

@@ -37,8 +37,7 @@ def publish(
     *,
     folder: Annotated[Path, CLASS],
     only: Annotated[
-        Sequence[str],
-        Option("--only", "ID", "publish only these, even if they are still open"),
+        Sequence[str], Option("--only", "ID", "publish only these, even if they are still open")
     ] = (),
     dry_run: Annotated[
         bool, Flag("--dry-run", "only show what would be published, and what changes")

@@ -168,8 +168,7 @@ def verify(
     results: Annotated[Sequence[Path], RESULTS],
     rubric: Annotated[str | None, RUBRIC] = None,
     allowed_signers: Annotated[
-        Path | None,
-        Option("--allowed-signers", "FILE", "the SSH keys that may have signed, as git has them"),
+        Path | None, Option("--allowed-signers", "FILE", "the SSH keys that may have signed, as git has them")
     ] = None,
     against: Annotated[
         Path | None,

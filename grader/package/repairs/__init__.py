@@ -101,7 +101,7 @@ def apply_repair(folder: Path, repair: Repair) -> None:
     else:
         data = read_data(folder, repair.file)
         if data is None:
-            raise NotRepairable(f"{repair.file} is no file that can be repaired")
+            raise NotRepairable(f"{repair.file} is not a file that can be repaired")
         write_data(folder, repair.file, _repair_bytes(data, repair))
         if repair.kind == "package-name" and repair.file == MANIFEST:
             _rename_package(folder, repair)

@@ -241,7 +241,7 @@ def _correct_include(files: Files) -> None:
         message = (
             f"line {call.line} of {CMAKE}: catkin_package(…) names {folders}, which is not in the package"
         )
-        fix = f"take INCLUDE_DIRS {listed} out" if absent == given else f"take {listed} out of INCLUDE_DIRS"
+        fix = f"remove INCLUDE_DIRS {listed}" if absent == given else f"remove {listed} from INCLUDE_DIRS"
         files.change("build-line", CMAKE, text, message, fix)
         return
 
@@ -308,7 +308,7 @@ def _correct_types(files: Files, package: PackageFacts) -> None:
             )
             if right != field.type and field.line <= len(lines):
                 lines[field.line - 1] = lines[field.line - 1].replace(field.type, right, 1)
-                message = f"line {field.line} of {one.path}: there is no type `{field.type}` of a field"
+                message = f"line {field.line} of {one.path}: there is no field type `{field.type}`"
                 files.change("build-line", one.path, "\n".join(lines), message)
 
 

@@ -36,7 +36,7 @@ class NotRepairable(ValueError):
 
 
 def read_data(folder: Path, file: str) -> bytes | None:
-    """Return a file's bytes; None for what is no regular file inside the folder, or too large."""
+    """Return a file's bytes; None for what is not a regular file inside the folder, or too large."""
     try:
         with _open(folder, file) as stream:
             data = stream.read(TEXT_BYTES_MAX + 1)
@@ -68,7 +68,7 @@ def parts_of(file: str) -> tuple[str, ...]:
     """Return the names on the way to a file. Raises NotRepairable for a path that could lead out of the folder."""
     parts = tuple(file.split("/"))
     if not file or "\0" in file or {"", ".", ".."} & set(parts):
-        raise NotRepairable(f"{file} is no path inside the package")
+        raise NotRepairable(f"{file} is not a path inside the package")
     return parts
 
 
@@ -103,7 +103,16 @@ class Files:
         """Remember a repair that changes no line of a text."""
         self.repairs.append(repair)
 
-    def change(self, kind: RepairKind, file: str, after: str, message: str, fix: str = "") -> None:
+    def change(
+        self,
+        kind: RepairKind,
+        file: str,
+        after: str,
+        message: str,
+        fix: str = "",
+        *,
+        asks_input: bool = False,
+    ) -> None:
         """Remember that the file's text becomes `after`. Without a `fix`, the changed lines say it."""
         file = self._renamed.get(file, file)
         before = self.text(file)
@@ -112,7 +121,8 @@ class Files:
         line, old, new = changed_lines(before, after)
         self._texts[file] = after
         words = {"message": message, "fix": fix or added_lines(old, new)}
-        self.repairs.append(Repair(kind=kind, file=file, line=line, before=old, after=new, **words))
+        made = Repair(kind=kind, file=file, line=line, before=old, after=new, asks_input=asks_input, **words)
+        self.repairs.append(made)
 
 
 def repair_xml(files: Files, file: str, root: str, kind: RepairKind) -> bool:
@@ -218,7 +228,7 @@ def write_data(folder: Path, file: str, data: bytes, *, mode: int | None = None)
     with _opened_parent(folder, file) as (parent, name):
         was = os.stat(name, dir_fd=parent, follow_symlinks=False)
         if not stat.S_ISREG(was.st_mode):
-            raise NotRepairable(f"{file} is no regular file")
+            raise NotRepairable(f"{file} is not a regular file")
         beside = f".{secrets.token_hex(8)}"
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | CLOEXEC | NOFOLLOW | BINARY
         try:
@@ -265,7 +275,7 @@ def rename_file(folder: Path, repair: Repair) -> None:
     """Give a file its name, and write this name where the build files and launch files have the old one."""
     old, new = repair.before, repair.after
     if PurePosixPath(old).parent != PurePosixPath(new).parent:
-        raise NotRepairable(f"{new} lies in another folder")
+        raise NotRepairable(f"{new} is in another folder")
     if HAS_DIR_FD:
         _rename(folder, old, new)
     else:
@@ -277,7 +287,7 @@ def _rename(folder: Path, old: str, new: str) -> None:
     with _opened_parent(folder, old) as (parent, name):
         target = parts_of(new)[-1]
         if not stat.S_ISREG(os.stat(name, dir_fd=parent, follow_symlinks=False).st_mode):
-            raise NotRepairable(f"{old} is no regular file")
+            raise NotRepairable(f"{old} is not a regular file")
         with suppress(FileNotFoundError):
             found = os.stat(target, dir_fd=parent, follow_symlinks=False)
             if not os.path.samestat(found, os.stat(name, dir_fd=parent, follow_symlinks=False)):

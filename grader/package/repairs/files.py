@@ -52,13 +52,15 @@ def _repair_bytes(files: Files, script: SourceFile) -> None:
     if data.startswith(UTF16) or (script.encoding == "unknown-8bit" and as_text(data) is None):
         data = _repair_encoding(files, script, data)
     if data.startswith(BOM) and data[3:5] == b"#!":
-        message = f"{script.path} begins with an invisible byte order mark (BOM), so its first line is no #!"
+        message = (
+            f"{script.path} begins with an invisible byte order mark (BOM), so it does not begin with #!"
+        )
         _add_bytes(
             files, "byte-order-mark", script.path, data, message=message, fix="save it as UTF-8 without BOM"
         )
         data = data.removeprefix(BOM)
     if b"\r\n" in data and (data.startswith(b"#!") or script.path.endswith(".sh")):
-        message = f"the lines of {script.path} end as on Windows (CR LF)"
+        message = f"{script.path} has Windows line endings (CR LF)"
         _add_bytes(files, "line-ends", script.path, data, message=message, fix=f"dos2unix {script.path}")
     text = as_text(data)
     files.put(script.path, text)

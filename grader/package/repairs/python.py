@@ -130,7 +130,8 @@ def _join_steps(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
 def _change(files: Files, file: str, cause: Cause, steps: list[_Step]) -> None:
     kind = KINDS.get(cause, "python-syntax")
     message, fix = _words(file, cause, steps, files.text(file) or "")
-    files.change(kind, file, steps[-1].text, message, fix)
+    asks = any("raw_input" in step.word.split(", ") for step in steps if step.cause == "old-name")
+    files.change(kind, file, steps[-1].text, message, fix, asks_input=asks)
 
 
 def _required_indentation(before: str, after: str, first: str) -> str:
@@ -161,7 +162,7 @@ def _rewritten(before: str, after: str) -> str:
         return ""
     written = [f"in line {number}, write {new}" for number, new in found[1:LINES_SHOWN]]
     left = len(found) - LINES_SHOWN
-    more = f"; {plural(left, 'more line')} alike" if left > 0 else ""
+    more = f"; {plural(left, 'more line')} in the same way" if left > 0 else ""
     return "; ".join([f"write {found[0][1]}", *written]) + more
 
 
@@ -186,7 +187,7 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     return said, fix if cause != "old-name" or word == "raw_input" else ""
 
 
-BELOW = "{place}: `global {word}` stands below a line that uses {word}"
+BELOW = "{place}: `global {word}` comes after a line that uses {word}"
 WORDS: dict[Cause, tuple[str, str]] = {
     "tabs": ("{place}: tabs and spaces are mixed in the indentation", "replace the tabs: "),
     "level": ("{place}: {told}", "change the indentation: "),
@@ -194,8 +195,8 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "commented": ("{place}: {told}", ""),
     "braces": ("{place}: Python has no `{{` and `}}` around a block",
      "end the first line of each block with `:` in place of `{{`, and delete each `}}` that ends a block"),
-    "global": (BELOW, "move `global {names}` up, as the first line of the function, and have it nowhere else in it"),
-    "outside": (BELOW, "take line {line} out: outside of a function `global` does nothing"),
+    "global": (BELOW, "move `global {names}` up, as the first line of the function, and nowhere else in it"),
+    "outside": (BELOW, "delete line {line}: outside a function, `global` does nothing"),
     "old-name": ("{place}: {word} is Python 2",
      "put a value in the code in place of `raw_input(…)`: a node cannot ask for input"),
     "import": ("{place} uses {word}, which is not imported", ""),
@@ -208,6 +209,6 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "guard": ("{place}: `__name__` is never {word!r}", ""),
     "main": ("{place}: nothing calls {calls}", "add `if __name__ == '__main__':`, and {calls} below it"),
     "spin": ("{file} ends as soon as it has subscribed, because nothing keeps it running",
-     "write {word} as the last line of what makes the node"),
+     "write {word} as the last line of the code that makes the node"),
 }  # fmt: skip
 """What is wrong, and how it is repaired, where that is known without Python's own message."""
