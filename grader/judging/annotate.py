@@ -499,17 +499,23 @@ def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | No
     """Return the verdict; one on a package that roslaunch does not find cites the lines of the launch file that name
     it."""
     absent = verdict.sought_name("package")
-    file = find_launch(package, str(criterion.parameters.get("launch", ""))) if package and absent else None
-    if file is None or not verdict.status.is_lost:
+    if package is None or not absent or not verdict.status.is_lost:
         return verdict
+    asked = find_launch(package, str(criterion.parameters.get("launch", "")))
     name = re.compile(rf"""\$\(find\s+{re.escape(absent)}\)|pkg\s*=\s*["']{re.escape(absent)}["']""")
-    lines = [n for n, text in enumerate(build.file_lines(file.path)[:_LINES_READ], 1) if name.search(text)]
-    if not lines:
-        return verdict
-    where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))}"
-    hint = f"write the package's exact name in {where}, push {absent} if it is your own, or remove it"
-    cited = tuple(FileCitation(file=file.path, line=n) for n in lines)
-    return verdict.model_copy(update={"hint": hint, "citations": cited})
+    for file in (
+        (asked,) if asked is not None else package.launch_files
+    ):  # one by another name was judged on a copy
+        lines = [
+            n for n, text in enumerate(build.file_lines(file.path)[:_LINES_READ], 1) if name.search(text)
+        ]
+        if lines:
+            of_file = "" if asked is not None else f" of {file.path}"
+            where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))}{of_file}"
+            hint = f"write the package's exact name in {where}, push {absent} if it is your own, or remove it"
+            cited = tuple(FileCitation(file=file.path, line=n) for n in lines)
+            return verdict.model_copy(update={"hint": hint, "citations": cited})
+    return verdict
 
 
 def cite_name(verdict: Verdict, build: Run) -> Verdict:

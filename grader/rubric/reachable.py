@@ -39,6 +39,7 @@ def reach_faults(
     """Yield what the runs of a rubric's scenarios cannot show."""
     yield from _too_many(rubric, scenarios, checks)
     yield from _too_few(rubric, scenarios)
+    yield from _too_late(scenarios)
     criteria = list(as_maps(rubric.get("criteria")))
     for index, criterion in criteria:
         path, given = ("criteria", index, "with"), as_map(criterion.get("with"))
@@ -109,6 +110,20 @@ def _too_few(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> It
         window_s, rate_hz = until.get("window_s"), given.get("rate_hz")
         if criterion.get("check") == "rate" and is_number(window_s) and is_number(rate_hz):
             yield from (((*path, "rate_hz"), fault) for fault in _seldom(rate_hz, window_s))
+
+
+def _too_late(scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield calls and answers of the grader's that come after the end of the run at its latest."""
+    for name, scenario in scenarios.items():
+        limit_s = as_map(scenario.get("until")).get("limit_s", Until.model_fields["limit_s"].default)
+        if "steps" in scenario or scenario.get("clock") == "warped" or not is_number(limit_s):
+            continue
+        for key in ("calls", "serves"):
+            for index, one in as_maps(scenario.get(key)):
+                delay_s = one.get("delay_s")
+                if is_number(delay_s) and delay_s >= limit_s:
+                    fault = f"that is {delay_s:g} s, and the run is over after {limit_s:g} s (limit_s)"
+                    yield ("scenarios", name, key, index, "delay_s"), fault
 
 
 def _seldom(rate_hz: float, window_s: float) -> Iterator[str]:

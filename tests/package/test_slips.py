@@ -385,3 +385,44 @@ def test_a_name_that_is_not_there_and_one_that_is_spelt_alike(tmp_path, text, to
     (tmp_path / "a.py").write_text(text)
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in ("misspelt", "outside-method")]
     assert [s.fix for s in slips] == told
+
+
+@pytest.mark.parametrize(
+    ("text", "kinds"),
+    [
+        ("def talk():\n    while True:\n        rate.sleep()\n    rate = rospy.Rate(10)\n", {"undefined"}),
+        (
+            "def talk():\n    def hear(msg):\n        pub.publish(msg)\n    pub = rospy.Publisher('a', Int8)\n",
+            set(),
+        ),
+        ("def talk():\n    global rate\n    rate.sleep()\n    rate = rospy.Rate(10)\n", set()),
+        ("def talk(rate):\n    rate.sleep()\n    rate = rospy.Rate(10)\n", set()),
+        (
+            "while not rospy.is_shutdown():\n    rospy.Subscriber('a', Int8, hear)\n    rate.sleep()\n",
+            {"subscribed-again"},
+        ),
+        ("while not rospy.is_shutdown():\n    rospy.Subscriber('a', Int8, hear)\n    rospy.spin()\n", set()),
+        (
+            "def hear(msg):\n    pass\ndef hear(msg):\n    pass\nrospy.Subscriber('a', Int8, hear)\n",
+            {"defined-twice"},
+        ),
+        ("def hear(msg):\n    pass\ndef other(msg):\n    pass\nrospy.Subscriber('a', Int8, hear)\n", set()),
+        (
+            "from rospy import Subscriber\nclass Subscriber:\n    pass\nSubscriber('a', Int8, print)\n",
+            {"defined-twice"},
+        ),
+        ("while rospy.is_shutdown():\n    pub.publish(1)\n", {"loop-left"}),
+        (
+            "while not rospy.is_shutdown():\n    pub.publish(1)\n    if n:\n        rate.sleep()\n",
+            {"sleep-outside"},
+        ),
+        ("while not rospy.is_shutdown():\n    if n:\n        pub.publish(1)\n        rate.sleep()\n", set()),
+    ],
+)
+def test_slips_that_hide_what_was_meant(tmp_path, text, kinds):
+    (tmp_path / "a.py").write_text(text)
+    looked_for = {"subscribed-again", "defined-twice", "loop-left", "sleep-outside"}
+    found = [
+        s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in looked_for or "after it" in s.message
+    ]
+    assert {s.kind for s in found} == kinds

@@ -210,7 +210,7 @@ def assigned_late(tree):
         if not isinstance(function, ast.FunctionDef):
             continue
         taken = {one.arg for one in ast.walk(function.args) if isinstance(one, ast.arg)} | outside
-        names = [n for n in ast.walk(function) if isinstance(n, ast.Name) and n.id not in taken]
+        names = [n for n in walk_own(function) if isinstance(n, ast.Name) and n.id not in taken]
         stored = {}
         for statement in function.body:
             for n in ast.walk(statement):
@@ -228,6 +228,16 @@ def assigned_late(tree):
             message = "line %d, which gives `%s` its value, comes after it" % (given.lineno, n.id)
             fix = "move line %d above line %d" % (given.lineno, above.lineno)
             yield slip(n.lineno, "undefined", message, fix=fix, name=n.id)
+
+
+def walk_own(function):
+    """Yield the nodes that are run when the function is: not those of functions that it defines."""
+    left = list(function.body)
+    while left:
+        node = left.pop()
+        if not isinstance(node, (ast.FunctionDef, ast.Lambda)):
+            yield node
+            left += ast.iter_child_nodes(node)
 
 
 def outside_methods(tree):

@@ -191,7 +191,8 @@ def callbacks(tree):
 def subscribed_again(tree):
     """Yield each `Subscriber(…)` in a loop that goes on until the node ends: it is made anew in each turn."""
     for loop in walk(tree):
-        if isinstance(loop, ast.While) and any(is_call(n, "is_shutdown") for n in ast.walk(loop.test)):
+        endless = isinstance(loop, ast.While) and any(is_call(n, "is_shutdown") for n in ast.walk(loop.test))
+        if endless and not any(is_call(n, "spin") for n in ast.walk(loop)):
             made = next((n for n in ast.walk(loop) if called_name(n) == "Subscriber"), None)
             if made is not None:
                 message = "the loop of line %d makes the Subscriber of line %d again and again"

@@ -241,6 +241,14 @@ def _before_catkin_package(found: re.Match[str], _package: PackageFacts, _lines:
     return Explained(why, f"move {found[1]}(…) above catkin_package(…)")
 
 
+def _late_project(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    """CMake gives a name of its own to what comes before `project(…)`."""
+    call = next(iter(cmake_calls(package, "project")), None)
+    why = f"project(…) comes after {found[1]}(…)" if call else f"there is no project(…) before {found[1]}(…)"
+    fix = f"move project(…) from line {call.line}" if call else f"write project({package.name})"
+    return Explained(why, f"{fix} to right below cmake_minimum_required(…), with find_package(…) next")
+
+
 def _missing_message(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     path = _below(found[1], package)
     return _missing_file(path, package, f"add_{found[2]}_files(…) names {path}")
@@ -506,6 +514,7 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"Could not find messages which '([^']+)' depends on", _message_of_another),
     (r"(Invalid declaration|is not a legal message|InvalidMsgSpec|MsgNotFound)", _no_definition),
     (r"(generate_messages)\(\) must be called before catkin_package\(\)", _before_catkin_package),
+    (r"You must call project\(\) before calling (\w+)\(\)", _late_project),
     (UNKNOWN_COMMAND + r' "(\w+)"', _unknown_command),
     (r"Parse error\.|Error\(s\) in package", _unreadable),
     (r"does not contain a CMakeLists\.txt", _no_cmake_lists),

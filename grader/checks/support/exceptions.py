@@ -289,7 +289,7 @@ def _init_node(message: str, source: str) -> Meaning | None:
     called = next(iter(_calls(source, "init_node")), None)
     if called is not None and len(called.args) > 1 and message == "'bool' object is not iterable":
         flag = called.args[1]
-        cause = "the second value of `init_node(…)` is no flag, unless it has its name"
+        cause = "the second argument of `init_node(…)` is not `anonymous`, unless it says so"
         return cause, rewritten(source, (flag, f"anonymous={ast.unparse(flag)}"))
     if called is None or not called.args or not message.startswith("argument of type"):
         return None
