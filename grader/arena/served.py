@@ -81,7 +81,7 @@ class ServedServices:
         live.answers_s = max(live.answers_s, time.monotonic() + one.delay_s)
         request = self._types[one.name].request.decode(base64.b64decode(fields["data"]))
         response = None if one.fails else one.in_turn[fields["answer"]]
-        detail = f"the request is no {one.type}" if request is None else FAILS if one.fails else ""
+        detail = f"the request is not a {one.type}" if request is None else FAILS if one.fails else ""
         about = {"topic": one.name, "type": one.type, "value": {"request": request, "response": response}}
         event = ActorEvent(action="serve", actor=fields["caller"], **about, detail=detail)
         self._arena.note(event, time_ns)

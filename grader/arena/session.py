@@ -236,7 +236,7 @@ class ArenaSession:
             for frame in self._frames.feed(chunk):
                 self._take(frame)
         except (ValueError, KeyError) as error:
-            self._failure = f"it sent what is no frame: {type(error).__name__}"
+            self._failure = f"it sent something that is not a frame: {type(error).__name__}"
         except Exception as error:  # noqa: BLE001 - the disk, the memory: `wait` raises it where it is heeded
             self._error = error
         if not chunk and not self._done:

@@ -481,7 +481,7 @@ class StepRunner:
             self._answer(call, None, answer["error"])
             return
         value = types.response.decode(base64.b64decode(answer["data"]))
-        self._answer(call, value, "" if value is not None else f"the answer is no {call.type}")
+        self._answer(call, value, "" if value is not None else f"the answer is not a {call.type}")
 
     def _refuse(self, call: Call, text: str | None, error: str, *, fits: bool) -> None:
         """Note a call that cannot be made: by the fault of the student's own definition, or of this machine."""

@@ -260,7 +260,7 @@ def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
     if links:
         path = printable(links[0])
         return (
-            f"{path} is only a pointer to another repository, its files are not in this one: "
+            f"{path} is only a pointer to another repository: its files are not in this one: "
             f"delete {path}/.git, `git rm --cached {path}`, `git add {path}`, commit and push."
         )
     for folder in walk(root, tolerant=True):

@@ -140,7 +140,7 @@ class Git:
                 raise GitTooMuch(said) if _TOO_MUCH.search(said) else GitFailed(said)
             answer = out.read(_ANSWER_BYTES + 1)
         if len(answer) > _ANSWER_BYTES:
-            raise GitTooMuch(f"git {args[0]} has no end")
+            raise GitTooMuch(f"git {args[0]} does not finish")
         return answer
 
     def records(self, *args: str, cwd: Path, repository: Repository) -> Generator[bytes]:
@@ -168,7 +168,7 @@ class Git:
         poll = select.poll()
         poll.register(descriptor, select.POLLIN)
         if not poll.poll(left_s * 1000):
-            raise GitTimeout(f"no end within {min(self.timeout_s, _SILENCE_S):g} s")
+            raise GitTimeout(f"not finished within {min(self.timeout_s, _SILENCE_S):g} s")
         return os.read(descriptor, 1 << 16)
 
     @contextmanager

@@ -60,7 +60,7 @@ def parse_source(text: str) -> Source:
     Raises UsageError for what is neither there nor a git URL, SubmissionError for what cannot be a source.
     """
     if len(text) > _LONGEST:
-        raise UsageError(f"a SOURCE of {len(text)} letters is longer than any path or address", hint=_SOURCES)
+        raise UsageError(f"a SOURCE of {len(text)} characters is longer than any path or address", hint=_SOURCES)
     local = _existing(text)
     if local is not None:
         return _local(local, None, text)
@@ -137,7 +137,7 @@ def _local(path: Path, ref: str | None, text: str, *, clone: bool = False) -> So
             return Source(kind="folder", given=given, name=_folder_name(path), path=path)
         return _local_repository(path, ref, given)
     if not path.is_file():
-        what = "is a link to what is not there" if path.is_symlink() else "is no folder and no file"
+        what = "is a link to a file that does not exist" if path.is_symlink() else "is neither a folder nor a file"
         raise SubmissionError(f"{given} {what}", hint=_SOURCES)
     if ref is not None:
         raise UsageError(f"{printable(path.name)} is a file: only a repository has @{ref}", hint=_SOURCES)
@@ -151,8 +151,8 @@ def _local_repository(path: Path, ref: str | None, given: str) -> Source:
     top = path if _is_git_folder(path) else next(around, None)
     if top is None:
         raise SubmissionError(
-            f"{given}: {printable(str(path))} is no git repository",
-            hint="Give a folder that is no repository by its plain path, without file:// and without @.",
+            f"{given}: {printable(str(path))} is not a git repository",
+            hint="Give a folder that is not a repository by its plain path, without file:// and without @.",
         )
     inside = path.relative_to(top).as_posix()
     return Source(
@@ -180,7 +180,7 @@ def _folder_name(path: Path) -> str:
 def _from_url(text: str, match: re.Match[str]) -> Source:
     scheme, authority, path = match["scheme"].lower(), match["authority"], match["path"] or ""
     if scheme not in _SCHEMES:
-        raise UsageError(f"{scheme}:// is no address of a git repository", hint=_SOURCES)
+        raise UsageError(f"{scheme}:// is not the address of a git repository", hint=_SOURCES)
     if scheme == "file" and authority in ("", "localhost"):
         return _from_file_url(path, text)
     if scheme == "file" or authority.startswith("-"):

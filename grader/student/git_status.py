@@ -169,7 +169,7 @@ class _Advice:
             text = f"{number} of the package {verb} not in git: {listing(list(files.untracked))}"
             yield Point(kind="untracked", text=text, fix=commands.add_and_commit(files.untracked))
         if files.pointers:
-            text = f"Of {listing(list(files.pointers))} git has only a pointer to another repository, not the files."
+            text = f"git has only a pointer to another repository for {listing(list(files.pointers))}, not the files."
             yield Point(kind="untracked", text=text, fix=commands.git("submodule", "status"))
         if files.ignored:
             text = f"A .gitignore file keeps out of git what the package uses: {listing(list(files.ignored))}"

@@ -169,7 +169,7 @@ def test_the_column_ref_and_the_ref_of_the_source(server):
         server.obtain(ref="--upload-pack=x")
     with pytest.raises(UsageError, match="only a repository has"):
         server.obtain(str(lab_zip(server.base / "a.zip")), ref="main")
-    with pytest.raises(SubmissionError, match="no git repository"):
+    with pytest.raises(SubmissionError, match="not a git repository"):
         server.obtain(str(write(server.base / "plain", lab())), ref="main")
 
 

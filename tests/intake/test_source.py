@@ -108,7 +108,7 @@ def test_a_local_repository_with_a_ref(folder, ref, tmp_path):
 
 def test_a_ref_asks_for_a_repository(tmp_path):
     write(tmp_path, {"plain/x": "", "lab1.zip": ""})
-    with pytest.raises(SubmissionError, match="no git repository"):
+    with pytest.raises(SubmissionError, match="not a git repository"):
         parse_source(f"{tmp_path}/plain@v1")
     with pytest.raises(UsageError, match="only a repository has"):
         parse_source(f"{tmp_path}/lab1.zip@v1")
@@ -124,7 +124,7 @@ def test_file_addresses(tmp_path):
     with pytest.raises(SubmissionError, match="no such folder"):
         parse_source(f"file://{tmp_path}/nowhere")
     write(tmp_path / "plain", lab())
-    with pytest.raises(SubmissionError, match="no git repository"):
+    with pytest.raises(SubmissionError, match="not a git repository"):
         parse_source(f"file://{tmp_path}/plain")
 
 
@@ -168,5 +168,5 @@ def test_a_folder_as_what_is_committed_there(tmp_path):
     repo = repository(tmp_path / "repo", lab())
     source = as_repository(parse_source(str(repo)))
     assert (source.kind, source.ref, source.given, source.top) == ("repository", None, str(repo), repo)
-    with pytest.raises(SubmissionError, match="no git repository"):
+    with pytest.raises(SubmissionError, match="not a git repository"):
         as_repository(parse_source(str(write(tmp_path / "plain", lab()))))

@@ -133,7 +133,7 @@ def test_a_port_in_use_is_said_in_one_line(server, out, capsys) -> None:
 
 def test_a_folder_without_a_batch(tmp_path, capsys) -> None:
     assert run(["review", str(tmp_path), "--no-browser"]) == 2
-    assert "no batch has been here" in capsys.readouterr().err
+    assert "no batch was graded here" in capsys.readouterr().err
 
 
 def test_a_rubric_that_has_changed_since(out, tmp_path, capsys) -> None:

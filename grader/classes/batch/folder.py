@@ -152,7 +152,7 @@ def open_batch(folder: Path) -> BatchFolder:
         return BatchFolder(folder, BatchRun.read_json(data))
     except FileNotFoundError as error:
         raise UsageError(
-            f"{folder}: no batch has been here: there is no {RUN}", hint="give the --out of `grader batch`"
+            f"{folder}: no batch was graded here: there is no {RUN}", hint="give the --out of `grader batch`"
         ) from error
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from error

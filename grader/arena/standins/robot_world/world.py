@@ -31,7 +31,7 @@ def read_plan(path, parse):
     path = Path(path)
     plan = parse(path.read_text())
     if not isinstance(plan, dict) or not {"walls", "boxes", "image"} & set(plan):
-        raise ValueError(f"{path}: neither walls, boxes nor the image of a map")
+        raise ValueError(f"{path}: neither walls nor boxes nor the image of a map")
     walls = walls_of(plan.get("walls", []), plan.get("boxes", []))
     if "image" in plan:
         rows = read_pgm((path.parent / str(plan["image"])).read_bytes())
@@ -48,15 +48,15 @@ def read_pgm(data):
         while end < len(data) and not data[end : end + 1].isspace():
             end += 1
         if end == place:
-            raise ValueError("the picture is cut short")
+            raise ValueError("the image is cut short")
         fields.append(data[place:end])
         place = end
     kind, (width, height, white) = fields[0], (int(field) for field in fields[1:])
     if kind not in (b"P2", b"P5") or not 0 < width * height <= PIXELS_MAX or not 0 < white < 256:
-        raise ValueError("no PGM picture of 8 bits a pixel, or a larger one than four million pixels")
+        raise ValueError("not an 8-bit PGM image, or one of more than four million pixels")
     values = data[place + 1 :] if kind == b"P5" else [int(field) for field in data[place:].split()]
     if len(values) < width * height:
-        raise ValueError("the picture is cut short")
+        raise ValueError("the image is cut short")
     return [[value / white for value in values[row * width : (row + 1) * width]] for row in range(height)]
 
 
