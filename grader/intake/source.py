@@ -60,7 +60,9 @@ def parse_source(text: str) -> Source:
     Raises UsageError for what is neither there nor a git URL, SubmissionError for what cannot be a source.
     """
     if len(text) > _LONGEST:
-        raise UsageError(f"a SOURCE of {len(text)} characters is longer than any path or address", hint=_SOURCES)
+        raise UsageError(
+            f"a SOURCE of {len(text)} characters is longer than any path or address", hint=_SOURCES
+        )
     local = _existing(text)
     if local is not None:
         return _local(local, None, text)
@@ -137,7 +139,11 @@ def _local(path: Path, ref: str | None, text: str, *, clone: bool = False) -> So
             return Source(kind="folder", given=given, name=_folder_name(path), path=path)
         return _local_repository(path, ref, given)
     if not path.is_file():
-        what = "is a link to a file that does not exist" if path.is_symlink() else "is neither a folder nor a file"
+        what = (
+            "is a link to a file that does not exist"
+            if path.is_symlink()
+            else "is neither a folder nor a file"
+        )
         raise SubmissionError(f"{given} {what}", hint=_SOURCES)
     if ref is not None:
         raise UsageError(f"{printable(path.name)} is a file: only a repository has @{ref}", hint=_SOURCES)

@@ -9,6 +9,7 @@ gives the shares of points that were earned on the copy. `repairs_of` says what 
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from graphlib import TopologicalSorter
@@ -262,10 +263,8 @@ def _charges(
             new = _words(repair.after) - _words(repair.before)
             asking = [c for c in asking if c.id in better or new & _words(first[c.id].message)]
         asking = [c for c in asking if _names(c, repair)] or asking
-        place = (repair.file, repair.line)
-        asking = [c for c in asking if place in cited_lines(first[c.id].citations)] or asking
         if asking:
-            charges[repair] = {asking[0].id}
+            charges[repair] = {min(asking, key=lambda c: _lines_away(first[c.id], repair)).id}
             continue
         possible = [c for c in criteria if repair in needs[c.id]]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
@@ -275,6 +274,15 @@ def _charges(
         charges[repair] = set((counting if named else other or counting)[:1])
         misnamed |= charges[repair] if named else set()
     return charges
+
+
+def _lines_away(found: Verdict, repair: Repair) -> float:
+    """Return how far the nearest line that a verdict cites is from the repaired one. The line below which a call that
+    is missing goes is no fault."""
+    if repair.line is None or found.sought_name("call") or found.sought_name("below"):
+        return math.inf
+    lines = [line for file, line in cited_lines(found.citations) if file == repair.file]
+    return min((abs(line - repair.line) for line in lines), default=math.inf)
 
 
 def _cites(found: Verdict | CriterionResult, repair: Repair) -> bool:
