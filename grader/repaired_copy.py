@@ -58,13 +58,7 @@ def choose_repairs(
     blocked = [c for c in of_files if by_id[c.id].blocked_by or c.check == BUILD or is_unmade(by_id[c.id])]
     if not lost and not blocked:
         return (), ()
-    found = list(find_repairs(submission.package.folder, facts, wanted_of(rubric)))
-    for package, own in zip(submission.also, facts.also, strict=True):
-        way = facts.way_to(own)
-        found += [
-            one.with_paths(partial(posixpath.join, way))
-            for one in find_repairs(package.folder, own, wanted_of(rubric, own.asked))
-        ]
+    found = _find_in_all(submission, facts, rubric)
     typed = any(step.type is not None for scenario in rubric.scenarios.values() for step in scenario.steps)
     counting = [one for one in found if rubric.share_of(one.kind) > 0 and (typed or not one.asks_input)]
     built, launched = built or not needs_build(facts), launched_in(facts)
@@ -90,6 +84,18 @@ def choose_repairs(
     made = {c.mistake.name for c in criteria if c.mistake is not None and is_unmade(c)}
     before = [one for one in counting if one.kind in DONE_BEFORE_RUNS and one.file not in made]
     return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios or unblocks else ((), ())
+
+
+def _find_in_all(submission: Submission, facts: PackageFacts, rubric: Rubric) -> list[Repair]:
+    """Return the repairs of all of the lab's packages, with paths from the main one."""
+    found = list(find_repairs(submission.package.folder, facts, wanted_of(rubric)))
+    for package, own in zip(submission.also, facts.also, strict=True):
+        way = facts.way_to(own)
+        found += [
+            one.with_paths(partial(posixpath.join, way))
+            for one in find_repairs(package.folder, own, wanted_of(rubric, own.asked))
+        ]
+    return found
 
 
 @contextmanager

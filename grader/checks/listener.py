@@ -88,12 +88,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
         message = "it prints so many numbers that there is no telling which of them it heard"
         verdict = failed(message, hint="print each number once, in the callback")
     elif missing:
-        verdict = (
-            _other_words(probes, missing, lines, params)
-            or _likely_reason(package, run, probes, missing, lines)
-            or _some_in_other_words(probes, missing, lines, params)
-            or _by_number(probes, missing, lines, _print_in_comment(package, run))
-        )
+        verdict = _judge_missing(package, run, probes, missing, params)
     elif not in_order(places):
         message = f"what came on {params.topic} is printed, but not in the order in which it was sent"
         verdict = failed(message, hint="print in the callback itself, not later from a variable").once()
@@ -194,16 +189,24 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))
 
 
-def _likely_reason(
-    package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]
-) -> Verdict | None:
+def _judge_missing(
+    package: PackageFacts,
+    run: Run,
+    probes: Sequence[Probe],
+    missing: Sequence[Probe],
+    params: HearsParams,
+) -> Verdict:
     """Some or all of what was sent was not printed: the likeliest reason that shows."""
+    lines = printed_lines(run)
     return (
-        _judge_error(package, run)
+        _other_words(probes, missing, lines, params)
+        or _judge_error(package, run)
         or _some_numbers(probes, missing, lines)
         or _subscribed_again(package, run, probes, missing)
         or _only_again(probes, missing)
         or _waiting(package, run, probes, missing)
+        or _some_in_other_words(probes, missing, lines, params)
+        or _by_number(probes, missing, lines, _print_in_comment(package, run))
     )
 
 
@@ -260,7 +263,7 @@ def _only_again(probes: Sequence[Probe], missing: Sequence[Probe]) -> Verdict | 
 def _subscribed_again(
     package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe]
 ) -> Verdict | None:
-    """Some were lost while a loop made the Subscriber anew in each of its turns."""
+    """Some were lost while a loop made another Subscriber in each turn."""
     slip = run_slip(package, run, "subscribed-again")
     if slip is None:
         return None

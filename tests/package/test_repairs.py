@@ -414,6 +414,22 @@ def test_a_mistake_is_found_and_repaired(name: str, tmp_path: Path) -> None:
         assert part.encode() in (folder / path).read_bytes()
 
 
+def test_files_that_several_calls_name_without_their_folder(tmp_path: Path) -> None:
+    calls = "add_executable(one one.cpp)\ntarget_link_libraries(one ${catkin_LIBRARIES})\nadd_library(two two.cpp)\n"
+    folder = package(
+        tmp_path,
+        {
+            **swapped(CMAKELISTS, ("catkin_package()\n", f"catkin_package()\n{calls}")),
+            "src/one.cpp": "int main() {}\n",
+            "src/two.cpp": "int two() { return 2; }\n",
+        },
+    )
+    assert [repair.kind for repair in repair_all(folder)] == ["build-line"] * 2
+    text = (folder / CMAKELISTS).read_text()
+    assert "add_executable(one src/one.cpp)\n" in text
+    assert "add_library(two src/two.cpp)\n" in text
+
+
 def test_lines_that_may_be_meant_otherwise_are_left_alone(tmp_path: Path) -> None:
     folder = package(
         tmp_path, swapped(TALKER, ("        publisher.publish(1)", "    publisher.publish(1)\n     x = 1"))

@@ -189,7 +189,7 @@ def callbacks(tree):
 
 
 def subscribed_again(tree):
-    """Yield each `Subscriber(…)` in a loop that goes on until the node ends: it is made anew in each turn."""
+    """Yield each `Subscriber(…)` in a loop that runs until the node ends: each turn makes another one."""
     for loop in walk(tree):
         endless = isinstance(loop, ast.While) and any(is_call(n, "is_shutdown") for n in ast.walk(loop.test))
         if endless and not any(is_call(n, "spin") for n in ast.walk(loop)):

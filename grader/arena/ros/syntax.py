@@ -135,12 +135,13 @@ def parse_lines(lines):
 
 def first_version(lines):
     """Return the lines with those blank that git's merge markers give for the other version, and the markers."""
-    kept, version = [], 0
+    kept, is_other, is_open = [], False, False
     for line in lines:
         marker = MARKER.match(line)
         if marker:
-            version = {"<": 1, "=": 2 * (version == 1), ">": 0, "|": 2}[line[0]]
-        kept.append("" if marker or version == 2 else line)
+            is_open = line[0] != ">" and (is_open or line[0] == "<")
+            is_other = is_open and line[0] != "<"
+        kept.append("" if marker or is_other else line)
     return kept
 
 

@@ -391,11 +391,8 @@ def refusal(run: Run, package: PackageFacts | None = None) -> Absence | None:
 
 def _file_meant(package: PackageFacts, name: str) -> str:
     """Return the path of the only file of that kind, or of the one that is spelt alike; "" for none."""
-    names = {
-        n: p
-        for n, p in paths_by_name(package).items()
-        if PurePosixPath(n).suffix == PurePosixPath(name).suffix
-    }
+    kind = PurePosixPath(name).suffix
+    names = {n: p for n, p in paths_by_name(package).items() if PurePosixPath(n).suffix == kind}
     near = near_names(name, names) or (tuple(names) if len(names) == 1 else ())
     return names[near[0]] if near else ""
 

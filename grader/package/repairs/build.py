@@ -459,7 +459,7 @@ def _install(files: Files, package: PackageFacts, wanted: Wanted) -> None:
 def _correct_paths(files: Files, package: PackageFacts) -> None:
     """Of files that a call names and that lie elsewhere in the package, each by its name alone: where they lie."""
     own = [f.path for f in package.files if is_own(f.path)]
-    for call in _commands(files, INSTALL, "add_executable", "add_library"):
+    for call in reversed(_commands(files, INSTALL, "add_executable", "add_library")):  # places above stay
         moved: list[tuple[Token, str]] = []
         for token in _words(call):
             path = PurePosixPath(_plain(token.value))
