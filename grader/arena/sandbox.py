@@ -298,7 +298,7 @@ def refused_limits() -> str:
 
 
 def why_no_sandbox() -> str:
-    """Return why to go without a sandbox, in one line; "" where the sandbox and the arena's own network work.
+    """Return why to go without a sandbox, on one line; "" where the sandbox and the arena's own network work.
 
     Raises SandboxMissing where that is not known.
     """

@@ -129,7 +129,7 @@ class Wrong(NamedTuple):
 
 def _respell(call: CMakeCall, name: str) -> Wrong:
     why = f"line {call.line}: there is no command {call.name}(…)"
-    return Wrong(why, f"write {name} for {call.name}", call.line)
+    return Wrong(why, f"write {name} instead of {call.name}", call.line)
 
 
 def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
@@ -165,7 +165,7 @@ def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
 
 def _below(call: CMakeCall | None) -> str:
     """Return where a new call goes: below this one, which may go on over several lines."""
-    return f" below the {call.name}(…) of line {call.line}" if call else ""
+    return f" below the {call.name}(…) on line {call.line}" if call else ""
 
 
 def _first(facts: CMakeFacts, name: str) -> CMakeCall | None:

@@ -117,7 +117,7 @@ def definition(package: PackageFacts, params: DefinitionParams) -> Verdict:
 def _fixes(faults: list[_Fault]) -> Iterator[str]:
     """Yield each fix once, with its line where there are several."""
     for fault in dict.fromkeys(faults):
-        yield f"in line {fault.line}, {fault.hint}" if fault.line and len(faults) > 1 else fault.hint
+        yield f"on line {fault.line}, {fault.hint}" if fault.line and len(faults) > 1 else fault.hint
 
 
 def _words(fields: Iterator[InterfaceField] | list[InterfaceField] | tuple[InterfaceField, ...]) -> str:

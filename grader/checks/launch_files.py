@@ -108,7 +108,7 @@ def _with_next(verdict: Verdict, package: PackageFacts, params: LaunchXmlParams)
     if not slips:
         return verdict
     message = f"{verdict.message}; with that repaired, {'; '.join(f'line {s.line}: {s.why}' for s in slips)}"
-    hint = "; then ".join((verdict.hint, *dict.fromkeys(f"in line {s.line} {s.fix}" for s in slips)))
+    hint = "; then ".join((verdict.hint, *dict.fromkeys(f"on line {s.line} {s.fix}" for s in slips)))
     cited = tuple(FileCitation(file=s.file, line=s.line) for s in slips)
     return verdict.model_copy(
         update={"message": message, "hint": hint, "citations": (*verdict.citations, *cited)}
@@ -185,15 +185,15 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     commented = (line for kind, line in file.commented if kind in {name, PurePosixPath(name).stem})
     if line := next(commented, None):
         cited = (FileCitation(file=file.path, line=line),)
-        message = f"{message}: the one in line {line} is in a comment, which roslaunch skips"
+        message = f"{message}: the one on line {line} is in a comment, which roslaunch skips"
         kind = "" if (name, line) in file.commented else f', and write type="{name}" in it'
-        hint = f"take the <node> of line {line} out of the comment: remove `<!--` before it and `-->` after it{kind}"
+        hint = f"take the <node> on line {line} out of the comment: remove `<!--` before it and `-->` after it{kind}"
         return failed(message, hint=hint, citations=cited)
     if off := next(
         (one for one in file.switched_off if PurePosixPath(one[0]).stem == PurePosixPath(name).stem), None
     ):
         cited = (FileCitation(file=file.path, line=off[1]),)
-        message = f"{message}: {off[2]} in line {off[1]} leaves the one that is there out"
+        message = f"{message}: {off[2]} on line {off[1]} leaves the one that is there out"
         hint = f"remove {off[2]} from line {off[1]}, or give its <arg> the other default"
         return failed(message, hint=hint if "$(arg" in off[2] else hint.partition(",")[0], citations=cited)
     swapped = next(
@@ -201,14 +201,14 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     )
     if swapped is not None:
         cited = (FileCitation(file=file.path, line=swapped.line),)
-        message = f"{message}: in line {swapped.line}, pkg and type are swapped"
+        message = f"{message}: on line {swapped.line}, pkg and type are swapped"
         return failed(
-            message, hint=f'write pkg="{pkg}" type="{name}" in line {swapped.line}', citations=cited
+            message, hint=f'write pkg="{pkg}" type="{name}" on line {swapped.line}', citations=cited
         )
     unknown = (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node")
     for tag, line in unknown:
         cited = (FileCitation(file=file.path, line=line),)
-        message = f"{message}: roslaunch skips the tag <{tag}> of line {line}"
+        message = f"{message}: roslaunch skips the tag <{tag}> on line {line}"
         hint = "the tag is <node …>, in lower case"
         if tag == "node":
             message = f"{message}, which stands inside of another <node>"
@@ -406,7 +406,7 @@ def _unread_variable(package: PackageFacts, build: Run, file: LaunchFile, params
             if assigned and re.match(rf"\s*{re.escape(params.program)}\b", line):
                 right = value_given(line.strip(), assigned[-1])
                 why = f"it is not given the value of {assigned[-1]}"
-                return Slip(path, number, why, f"in line {number}, write `{right}`") if right else None
+                return Slip(path, number, why, f"on line {number}, write `{right}`") if right else None
     return None
 
 

@@ -160,7 +160,7 @@ def _other_tag(
         if tag is not None and name in line:
             why = f"<{tag[1]}> does not load {params.file}"
             right = f'<rosparam file="$(find {package.name})/{params.file}" command="load"/>'
-            return Slip(file.path, number, why, f"in line {number}, write `{right}`").verdict()
+            return Slip(file.path, number, why, f"on line {number}, write `{right}`").verdict()
     return None
 
 

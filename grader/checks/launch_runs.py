@@ -380,11 +380,11 @@ def _find_unnamed(
 def _other_type(file: LaunchFile, node: LaunchNode, name: str, params: LaunchRunsParams) -> Verdict:
     """Return the loss by a `type` that is not quite that of the program, with wrong values of parameters behind it."""
     lines = (
-        f'in line {one.line} write value="{params.params[key]}" for {key}'
+        f'on line {one.line} write value="{params.params[key]}" for {key}'
         for one in file.params
         if (key := one.name.rpartition("/")[2]) in params.params and one.value != str(params.params[key])
     )
-    fix = "; then ".join([f'in line {node.line} write type="{name}"', *lines])
+    fix = "; then ".join([f'on line {node.line} write type="{name}"', *lines])
     return Slip(node.file, node.line, f'{node.pkg} has no program "{node.type}"', fix).verdict()
 
 
@@ -401,7 +401,7 @@ def _twins(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
         lines = (spaces[0].line, first.line)
         cited = tuple(FileCitation(file=node.file or file.path, line=line) for line in lines)
         message = f"two nodes are called {node.full_name} (lines {first.line} and {node.line} of {file.path})"
-        hint = f'in line {lines[0]}, write ns="{lacking[0].rpartition("/")[0].strip("/")}"'
+        hint = f'on line {lines[0]}, write ns="{lacking[0].rpartition("/")[0].strip("/")}"'
         return failed(f"{message}, and roslaunch starts nothing", hint=hint, citations=cited)
     return None
 
@@ -536,7 +536,7 @@ def _named_in_scripts(
     renaming = find_renaming(package, nodes, topic, in_scripts=False)
     lines = join_words(f"line {one.line} of {one.file}" for one in named)
     hint = (
-        f"write {topic.lstrip('/')} in {lines}, not {join_words(dict.fromkeys(one.message for one in named))}"
+        f"write {topic.lstrip('/')} on {lines}, not {join_words(dict.fromkeys(one.message for one in named))}"
     )
     if renaming is not None:
         hint = f"{hint}; then in {file.path} {renaming.fix}"

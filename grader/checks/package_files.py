@@ -360,7 +360,7 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     misspelt = [d for d in found.dependencies if d.kind in RUNTIME_KINDS and d.name in near]
     hint = f"add {' '.join(f'<{tag}>{n}</{tag}>' for n in missing)} below line {last}"
     if len(missing) == len(misspelt) == 1:
-        hint = f"write {missing[0]} for {misspelt[0].name} in line {misspelt[0].line}"
+        hint = f"write {missing[0]} instead of {misspelt[0].name} on line {misspelt[0].line}"
         lines = (FileCitation(file=found.file, line=misspelt[0].line),)
     verdict = failed(
         f"{found.file} does not declare {join_words(missing)} as a run-time dependency{slip or only}",

@@ -207,9 +207,9 @@ def _given_twice(name: str, path: str, keys: tuple[Key, ...]) -> Verdict | None:
         return None
     first, *_, second = lines[above]
     last = above.rpartition("/")[2]
-    where = f"in line {first} and again in line {second}"
+    where = f"on line {first} and again on line {second}"
     message = f"{path} has `{last}:` {where}, and only the last one counts: there is no {name}"
-    hint = f"delete line {second}, and put what stands below it under the `{last}:` of line {first}"
+    hint = f"delete line {second}, and put what stands below it under the `{last}:` on line {first}"
     return failed(message, hint=hint, citations=(FileCitation(file=path, line=second),))
 
 
@@ -228,7 +228,7 @@ def _duplicate_advice(path: str, keys: tuple[Key, ...]) -> str:
         return ""
     name, lines = twice
     return (
-        f"{path} gives {name} in line {lines[0]} and again in line {lines[-1]}, and only the last one counts"
+        f"{path} gives {name} on line {lines[0]} and again on line {lines[-1]}, and only the last one counts"
     )
 
 
@@ -240,8 +240,8 @@ def _column(name: str, shallow: str, keys: tuple[Key, ...]) -> str:
     parent = above.rpartition("/")[2]
     if beside is None:
         return f"indent {last} by two spaces more than {parent}, below it"
-    where = f"in line {own.line} " if own else ""
-    neighbour = f"{beside.path.rpartition('/')[2]} in line {beside.line}"
+    where = f"on line {own.line} " if own else ""
+    neighbour = f"{beside.path.rpartition('/')[2]} on line {beside.line}"
     return f"indent {last} {where}by {plural(beside.indent, 'space')}, as {neighbour}, so that it is below {parent}"
 
 

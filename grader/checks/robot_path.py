@@ -326,6 +326,6 @@ def _after(path: Sequence[Pose], pose: Pose) -> str:
 
 
 def measured(path: Sequence[Pose], course: Course, way: Way) -> str:
-    """Return the figures of a path in one line."""
+    """Return the figures of a path on one line."""
     off = metres(course.off_m) if course.strayed is None else metres(_peak(path, way, course)[1])
     return f"{off} off at most, {metres(length_m(path))} long, {course.reached} of {len(way.points)} points"

@@ -221,7 +221,7 @@ def offers(run: Run) -> dict[str, Offer]:
 
 
 def described(found: Mapping[str, Offer]) -> str:
-    """Return all services in one line."""
+    """Return all services on one line."""
     return (
         join_words(f"{name} ({offer.type or 'type unknown'})" for name, offer in found.items())
         or "no service"

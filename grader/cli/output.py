@@ -60,7 +60,7 @@ def guarded(command: Callable[[], int], *, debug: bool) -> int:
         _trace(debug)
         report(error)
         return error.exit_code
-    except Exception as error:  # noqa: BLE001 - the last place: no caller could show it in one line
+    except Exception as error:  # noqa: BLE001 - the last place: no caller could show it on one line
         _trace(debug)
         _say(f"grader: internal error: {type(error).__name__}: {_line(error)}{'' if debug else DEBUG_HINT}")
         return ExitCode.NOT_GRADED

@@ -62,7 +62,7 @@ _DAMAGE = (
 def load_run(source: Path | BinaryIO, budget: MemoryBudget | None = None) -> Run:
     """Read one recorded run. A file without the grader's metadata is a real-time run named after the file.
 
-    `budget` is shared with what is loaded beside it. Raises EvidenceError, in one line that names the file, for
+    `budget` is shared with what is loaded beside it. Raises EvidenceError, on one line that names the file, for
     whatever cannot be read to its end.
     """
     budget = budget or MemoryBudget()
@@ -168,7 +168,7 @@ def _damage(stream: BinaryIO) -> tuple[str, str]:
 
 
 def _first(error: ValidationError) -> str:
-    """Return the first of pydantic's errors in one line."""
+    """Return the first of pydantic's errors on one line."""
     fault = error.errors(include_url=False, include_input=False)[0]
     place = ".".join(str(part) for part in fault["loc"])
     return f"{error.title}{'.' + place if place else ''}: {fault['msg']}"

@@ -268,17 +268,17 @@ class Later:
     def _rate(self) -> Iterator[str]:
         hz, numbers = float(str(self._wanted["rate_hz"])), self._of("rate-number")
         if len(numbers) == 1 and abs(float(numbers[0].message) - hz) > RATE_SHARE * hz:
-            yield f"make it {significant(hz)} Hz in {_line(numbers[0])}, which asks for {numbers[0].message} Hz"
+            yield f"make it {significant(hz)} Hz on {_line(numbers[0])}, which asks for {numbers[0].message} Hz"
         for slip in self._of("not-called"):
             if "sleep" in slip.name:
-                yield f"in {_line(slip)}, {slip.fix}"
+                yield f"on {_line(slip)}, {slip.fix}"
 
     def _node_name(self) -> Iterator[str]:
         own, names = self._of("node-name"), list(texts_in(self._wanted.get("names")))
         if self._ran or len(own) != 1 or not names or f"init_node('{names[0]}'" in self._verdict.hint:
             return
         if own[0].message.lstrip("/") not in names:
-            yield f"name the node {names[0]} in {_line(own[0])}, not {own[0].message}"
+            yield f"name the node {names[0]} on {_line(own[0])}, not {own[0].message}"
         if own[0].name == "anonymous" and self._wanted.get("anonymous") == "forbidden":
             yield f"remove anonymous=True from {_line(own[0])}"
 
@@ -287,13 +287,13 @@ class Later:
         twice = {PurePosixPath(one).name for one in started if one and started.count(one) > 1}
         for slip in self._of("node-name"):
             if PurePosixPath(slip.file).name in twice and not slip.name:
-                yield f"write anonymous=True in {_line(slip)}, since two of it run at once"
+                yield f"write anonymous=True on {_line(slip)}, since two of it run at once"
 
     def _published(self) -> Iterator[str]:
         published, kind = self._of("publisher"), str(self._wanted.get("type", ""))
         lines = [one.line for one in published if f"/{one.message.lstrip('/')}" == self._topic]
         if len(published) == 1 and not lines and not self._ran:
-            yield f"publish on {self._topic} in {_line(published[0])}, not on {published[0].message}"
+            yield f"publish on {self._topic} on {_line(published[0])}, not on {published[0].message}"
         if len(published) > 1 and not lines:
             names = join_words(f"{one.message} (line {one.line})" for one in published[:NAMES_SHOWN])
             yield f"publish {kind} on {self._topic}: {published[0].file} publishes on {names}"
@@ -310,7 +310,7 @@ class Later:
         own = sent[0].rpartition("/")[2] if sent else ""
         elsewhere = len(heard) == 1 and f"/{heard[0].message.lstrip('/')}" != self._topic
         if elsewhere and not self._ran:
-            yield f"subscribe to {self._topic} in {_line(heard[0])}, not to {heard[0].message}"
+            yield f"subscribe to {self._topic} on {_line(heard[0])}, not to {heard[0].message}"
         other = sent and len(types) == 1 and types[0].message != own
         if other and (elsewhere or (not heard and f"/{types[0].message}" not in self._verdict.message)):
             yield self._retype("subscribe with", sent[0], types[0])
@@ -320,14 +320,14 @@ class Later:
         if not unheard or template == VALUE or any(says(one.message, template) for one in said):
             return
         if len(said) == 1 >= len({one.line for one in heard}):  # else it may be another callback
-            yield f"print '{in_words(template)}' in {_line(said[0])}, not '{in_source(said[0].message)}'"
+            yield f"print '{in_words(template)}' on {_line(said[0])}, not '{in_source(said[0].message)}'"
         elif self._lacks_words(template.partition(VALUE)[0]):
             yield f"print '{in_words(template)}'"
         elif other and not said and len(self._of("prints")) == 1:  # a field that the right type does not have
-            yield f"print the `data` of the message in {_line(self._of('prints')[0])}"
+            yield f"print the `data` of the message on {_line(self._of('prints')[0])}"
 
     def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> str:
-        fault = f"{verb} {wanted} in {_line(slip)}, not {slip.message}"
+        fault = f"{verb} {wanted} on {_line(slip)}, not {slip.message}"
         self.retyped[fault] = wanted, slip.message
         return fault
 
@@ -352,21 +352,21 @@ class Later:
             return
         text = said[0].message
         if text in {SAID_VALUE, SAID_DATA} and self._lacks_words(template.partition(SECONDS)[0]):
-            yield f"publish `{code}` in {_line(said[0])}"
+            yield f"publish `{code}` on {_line(said[0])}"
         if len(self._of("publisher")) > 1:  # it may be another topic's
             yield f"publish `{code}`"
             return
         sample = template.replace(SECONDS, "1234567890.25")
         if not could_say(text, sample):
             words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code
-            yield f"publish `{words}` in {_line(said[0])}, not '{in_source(text)}'"
+            yield f"publish `{words}` on {_line(said[0])}, not '{in_source(text)}'"
         elif SECONDS in template and self._of("no-clock"):
-            yield f"publish the time in {_line(said[0])}, `{code}`: the script only counts"
+            yield f"publish the time on {_line(said[0])}, `{code}`: the script only counts"
 
     def _logged(self) -> Iterator[str]:
         text, said = str(self._wanted.get("text", "")), self._of("prints")
         if len(said) == 1 and "{" not in said[0].message and text not in said[0].message:
-            yield f"log {text!r} in {_line(said[0])}, not {said[0].message!r}"
+            yield f"log {text!r} on {_line(said[0])}, not {said[0].message!r}"
 
 
 def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) -> Iterator[str]:
@@ -465,7 +465,7 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
     found = commented_calls(package, build.file_lines(CMAKE)[:_LINES_READ], verdict.sought_names("uncalled"))
     if not found:
         return verdict
-    told = "; ".join(f"{name}(…) is commented out in {lines_text(*place)}" for name, place in found.items())
+    told = "; ".join(f"{name}(…) is commented out on {lines_text(*place)}" for name, place in found.items())
     places = join_words(lines_text(*place) for place in found.values())
     update = {
         "message": f"{verdict.message}; {told}",
@@ -488,7 +488,7 @@ def _cite_install(verdict: Verdict, package: PackageFacts, build: Run, called: s
         return verdict
     where = lines_text(*place)
     update = {
-        "message": verdict.message.replace(NOT_CALLED, f"{NOT_CALLED}: it is commented out in {where}", 1),
+        "message": verdict.message.replace(NOT_CALLED, f"{NOT_CALLED}: it is commented out on {where}", 1),
         "hint": f"in place of {where} {verdict.hint.removesuffix(below_catkin_package(package))}, without # before it",
         "citations": (FileCitation(file=file, line=place[0] + 1),),
     }
@@ -512,7 +512,7 @@ def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | No
         if lines:
             of_file = "" if asked is not None else f" of {file.path}"
             where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))}{of_file}"
-            hint = f"write the package's exact name in {where}, push {absent} if it is your own, or remove it"
+            hint = f"write the package's exact name on {where}, push {absent} if it is your own, or remove it"
             cited = tuple(FileCitation(file=file.path, line=n) for n in lines)
             return verdict.model_copy(update={"hint": hint, "citations": cited})
     return verdict

@@ -378,7 +378,7 @@ def _at_its_line(copy: Verdict) -> str:
     lines = [c for c in copy.citations if isinstance(c, FileCitation) and c.line is not None]
     if len(lines) != 1 or not copy.hint.startswith("write ") or " line " in copy.hint:
         return copy.hint
-    return f"in line {lines[0].line} of {lines[0].file}, {copy.hint}"
+    return f"on line {lines[0].line} of {lines[0].file}, {copy.hint}"
 
 
 def _is_told(repair: Repair, hint: str) -> bool:

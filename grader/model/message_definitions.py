@@ -99,7 +99,7 @@ def _no_field(text: str, path: str, line: int) -> Fault:
         line=line,
         kind="NoField",
         message=message,
-        cause=f"`{shown}` in line {line} is no field",
+        cause=f"`{shown}` on line {line} is no field",
         fix=f"write `{right}`" if is_known else "",
     )
 

@@ -26,7 +26,7 @@ class Fault(Record):
 
     `kind` is the parser's own word (`XMLSyntaxError`, `TabError`). `cause` says the same in a student's words, empty
     where the message says enough, and `fix` what to do, empty where that is not known. `unclosed` is the bracket that
-    is opened in that line and never closed, `?` where Python does not say which. `source` is the text of the line where
+    is opened on that line and never closed, `?` where Python does not say which. `source` is the text of the line where
     the column is known.
     """
 
@@ -282,7 +282,7 @@ class PythonSlip(Record):
     """What is remarkable in a Python file, most of it slips that show only when the node runs. Of one that does not
     compile only names, types and rates are known.
 
-    `message` says what is wrong in that line, `fix` what to do where that is always the same, and `name` is the
+    `message` says what is wrong on that line, `fix` what to do where that is always the same, and `name` is the
     function or variable that both speak of. Of a kind that is no slip, `message` is what is written there: a name, a
     number or a text.
 
@@ -308,7 +308,7 @@ class PythonSlip(Record):
     `publishes` and `prints`: no slips, but a text that is published or printed, `{}` for a value in it and `{data}`
     for that of a message. `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node,
     or a topic; `name` is the variable that is given the publisher, or `anonymous`. `publisher-type` and
-    `subscriber-type`: the message type in that line. `argument-text`: no slip, but where an argument of the command
+    `subscriber-type`: the message type on that line. `argument-text`: no slip, but where an argument of the command
     line is kept as a text; `fix` is the line with a number in its place. `defined-twice`: a callback that a second
     function of its name hides, or a call of an imported name that a class hides. `subscribed-again`: a
     `Subscriber(…)` that a loop makes in each of its turns.

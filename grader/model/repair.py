@@ -96,7 +96,7 @@ def place_of(repair: Repair) -> str:
 
 
 def added_lines(before: str, after: str) -> str:
-    """Return the lines that are new, in one line."""
+    """Return the lines that are new, on one line."""
     return "; ".join(_added(before, after))
 
 
@@ -138,7 +138,7 @@ def _blanks(line: str) -> str:
 
 
 def advice_on(repairs: Iterable[Repair]) -> list[str]:
-    """Return the advice for each of the repairs, as one for those that follow each other in one line. Of two that
+    """Return the advice for each of the repairs, as one for those that follow each other on one line. Of two that
     write the same line, the last has both."""
     made = list(repairs)
     last = [

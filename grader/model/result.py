@@ -161,7 +161,7 @@ class GitStatus(Record):
     points: tuple[Point, ...] = ()
     """Ways in which what will be marked differs from what was checked."""
     summary: str = ""
-    """What git has, in one line, where nothing differs."""
+    """What git has, on one line, where nothing differs."""
 
 
 class Repaired(Record):

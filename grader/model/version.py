@@ -27,7 +27,7 @@ class Versioned:
         return self.name.removeprefix("grader.")
 
     def newer(self, said: object) -> str:
-        """Return what is wrong, in one line, if `said` is a later version than this grader reads; else ""."""
+        """Return what is wrong, on one line, if `said` is a later version than this grader reads; else ""."""
         found = re.fullmatch(rf"{re.escape(self.name)}/([0-9]{{1,{_DIGITS_MAX}}})", str(said)[:100])
         if found is None or int(found[1]) <= self.version:
             return ""

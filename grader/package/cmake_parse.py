@@ -310,7 +310,7 @@ class HalfComment(NamedTuple):
     @property
     def fix(self) -> str:
         """Which comments to take away."""
-        return f"remove the `#` of {lines_text(self.line - 1, self.last - 1)}"
+        return f"remove the `#` on {lines_text(self.line - 1, self.last - 1)}"
 
 
 def join_half_comment(text: str) -> HalfComment | None:

@@ -259,7 +259,7 @@ def _near(data: bytes) -> tuple[ShebangFault, str]:
     if later is None:
         return "other", "there is no `#!` line at the top"
     before = f"line 1 is `{first[:40]}`" if first else "line 1 is blank"
-    return "other", f"{before} and `#!` comes in line {later}: it must be line 1"
+    return "other", f"{before} and `#!` comes on line {later}: it must be line 1"
 
 
 def is_near_python(data: bytes) -> bool:

@@ -120,7 +120,7 @@ def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
     strange = re.search(r"must not contain the following tags: (\w+)", message)
     if strange and (near := difflib.get_close_matches(strange[1], _KNOWN_TAGS, 1, _ALIKE)):
         reason = reason._replace(
-            fix=f"write `<{near[0]}>` for `<{strange[1]}>`, and the same in its closing tag"
+            fix=f"write `<{near[0]}>` instead of `<{strange[1]}>`, and the same in its closing tag"
         )
     return None, _fault(place, "InvalidPackage", "; ".join(message.split("\n")), *reason)
 

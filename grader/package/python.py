@@ -53,14 +53,14 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
     (r"multiple exception types", "this is Python 2", "write `except Error as name:`"),
     (r"leading zeros in decimal", "a number may not begin with 0", "write 777, or 0o777 for an octal one"),
     (r"expected ':'", "a colon `:` is missing at the end of the line"),
-    (r"'(.)' was never closed", "the bracket `{0}` is opened in this line and never closed"),
+    (r"'(.)' was never closed", "the bracket `{0}` is opened on this line and never closed"),
     (r"unmatched '(.)'",
      "there is one `{0}` too many, or its opening bracket is missing", "delete it, or write what it closes"),
     (r"closing parenthesis '(.)' does not match opening parenthesis '(.)'",
      "a `{1}` is closed by `{0}`", "make the two match"),
     (r"triple-quoted", "a triple-quoted string is opened and never closed", "write the three quotes where it ends"),
     (r"EOL while scanning|unterminated (f-)?string",
-     "a quote is opened in this line and never closed", "write the same quote where the string ends"),
+     "a quote is opened on this line and never closed", "write the same quote where the string ends"),
     (r"Maybe you meant '=='", "`=` gives a value to a name; to compare, write `==`"),
     (r"cannot assign to|can't assign to", "what is on the left of `=` is not a name", "write a name there"),
     (r"forgot a comma", "a comma is missing between two values", "write `,` between them"),
@@ -265,7 +265,7 @@ def reason_of(
             "tabs and spaces are mixed in the indentation of this file", "use four spaces everywhere"
         )
     if (empty := _EMPTY_BLOCK.match(message)) and _NEXT_BLOCK.match(text) and "class" not in message:
-        why = f"there are only comments in the block of line {empty[1]}"
+        why = f"there are only comments in the block on line {empty[1]}"
         return Reason(why, "write below it what it is to do")
     reason = reason_of_line(text) if vague else Reason()
     if vague and opened is not None and not reason.why:
@@ -281,7 +281,7 @@ def reason_of(
 
 
 def _never_closed(line: int) -> Reason:
-    return Reason(f"a bracket that is opened in line {line} is never closed")
+    return Reason(f"a bracket that is opened on line {line} is never closed")
 
 
 def _lacks_colon(text: str, column: int | None) -> bool:

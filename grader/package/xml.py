@@ -21,7 +21,7 @@ _NO_QUOTE = (r"Unescaped '<' not allowed in attr", r"AttValue: ['\"] expected")
 _CAUSES: tuple[tuple[str, ...], ...] = (
     (r"Document is empty", "the file is empty", "write `<{root}>` and `</{root}>` into it"),
     (r"Start tag expected", "there is something before the first tag", "the file must start with `<{root}>`"),
-    (_NO_END, "`<{0}>` of line {1} is never closed", "add `</{0}>`"),
+    (_NO_END, "`<{0}>` on line {1} is never closed", "add `</{0}>`"),
     (r"hyphen|must not contain '--'", "`--` is not allowed inside a comment `<!-- ... -->`", "delete it there"),
     (r"Comment not terminated", "a comment is opened by `<!--` and never closed", "write `-->` where it ends"),
     (r"Extra content at the end",
@@ -35,7 +35,8 @@ _CAUSES: tuple[tuple[str, ...], ...] = (
     (_NO_QUOTE[1], "a closing quote is missing", 'write `"` where the value ends'),
     (r"AttValue: \" or ' expected", "the value of an attribute has no quotes around it", 'write name="value"'),
     (r"Specification mandates value for attribute (\S+)", "`{0}` has no value", 'write {0}="..."'),
-    (r"invalid element name", "a `<` does not begin a tag", "delete the space after it, or write `&lt;` for `<`"),
+    (r"invalid element name", "a `<` does not begin a tag",
+     "delete the space after it, or write `&lt;` instead of `<`"),
     (r"EntityRef|Entity '.*' not defined", "a plain `&` is not allowed", "write `&amp;`"),
     (r"character encoding|not proper UTF-8|Unsupported encoding|switch encoding",
      "the file is not saved in the encoding that it names", "save it as UTF-8"),
@@ -206,7 +207,7 @@ def _explain(message: str, log: list[str], line: str, *, root: str) -> tuple[Rea
 
 
 def _mismatch(opened: str, line: int, closed: str, root: str) -> tuple[Reason, int | None]:
-    tag = f"`<{opened}>` of line {line}"
+    tag = f"`<{opened}>` on line {line}"
     if opened.lower() == closed.lower():
         return Reason(
             f"{tag} is closed by `</{closed}>`, with other capital letters", f"write `</{opened}>`"

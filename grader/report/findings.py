@@ -58,7 +58,7 @@ class Finding:
 
     @property
     def said(self) -> str:
-        """All of it in one line: `chatter-rate: 0/10 points: it came at 5 Hz. Hint: sleep less`."""
+        """All of it on one line: `chatter-rate: 0/10 points: it came at 5 Hz. Hint: sleep less`."""
         hint = f". Hint: {self.hint}" if self.hint else ""
         return f"{self.title}: {self.message.rstrip('.')}{hint}"
 

@@ -1,4 +1,4 @@
-"""The report in a terminal: what was reached in one line, then what was lost, then the points. Readable in a pipe."""
+"""The report in a terminal: what was reached on one line, then what was lost, then the points. Readable in a pipe."""
 
 from __future__ import annotations
 

@@ -269,12 +269,12 @@ def hint_beside(criterion: CriterionResult, place: str) -> str:
     if file:
         hint = re.sub(
             rf"(?:(?<=; )|^){re.escape(file)},? line (\d+): (?![^;]*\bline \1\b)",
-            r"in line \1, ",
+            r"on line \1, ",
             hint,
         )
     told = without_place(hint, place)
     whole = len(file_places(criterion)) == 1 and "line" not in told and WHOLE_LINE.match(told)
-    return f"in line {number}, {told}" if file and whole else told
+    return f"on line {number}, {told}" if file and whole else told
 
 
 WHOLE_LINE = re.compile(
@@ -323,7 +323,7 @@ def headline(text: str) -> tuple[str, str]:
 HEADLINE_LEAST = 20
 STEPS = re.compile(r"; (?:and )?(?:then )?")
 ORDERS = re.compile(
-    r"""(\S+\ line\ \d+:\ |line\ \d+:\ |in\ line\ \d+,\ |first\ )?
+    r"""(\S+\ line\ \d+:\ |line\ \d+:\ |on\ line\ \d+,\ |first\ )?
     (add|begin|call|change|check|chmod|correct|create|declare|delete|dos2unix|end|fill|fix|git|give|hand|indent|install|keep|let
     |list|look|make|move|name|open|pass|print|publish|put|remove|rename|replace|run|send|set|start|stop|subscribe|take|test_\w+|try|use|write)\b
     """,
@@ -370,7 +370,7 @@ WITH_NODES = re.compile(r"(rosnode|rosservice|rostopic)\b|rosparam get\b")
 
 
 def see_words(reproduce: str) -> str:
-    """Return how to see it, in one line: `rosrun lab1 talker.py (with roscore running)`."""
+    """Return how to see it, on one line: `rosrun lab1 talker.py (with roscore running)`."""
     where = where_to_type(reproduce).removesuffix(":")
     return f"{reproduce} ({where[:1].lower()}{where[1:]})" if where else reproduce
 

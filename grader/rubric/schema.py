@@ -82,7 +82,7 @@ def inner_records(record: type[Record]) -> dict[type[Record], str]:
 
 
 def about(record: type[Record]) -> str:
-    """Return the record's own docstring in one line."""
+    """Return the record's own docstring on one line."""
     return " ".join((inspect.getdoc(record) or "").split())
 
 

@@ -264,7 +264,7 @@ class _Reader:
                 continue
             line = key_node.start_mark.line + 1
             if key in own:
-                self.faults.append(((*path, key), f"is given twice, again in line {line}"))
+                self.faults.append(((*path, key), f"is given twice, again on line {line}"))
                 continue
             own.add(key)
             data[key] = self.read(value_node, (*path, key))
@@ -288,7 +288,7 @@ class _Reader:
             return str(node.value)
         shown = node.value if isinstance(node, yaml.ScalarNode) else "this"
         line = node.start_mark.line + 1
-        self.faults.append((path, f"{shown} in line {line} is not a string: put the key in quotes"))
+        self.faults.append((path, f"{shown} on line {line} is not a string: put the key in quotes"))
         return None
 
     def _scalar(self, node: yaml.Node, path: KeyPath) -> Value:

@@ -34,11 +34,12 @@ from std_msgs.msg import Int8
          "wait for it before the call: `rospy.wait_for_service('/add')`"),
         (6, "add(1, 2)", "rospy.service.ServiceException: remote error reported: md5sums do not match: [1] vs. [2]",
          "give both the same .srv, with the names and types of the handout, and build again"),
-        (6, "while true:", "NameError: name 'true' is not defined. Did you mean: 'True'?", "write `True` for `true`"),
-        (6, "last = null", "NameError: name 'null' is not defined", "write `None` for `null`"),
+        (6, "while true:", "NameError: name 'true' is not defined. Did you mean: 'True'?",
+         "write `True` instead of `true`"),
+        (6, "last = null", "NameError: name 'null' is not defined", "write `None` instead of `null`"),
         (6, "n = 0 // start", "NameError: name 'start' is not defined", "write `n = 0 # start`"),
         (6, "pub.publish('a')", "NameError: name 'pub' is not defined",
-         "in line 6, write self.pub instead of pub; write `from std_msgs.msg import String` at the top"),
+         "on line 6, write self.pub instead of pub; write `from std_msgs.msg import String` at the top"),
         (6, "talker.run()", "TypeError: run() takes 0 positional arguments but 1 was given",
          "write `def run(self):`"),
         (6, 'pub = rospy.Publisher(String, "chatter", queue_size=10)',
@@ -74,7 +75,7 @@ from std_msgs.msg import Int8
         (6, "pub.publish(text)", "AttributeError: 'tuple' object has no attribute 'encode'",
          'put the values into the text with `%`: `"… %s" % value`, not after a comma'),
         (6, "pub.publish(dta=3)", "AttributeError: dta is not an attribute of Int8",
-         "write `data=` for `dta=`"),
+         "write `data=` instead of `dta=`"),
         (6, "rospy.publish(3)",
          "AttributeError: module 'rospy' has no attribute 'publish'. Did you mean: 'Publisher'?",
          "write that name in front of it: `pub.publish(…)`"),
@@ -83,7 +84,7 @@ from std_msgs.msg import Int8
         (8, "self.rate.sleep()", "AttributeError: 'Talker' object has no attribute 'rate'",
          "in `__init__`, write `self.rate = …`, with the value that it should have"),
         (9, "Talker.stay()", "TypeError: Talker.stay() missing 1 required positional argument: 'self'",
-         "in line 9, write `Talker().stay()`"),
+         "on line 9, write `Talker().stay()`"),
         (10, "rospy.on_shutdown(leave())", "TypeError: shutdown hook [None] must be a function or callable object",
          "write `leave`, without brackets"),
         (6, "rospy.loginfo('%s heard: %s' % rospy.get_name(), msg.data)",
@@ -96,30 +97,30 @@ from std_msgs.msg import Int8
         (6, "rospy.loginfo('Sending: ', text)", "TypeError: not all arguments converted during string formatting",
          "write `rospy.loginfo('Sending: %s', text)`"),
         (6, "rospy.loginfo('I heard ' + msg)", 'TypeError: can only concatenate str (not "String") to str',
-         "write `msg.data` for `msg`"),
+         "write `msg.data` instead of `msg`"),
         (6, "text = 'I heard ' + number", 'TypeError: can only concatenate str (not "Int8") to str',
-         "write `str(number.data)` for `number`"),
+         "write `str(number.data)` instead of `number`"),
         (6, "text = 'at ' + where", 'TypeError: can only concatenate str (not "Point") to str',
-         "write `str(where.x)` for `where`"),
+         "write `str(where.x)` instead of `where`"),
         (6, "n = int(msg)", "TypeError: int() argument must be a string, a bytes-like object or a number, not 'Int8'",
          "take its field, as in `msg.data`"),
         (6, "words = msg.split()", "AttributeError: 'String' object has no attribute 'split'",
-         "write `.data.split` for `.split`"),
+         "write `.data.split` instead of `.split`"),
         (6, "number_pub.publish(Int8(data=str(n)))",
          "ROSSerializationException: field data must be an integer type", "write `number_pub.publish(Int8(data=n))`"),
         (6, "number_pub.publish(n)", "TypeError: field data must be of type bytes or an ascii string",
-         "swap `number_pub` and `text_pub` in lines 13 and 14, or where they publish"),
+         "swap `number_pub` and `text_pub` on lines 13 and 14, or where they publish"),
         (6, "other_pub.publish(n)", "TypeError: field data must be of type bytes or an ascii string",
          "publish a string here, `str(…)`; numbers go to the publisher of their own topic"),
         (6, "counter += 1", "TypeError: unsupported operand type(s) for +=: 'Int8' and 'int'",
-         "write `counter.data` for `counter`"),
+         "write `counter.data` instead of `counter`"),
         (6, "rate.sleep()", "AttributeError: 'Duration' object has no attribute 'sleep'",
          "make it with `rospy.Rate(…)`, which takes how many times a second the loop runs"),
         (6, "now = time.time()", "AttributeError: 'builtin_function_or_method' object has no attribute 'time'",
-         "write `time` for `time.time`"),
+         "write `time` instead of `time.time`"),
         (6, "now = datetime.datetime.now()",
          "AttributeError: type object 'datetime.datetime' has no attribute 'datetime'",
-         "write `datetime` for `datetime.datetime`"),
+         "write `datetime` instead of `datetime.datetime`"),
         (6, "rospy.init_node(talker, anonymous=True)", "TypeError: argument of type 'function' is not iterable",
          "write `rospy.init_node('talker', anonymous=True)`"),
         (6, "print('sum: %d' % answer)", "TypeError: %d format: a real number is required, not AddResponse",
@@ -185,7 +186,7 @@ def test_a_line_is_counted_without_the_first_line_that_the_arena_writes(tmp_path
     )
     assert [place.line for place in end.citations] == [line]
     assert f"talker.py, line {line}" in end.cause
-    assert end.hint == f"in line {line}, write rospy instead of rospu"
+    assert end.hint == f"on line {line}, write rospy instead of rospu"
 
 
 def said(package, *frames, error):
@@ -230,7 +231,7 @@ INSIDE = (LIBRARY, 47, "from .client import spin")
         ("from lab.msg import Reading", "ImportError: cannot import name 'Reading' from 'lab.msg' (/d/__init__.py)",
          "list Reading.msg in add_message_files(…)"),
         ("from lab.srv import Sum", "ImportError: cannot import name 'Sum' from 'lab.srv' (/d/__init__.py)",
-         "write the one that you mean for Sum"),
+         "write the one that you mean instead of Sum"),
         # it has made none
         ("from lab.msg import Reading", "ModuleNotFoundError: No module named 'lab'",
          "first get the build to pass: catkin_make"),
@@ -259,15 +260,15 @@ def test_a_class_that_the_build_makes_is_imported_from_its_module(tmp_path, sour
         ("return AddResponse(3)", "NameError: name 'AddResponse' is not defined",
          "write `from lab.srv import AddResponse` at the top"),
         ("x = Reading()", "NameError: name 'Reading' is not defined", "write `from lab.msg import Reading` at the top"),
-        ("Reading(levl=1)", "AttributeError: levl is not an attribute of Reading", "write `level=` for `levl=`"),
-        ("Reading(x=1)", "AttributeError: x is not an attribute of Reading", "write `level=` for `x=`"),
+        ("Reading(levl=1)", "AttributeError: levl is not an attribute of Reading", "write `level=` instead of `levl=`"),
+        ("Reading(x=1)", "AttributeError: x is not an attribute of Reading", "write `level=` instead of `x=`"),
         ("found = buffer.lookup_transform('a', 'b', rospy.Time(0))",
          'tf2.LookupException: "a" passed to lookupTransform argument target_frame does not exist',
          "catch it, `try: … except tf2_ros.TransformException:`"),
         ("ask(a, b)", "genpy.message.SerializationError: field value must be float type",
-         "in line 4, write `a, b = map(float, sys.argv[1:3])`"),
+         "on line 4, write `a, b = map(float, sys.argv[1:3])`"),
         ("ask(a, b)", "genpy.message.SerializationError: field value must be an integer type",
-         "in line 4, write `a, b = map(int, sys.argv[1:3])`"),
+         "on line 4, write `a, b = map(int, sys.argv[1:3])`"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_messages_is_told_with_their_fields(tmp_path, source, error, hint):
@@ -407,6 +408,6 @@ def test_a_module_that_is_used_and_not_imported_is_meant_by_one_that_is_not_ther
     package = facts_of(tmp_path)
     error = "ModuleNotFoundError: No module named 'ros'"
     here = explain_traceback(said(package, ("a.py", 1, "import ros"), error=error), package)
-    assert here.hint == "write rospy for ros"
+    assert here.hint == "write rospy instead of ros"
     assert not here.of_machine
     assert explain_traceback(said(package, ("b.py", 1, "import ros"), error=error), package).of_machine

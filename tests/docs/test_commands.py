@@ -20,7 +20,7 @@ ENDS = re.compile(r"\s(?:[|&>;]|2>|\|\||&&).*$|\s{3,}\S.*$|\s#\s.*$")
 
 
 def command_lines(page: str) -> Iterator[str]:
-    """What follows `grader` in each line of a block that runs it."""
+    """What follows `grader` on each line of a block that runs it."""
     for info, content in fences(page):
         if info.split(" ")[0] not in SHELLS:
             continue

@@ -1,4 +1,4 @@
-"""Recordings of other tools: read whole, or refused in one line that says why."""
+"""Recordings of other tools: read whole, or refused on one line that says why."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reading back, reading what others wrote, and refusing what is broken in one line."""
+"""Reading back, reading what others wrote, and refusing what is broken on one line."""
 
 from __future__ import annotations
 

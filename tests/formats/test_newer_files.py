@@ -1,4 +1,4 @@
-"""What a newer grader wrote is named as such in one line and never written over; its further keys are borne."""
+"""What a newer grader wrote is named as such on one line and never written over; its further keys are borne."""
 
 from __future__ import annotations
 

@@ -197,7 +197,7 @@ def test_a_package_that_roslaunch_does_not_find_is_shown_where_it_is_named(
         assert found == said
     else:
         assert found.citations == (FileCitation(file="launch/a.launch", line=line),)
-        assert found.hint.startswith(f"write the package's exact name in line {line}, push elsewhere if")
+        assert found.hint.startswith(f"write the package's exact name on line {line}, push elsewhere if")
 
 
 @pytest.mark.parametrize(
@@ -224,7 +224,7 @@ def test_a_call_that_is_commented_out_is_named_by_its_lines(text: str, place: st
     if not place:
         assert found.hint == lost.hint
         return
-    assert f"is called: it is commented out in {place}, so nothing installs a.py" in found.message
+    assert f"is called: it is commented out on {place}, so nothing installs a.py" in found.message
     call = "write catkin_install_python(PROGRAMS a.py DESTINATION b)"
     assert found.hint == f"in place of {place} {call}, without # before it"
 
@@ -256,10 +256,10 @@ def commented(text: str, *interfaces: str) -> tuple[Run, PackageFacts]:
     [
         (
             "msg/Num.msg",
-            "add_message_files(…) is commented out in lines 2 to 5; generate_messages(…) is commented out in line 6",
+            "add_message_files(…) is commented out on lines 2 to 5; generate_messages(…) is commented out on line 6",
             [2, 6],
         ),
-        ("srv/Add.srv", "generate_messages(…) is commented out in line 6", [6]),
+        ("srv/Add.srv", "generate_messages(…) is commented out on line 6", [6]),
     ],
 )
 def test_calls_that_make_messages_and_are_commented_out_are_named(
@@ -287,7 +287,7 @@ def test_a_call_of_catkins_that_is_commented_out_is_named(call: str, cited: bool
     lost = failed(f"{call} is missing", hint=f"add {call}").seeking("uncalled", call.partition("(")[0])
     found = cite_commented_call(lost, package, build)
     assert (found.citations == (FileCitation(file="CMakeLists.txt", line=2),)) == cited
-    assert ("is commented out in line 2" in found.message) == cited
+    assert ("is commented out on line 2" in found.message) == cited
 
 
 MANIFEST_LINES = (

@@ -360,9 +360,9 @@ def test_a_node_that_ended_tells_what_its_script_would_lose_next() -> None:
         assert {c.status.value for c in judged.values()} == {"fail", "blocked"}
         hints.append(judged["node"].hint)
     assert hints[0] == (
-        f"{hints[1]}; then publish on /chatter in line 5 of {script}, not on position, "
-        f"publish std_msgs/String in line 5 of {script}, not Twist and "
-        f"make it 10 Hz in line 7 of {script}, which asks for 0.5 Hz"
+        f"{hints[1]}; then publish on /chatter on line 5 of {script}, not on position, "
+        f"publish std_msgs/String on line 5 of {script}, not Twist and "
+        f"make it 10 Hz on line 7 of {script}, which asks for 0.5 Hz"
     )
     assert "then" not in hints[1]
 

@@ -101,55 +101,55 @@ COPIES = {
 CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str, Any]], str]] = {
     "rate behind an undefined name": (
         "node", DIES, TALKER, [slip("undefined", "", 3, **UNDEFINED), slip("rate-number", "2", 4)],
-        f"above line 3, create the message: `countmsg = Int32()`; then make it 10 Hz in line 4 of {FILE}"),
+        f"above line 3, create the message: `countmsg = Int32()`; then make it 10 Hz on line 4 of {FILE}"),
     "text behind an undefined name": (
         "node", DIES, TALKER, [slip("publishes", "my words {}")],
-        f'; then publish `"hello world %s" % rospy.get_time()` in line 5 of {FILE}, not \'my words <value>\''),
+        f'; then publish `"hello world %s" % rospy.get_time()` on line 5 of {FILE}, not \'my words <value>\''),
     "the type of a topic whose name is in a variable": (
         "node", DIES, TALKER, [slip("publisher-type", "Num")],
-        f"; then publish std_msgs/String in line 5 of {FILE}, not Num"),
+        f"; then publish std_msgs/String on line 5 of {FILE}, not Num"),
     "the type that is subscribed to, and a field that the right one lacks": (
         "node", DIES, [NODE | ROOT, HEARS | {"requires": ["node"]}],
         [slip("subscriber", "vel"), slip("subscriber-type", "Twist"), slip("prints", "{}I heard {}", 7)],
-        f"not Twist and print the `data` of the message in line 7 of {FILE}"),
+        f"not Twist and print the `data` of the message on line 7 of {FILE}"),
     "a second undefined name": (
         "node", DIES, TALKER, [slip("undefined", "", name="math", fix="write `import math` at the top")],
         "; then write `import math` at the top"),
     "a name in Python 2 behind it": (
         "node", DIES, TALKER, [slip("undefined", "", name="null", fix="above line 5, …")],
-        "; then in line 5, write `None` for `null`"),
+        "; then on line 5, write `None` instead of `null`"),
     "a message type that is not imported": (
         "node", DIES, TALKER, [slip("undefined", "", name="Twist", fix="define <package>")],
         "; then write `from geometry_msgs.msg import Twist` at the top"),
     "rate.sleep without brackets behind it": (
         "node", DIES, TALKER, [slip("not-called", "", name="rate.sleep", fix="write `rate.sleep()`")],
-        f"; then in line 5 of {FILE}, write `rate.sleep()`"),
+        f"; then on line 5 of {FILE}, write `rate.sleep()`"),
     "a count where the time belongs": (
         "node", DIES, TALKER, [slip("publishes", "hello world {}"), slip("no-clock", "the script counts")],
-        f'; then publish the time in line 5 of {FILE}, `"hello world %s" % rospy.get_time()`: the script only counts'),
+        f'; then publish the time on line 5 of {FILE}, `"hello world %s" % rospy.get_time()`: the script only counts'),
     "text behind another topic": (
         "message", ELSEWHERE, TALKER, [],
         'publish "hello world %s" % rospy.get_time()'),
     "listener's topic, type and words behind an error": (
         "node", DIES, [NODE | ROOT, HEARS | {"requires": ["node"]}],
         [slip("subscriber", "hello"), slip("subscriber-type", "Int32"), slip("prints", "got {data}", 7)],
-        (f"then subscribe to /chatter in line 5 of {FILE}, not to hello, subscribe with std_msgs/String in line 5 of "
-         f"{FILE}, not Int32 and print 'I heard <message>' in line 7 of {FILE}, not 'got <message>'")),
+        (f"then subscribe to /chatter on line 5 of {FILE}, not to hello, subscribe with std_msgs/String on line 5 of "
+         f"{FILE}, not Int32 and print 'I heard <message>' on line 7 of {FILE}, not 'got <message>'")),
     "two topics, and none is the right one": (
         "node", DIES, TALKER, [slip("publisher", "left"), slip("publisher", "right", 6)],
         f"publish std_msgs/String on /chatter: {FILE} publishes on left (line 5) and right (line 6)"),
     "words that are glued to others": (
         "node", DIES, [NODE | ROOT, HEARS | {"requires": ["node"]}], [slip("prints", "I heard: {data}", 7)],
-        f"then print 'I heard <message>' in line 7 of {FILE}, not 'I heard: <message>'"),
+        f"then print 'I heard <message>' on line 7 of {FILE}, not 'I heard: <message>'"),
     "listener's words behind another topic": (
         "hears", DEAF, [NODE | ROOT, HEARS], [slip("subscriber", "hello"), slip("prints", "{}got {data}", 7)],
-        f"; then print 'I heard <message>' in line 7 of {FILE}, not '<value>got <message>'"),
+        f"; then print 'I heard <message>' on line 7 of {FILE}, not '<value>got <message>'"),
     "two copies of one name behind an error": (
         "node", DIES, [NODE | ROOT, COPIES], [slip("node-name", "talker", 11)],
-        f"write anonymous=True in line 11 of {FILE}, since two of it run at once"),
+        f"write anonymous=True on line 11 of {FILE}, since two of it run at once"),
     "other words that are logged, behind an error": (
         "node", DIES, [NODE | ROOT, LOGS], [slip("prints", "Hello ROS")],
-        f"; then log 'Hello World!' in line 5 of {FILE}, not 'Hello ROS'"),
+        f"; then log 'Hello World!' on line 5 of {FILE}, not 'Hello ROS'"),
 }  # fmt: skip
 NOTHING: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str, Any]]]] = {
     "the right words": (
@@ -179,7 +179,7 @@ def test_a_type_that_the_lab_does_not_want_is_not_imported_first() -> None:
     told = hint_of("node", run, TALKER, slip("publisher", "chatter"), slip("publisher-type", "JointState"))
     assert (
         told
-        == f"from std_msgs.msg import String; then publish std_msgs/String in line 5 of {FILE}, not JointState"
+        == f"from std_msgs.msg import String; then publish std_msgs/String on line 5 of {FILE}, not JointState"
     )
 
 
@@ -199,7 +199,7 @@ def test_words_that_stand_nowhere_in_the_source_are_named() -> None:
     assert hint_of("node", DIES, heard, source=LACKS).endswith("; then print 'I heard <message>'")
     other = slip("publishes", "{}", 6)
     assert hint_of("node", DIES, TALKER, other, source=LACKS).endswith(
-        f'; then publish `"hello world %s" % rospy.get_time()` in line 6 of {FILE}'
+        f'; then publish `"hello world %s" % rospy.get_time()` on line 6 of {FILE}'
     )
     assert hint_of("node", DIES, TALKER, source=LACKS).endswith(
         '; then publish `"hello world %s" % rospy.get_time()`'
@@ -229,7 +229,7 @@ def test_what_a_machine_lacks_does_not_hide_what_is_the_students() -> None:
         for found in ([slip("rate-number", "2")], [slip("rate-number", "10")])
     ]
     assert hints[0].startswith(
-        f"make it 10 Hz in line 5 of {FILE}, which asks for 2 Hz. For the rest, tell your instructor"
+        f"make it 10 Hz on line 5 of {FILE}, which asks for 2 Hz. For the rest, tell your instructor"
     )
     assert hints[1].startswith("nothing for you to do: tell your instructor")
     assert judgement_of(run, TALKER).undecided == frozenset()
@@ -245,7 +245,7 @@ def test_a_name_in_an_except_is_not_reached() -> None:
     sources = {"except": "try:\nexcept rospi.ROSInterruptException:\n", "plain": "x = 1\nrospi.spin()\n"}
     hints = {name: hint_of("node", DIES, TALKER, wrong, source=text) for name, text in sources.items()}
     assert "rospi" not in hints["except"]
-    assert "; then in line 2, write rospy instead of rospi" in hints["plain"]
+    assert "; then on line 2, write rospy instead of rospi" in hints["plain"]
 
 
 CPP = """\
@@ -282,10 +282,10 @@ def test_words_of_a_source_in_cpp_are_named_too() -> None:
         found = judge(cpp_rubric(NODE | ROOT, CHATTER, MESSAGE, HEARS), cpp_runs(run))
         told |= {c.id: c.hint for c in found}
     assert told["chatter"].endswith(
-        "; then publish `hello world <seconds>` in line 4 of src/talker.cpp, not 'my words <value>'"
+        "; then publish `hello world <seconds>` on line 4 of src/talker.cpp, not 'my words <value>'"
     )
     assert told["hears"].endswith(
-        "; then print 'I heard <message>' in line 5 of src/talker.cpp, not 'got [<message>]'"
+        "; then print 'I heard <message>' on line 5 of src/talker.cpp, not 'got [<message>]'"
     )
 
 
@@ -356,6 +356,6 @@ def test_arguments_without_a_value_are_named_behind_what_roslaunch_says_first() 
     (found,) = judge(rubric(lab, scenarios=scenarios), runs)
     assert "Resource not found: elsewhere" in found.message
     assert found.hint.endswith(
-        '; then in line 3 of launch/a.launch write <arg name="rate" default="…"/> and '
+        '; then on line 3 of launch/a.launch write <arg name="rate" default="…"/> and '
         'below <launch> in launch/a.launch add <arg name="speed" default="…"/>'
     )

@@ -147,7 +147,7 @@ def test_what_a_blocked_criterion_is_lost_by_next_is_named_with_its_line() -> No
     assert found.message == "a value; with that repaired, the node is named /listener, not /talker"
     assert found.hint == (
         "src/numeric_talker.py line 8: write `r = rospy.Rate(1)`; "
-        "then in line 4 of src/numeric_talker.py, write rospy.init_node('talker')"
+        "then on line 4 of src/numeric_talker.py, write rospy.init_node('talker')"
     )
 
 
@@ -161,7 +161,7 @@ def test_what_is_wrong_besides_in_the_same_file_is_said_once() -> None:
             "before": "  <name>lab_1</name>",
             "after": "  <name>lab1</name>",
             "message": "line 3 of package.xml: the package is called lab_1, not lab1",
-            "fix": "write lab1 for lab_1 in package.xml, in project(…) and in every pkg=",
+            "fix": "write lab1 instead of lab_1 in package.xml, in project(…) and in every pkg=",
         }
     )
     runs = build_runs({"runs": {"talker": GOOD_RUN}, "package": {**PACKAGE, "manifest": {"name": "lab_1"}}})
@@ -196,7 +196,7 @@ def test_what_fails_on_the_copy_too_says_why() -> None:
 
 
 def died(error: str, line: int) -> dict[str, Any]:
-    """A run in which the talker dies of an error in this line."""
+    """A run in which the talker dies of an error on this line."""
     where = f'  File "/ws/src/lab1/src/numeric_talker.py", line {line}, in main'
     console = [{"process": "talker", "stream": "stderr", "at_s": 0.2, "lines": [where, error]}]
     if not error.startswith("SyntaxError"):

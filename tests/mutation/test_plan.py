@@ -25,7 +25,7 @@ def two_nodes() -> Solution:
 
 
 def declared(*mutants: dict[str, object]) -> LoadedMutants:
-    """Mutants `a`, `b`, … in lines 10, 20, …; each is given by its one edit, or whole."""
+    """Mutants `a`, `b`, … on lines 10, 20, …; each is given by its one edit, or whole."""
     records = {}
     for name, mutant in zip("abc", mutants, strict=False):
         whole = mutant if "edits" in mutant else {"edits": (mutant,)}

@@ -53,10 +53,10 @@ def test_attributes_that_are_not_there_are_none():
         (
             '<launch>\n<node pkg="a">\n</launch>',
             2,
-            "`<node>` of line 2 is still open where `</launch>` comes",
+            "`<node>` on line 2 is still open where `</launch>` comes",
         ),
         ("<launch>\n</node>\n</launch>", 2, "`</node>` closes nothing"),
-        ("<launch>\n<node/>\n", 1, "`<launch>` of line 1 is never closed"),
+        ("<launch>\n<node/>\n", 1, "`<launch>` on line 1 is never closed"),
         ('<launch\n<node pkg="a"/></launch>', 1, "the tag `<launch` is not finished"),
         ('<launch>\n<node pkg="a"type="b"/>\n</launch>', 2, "a space before each attribute"),
         ("<launch>\n<node pkg=a/></launch>", 2, "no quotes around it"),

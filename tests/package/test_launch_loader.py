@@ -94,7 +94,7 @@ def test_pass_all_args(tmp_path: Path) -> None:
         (
             "c.launch",
             "<launch>",
-            "it includes launch/c.launch, and it is not well-formed: `<launch>` of line 1 is never",
+            "it includes launch/c.launch, and it is not well-formed: `<launch>` on line 1 is never",
         ),
         (
             "c.launch",

@@ -98,7 +98,7 @@ CASES = {
     "latin-1": Case({TALKER: SCRIPT.replace("import rospy\n", "import rospy  # caf\u00e9\n").encode("latin-1")},
                 ["encoding"], "not saved as UTF-8"),
     "no-shebang": Case(swapped(TALKER, ("#!/usr/bin/env python3\n", "")), ["shebang"], "cannot be started"),
-    "shebang-blank": Case({TALKER: "\n" + SCRIPT}, ["shebang"], "`#!` comes in line 2"),
+    "shebang-blank": Case({TALKER: "\n" + SCRIPT}, ["shebang"], "`#!` comes on line 2"),
     "tabs-of-8": Case(swapped(TALKER, ("        publisher.pub", "\tpublisher.pub")), ["python-syntax"],
         "tabs and spaces"),
     "body-not-indented": Case(
@@ -253,7 +253,7 @@ CASES = {
     "no-buildtool": Case(swapped(XML, ("  <buildtool_depend>catkin</buildtool_depend>\n", "")),
                      ["manifest-line"], "does not name catkin"),
     "no-depend": Case(swapped(XML, ("  <depend>rospy</depend>\n", "")), ["manifest-line"], "does not name rospy"),
-    "open-tag": Case(swapped(XML, ("x</description>", "x")), ["manifest-line"], "`<description>` of line 4 is still"),
+    "open-tag": Case(swapped(XML, ("x</description>", "x")), ["manifest-line"], "`<description>` on line 4 is still"),
     "no-find": Case(swapped(CMAKELISTS, ("find_package", "# find_package")), ["build-line"], "not call find_package"),
     "no-catkin-package": Case(swapped(CMAKELISTS, ("catkin_package()\n", "")), ["build-line"], "catkin_package()"),
     "command": Case(swapped(CMAKELISTS, ("catkin_package", "catkin_pakage")), ["build-line"], "no command catkin_p"),
@@ -284,7 +284,9 @@ CASES = {
     "installed-misspelt": Case(
         {CMAKELISTS: CMAKE + INSTALL.replace("scripts/other.py", "src/talker src/listener"), **INSTALLED},
         ["build-line", "build-line"],
-        "write src/listener.py for src/listener; CMakeLists.txt line 8: write src/talker.py for src/talker", INSTALLS,
+        "write src/listener.py instead of src/listener; "
+        "CMakeLists.txt line 8: write src/talker.py instead of src/talker",
+        INSTALLS,
     ),
     "line-ends-that-do-no-harm": Case(
         {CMAKELISTS: CMAKE.replace("(lab)", "(xyz)").replace("\n", "\r\n")}, ["build-line"],
@@ -335,7 +337,7 @@ CASES = {
     "which-of-two-launch-files": Case({"launch/first.launch": LAUNCH}, [], wanted=STARTED),
     "package-twice-in-a-renamed-launch-file": Case(
         {LAUNCHED: None, "launch/la_b.launch": TWO_NODES.replace('pkg="lab"', 'pkg="laab"')},
-        ["file-name", "package-name"], 'write pkg="lab" for pkg="laab"', asking(launch_files=("lab.launch",)),
+        ["file-name", "package-name"], 'write pkg="lab" instead of pkg="laab"', asking(launch_files=("lab.launch",)),
         {LAUNCHED: TWO_NODES},
     ),
     "two-nodes-of-nearly-one-name": Case(
@@ -344,7 +346,7 @@ CASES = {
     ),
     "half-a-comment": Case(
         {CMAKELISTS: CMAKE.replace("catkin_package()", "# catkin_package(\n)")}, ["build-line"],
-        "remove the `#` of line 4", after={CMAKELISTS: "\ncatkin_package(\n)"},
+        "remove the `#` on line 4", after={CMAKELISTS: "\ncatkin_package(\n)"},
     ),
     "program-without-libraries": Case(
         {CMAKELISTS: CMAKE + "add_executable(mean src/mean.cpp)\n", "src/mean.cpp": "int main() {}\n"}, ["build-line"],
@@ -373,7 +375,7 @@ CASES = {
     ),
     "own-message-named-otherwise": Case(
         {**OWN, CMAKELISTS: OWN_CMAKE.replace("Level", "level").replace("catkin_p", "generate_messages()\ncatkin_p")},
-        ["build-line"], "write Level.msg for level.msg",
+        ["build-line"], "write Level.msg instead of level.msg",
     ),
     "own-message-of-another": Case(
         {**OWN, "msg/Level.msg": "Header header\ngeometry_msgs/Point at\n",

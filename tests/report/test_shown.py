@@ -50,8 +50,8 @@ FLOOD = "`/chatter` runs at about 5,500 Hz instead of 10 Hz; the loop does not s
         ("/chatter carries std_msgs/String", ["/chatter", "std_msgs/String"]),
         ("a `:` of src/talker.py", [":", "src/talker.py"]),
         ("write #!/usr/bin/env python3 first", ["#!/usr/bin/env python3"]),
-        ('write type="talker.py" for type="talker"', ['type="talker.py"', 'type="talker"']),
-        ("write name= for nme=, or anonymous=True", ["name=", "nme=", "anonymous=True"]),
+        ('write type="talker.py" instead of type="talker"', ['type="talker.py"', 'type="talker"']),
+        ("write name= instead of nme=, or anonymous=True", ["name=", "nme=", "anonymous=True"]),
         (
             "chmod +x src/a.py src/b.py, then git add --chmod=+x src/a.py, commit and push",
             [
@@ -128,15 +128,15 @@ def test_a_fix_with_several_steps_is_told_step_by_step() -> None:
 @pytest.mark.parametrize(
     ("hint", "shown"),
     [
-        ("src/a.py line 3: write f()", "in line 3, write f()"),
+        ("src/a.py line 3: write f()", "on line 3, write f()"),
         ("src/a.py line 3: indent line 3 by four spaces", "indent line 3 by four spaces"),
-        ("write f()", "in line 3, write f()"),
+        ("write f()", "on line 3, write f()"),
         ("write f() after the loop", "write f() after the loop"),
         ("write the names one below the other", "write the names one below the other"),
-        ('write pkg="lab1"', 'in line 3, write pkg="lab1"'),
+        ('write pkg="lab1"', 'on line 3, write pkg="lab1"'),
         (
             "src/a.py line 3: write f(); src/b.py line 4: write g()",
-            "in line 3, write f(); src/b.py line 4: write g()",
+            "on line 3, write f(); src/b.py line 4: write g()",
         ),
     ],
 )

@@ -90,7 +90,7 @@ def test_three_faults_are_all_named_with_file_and_line(tmp_path):
         (
             "title: 10 Hz\n",
             "title: 10 Hz\n    title: x\n",
-            "20: criteria[1].title: is given twice, again in line 21",
+            "20: criteria[1].title: is given twice, again on line 21",
         ),
         ("    scenario: real\n", "", '13: criteria[0].scenario: is missing: "rate" judges a run'),
         (
@@ -151,7 +151,7 @@ def test_three_faults_are_all_named_with_file_and_line(tmp_path):
         (
             "package: lab1\n",
             "package: lab1\n12: x\n",
-            "1: 12 in line 6 is not a string: put the key in quotes",
+            "1: 12 on line 6 is not a string: put the key in quotes",
         ),
         (
             "package: lab1\n",

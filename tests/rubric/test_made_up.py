@@ -301,9 +301,9 @@ def test_a_value_that_the_program_has_got_is_not_the_cause(tmp_path: Path) -> No
     told = "; <rate> is made up for each submission, 14 here, and comes with the argument _rate:=14"
     for hint, seen, words in (
         (
-            "write 14 in line 14, 14.5 or v14: (14)",
+            "write 14 on line 14, 14.5 or v14: (14)",
             "10 Hz",
-            "write <rate> in line 14, 14.5 or v14: (<rate>)" + told,
+            "write <rate> on line 14, 14.5 or v14: (<rate>)" + told,
         ),
         ("write 14", "a: 10, b: 14", "write 14"),
         ("", "114 and 14.2", told.removeprefix("; ")),

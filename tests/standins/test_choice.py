@@ -139,6 +139,6 @@ def test_the_real_package_of_a_sourced_ros_wins(tmp_path: Path, monkeypatch: pyt
     )
     with make_place({"launch/all.launch": launch}, sandbox="none") as place:
         seen = run(place, scenario, tmp_path / "run.mcap")
-    # It may come behind words of roslaunch's own, in one line.
+    # It may come behind words of roslaunch's own, on one line.
     assert any("the real talker" in line for line in printed(seen, "all"))
     assert len(seen.student_channels("/turtle1/pose")) == 1

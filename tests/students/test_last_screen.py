@@ -26,7 +26,7 @@ MISTAKES = [
         f"✗ talker-executable {MINUS}25 in all scripts/talker.py:11",
         "SyntaxError: the line that begins a block ends with `:`",
         "while not rospy.is_shutdown();",
-        "fix: in line 11, write `while not rospy.is_shutdown():`",
+        "fix: on line 11, write `while not rospy.is_shutdown():`",
     ),
     (
         "mcr2-basic-comms/message-without-time",
@@ -41,7 +41,7 @@ MISTAKES = [
         "launch/activity1.launch:3",
         "there is no talker.py in a package basic_coms",
         '3 | <node name="talker" pkg="basic_coms"',
-        'fix: in line 3, write pkg="basic_comms"',
+        'fix: on line 3, write pkg="basic_comms"',
     ),
     (
         "mcr2-basic-comms/rate-sleep-without-brackets",

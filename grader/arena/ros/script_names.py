@@ -106,7 +106,7 @@ def misspelt(tree):
             yield slip(node.lineno, "outside-method", message % node.lineno, fix=fix)
         elif id(node) in keys:
             message = "the key `%s` is written here without quotes" % node.id
-            fix = "in line %d, write `%s`" % (node.lineno, keys[id(node)])
+            fix = "on line %d, write `%s`" % (node.lineno, keys[id(node)])
             yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
         elif node.id not in known and (near := spelt_alike(node.id, own, attributes)):
             fix = "write %s instead of %s" % (near, node.id)
@@ -359,7 +359,7 @@ def known_elsewhere(node, tree):
     for one in walk(tree):
         if isinstance(one, ast.ClassDef) and name in bound_names(one):
             owner = "self" if any(n is node for n in ast.walk(one)) else "%s()" % one.name
-            fix = "in line %d, write `%s.%s` for `%s`" % (node.lineno, owner, name, name)
+            fix = "on line %d, write `%s.%s` instead of `%s`" % (node.lineno, owner, name, name)
             return "`%s` belongs to the class %s" % (name, one.name), fix
     for one in walk(tree):
         if isinstance(one, ast.FunctionDef) and name in bound_names(one):
@@ -432,7 +432,7 @@ def counter_slips(tree):
             if set_at:
                 one = body[set_at[0]]
                 message = "this sets `%s` again each time around the loop" % name
-                fix = "move line %d above the loop of line %d" % (one.lineno, loop.lineno)
+                fix = "move line %d above the loop on line %d" % (one.lineno, loop.lineno)
                 yield slip(one.lineno, "set-in-loop", message, fix=fix, name=name)
             elif reset_at and node in body:
                 first = next((i for i in sent if name in names_in(body[i])), sent[0])
@@ -440,7 +440,7 @@ def counter_slips(tree):
                 if turn[0] < turn[1]:
                     line = body[reset_at[0]].lineno
                     message = "the counter is reset before line %d adds one, and that sum is published"
-                    fix = "move line %d above the `if` in line %d" % (node.lineno, line)
+                    fix = "move line %d above the `if` on line %d" % (node.lineno, line)
                     yield slip(line, "reset-early", message % node.lineno, fix=fix, name=name)
 
 
@@ -458,7 +458,7 @@ def uncounted(tree):
             sent = [names_in(n) for n in ast.walk(loop) if is_call(n, "publish")]
             for name in () if ends else (dotted(t) for t in increments(after)):
                 if any(name in names for names in sent):
-                    message = "`%s` is counted below the loop of line %d, which does not end before the node"
+                    message = "`%s` is counted below the loop on line %d, which does not end before the node"
                     last = after
                     for one in body[at + 2 :]:
                         last = one if name in names_in(one) else last

@@ -47,15 +47,15 @@ class Members:
             return None
         for name, method in self.methods.items():
             if name not in self.called and name.replace("_", "").lower() in ("init", "int", "inti", "ini"):
-                why = "`%s` in line %d is not the name of the method that Python calls" % (
+                why = "`%s` on line %d is not the name of the method that Python calls" % (
                     name,
                     method.lineno,
                 )
-                return method, why, "in line %d, write `__init__` for `%s`" % (method.lineno, name)
+                return method, why, "on line %d, write `__init__` instead of `%s`" % (method.lineno, name)
         for n in walk(self.tree):
             if isinstance(n, ast.FunctionDef) and n.name == "__init__" and n not in all_methods(self.tree):
-                why = "`__init__` in line %d is not in the class %s" % (n.lineno, self.name)
-                fix = "indent `def __init__` in line %d like the other methods of %s, and its lines below it"
+                why = "`__init__` on line %d is not in the class %s" % (n.lineno, self.name)
+                fix = "indent `def __init__` on line %d like the other methods of %s, and its lines below it"
                 return n, why, fix % (n.lineno, self.name)
         return None
 
@@ -92,13 +92,13 @@ def never_given(own, name, line):
         for n in ast.walk(method):
             if isinstance(n, ast.Name) and n.id == name and isinstance(n.ctx, ast.Store):
                 why = "line %d gives a value to `%s`, and not to `self.%s`" % (n.lineno, name, name)
-                return why, "in line %d, write `self.%s` for `%s`" % (n.lineno, name, name)
+                return why, "on line %d, write `self.%s` instead of `%s`" % (n.lineno, name, name)
     near = difflib.get_close_matches(name, sorted(own.fixed | set(own.stores)), 1, 0.75)
     near = near or [
         n for n in sorted(own.fixed | set(own.stores)) if n.startswith(name) or name.startswith(n)
     ]
     if near:
-        fix = "in line %d, write `self.%s` for `self.%s`" % (line, near[0], name)
+        fix = "on line %d, write `self.%s` instead of `self.%s`" % (line, near[0], name)
         return "did you mean self.%s?" % near[0], fix
     why = "nothing in the file gives `self.%s` a value" % name
     return why, "in `__init__`, write `self.%s = …`, with the value that it should have" % name
@@ -125,7 +125,7 @@ def classes_as_objects(classes, tree):
         line = given[0].lineno if given else n.lineno
         message = "`%s` is the class itself, not an object of it" % owner
         yield slip(
-            n.lineno, "object", message, fix="in line %d, write `%s`" % (line, right), name=method.name
+            n.lineno, "object", message, fix="on line %d, write `%s`" % (line, right), name=method.name
         )
 
 
@@ -195,7 +195,7 @@ def subscribed_again(tree):
         if endless and not any(is_call(n, "spin") for n in ast.walk(loop)):
             made = next((n for n in ast.walk(loop) if called_name(n) == "Subscriber"), None)
             if made is not None:
-                message = "the loop of line %d makes the Subscriber of line %d again and again"
+                message = "the loop on line %d makes the Subscriber on line %d again and again"
                 fix = "move line %d above line %d, and write `rospy.spin()` in place of the loop if that is all it does"
                 lines = (made.lineno, loop.lineno)
                 yield slip(made.lineno, "subscribed-again", message % lines[::-1], fix=fix % lines)
@@ -216,14 +216,14 @@ def hidden_names(tree):
         twice = functions.get(dotted(given[0]), []) if given else []
         if len(twice) > 1:
             lines = (twice[1].lineno, twice[0].name, twice[0].lineno)
-            message = "line %d defines `%s` again, so that the one of line %d is never called" % lines
-            fix = "give the function of line %d another name, also in the Subscriber(…) that is to call it"
+            message = "line %d defines `%s` again, so that the one on line %d is never called" % lines
+            fix = "give the function on line %d another name, also in the Subscriber(…) that is to call it"
             yield slip(
                 twice[1].lineno, "defined-twice", message, fix=fix % twice[1].lineno, name=twice[0].name
             )
         if isinstance(getattr(node, "func", None), ast.Name) and name in classes and name in imported:
-            message = "the class of line %d is called %s too, and hides what is imported"
-            fix = "write `%s(…)` in line %d, and `import %s` at the top if it is not there"
+            message = "the class on line %d is called %s too, and hides what is imported"
+            fix = "write `%s(…)` on line %d, and `import %s` at the top if it is not there"
             fix %= (imported[name], node.lineno, imported[name].partition(".")[0])
             yield slip(
                 node.lineno, "defined-twice", message % (classes[name].lineno, name), fix=fix, name=name
@@ -237,7 +237,7 @@ def wrong_callback(own, call, functions, bound, values):
         others = [f for f in functions.values() if f is not own and takes(f, bound)[0] == values]
         message = "`%s` is the function that makes this call, not its callback" % own.name
         meant = others[0].name if len(others) == 1 else "the name of the function that prints the message"
-        return message, "in line %d, write %s for %s" % (call.lineno, meant, own.name)
+        return message, "on line %d, write %s instead of %s" % (call.lineno, meant, own.name)
     if bound and len(given) == values and "self" not in given:
         message = "`%s` is called on an object, and takes no `self`" % own.name
         return message, "write `def %s(%s):`" % (own.name, ", ".join(["self", *given]))

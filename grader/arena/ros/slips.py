@@ -176,7 +176,7 @@ def never_reached(tree):
                 behind = [n for n in behind if word(n) and word(n) not in within]
                 if behind and "publish" not in within:
                     what = "spin()" if spins else "loop"
-                    message = "the %s in line %d never ends, so the %s(…) in line %d is never reached"
+                    message = "the %s on line %d never ends, so the %s(…) on line %d is never reached"
                     message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
                     fix = "move line %d above line %d" % (behind[0].lineno, loop.lineno)
                     fix = "" if word(behind[0]) == "publish" else fix
@@ -191,32 +191,32 @@ def stopped_loops(tree):
     for loop in walk(tree):
         once = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
         if once and not turned[loop][1] and any(is_call(n, "publish") for n in ast.walk(loop)):
-            message = "the `if` in line %d runs what follows it once" % loop.lineno
-            fix = "write `while` for `if` in line %d" % loop.lineno
+            message = "the `if` on line %d runs what follows it once" % loop.lineno
+            fix = "write `while` instead of `if` on line %d" % loop.lineno
             yield slip(loop.lineno, "loop-left", message, fix=fix)
         if isinstance(loop, ast.While) and is_call(loop.test, "is_shutdown"):
-            message = "the loop of line %d runs only once the node is to end: it lacks a `not`" % loop.lineno
-            fix = "in line %d, write `while not %s():`" % (loop.lineno, dotted(loop.test.func))
+            message = "the loop on line %d runs only once the node is to end: it lacks a `not`" % loop.lineno
+            fix = "on line %d, write `while not %s():`" % (loop.lineno, dotted(loop.test.func))
             yield slip(loop.lineno, "loop-left", message, fix=fix)
         inside = list(ast.walk(loop)) if isinstance(loop, (ast.While, ast.For)) else []
         if not any(is_call(n, "publish") for n in inside):
             continue
         spin = next((n for n in inside if is_call(n, "spin")), None)
         if spin is not None:
-            message = "the loop stops at the spin() in line %d, which waits until the node ends" % spin.lineno
+            message = "the loop stops at the spin() on line %d, which waits until the node ends" % spin.lineno
             fix = "remove spin(): the loop keeps the node alive"
             yield slip(spin.lineno, "spin-in-loop", message, fix=fix)
         if is_counted(loop) and not turned[loop][1]:
-            message = "the loop of line %d ends after a fixed number of rounds" % loop.lineno
+            message = "the loop on line %d ends after a fixed number of rounds" % loop.lineno
             used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
-            fix = "write `while not rospy.is_shutdown():` in line %d" % loop.lineno
+            fix = "write `while not rospy.is_shutdown():` on line %d" % loop.lineno
             if isinstance(loop, ast.For) and dotted(loop.target) in used:
                 fix = "put it inside a `while not rospy.is_shutdown():`"
             yield slip(loop.lineno, "loop-left", message, fix=fix)
         left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None)
         if left is not None:
             word = "break" if isinstance(left, ast.Break) else "return"
-            message = "the loop ends the first time around, at the %s in line %d" % (word, left.lineno)
+            message = "the loop ends the first time around, at the %s on line %d" % (word, left.lineno)
             fix = "remove it from line %d, or put it inside an `if`" % left.lineno
             yield slip(left.lineno, "loop-left", message, fix=fix)
 
@@ -253,7 +253,7 @@ def sleepless_loops(tree):
         if waits or inner or not outside or not any(is_call(n, "publish") for n in inside):
             continue
         name = dotted(outside[0].func) or "sleep"
-        message = "`%s()` is outside the loop of line %d" % (name, loop.lineno)
+        message = "`%s()` is outside the loop on line %d" % (name, loop.lineno)
         last = loop.body[-1]
         fix = "move it into that loop, below line %d, with the same spaces or tabs before it as line %d has"
         fix %= (last.end_lineno, last.lineno)
@@ -270,7 +270,7 @@ def sleeps_in_if(loop):
         own = [n for n in within if isinstance(n, ast.Expr) and is_call(n.value, "sleep")]
         if plain and len(sleeps) == len(own) == 1 and own[0] is within[-1] and one is loop.body[-1]:
             name, line = dotted(own[0].value.func), own[0].lineno
-            message = "`%s()` stands in the `if` of line %d" % (name, one.lineno)
+            message = "`%s()` stands in the `if` on line %d" % (name, one.lineno)
             fix = "write line %d with the same spaces or tabs before it as line %d has" % (line, one.lineno)
             yield slip(line, "sleep-outside", message, fix=fix, name=name)
 
@@ -288,7 +288,7 @@ def sleeps_twice(tree):
         ]
         if sorted(publish) == [False, True]:
             lines = (body[at[0]].lineno, body[at[1]].lineno)
-            message = "the loop sleeps in line %d and again in line %d" % lines
+            message = "the loop sleeps on line %d and again on line %d" % lines
             yield slip(lines[1], "sleep-twice", message, fix="delete line %d" % lines[1])
 
 
@@ -304,9 +304,9 @@ def waiting_callbacks(tree):
             if isinstance(inner, ast.While) and is_endless(inner):
                 message, fix = "the loop in the callback `%s`, line %d, never ends", "take the loop out of it"
             elif is_call(inner, "spin"):
-                message, fix = "the callback `%s` calls spin() in line %d", "move line %d out of it"
+                message, fix = "the callback `%s` calls spin() on line %d", "move line %d out of it"
             elif called_name(inner) == "sleep" and not is_short(inner):
-                message, fix = "the callback `%s` sleeps in line %d", "delete line %d"
+                message, fix = "the callback `%s` sleeps on line %d", "delete line %d"
             else:
                 continue
             fix = fix % inner.lineno if "%" in fix else fix
@@ -498,16 +498,16 @@ def deaf_loops(tree):
         wakes = any(is_call(n, "sleep") and dotted(n.func) != "time.sleep" for n in inside)
         asks = "check `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
         for handler in caught[:1]:
-            message = "the `except` in line %d catches what Ctrl-C raises, and the loop in line %d goes on"
+            message = "the `except` on line %d catches what Ctrl-C raises, and the loop on line %d goes on"
             message %= (handler.lineno, loop.lineno)
             catching.append(slip(loop.lineno, "deaf", message, fix=asks))
         if not caught and not wakes:
             known = isinstance(loop, ast.While) and isinstance(loop.test, ast.Constant)
-            message = "the loop in line %d never checks whether the node should end" % loop.lineno
+            message = "the loop on line %d never checks whether the node should end" % loop.lineno
             (endless if known else others).append(slip(loop.lineno, "deaf", message, fix=asks))
     for node in walk(tree):
         if is_call(node, "init_node") and any(k.arg == "disable_signals" for k in node.keywords):
-            message = "`disable_signals=True` in line %d keeps Ctrl-C from rospy" % node.lineno
+            message = "`disable_signals=True` on line %d keeps Ctrl-C from rospy" % node.lineno
             yield slip(node.lineno, "deaf", message, fix="leave it out")
         if is_call(node, "signal") and node.args and dotted(node.args[0]).endswith("SIGINT"):
             message = "line %d gives Ctrl-C another meaning" % node.lineno

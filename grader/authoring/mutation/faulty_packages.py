@@ -147,7 +147,7 @@ def _mutant_text(name: str, mutant: Mutant, costs: dict[str, str]) -> str:
 
 
 def _flow(data: object) -> str:
-    """Return a map as YAML in one line, with invisible letters escaped."""
+    """Return a map as YAML on one line, with invisible letters escaped."""
 
     def dump(*, letters: bool) -> str:
         return yaml.safe_dump(

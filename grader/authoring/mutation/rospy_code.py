@@ -66,7 +66,7 @@ def literal(script: Script, node: ast.AST | None) -> ast.Constant | None:
 
 
 def text_literal(script: Script, node: ast.AST | None) -> ast.Constant | None:
-    """Return the same for texts that stand in one line."""
+    """Return the same for texts that stand on one line."""
     found = literal(script, node)
     whole = found is not None and isinstance(found.value, str) and found.lineno == found.end_lineno
     return found if whole else None

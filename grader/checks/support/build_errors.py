@@ -125,9 +125,12 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
     near = get_close_matches(name, (*ALWAYS_THERE, *known_packages()), 1, ONE_EDIT)
     if name in SLIPS_OF_COMPONENTS:
         why = f"find_package(…) reads {name} as the name of a package: the keyword is COMPONENTS"
-        return Explained(why, f"write COMPONENTS for {name}")
+        return Explained(why, f"write COMPONENTS instead of {name}")
     if slips := _misspelt_components(package):
-        wrong, right = join_words(slips), "; ".join(f"write {new} for {old}" for old, new in slips.items())
+        wrong, right = (
+            join_words(slips),
+            "; ".join(f"write {new} instead of {old}" for old, new in slips.items()),
+        )
         what = (
             "there is no package of that name" if len(slips) == 1 else "there are no packages of these names"
         )
@@ -209,7 +212,7 @@ def no_types(package: PackageFacts) -> Explained | None:
     if not wrong:
         return None
     place, first, _ = wrong[0]
-    fixes = [f"in line {at.line} of {at.file}, write `{right} {field.name}`" for at, field, right in wrong]
+    fixes = [f"on line {at.line} of {at.file}, write `{right} {field.name}`" for at, field, right in wrong]
     others = {right.partition("/")[0] for _, _, right in wrong if "/" in right}
     named = f", and {join_words(sorted(others))} after DEPENDENCIES in generate_messages(…)" if others else ""
     if len(wrong) == 1 and not others:
@@ -273,7 +276,7 @@ def _missing_script(found: re.Match[str], package: PackageFacts, _lines: Sequenc
 def _missing_files(paths: Sequence[str], package: PackageFacts, words: str, where: str) -> Explained:
     """Several that one edit puts right: with the paths of those that lie elsewhere in the package."""
     near = {path: found[0] for path in paths if (found := near_names(path, (f.path for f in package.files)))}
-    hints = [f"write {right} for {path}" for path, right in near.items()]
+    hints = [f"write {right} instead of {path}" for path, right in near.items()]
     if rest := [path for path in paths if path not in near]:
         them = "them" if len(rest) > 1 else "it"
         hints.append(f"add {join_words(rest)} and push {them}, or take {them} out of {where}")
@@ -380,7 +383,7 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
     why = f"{text}: nothing makes it wait for its message, so a parallel build (-j) sometimes fails"
     waiting = _programs_without(package, "add_dependencies")
     fixes = [
-        f"below the add_executable(…) of line {call.line}, write "
+        f"below the add_executable(…) on line {call.line}, write "
         f"add_dependencies({call.args[0]} ${{${{PROJECT_NAME}}_EXPORTED_TARGETS}})"
         for call in cmake_calls(package, "add_executable")
         if call.args and call.args[0] in waiting
@@ -475,7 +478,7 @@ def _main_twice(_found: re.Match[str], _package: PackageFacts, _lines: Sequence[
 def _unknown_command(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     name = found[1]
     if right := meant_command(name.lower()):
-        return Explained(f"there is no command {name}(…)", f"write {right} for {name}")
+        return Explained(f"there is no command {name}(…)", f"write {right} instead of {name}")
     has_catkin = any(one.args[:1] == ("catkin",) for one in cmake_calls(package, "find_package"))
     if name.lower() in OF_INTERFACES and has_catkin:
         why = f"{name}(…) comes with message_generation, which find_package(catkin …) does not name"

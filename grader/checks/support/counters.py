@@ -262,7 +262,7 @@ def cite_slip(verdict: Verdict, count: Count, run: Run, package: PackageFacts, *
     hint = (
         f"in {slip.file}, {slip.fix}"
         if "line" in slip.fix
-        else f"{slip.fix} in line {slip.line} of {slip.file}"
+        else f"{slip.fix} on line {slip.line} of {slip.file}"
     )
     cited = (slip.place, *verdict.citations)
     return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
@@ -328,7 +328,7 @@ def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], pa
     does = "" if wrong_value else f" compares it with {slip.message}"
     message = f"{verdict.message} ({slip.file}, line {slip.line}{does})"
     right = params.minimum if wrong_value else params.maximum
-    hint = f"in line {slip.line}, write {right} instead of {slip.message}"
+    hint = f"on line {slip.line}, write {right} instead of {slip.message}"
     if not wrong_value:
         hint = _limit_hint(slip, params)
     return verdict.model_copy(update={"message": message, "hint": hint, "citations": (slip.place,)})
@@ -336,7 +336,7 @@ def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], pa
 
 def _limit_hint(slip: PythonSlip, params: WrapParams) -> str:
     most = params.maximum
-    return f"let it count up to {most} there: `if counter > {most}`, or `% {most + 1}`, in line {slip.line}"
+    return f"let it count up to {most} there: `if counter > {most}`, or `% {most + 1}`, on line {slip.line}"
 
 
 def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Literal["program", "flood", "lost"]:

@@ -53,7 +53,7 @@ SLIPS = {
     **{f"name '{old}' is not defined": (f"`{old}` is Python 2", f"write `{new}`, as in Python 3")
        for old, new in {"xrange": "range", "unicode": "str", "basestring": "str", "long": "int", "unichr": "chr",
                         "reduce": "functools.reduce", "file": "open"}.items()},
-    **{f"name '{old}' is not defined": (f"Python has no `{old}`", f"write `{new}` for `{old}`")
+    **{f"name '{old}' is not defined": (f"Python has no `{old}`", f"write `{new}` instead of `{old}`")
        for old, new in {"true": "True", "false": "False", "TRUE": "True", "FALSE": "False", "null": "None",
                         "NULL": "None", "nullptr": "None", "nil": "None", "none": "None", "this": "self",
                         "printf": "print", "cout": "print(…)", "Pass": "pass", "Break": "break",
@@ -431,7 +431,7 @@ def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Me
     if (twice := _IN_ITSELF.search(message)) and re.search(rf"\b{twice[1]}\.{twice[1]}\b", source):
         name = twice[1]
         cause = f"`from {name} import {name}` makes `{name}` what is in the module, and not the module"
-        return cause, f"write `{name}` for `{name}.{name}`"
+        return cause, f"write `{name}` instead of `{name}.{name}`"
     if found := re.match(r"'(tuple|list|dict)' object has no attribute 'encode'", message):
         hint = 'put the values into the text with `%`: `"… %s" % value`, not after a comma'
         return f"a string is published here, and this is a {found[1]}", hint
@@ -552,7 +552,7 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
         why = f"`{owner}` publishes {types[here.line]} on {here.message} (line {here.line})"
         lines = sorted((here.line, others[0].line))
         fix = (
-            f"swap `{owner}` and `{others[0].name}` in lines {lines[0]} and {lines[1]}, or where they publish"
+            f"swap `{owner}` and `{others[0].name}` on lines {lines[0]} and {lines[1]}, or where they publish"
         )
         return why, fix
     call = "str(…)" if wants_text else "int(…)"

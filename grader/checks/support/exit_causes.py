@@ -310,7 +310,7 @@ def _no_number(found: Traceback, place: FileCitation, package: PackageFacts) -> 
             if kind == "int"
             else read.fix.replace("map(int, ", "map(float, ").replace("= int(", "= float(")
         )
-        return "a command-line argument is a string", f"in line {read.line}, write `{fix}`"
+        return "a command-line argument is a string", f"on line {read.line}, write `{fix}`"
     if ".publish(" in found.own_frames[-1].source:
         return None
     return "it takes a number but gets something else", f"turn the value into one first: `{kind}(…)`"
@@ -374,7 +374,7 @@ def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> t
 
 
 def _callback(found: Traceback, place: FileCitation | None, package: PackageFacts) -> PythonSlip | None:
-    """The callback that the error speaks of: one that is called in this line, or that ROS calls with other values."""
+    """The callback that the error speaks of: one that is called on this line, or that ROS calls with other values."""
     called = [s for s in package.slips if s.kind == "callback-called" and place is not None]
     here = next((s for s in called if place and (s.file, s.line) == (place.file, place.line)), None)
     match = _ARITY.match(found.message)
@@ -396,12 +396,12 @@ def _operand(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
         value = value if kind == "String" or not of_text else f"str({value})"
         return (
             f"{other or 'one side'} is the whole message ({kind})",
-            f"write `{value}` for `{other or 'msg'}`",
+            f"write `{value}` instead of `{other or 'msg'}`",
         )
     if not of_text:
         return None
     if other:
-        return f"{other} is not a string", f"write `str({other})` for `{other}`"
+        return f"{other} is not a string", f"write `str({other})` instead of `{other}`"
     return (
         f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} is not a string",
         "wrap it in `str(…)` before you add it to a string",

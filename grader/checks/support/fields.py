@@ -198,7 +198,7 @@ def _kinds(got: object, wanted: object) -> str:
 
 
 def fields_text(value: Mapping[str, Any]) -> str:
-    """Return a request's or an answer's fields in one line."""
+    """Return a request's or an answer's fields on one line."""
     return shown(", ".join(f"{name}: {value_text(one)}" for name, one in value.items())) or "nothing"
 
 

@@ -184,7 +184,7 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
         }
         slips = {name: meant[0] for name in node.unknown if (meant := near_names(name, missing))} | known
         told = "".join(f"; it has no attribute {name}" for name in slips)
-        fix = "; ".join(f"write {right}= for {name}=" for name, right in slips.items())
+        fix = "; ".join(f"write {right}= instead of {name}=" for name, right in slips.items())
         stem = PurePosixPath(node.type or "<file>.py").stem
         own = {"pkg": package.name, "type": f"{node.name or '<file>'}.py", "name": stem}
         add = " ".join(f'{name}="{own[name]}"' for name in missing)
@@ -231,7 +231,7 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
             fix = f'write name="{PurePosixPath(str(node.name)).name}"; a namespace goes into ns="…"'
             yield _slip(node, f'name="{node.name}" has a slash in it, which roslaunch refuses', fix)
         elif node.full_name in seen and not node.uncertain:
-            why = f"a second node is named {node.full_name}, like that of line {seen[node.full_name].line}"
+            why = f"a second node is named {node.full_name}, like that on line {seen[node.full_name].line}"
             yield _slip(node, why, "give each <node> its own name: roslaunch refuses the file")
         if not node.uncertain:
             seen.setdefault(node.full_name, node)
@@ -426,7 +426,7 @@ def unset_arg_fixes(file: LaunchFile, told: str) -> Iterator[str]:
         written = f'<arg name="{arg.name}" default="…"/>'
         if written not in told:
             yield (
-                f"in line {arg.line} of {arg.file} write {written}"
+                f"on line {arg.line} of {arg.file} write {written}"
                 if arg.declared
                 else f"below <launch> in {arg.file} add {written}"
             )
@@ -582,7 +582,7 @@ def _substitute_inside(inside: str) -> tuple[str, str]:
 
 
 def _join_required(lines: Iterable[str]) -> Iterator[str]:
-    """Of a node with required="true", roslaunch says in one line that it "died", and in the next one how it ended."""
+    """Of a node with required="true", roslaunch says on one line that it "died", and in the next one how it ended."""
     name = ""
     for line in lines:
         if match := _REQUIRED.search(line):

@@ -138,4 +138,4 @@ def _described(uses: Sequence[_Use], topic: str, *, drop_ns: bool, drop_remaps: 
 
 def _in_lines(found: Sequence[LaunchLine]) -> str:
     numbers = sorted({line.line for line in found})
-    return f" in line{'s' * (len(numbers) > 1)} {join_words(map(str, numbers))}" if numbers else ""
+    return f" on line{'s' * (len(numbers) > 1)} {join_words(map(str, numbers))}" if numbers else ""

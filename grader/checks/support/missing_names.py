@@ -74,12 +74,12 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
     if wrong := re.match(r"(\w+) is not an attribute of (\w+)$", found.message):
         known = fields_of(package, wrong[2])
         near = near_names(wrong[1], known) or (known if len(known) == 1 else ())
-        hint = f"write `{near[0]}=` for `{wrong[1]}=`" if near else ""
+        hint = f"write `{near[0]}=` instead of `{wrong[1]}=`" if near else ""
         said = f"{wrong[2]} has {join_words(known[:ATTRIBUTES_SHOWN])}" if known else ""
         return said, hint or f"leave out `{wrong[1]}=`, or write the field that you mean"
     if wrong := _KEYWORD.search(found.message):
         near = near_names(wrong[1], KEYWORDS)
-        return (f"it is called {near[0]}", f"write {near[0]}= for {wrong[1]}=") if near else None
+        return (f"it is called {near[0]}", f"write {near[0]}= instead of {wrong[1]}=") if near else None
     is_import = found.kind in IMPORT_ERRORS
     return (_own_module(found, package) or _other_module(found, package)) if is_import else None
 
@@ -157,7 +157,7 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
         own = next((one for one in maker.interfaces if wanted[1] in one.classes), None)
         if own is None:
             made = join_words(name for one in maker.interfaces for name in one.classes)
-            return f"the build makes {made}", f"write the one that you mean for {wanted[1]}"
+            return f"the build makes {made}", f"write the one that you mean instead of {wanted[1]}"
         kind = own.path.rpartition(".")[2].replace("msg", "message").replace("srv", "service")
         hint = f"list {own.path.rpartition('/')[2]} in add_{kind}_files(…)"
         return f"the build has not made it from {own.path}", hint
@@ -190,9 +190,9 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
     if asked and asked[1] in ROS_2:
         return f"{asked[1]} is from ROS 2", "this lab is for ROS 1: write the node with rospy"
     if asked and asked[1] in PYTHON_2:
-        return f"{asked[1]} is a Python 2 module", f"write {PYTHON_2[asked[1]]} for {asked[1]}"
+        return f"{asked[1]} is a Python 2 module", f"write {PYTHON_2[asked[1]]} instead of {asked[1]}"
     if asked and asked[1] in TUTORIALS - {package.name}:
-        fix = f"write your package's name for {asked[1]}, or leave the line out"
+        fix = f"write your package's name instead of {asked[1]}, or leave the line out"
         return "tutorials use that name for the reader's own package", fix
     meant = unimported_module(found, package)
     near = near_names(asked[1], noetic_messages()) if asked and asked[1] not in known_packages() else ()
@@ -202,7 +202,7 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
     if near:
         return f"messages come from {near[0]}.msg", f"write `from {near[0]}.msg import …`"
     meant = meant or (nearest_module(asked[1], own_modules(package)) if asked else "")
-    return (f"did you mean {meant}?", f"write {meant} for {asked[1]}") if asked and meant else None
+    return (f"did you mean {meant}?", f"write {meant} instead of {asked[1]}") if asked and meant else None
 
 
 def _own_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
@@ -274,11 +274,11 @@ def _other_attributes(package: PackageFacts, owner: str, wrong: str, source: str
     if owner in ATTRIBUTES:
         return None
     if len(known) == 1 and any(hasattr(kind, wrong) for kind in (str, float, list)):
-        return f"it is the whole message ({owner})", f"write `.{known[0]}.{wrong}` for `.{wrong}`"
+        return f"it is the whole message ({owner})", f"write `.{known[0]}.{wrong}` instead of `.{wrong}`"
     if len(known) == 1:
         return f"{owner} has only {known[0]}", _line_with(source, wrong, known[0])
     listed = join_words(known[:ATTRIBUTES_SHOWN]) + (", …" if len(known) > ATTRIBUTES_SHOWN else "")
-    return f"{owner} has {listed}", f"write the field that you mean for {wrong}"
+    return f"{owner} has {listed}", f"write the field that you mean instead of {wrong}"
 
 
 def _field_of_number(found: Traceback, owner: str) -> tuple[str, str] | None:
@@ -300,7 +300,7 @@ def _begins_alike(name: str, wrong: str) -> bool:
 def _line_with(source: str, wrong: str, right: str) -> str:
     """Return the advice to write the line with another attribute, where it has the wrong one once."""
     line, count = re.subn(rf"\.{wrong}\b", f".{right}", source)
-    return f"write `{shown(line)}`" if count == 1 else f"write {right} for {wrong}"
+    return f"write `{shown(line)}`" if count == 1 else f"write {right} instead of {wrong}"
 
 
 def fields_of(package: PackageFacts, name: str) -> tuple[str, ...]:
@@ -333,11 +333,11 @@ def name_slip(slip: PythonSlip, package: PackageFacts) -> NameSlip | None:
         why = f"line {gone[0].line}, which gives it its value, is commented out"
         return NameSlip(name, slip.line, why, gone[0].fix)
     if slip.kind == "misspelt":
-        return NameSlip(name, slip.line, why, f"in line {slip.line}, {fix}")
+        return NameSlip(name, slip.line, why, f"on line {slip.line}, {fix}")
     if slip.kind != "undefined":
         return None
     if known := SLIPS.get(f"name '{name}' is not defined"):
-        return NameSlip(name, slip.line, known[0], f"in line {slip.line}, {known[1]}")
+        return NameSlip(name, slip.line, known[0], f"on line {slip.line}, {known[1]}")
     having = [f"{package}.msg" for package, types in noetic_messages().items() if name in types]
     made = [
         f"{p.name}.{i.module}" for p in (package, *package.also) for i in p.interfaces if name in i.classes

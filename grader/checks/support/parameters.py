@@ -47,7 +47,7 @@ _CAUSES = (
     (r"exceeds XML-RPC limits|Overflow Error", "a number is larger than 2147483647, the largest that ROS can hold",
      'write a long number in quotes, as text: phone: "9876543210"'),
     (r"mapping values are not allowed here",
-     "in line {line} or above it, the space after a `:` is missing, or a `:` is part of a value",
+     "on line {line} or above it, the space after a `:` is missing, or a `:` is part of a value",
      'write `name: value` with a space, and a value that holds a `:` in "quotes"'),
     (r"scanning a quoted scalar|found unexpected end of stream", "a closing quote is missing near line {line}",
      'close every " on its own line'),

@@ -65,7 +65,7 @@ class SubmissionOutcome(Record):
     """What became of a job, in short: the rest is in its folder.
 
     `kept`: the earlier result stays. `handed_in` is the submission's time, None if it could not be found out. `message`
-    and `hint` say in one line each why there is no result, or why the earlier one stays.
+    and `hint` say on one line each why there is no result, or why the earlier one stays.
     """
 
     id: str
@@ -260,7 +260,7 @@ class FolderJob:
 
 @dataclass(frozen=True, kw_only=True)
 class GradedSubmission:
-    """A grading's result, or in one line why there is none. `again` is how many of its runs were made again."""
+    """A grading's result, or on one line why there is none. `again` is how many of its runs were made again."""
 
     name: str
     result: GradingResult | None

@@ -74,7 +74,7 @@ class Regraded:
     """One submission: its points before and after, what changed, in the new rubric's order, and the scenarios without a
     recording that fits.
 
-    `error` says in one line why it could not be judged: its result stays as it was. `first` is what each criterion was
+    `error` says on one line why it could not be judged: its result stays as it was. `first` is what each criterion was
     before, kept only where scenarios are missing. A class of thousands is kept as these, and never as whole results.
     """
 

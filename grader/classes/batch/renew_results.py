@@ -37,7 +37,7 @@ PACKAGE, SCENARIO = "package.mcap", "scenario.digest"
 
 @dataclass(frozen=True, kw_only=True)
 class JudgedFolder:
-    """One submission's criteria, or in one line why there are none and what to do about it.
+    """One submission's criteria, or on one line why there are none and what to do about it.
 
     `missing` are the rubric's scenarios without a recording that fits.
     """
@@ -139,7 +139,7 @@ CONSOLE = "console.log"
 
 @dataclass(frozen=True, kw_only=True)
 class WrittenReports:
-    """One submission's reports are written, or `error` says in one line why not."""
+    """One submission's reports are written, or `error` says on one line why not."""
 
     folder: Path
     rubric_digest: str = ""

@@ -123,7 +123,7 @@ class _Reading:
                 self.faults.append(((key,), f'there is no submission "{key}"{self._near(key)}'))
             elif first.setdefault(name, key) != key:
                 line = self._source.line((first[name],))
-                self.faults.append(((key,), f"is the submission of line {line} already, {first[name]}"))
+                self.faults.append(((key,), f"is the submission on line {line} already, {first[name]}"))
             self._submission(key, value, name)
 
     def _schema(self, value: object) -> None:

@@ -58,7 +58,7 @@ def rename_package(files: Files, package: PackageFacts, wanted: Wanted) -> None:
         return
     old, new = manifest.name, wanted.package
     message = f"line {manifest.name_line} of {MANIFEST}: the package is called {old}, not {new}"
-    fix = f'write {new} for {old} in {MANIFEST}, in project(…) and in every pkg="…"'
+    fix = f'write {new} instead of {old} in {MANIFEST}, in project(…) and in every pkg="…"'
     files.change("package-name", MANIFEST, rename_word(text, old, new), message, fix)
     for file in naming_files(files.folder):
         other = files.text(file)
@@ -180,7 +180,7 @@ def _spell_catkin(files: Files) -> None:
         name = next(iter(_words(command)), None)
         if name is not None and name.value != "catkin" and name.value.lower() == "catkin":
             message = f"line {command.line} of {CMAKE}: find_package(…) names {name.value}, and not catkin"
-            fix = f"write catkin for {name.value}"
+            fix = f"write catkin instead of {name.value}"
             files.change("build-line", CMAKE, _replace_token(_cmake(files), name, "catkin"), message, fix)
             return
 
@@ -350,7 +350,7 @@ def _name_definitions(files: Files, name: str, made: Sequence[str]) -> None:
         stray = next((word for word in sorted(named - {*made}) if is_near(word, file)), "FILES")
         token = next((t for one in _commands(files, name) for t in _words(one) if t.value == stray), None)
         if token is not None:
-            new, place = (f"FILES {file}", "after") if stray == "FILES" else (file, "for")
+            new, place = (f"FILES {file}", "after") if stray == "FILES" else (file, "instead of")
             message = f"line {call.line} of {CMAKE}: {name}(…) does not name {file}"
             changed = _replace_token(_cmake(files), token, new)
             files.change("build-line", CMAKE, changed, message, f"write {file} {place} {stray}")
@@ -407,7 +407,7 @@ def _add_call(files: Files, what: str, line: str, below: Sequence[str], names: S
     if commented is not None:
         at, call = commented
         places = lines_text(at, at + len(call) - 1)
-        fix, new = f"remove the `#` of {places}", call
+        fix, new = f"remove the `#` on {places}", call
         if not set(names) <= set(re.findall(r"[^\s()]+", "\n".join(call))):
             fix, new = f"in place of {places} write {line}", [line]
         changed = "\n".join([*lines[:at], *new, *lines[at + len(call) :]])
@@ -472,7 +472,7 @@ def _correct_paths(files: Files, package: PackageFacts) -> None:
             text = _replace_token(text, token, right)
         named, there = join_words(t.value for t, _ in moved), join_words(right for _, right in moved)
         message = f"line {call.line} of {CMAKE}: {call.identifier}(…) names {named}, which the package has as {there}"
-        fix = " and ".join(f"write {right} for {token.value}" for token, right in moved)
+        fix = " and ".join(f"write {right} instead of {token.value}" for token, right in moved)
         files.change("build-line", CMAKE, text, message, fix)
 
 
@@ -519,7 +519,7 @@ def _replace_stray(files: Files, own: Sequence[str], path: str) -> bool:
         for token in _words(call):
             if _plain(token.value) not in own and _is_about(PurePosixPath(token.value).name, name):
                 message = f"line {call.line} of {CMAKE}: {token.value} does not exist; the script is {path}"
-                fix = f"write {path} for {token.value}"
+                fix = f"write {path} instead of {token.value}"
                 files.change("build-line", CMAKE, _replace_token(_cmake(files), token, path), message, fix)
                 return True
     return False

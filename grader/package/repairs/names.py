@@ -501,7 +501,7 @@ def _set_attribute(
             if kind == "package-name":
                 lines = [pattern.sub(lambda m: m["head"] + new, one) for one in lines]
             message = f'line {number + 1} of {file}: {attribute}="{old}" should be {attribute}="{new}"'
-            fix = f'write pkg="{new}" for pkg="{old}"' if kind == "package-name" else ""
+            fix = f'write pkg="{new}" instead of pkg="{old}"' if kind == "package-name" else ""
             files.change(kind, file, "\n".join(lines), message, fix)
             return
         if number >= line and "<" in lines[number].replace("<!--", ""):

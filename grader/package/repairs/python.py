@@ -160,7 +160,7 @@ def _rewritten(before: str, after: str) -> str:
     found = [(number, as_code(new.strip())) for number, (old, new) in enumerate(pairs, start=1) if old != new]
     if len(found) < 2 or before.count("\n") != after.count("\n"):
         return ""
-    written = [f"in line {number}, write {new}" for number, new in found[1:LINES_SHOWN]]
+    written = [f"on line {number}, write {new}" for number, new in found[1:LINES_SHOWN]]
     left = len(found) - LINES_SHOWN
     more = f"; {plural(left, 'more line')} in the same way" if left > 0 else ""
     return "; ".join([f"write {found[0][1]}", *written]) + more

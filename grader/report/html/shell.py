@@ -112,7 +112,7 @@ def prose(text: str) -> Markup:
 
 
 TO_WRITE = re.compile(
-    r"(?:in line \d+, |in place of lines? [\d to]+ )?(?:write|add|publish|use) <code>(.*?)</code>",
+    r"(?:on line \d+, |in place of lines? [\d to]+ )?(?:write|add|publish|use) <code>(.*?)</code>",
     re.IGNORECASE,
 )
 IS_CODE = re.compile(r"[(<=\"']")

@@ -167,7 +167,7 @@ def test_code_that_a_fix_says_to_write_can_be_copied():
         return found.xpath(".//*[contains(@class, 'hint')]//button/@data-copy")
 
     assert copied("write `rate.sleep()` as the last line") == ["rate.sleep()"]
-    assert copied("add <depend>rospy</depend> below line 4; then in line 7, write f(a)") == [
+    assert copied("add <depend>rospy</depend> below line 4; then on line 7, write f(a)") == [
         "<depend>rospy</depend>",
         "f(a)",
     ]
