@@ -97,7 +97,7 @@ def _evidence_files(folder: Path) -> Iterator[str]:
         for file in files:
             name = Path(place, file).relative_to(folder).as_posix()
             if not name.isprintable():
-                raise EvidenceError(f"{name!r} is no name that the grader gives to evidence")
+                raise EvidenceError(f"{name!r} is not a name that the grader gives to evidence")
             yield name
 
 

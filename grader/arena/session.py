@@ -213,7 +213,7 @@ class ArenaSession:
         a process was killed, and not by the arena: the machine had no memory for it, or a person ended it."""
         self.send(do="finish")
         if not await self.wait(lambda: self._done, END_S):
-            raise ArenaError("the managed roscore did not end in order", hint="grade again")
+            raise ArenaError("the managed roscore did not shut down cleanly", hint="grade again")
         killed = self._killed.first(last_run=self._last_run)
         if killed:
             raise ArenaError(

@@ -293,7 +293,7 @@ class Proposal(DraftSheet):
                 file = PurePosixPath(script).name
                 self.add(
                     f"{name}-answers-{label_of(topic)}-{label_of(answer)}",
-                    f"{file} publishes on {answer} upon each message on {topic}",
+                    f"{file} publishes on {answer} after each message on {topic}",
                     "reacts",
                     parameters,
                     scenario=scenario,

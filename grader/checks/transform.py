@@ -155,7 +155,7 @@ def _never_called(
     if slip is None or not own or any(params.child in {one.parent, one.child} for one in own):
         return None
     message = f"{params.name} is not sent: {slip.message} (line {slip.line} of {slip.file})"
-    return failed(message, hint=f"call `{slip.name}()` where it is to be sent", citations=(slip.place,))
+    return failed(message, hint=f"call `{slip.name}()` where it should be sent", citations=(slip.place,))
 
 
 def _not_sent(

@@ -123,7 +123,7 @@ def points_to_pass(rubric: Rubric, points: float) -> str:
     needed = scaled_pass_mark(rubric, points)
     if needed is None:
         return "to pass, every visible criterion has to be met"
-    return f"to pass, it takes {number(needed)}"
+    return f"to pass, you need {number(needed)}"
 
 
 def summarize(graded: JobResult) -> str:

@@ -69,7 +69,7 @@ class JobSettings:
             )
         if self.attempt > self.attempts:
             message = (
-                f"attempt {self.attempt}, and {plural(self.attempts, 'attempt')} can be graded: nothing was"
+                f"this is attempt {self.attempt}, and only {plural(self.attempts, 'attempt')} can be graded"
             )
             raise SubmissionError(
                 message, hint="what was graded before counts; ask your teachers for one more"

@@ -65,7 +65,7 @@ def _gradescope_fault(fault: GraderError) -> dict[str, Any]:
     why = f"NOT GRADED, {LOOK}: {line(fault.message, LIMIT)}"
     test = {"name": "NOT GRADED", "status": "failed", "output": why, "visibility": "visible"}
     return {
-        "output": f"{why}\n{line(fault.hint, LIMIT)}\nThis is no mark: nothing was counted against you.",
+        "output": f"{why}\n{line(fault.hint, LIMIT)}\nThis is not a mark: nothing was counted against you.",
         "output_format": "text",
         "visibility": "visible",
         "stdout_visibility": "hidden",

@@ -86,7 +86,7 @@ def _parse_line(text: str, part: str, line: int) -> InterfaceField | None:
 
 def _no_field(text: str, path: str, line: int) -> Fault:
     shown = text.strip()[:60]
-    message = f"`{shown}` is no field: a line is a type and a name, like `float64 speed`"
+    message = f"`{shown}` is not a field: a line is a type and a name, like `float64 speed`"
     bare = shown.partition("//")[0].strip().rstrip(";, ")
     right = re.sub(r"^(\w+)\.", r"\1/", bare) + (
         f"  # {note.strip()}" if (note := shown.partition("//")[2]) else ""
@@ -99,7 +99,7 @@ def _no_field(text: str, path: str, line: int) -> Fault:
         line=line,
         kind="NoField",
         message=message,
-        cause=f"`{shown}` on line {line} is no field",
+        cause=f"`{shown}` on line {line} is not a field",
         fix=f"write `{right}`" if is_known else "",
     )
 

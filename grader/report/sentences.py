@@ -361,7 +361,7 @@ def pass_mark(result: GradingResult, rubric: Rubric, hidden: int) -> str:
     """What it takes to pass; empty where the rubric has no pass mark."""
     if rubric.pass_mark is None:
         return ""
-    mark = f"To pass, it takes {count_points(rubric.pass_mark)} of {number(rubric.max_points)}"
+    mark = f"To pass, you need {count_points(rubric.pass_mark)} of {number(rubric.max_points)}"
     if not_graded(result):
         return f"{mark}."
     if hidden:

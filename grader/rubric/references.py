@@ -218,7 +218,7 @@ def _of_grader(
     for name, scenario in scenarios.items():
         for at, part, one in services_in(scenario):
             if part == "request" and one.get("service") in _served_names(scenario):
-                fault = f"the grader offers {one['service']} itself (serves): a student's node is to call it"
+                fault = f"the grader offers {one['service']} itself (serves): a student's node should call it"
                 yield ("scenarios", name, *at, "service"), fault
     asked = {
         str(as_map(c.get("with")).get("topic"))

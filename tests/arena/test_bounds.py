@@ -50,7 +50,7 @@ def test_calls_as_clients_write_them(module, value) -> None:
     [
         (b'<!DOCTYPE a [<!ENTITY a "b">]>' + call("<value>&a;</value>"), "a document type"),
         (call("<value><!-- --></value>"), "comments"),
-        (call("<value>x</value>").decode().encode("utf-16"), "no text"),
+        (call("<value>x</value>").decode().encode("utf-16"), "not text"),
         (call(f"<value {'a' * 200}>x</value>"), "more than a name"),
         (call("<value><array><data>" * 60), "nested too deeply"),
         (call("<value/>" * 200_001), "more than 200000 elements"),
@@ -61,7 +61,7 @@ def test_calls_as_clients_write_them(module, value) -> None:
             "not a string",
         ),
         (call("<value><nil/></value>"), "no XML-RPC"),
-        (call("<value>\0</value>"), "no text"),
+        (call("<value>\0</value>"), "not text"),
         (b"", "no XML-RPC"),
         (b"<methodCall>", "no XML-RPC"),
     ],
@@ -140,8 +140,8 @@ TYPE = "std_msgs/String"
         ("registerPublisher", ("/new", "/t", TYPE, NOBODY), ""),
         ("registerPublisher", ("/new", "/t", TYPE, GRADER), "which is not its own"),
         ("registerPublisher", ("/new", "/t", TYPE, "http://host/"), "which is not its own"),
-        ("registerPublisher", ("/new", "/t" * 200, TYPE, NEW), "no name"),
-        ("registerPublisher", ("/new", "/t", "a/\x1b[31m", NEW), "no name"),
+        ("registerPublisher", ("/new", "/t" * 200, TYPE, NEW), "not a name"),
+        ("registerPublisher", ("/new", "/t", "a/\x1b[31m", NEW), "not a name"),
         ("registerPublisher", ("/new", "/my-topic with odd letters ä", TYPE, NEW), ""),
         ("registerService", ("/new", "/s", "rosrpc://127.0.0.1:9", NEW), ""),
         ("registerService", ("/new", "/s", OLD, NEW), "an address of old"),
@@ -387,7 +387,7 @@ def tcpros(monkeypatch):
         (struct.pack("<I", 1 << 30), "connection header of"),
         (header_of(type="a/b") + b"\1" + struct.pack("<I", 1 << 30), "an answer of"),
         (header_of(type="a/b") + b"\0" + struct.pack("<I", 100_000) + b"y" * 100_000, "y" * 500),
-        (header_of(type="a/b\x1b[31m"), "is no name"),
+        (header_of(type="a/b\x1b[31m"), "is not a name"),
     ],
 )
 def test_what_a_service_answers_is_bounded(module, answer: bytes, why: str) -> None:

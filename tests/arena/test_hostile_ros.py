@@ -177,7 +177,9 @@ def test_calls_that_are_made_to_break_the_master(tmp_path: Path) -> None:
         "more than 200000 elements",
         "a number that is too large",
     )
-    assert_told(told(seen, "refused"), (*refused, "a name that is not a string", "what is no call"))
+    assert_told(
+        told(seen, "refused"), (*refused, "a name that is not a string", "something that is not a call")
+    )
     assert_told(told(seen, "limit"), ("more than 256 connections to the master",))
 
 

@@ -42,7 +42,7 @@ def test_a_mark_is_of_the_visible_points():
             marked = with_pass_mark(loaded, mark).rubric
             seen = (criterion(first.id, "partial", points, 5),)
             assert exit_code(seen, marked) is code
-            assert points_to_pass(marked, 5) == "to pass, it takes 3"
+            assert points_to_pass(marked, 5) == "to pass, you need 3"
 
 
 @pytest.mark.full
@@ -111,7 +111,7 @@ def test_so_many_attempts_are_graded(counter):
     last = read_settings({"GRADER_ATTEMPTS": "5", counter: "5"})
     last.check_attempt()
     assert (last.attempt, last.attempts) == (5, 5)
-    with pytest.raises(SubmissionError, match="attempt 6, and 5 attempts can be graded"):
+    with pytest.raises(SubmissionError, match="this is attempt 6, and only 5 attempts can be graded"):
         read_settings({"GRADER_ATTEMPTS": "5", counter: "6"}).check_attempt()
     read_settings({counter: "600"}).check_attempt()
     with pytest.raises(UsageError, match="this job has no number"):

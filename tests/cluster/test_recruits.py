@@ -23,7 +23,7 @@ A, B = "tcp://10.0.0.1:1", "tcp://10.0.0.2:1"
         ({**GOOD, "pydantic": "2.6.0"}, "it has pydantic 2.6.0, here it is 2.7.0"),
         ({"host": "node1"}, "it has grader of no version, here it is 1.0"),
         ({**GOOD, "ros": ""}, "no ROS 1 there"),
-        ({**GOOD, "kept_out": "/srv/out is another place there"}, "/srv/out is another place there"),
+        ({**GOOD, "kept_out": "/srv/out is a different place there"}, "/srv/out is a different place there"),
         (ModuleNotFoundError("No module named 'grader'"), "no grader like this one is installed there"),
         (Exception("ModuleNotFoundError(\"No module named 'grader'\")"), "no grader like this one"),
         (ValueError("broken"), "it cannot answer: ValueError: broken"),

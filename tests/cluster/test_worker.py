@@ -105,4 +105,4 @@ def test_it_says_who_it_is(exchange: Exchange) -> None:
     said = asyncio.run(worker.describe(exchange.url, WORD))
     assert said["kept_out"] == ""
     assert {name: said[name] for name in worker.versions()} == worker.versions()
-    assert "is another place there" in asyncio.run(worker.describe(exchange.url, "another"))["kept_out"]
+    assert "is a different place there" in asyncio.run(worker.describe(exchange.url, "another"))["kept_out"]

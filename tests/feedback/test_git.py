@@ -138,7 +138,7 @@ def test_a_working_copy_gets_nothing(published: Path, ada: Path, capsys) -> None
     use(published, {"ada": work.as_uri(), "bob": str(work / "talker.py")})
     assert feedback(published, "git", "--only", "ada", "bob") == 3
     said = capsys.readouterr().err
-    assert "ada: what was submitted is a working copy on this machine" in said
+    assert "ada: a working copy on this machine was submitted" in said
     assert "bob: no repository was submitted" in said
     assert git(work, "branch", "--format=%(refname:short)") == "main"
 

@@ -150,7 +150,7 @@ def test_a_mail_of_which_nobody_knows_is_not_sent_twice(
     assert [one.rcpt_tos for one in box.mails] == [["bob@x.example"]]
     box.breaks = set()
     assert send(published, server, "--only", "ada", "bob") == 3
-    assert "ada: it is not known whether it was sent: the run before was stopped" in capsys.readouterr().err
+    assert "ada: it is not known whether it was sent: the earlier run was stopped" in capsys.readouterr().err
     assert len(box.mails) == 1
     assert send(published, server, "--only", "ada", "--again") == 0
     assert len(box.mails) == 2

@@ -145,7 +145,7 @@ def test_columns_of_criteria(tmp_path: Path) -> None:
     ]
     assert [one[5:] for one in cells if "george" in one] == [["55.5", "40", "", "", "40"]]
     assert [one[5:] for one in cells if "konrad" in one] == [["", "", "", "", "40"]]
-    assert "criteria are without what being late cost: george" in remarks
+    assert "criteria do not include what being late cost: george" in remarks
 
 
 def test_line_ends_and_delimiters_stay(tmp_path: Path) -> None:

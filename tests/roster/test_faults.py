@@ -44,7 +44,7 @@ def test_every_fault_by_its_line(tmp_path: Path) -> None:
         "roster.csv:5: submitted_at: yesterday is not a time such as 2026-11-20 23:59 or 2026-11-20T23:59:00+01:00",
         "roster.csv:5: extension_days: many is not a number of days",
         (
-            "roster.csv:6: submitted_at: 20/11/2026 23:59 can be read with the day or the month first: "
+            "roster.csv:6: submitted_at: 20/11/2026 23:59 could be read with the day or the month first: "
             "write it as 2026-11-20 23:59"
         ),
         "roster.csv:7: extension_days: -1 is not a number of days",
@@ -90,8 +90,8 @@ def test_a_row_whose_fields_are_shifted_tells_its_id_only_from_the_first_column(
 def test_a_column_that_is_nearly_one_that_is_known(tmp_path: Path) -> None:
     roster = read(tmp_path, "id,source,extention_days,Submited At,fname,notes\nada,ssh://h/a,2,x,A,n\n")
     assert said(roster) == [
-        "roster.csv:1: the column extention_days means nothing here: did you mean extension_days?",
-        "roster.csv:1: the column Submited At means nothing here: did you mean submitted_at?",
+        "roster.csv:1: the column extention_days is not known here: did you mean extension_days?",
+        "roster.csv:1: the column Submited At is not known here: did you mean submitted_at?",
     ]
     assert roster.columns == ("extention_days", "Submited At", "fname", "notes")
     assert roster.entries[0].extra == {"extention_days": "2", "Submited At": "x", "fname": "A", "notes": "n"}

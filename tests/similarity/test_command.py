@@ -98,7 +98,7 @@ def test_a_submission_of_the_roster_without_evidence_is_named(tmp_path, capsys) 
     class_of(tmp_path, {"ann": SUBMISSIONS["ann"]})
     write_run(tmp_path, ("ann", "", ""), ("ben", "", ""))
     assert grader(["similar", str(tmp_path)]) == 0
-    assert "Not compared: ben: no evidence of it is here" in capsys.readouterr().out
+    assert "Not compared: ben: there is no evidence of it here" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("threshold", ["0", "101", "nan", "much", "-5"])

@@ -267,7 +267,9 @@ class Arena:
         for process in list(self._processes.values()):
             left = process.left_behind() if process.role == "student" else []
             if left:
-                detail = "{} of its processes still ran at the end and were stopped".format(len(left))
+                detail = "{} of its processes were still running at the end and were stopped".format(
+                    len(left)
+                )
                 self._wire.event("/grader/actor", {"action": "note", "actor": process.name, "detail": detail})
             process.kill()
         if self._master:

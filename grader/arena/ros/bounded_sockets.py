@@ -130,7 +130,7 @@ def slave_api(uri, seconds):
     """Return a proxy of a node's slave API, each of whose calls takes at most so many seconds; raise ValueError."""
     port = port_of(uri)
     if port is None:
-        raise ValueError("no address of a node: {}".format(str(uri)[:100]))
+        raise ValueError("not the address of a node: {}".format(str(uri)[:100]))
     return xmlrpc.client.ServerProxy(
         "http://{}:{}/".format(LOOPBACK, port), transport=_Transport(port, seconds)
     )

@@ -99,7 +99,7 @@ class Rules:
         for number, text in enumerate(args):
             most = KEY_CHARS_MAX if number else NAME_CHARS_MAX
             if isinstance(text, str) and number < 2 and (len(text) > most or not text.isprintable()):
-                return "called the master with a name that is none: {}".format(shown(text))
+                return "called the master with something that is not a name: {}".format(shown(text))
         if args and not isinstance(args[0], str):
             return "called the master with a name that is not a string"
         return ""
@@ -116,7 +116,9 @@ class Rules:
             return ""  # the master itself says what is wrong with it
         node, name = args[0], args[1]
         if any(len(text) > NAME_CHARS_MAX or not text.isprintable() for text in args):
-            return "registered {} with what is no name: {}".format(shown(node), shown(max(args, key=len)))
+            return "registered {} with something that is not a name: {}".format(
+                shown(node), shown(max(args, key=len))
+            )
         addresses = [args[number] for number in REGISTER[method]]
         for address in addresses:
             port = port_of(address)

@@ -226,7 +226,7 @@ class Recorder:
         self._guard.limit(self._processes.get(caller_id) or caller_id, detail)
 
     def too_large(self, connection, length):
-        detail = "began a message of {} MB on {}; the most is {} MB".format(
+        detail = "began a message of {} MB on {}; at most {} MB are allowed".format(
             length >> 20, shown(connection.topic), MESSAGE_BYTES_MAX >> 20
         )
         caller_id = connection.caller_id

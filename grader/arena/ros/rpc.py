@@ -180,7 +180,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             return True
 
     def send_error(self, code, message=None, explain=None):  # noqa: ARG002 - http.server calls it so
-        self._refuse(code, "what is no call")
+        self._refuse(code, "something that is not a call")
 
     def _answer(self):
         size = self._size()
@@ -229,7 +229,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         try:
             args, method = xmlrpc_parser.read(body)
         except (xmlrpc_parser.Malformed, xmlrpc.client.Fault) as error:
-            raise Refused(REFUSED_CODE, "what is no call: {}".format(shown(error))) from error
+            raise Refused(REFUSED_CODE, "something that is not a call: {}".format(shown(error))) from error
         if method != MULTICALL:
             return self._call(method, args)
         calls = args[0] if len(args) == 1 and isinstance(args[0], list) else []

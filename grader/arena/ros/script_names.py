@@ -333,7 +333,7 @@ def undefined(node, tree):
     used = uses[0] if uses else None
     calls = [n for n in walk(tree) if isinstance(n, ast.Call) and node in n.args]
     if name in GIVEN_BY_NAME and calls:
-        return "`%s` stands here without its value" % name, "write `%s=%s`" % (name, GIVEN_BY_NAME[name])
+        return "`%s` is named here without its value" % name, "write `%s=%s`" % (name, GIVEN_BY_NAME[name])
     inner = used.attr if isinstance(used, ast.Attribute) else ""
     module = "%s.%s" % (name, inner) if inner in ("msg", "srv") else ALIASES.get(name, name)
     if module != name or (name in MODULES and inner):

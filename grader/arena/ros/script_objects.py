@@ -217,7 +217,7 @@ def hidden_names(tree):
         if len(twice) > 1:
             lines = (twice[1].lineno, twice[0].name, twice[0].lineno)
             message = "line %d defines `%s` again, so that the one on line %d is never called" % lines
-            fix = "give the function on line %d another name, also in the Subscriber(…) that is to call it"
+            fix = "give the function on line %d another name, also in the Subscriber(…) that should call it"
             yield slip(
                 twice[1].lineno, "defined-twice", message, fix=fix % twice[1].lineno, name=twice[0].name
             )

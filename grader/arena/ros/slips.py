@@ -195,7 +195,9 @@ def stopped_loops(tree):
             fix = "write `while` instead of `if` on line %d" % loop.lineno
             yield slip(loop.lineno, "loop-left", message, fix=fix)
         if isinstance(loop, ast.While) and is_call(loop.test, "is_shutdown"):
-            message = "the loop on line %d runs only once the node is to end: it lacks a `not`" % loop.lineno
+            message = (
+                "the loop on line %d runs only when the node should end: a `not` is missing" % loop.lineno
+            )
             fix = "on line %d, write `while not %s():`" % (loop.lineno, dotted(loop.test.func))
             yield slip(loop.lineno, "loop-left", message, fix=fix)
         inside = list(ast.walk(loop)) if isinstance(loop, (ast.While, ast.For)) else []
@@ -270,7 +272,7 @@ def sleeps_in_if(loop):
         own = [n for n in within if isinstance(n, ast.Expr) and is_call(n.value, "sleep")]
         if plain and len(sleeps) == len(own) == 1 and own[0] is within[-1] and one is loop.body[-1]:
             name, line = dotted(own[0].value.func), own[0].lineno
-            message = "`%s()` stands in the `if` on line %d" % (name, one.lineno)
+            message = "`%s()` is inside the `if` on line %d" % (name, one.lineno)
             fix = "write line %d with the same spaces or tabs before it as line %d has" % (line, one.lineno)
             yield slip(line, "sleep-outside", message, fix=fix, name=name)
 
@@ -563,7 +565,7 @@ def without_effect(tree):
             "..."
         ]:
             name = dotted(node.value)
-            message, fix = "`{0} = {0}` changes nothing", "write `{0} = {0} + 1`, or what it is to be,"
+            message, fix = "`{0} = {0}` changes nothing", "write `{0} = {0} + 1`, or whatever it should be,"
             yield slip(node.lineno, "no-effect", message.format(name), fix=fix.format(name), name=name)
         value = node.value if isinstance(node, ast.Expr) else None
         if isinstance(value, ast.UnaryOp) and isinstance(value.operand, ast.UnaryOp):

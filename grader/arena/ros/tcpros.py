@@ -39,7 +39,7 @@ def check_fields(header):
     for name in ("type", "md5sum", "callerid", "topic", "latching"):
         value = header.get(name, "")
         if len(value) > FIELD_CHARS_MAX or not value.isprintable():
-            raise ProtocolError("the header's field {} is no name".format(name))
+            raise ProtocolError("the header's field {} is not a name".format(name))
     if len(header.get("message_definition", "")) > DEFINITION_CHARS_MAX:
         raise ProtocolError("a definition of more than {} characters".format(DEFINITION_CHARS_MAX))
 

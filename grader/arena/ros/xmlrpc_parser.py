@@ -28,7 +28,7 @@ def read(data):
     """Return (values, method name or None) of a whole call or answer; raise Malformed, or the xmlrpc.client.Fault in
     it."""
     if b"\0" in data:  # two bytes a character, too: what follows looks for one
-        raise Malformed("bytes that are no text")
+        raise Malformed("bytes that are not text")
     if b"<!" in data:
         raise Malformed("a document type, entities or comments")
     for start in range(0, len(data), PIECE_BYTES):

@@ -268,7 +268,7 @@ def _gradable(roster: Roster, out: Path) -> Roster:
         if Path(entry.source) == out.absolute():
             continue
         if safe_name(entry.id).casefold() in RESERVED:
-            text = f"id: {entry.id} is the name of a file of the batch's own"
+            text = f"id: {entry.id} is the name of one of the batch's own files"
             faults.append(RosterFault(where=entry.where, id=entry.id, text=text))
         else:
             entries.append(entry)

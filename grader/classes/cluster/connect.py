@@ -53,7 +53,7 @@ def check_address(text: str, *, insecure: bool = False) -> str:
     if text != LOCAL and not is_encrypted(text) and not insecure:
         raise UsageError(
             f"--cluster {text}: this scheduler asks for no certificate: "
-            "all who reach its port can run programs as its user",
+            "anyone who reaches its port can run programs as its user",
             hint="use tls:// (docs/how-to/cluster.md says how); if you are alone on that network, "
             "add --cluster-insecure",
         )
@@ -134,7 +134,7 @@ def _client(make: Any, address: str) -> Iterator[Any]:  # noqa: ANN401 - Dask ha
 def _no_scheduler(address: str) -> HostError:
     return HostError(
         f"no Dask scheduler answers at {address} within {CONNECT_S:g} s",
-        hint="start one there with `dask scheduler`, and look whether a firewall is between",
+        hint="start one there with `dask scheduler`, and check whether a firewall is in between",
     )
 
 

@@ -59,7 +59,7 @@ def _describe(exchange: str, word: str) -> dict[str, str]:
         ros = found.label if found else ""
     try:
         if not Exchange(exchange).answers(word):
-            kept_out = f"{exchange} is another place there"
+            kept_out = f"{exchange} is a different place there"
     except (GraderError, OSError) as error:
         kept_out = getattr(error, "message", "") or f"{exchange}: {error}"
     return {**versions(), "host": socket.gethostname(), "ros": ros, "kept_out": kept_out}

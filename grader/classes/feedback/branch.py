@@ -55,7 +55,7 @@ class Branch(Sender):
         self.branch = settings.branch or NAME
         if not _BRANCH.fullmatch(self.branch):
             raise UsageError(
-                f"--branch {self.branch[:80]}: no name for a branch", hint="for example: feedback"
+                f"--branch {self.branch[:80]}: not a valid name for a branch", hint="for example: feedback"
             )
 
     def place(self, feedback: Feedback) -> str:
@@ -85,7 +85,7 @@ def _repository(feedback: Feedback) -> Source:
         source.top is None or (source.top / ".git").exists() or source.top.name == ".git"
     ):
         raise NotSent(
-            "what was submitted is a working copy on this machine, from which its student fetches nothing",
+            "a working copy on this machine was submitted, and students do not fetch from it",
             hint="give the roster the repository's address, or a bare repository",
         )
     return source
@@ -165,7 +165,7 @@ def _refusal(failure: GitFailed, source: Source, branch: str) -> NotSent:
         said = next((row for row in failure.stderr.splitlines() if "rejected" in row or "remote:" in row), "")
         return NotSent(
             f"{source.given} does not take a push to {branch}: {' '.join(said.split())[:200]}",
-            hint="who sends feedback needs the right to write there",
+            hint="whoever sends feedback needs write access to it",
         )
     error = explained(failure, source)
     return NotSent(error.message, hint=error.hint)

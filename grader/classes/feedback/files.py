@@ -136,7 +136,7 @@ class CanvasFiles(Archive):
         if found := _TAR.search(name):
             return _tar(reports, (found["ending"] or found["short"] or "").lower())
         raise NotSent(
-            f"no report goes by the name of this file: {Path(name).suffix or name}",
+            f"no report can be named like this file: {Path(name).suffix or name}",
             hint="attach the report by hand: grader feedback --form folder writes it",
         )
 

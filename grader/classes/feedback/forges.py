@@ -100,7 +100,7 @@ class Comments(Sender):
         try:
             if not self.settings.public and self.is_public(path):
                 raise NotSent(
-                    "everybody can read this repository, and so the feedback",
+                    "everybody can read this repository, and so everybody could read the feedback",
                     hint="--public returns it all the same",
                 )
             return self._once(feedback, path, look=look)
@@ -168,8 +168,8 @@ class Comments(Sender):
                 f"{self.server} does not take the token: {error.text}", hint=f"set {self.token} again"
             )
         hints = {
-            403: "the token may not do that there",
-            404: "check the address, and what the token may see",
+            403: "the token does not have that permission there",
+            404: "check the address, and what the token can access",
             410: "issues are switched off there",
         }
         return NotSent(

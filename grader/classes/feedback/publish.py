@@ -205,7 +205,7 @@ def refuse_other_rubric(folder: BatchFolder, rubric: LoadedRubric) -> None:
     if rubric.digest != folder.run.rubric.digest:
         raise UsageError(
             f"{folder.run.rubric_source}: the rubric has changed since the class was graded",
-            hint=f"grader regrade {folder.path} judges it by the rubric of today; then publish it",
+            hint=f"grader regrade {folder.path} judges it by today's rubric; then publish it",
         )
 
 

@@ -115,7 +115,7 @@ class SentLog:
             self._lines.setdefault(safe_name(line.id), []).append(line)
 
 
-UNKNOWN = "it is not known whether it was sent: the run before was stopped in that moment"
+UNKNOWN = "it is not known whether it was sent: the earlier run was stopped at that moment"
 
 
 @dataclass(frozen=True, kw_only=True)

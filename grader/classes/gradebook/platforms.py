@@ -366,10 +366,10 @@ def remarks_of(marks: Sequence[Mark], *, per_criterion: bool) -> Iterator[str]:
             yield f"{mark.entry.id}: no grade ({mark.open})"
     late = [mark.entry.id for mark in marks if mark.late_cost]
     if per_criterion and late:
-        yield f"criteria are without what being late cost: {', '.join(late)}"
+        yield f"criteria do not include what being late cost: {', '.join(late)}"
     gated = [mark.entry.id for mark in marks if mark.gated]
     if per_criterion and gated:
-        yield f"criteria are without what a gate cost: {', '.join(gated)}"
+        yield f"criteria do not include what a gate cost: {', '.join(gated)}"
 
 
 def _mark(row: GradebookRow, worth: Sequence[str] | None) -> Mark:

@@ -304,7 +304,7 @@ def read_sheet(path: Path) -> Sheet:
     try:
         text = data[len(mark) :].decode(encoding)
     except UnicodeDecodeError as error:
-        raise UsageError(f"{path}: no {encoding.upper()} text", hint=_EXPORT) from error
+        raise UsageError(f"{path}: not {encoding.upper()} text", hint=_EXPORT) from error
     delimiter = delimiter_of(re.split(r"[\r\n]", text, maxsplit=1)[0])
     sheet = Sheet(
         path=path,

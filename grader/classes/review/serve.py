@@ -78,7 +78,7 @@ def _bound(port: int) -> Iterator[socket.socket]:
         try:
             listening.bind((HOST, port))
         except OSError as error:
-            why = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be had: {error.strerror}"
+            why = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be used: {error.strerror}"
             raise UsageError(f"port {port} {why}", hint="choose another --port, or none") from error
         yield listening
     finally:

@@ -73,7 +73,7 @@ def open_session(path: Path, pace: Pace | None = None) -> ReviewSession:
     if rubric.digest != run.rubric.digest:
         raise UsageError(
             f"{run.rubric_source}: the rubric has changed since the class was graded",
-            hint=f"grader regrade {path} judges it by the rubric of today; then review it",
+            hint=f"grader regrade {path} judges it by today's rubric; then review it",
         )
     return ReviewSession(path, rubric, pace or Pace())
 

@@ -301,7 +301,7 @@ def near_misses(columns: tuple[str, ...]) -> Iterator[tuple[str, str]]:
     for column in columns:
         near = difflib.get_close_matches(_plain(column)[:40], missing, n=1, cutoff=NEARLY)
         if near and near[0][0] == _plain(column)[0] and _plain(column) not in KNOWN:
-            yield column, f"the column {brief(column)} means nothing here: did you mean {near[0]}?"
+            yield column, f"the column {brief(column)} is not known here: did you mean {near[0]}?"
 
 
 def _plain(column: str) -> str:
@@ -339,7 +339,7 @@ def time_fault(text: str) -> str:
     if parse_time(text) is not None:
         return ""
     if _DAY_AND_MONTH.fullmatch(text.strip()):
-        return f"can be read with the day or the month first: write it as {EXAMPLE}"
+        return f"could be read with the day or the month first: write it as {EXAMPLE}"
     return f"is not a time such as {EXAMPLE} or 2026-11-20T23:59:00+01:00"
 
 

@@ -52,7 +52,7 @@ def from_folder(folder: Path, local: Local) -> Roster:
     paths = _inside(folder)
     if any(path.name == "package.xml" for path in paths):
         raise UsageError(
-            f"{folder}: this is one package, no folder of submissions",
+            f"{folder}: this is one package, not a folder of submissions",
             hint="grader grade takes one submission",
         )
     students: dict[tuple[str, ...], list[tuple[Path, Named | None]]] = {}
@@ -387,7 +387,7 @@ def _projects(path: Path) -> list[object]:
             projects += page if isinstance(page, list) else [_as_list(page, path)]
             at = _BLANKS.match(text, at).end()  # type: ignore[union-attr]
     except (ValueError, RecursionError) as error:
-        raise UsageError(f"{path}: no JSON: {printable(str(error))[:200]}", hint=_HINT) from error
+        raise UsageError(f"{path}: not JSON: {printable(str(error))[:200]}", hint=_HINT) from error
     if not text:
         raise UsageError(f"{path}: the file is empty", hint=_HINT)
     return projects
@@ -397,7 +397,7 @@ def _as_list(page: object, path: Path) -> object:
     """A project without a list around it, as `--output ndjson` writes one a line."""
     if isinstance(page, dict) and any(key in page for key in ADDRESSES):
         return page
-    raise UsageError(f"{path}: no list of projects", hint=_HINT)
+    raise UsageError(f"{path}: not a list of projects", hint=_HINT)
 
 
 def _text(path: Path) -> str:

@@ -152,14 +152,14 @@ def text_of(data: bytes, path: Path) -> str:
     """UTF-8, with or without its mark, or UTF-16. Raises UsageError with the line of what is neither."""
     workbook = next((what for magic, what in _WORKBOOKS.items() if data.startswith(magic)), None)
     if workbook:
-        raise UsageError(f"{path}: this is {workbook}, no CSV", hint=_SAVE)
+        raise UsageError(f"{path}: this is {workbook}, not CSV", hint=_SAVE)
     mark, encoding = encoding_of(data)
     try:
         return data[len(mark) :].decode(encoding)
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         named = encoding.removesuffix("-le").removesuffix("-be").upper()
-        raise UsageError(f"{path}:{line}: no {named} text", hint=_SAVE) from error
+        raise UsageError(f"{path}:{line}: not {named} text", hint=_SAVE) from error
 
 
 def encoding_of(data: bytes) -> tuple[bytes, str]:

@@ -103,7 +103,7 @@ def read_place(place: CodeSource) -> Fingerprints:
     except GraderError as error:
         reason = error.message
     except FileNotFoundError:
-        reason = "no evidence of it is here"
+        reason = "there is no evidence of it here"
     except OSError as error:
         reason = f"its evidence cannot be opened: {error.strerror}"
     except MemoryError:

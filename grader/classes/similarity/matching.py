@@ -162,11 +162,11 @@ def _notes(request: ComparisonRequest, count: int, found: Sequence[Sequence[str]
         )
     if any(len(group) >= LARGE_CLUSTER for group in found):
         notes.append(
-            f"{LARGE_CLUSTER} or more submissions hang together: they may have a source in common (a tutorial, "
+            f"{LARGE_CLUSTER} or more submissions are linked: they may share a source (a tutorial, "
             "code from the lecture); give it with --starter"
         )
     if cut:
-        notes.append("more pairs are alike than are named here")
+        notes.append("more pairs are alike than are listed here")
     return notes
 
 

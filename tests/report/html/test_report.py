@@ -293,7 +293,7 @@ def test_it_says_how_to_judge_it_again():
 
 def test_the_pass_mark_is_said_and_drawn():
     document = parsed(page(rubric=rubric(pass_mark=50)))
-    assert "To pass, it takes 50 points of 100: 37.5 points are missing." in words(document.find(".//header"))
+    assert "To pass, you need 50 points of 100: 37.5 points are missing." in words(document.find(".//header"))
     assert document.find_class("mark")[0].get("style") == "left:50%"
 
 

@@ -164,7 +164,7 @@ class Simulator:
 
     def _on_spawn(self, request):
         if request.name and not is_legal_name(request.name):
-            rospy.logerr("[%s] is no name for a turtle", request.name)
+            rospy.logerr("[%s] is not a name for a turtle", request.name)
             raise rospy.ServiceException(f"no legal name: {request.name}")
         try:
             with self._lock:
