@@ -23,6 +23,8 @@ os.register_at_fork(
 BLOCK = r"(?:if|elif|else|while|for|def|class|try|except|finally|with)\b"
 COMMENTED_OUT = "block commented out"
 """What the grader says of a comment that is the first line of the block below it."""
+OUT_OF_BLOCK = "ends its block too early"
+"""What the grader says of a line further out than the block that goes on below it."""
 MERGE_MARKER = re.compile(r"(<{7}|={7}|>{7})(\s|$)")
 _BLOCK = re.compile(rf"\s*{BLOCK}")
 _BRACE = rf"(?:\}}\s*)?{BLOCK}(?:.*[\w\])\"])?\s*\{{$"

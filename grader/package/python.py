@@ -17,7 +17,15 @@ from grader.limited_child import ChildLimits, run_limited
 from grader.model.package import Fault, PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.package.reading import printable
-from grader.syntax_fixes import BLOCK, COMMENTED_OUT, MERGE_MARKER, Reason, reason_of_line, without_texts
+from grader.syntax_fixes import (
+    BLOCK,
+    COMMENTED_OUT,
+    MERGE_MARKER,
+    OUT_OF_BLOCK,
+    Reason,
+    reason_of_line,
+    without_texts,
+)
 
 CHECK = "grader.arena.ros.syntax:check_all"
 MEMORY_BYTES, CPU_S = 1 << 30, 20
@@ -39,6 +47,7 @@ _VAGUE = (
 _EMPTY_BLOCK = re.compile(r"expected an indented block after .* on line (\d+)")
 _NEXT_BLOCK = re.compile(r"\s*(?:@|(?:def|async def|class|if __name__)\b)")
 _UNCLOSED = re.compile(r"'([(\[{])' was never closed")
+_OUT_OF_BLOCK = "this line is further out than the lines around it, which belong to one block"
 _COPIED = "copied from a PDF or a web page"
 
 _MESSAGES: tuple[tuple[str, ...], ...] = (
@@ -82,6 +91,8 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
     (r"null bytes", "the file holds null bytes, so it is not text, or was saved as UTF-16", "save it as UTF-8"),
     (r"after line continuation", r"nothing may follow a backslash `\` at the end of a line"),
     (r"duplicate argument '(\w+)'", "two parameters are both called `{0}`"),
+    (f"{OUT_OF_BLOCK}: (.*)", _OUT_OF_BLOCK, "{0}"),
+    (OUT_OF_BLOCK, _OUT_OF_BLOCK),
     (COMMENTED_OUT, "this line begins the block below it, and is commented out", "delete its `#`"),
     (r"unexpected EOF",
      "the file ends in the middle of something (a bracket, or a block without a body)", "complete its last lines"),

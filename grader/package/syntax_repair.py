@@ -24,6 +24,7 @@ from grader.syntax_fixes import (
 
 STEPS_MAX = 60
 STATEMENT_LINES_MAX = 12
+ODD_LINES_MAX = 3
 FIXERS = ("print", "except", "exec", "raise", "repr", "ne", "numliterals", "long", "unicode")
 OLD_PRINT = re.compile(r"\bprint\b(?!\s*\()")
 OUTERMOST = re.compile(r"(import|from)\s|if\s+__name__\b")
@@ -70,7 +71,11 @@ def _one_step(text: str, error: Error) -> Step | None:
         further = left is not None and (left["line"] > error["line"] or _is_next(error, left))
         if left is None or further:
             word = re.match(r"name '(\w+)'", error["message"])
-            line = _first_changed(text, candidate) if cause in ("braces", "commented") else error["line"]
+            line = (
+                _first_changed(text, candidate)
+                if cause in ("braces", "commented", "level")
+                else error["line"]
+            )
             found = {"cause": cause, "line": line, "error": error, "text": candidate}
             return {**found, "word": word[1] if word else ""}
     return None
@@ -173,8 +178,15 @@ def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:
     own = _width(lines[at])
     numbers = [number for number, line in enumerate(lines[:at]) if without_texts(line).strip()]
     above = [_width(lines[number]) for number in numbers] or [0]
-    if own > above[-1] and above[-2:-1] == [own]:  # the line between two of one level is the odd one
-        yield with_line(lines, numbers[-1], " " * own + lines[numbers[-1]].lstrip())
+    odd = next(
+        (i for i, width in enumerate(reversed(above)) if width >= own), 0
+    )  # lines further out than their block
+    level_before = next((width for width in reversed(above[: len(above) - odd]) if width <= own), None)
+    if own > above[-1] and 0 < odd <= ODD_LINES_MAX and level_before == own:
+        first = numbers[-odd]
+        moved_in = [" " * (own - _width(lines[first])) + line for line in lines[first:at]]
+        if not any(OUTERMOST.match(lines[number]) for number in numbers[-odd:]):
+            yield "\n".join([*lines[:first], *moved_in, *lines[at:]])
     if OUTERMOST.match(lines[at].strip()):
         level = 0
     elif own > above[-1]:

@@ -281,6 +281,21 @@ def test_the_first_line_of_a_block_that_is_commented_out(tmp_path, comment, hint
     assert syntax_hint(check_syntax(tmp_path, ["a.py"]).faults["a.py"]) == hint
 
 
+@pytest.mark.parametrize(
+    ("lines", "hint"),
+    [
+        ("    a()\nb()\n    c()", "line 3: begin it with 4 spaces"),
+        ("\tif x:\n\t\ta()\nb()\n# and\nc()\n\td()", "line 4: begin it with 1 tab"),
+        ("    a()\nb()\nc()\nd()\ne()\n    f()", "line 7: start it exactly below that one"),
+        ("    a()\nimport b\n    c()", "line 4: start it exactly below that one"),
+        ("    a()\n        b()", "line 3: start it exactly below that one"),
+    ],
+)
+def test_lines_further_out_than_their_block(tmp_path, lines, hint):
+    (tmp_path / "a.py").write_text(f"def f():\n{lines}\n")
+    assert syntax_hint(check_syntax(tmp_path, ["a.py"]).faults["a.py"]) == hint
+
+
 def test_a_right_line_is_never_corrected():
     lines = (
         "x = a[1::2]",

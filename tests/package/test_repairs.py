@@ -53,6 +53,7 @@ def listen():
 if __name__ == '__main__':
     listen()
 """
+DEEPER = "        if late:\n            wait()\n"
 OWN = {"msg/Level.msg": "float64 level\n", "src/level.py": "from lab.msg import Level\n"}
 OWN_CMAKE = CMAKE.replace("rospy)\n", "message_generation rospy)\nadd_message_files(FILES Level.msg)\n")
 SERVICE = {**OWN, "srv/Two.srv": "int64 a\n---\n", "src/level.py": "from lab.srv import Two\n"}
@@ -116,8 +117,14 @@ CASES = {
     "between-two-of-one-level": Case(
         swapped(TALKER, ("    rate = rospy", "count = 0\n    rate = rospy")),
         ["python-syntax"],
-        "this line is indented further than the one above",
+        "line 8 of src/talker.py: this line is further out than the lines around it",
         after={TALKER: "    count = 0\n    rate = rospy"},
+    ),
+    "further-out-after-a-deeper-block": Case(
+        swapped(TALKER, ("        rate.sleep()", f"{DEEPER}    a = 1\n    b = 2\n        rate.sleep()")),
+        ["python-syntax"],
+        "change the indentation: start lines 13 and 14 with 8 spaces",
+        after={TALKER: "        a = 1\n        b = 2\n        rate.sleep()"},
     ),
     "head-commented-out": Case(
         swapped(TALKER, ("    while not", "   ## while not")),

@@ -38,6 +38,8 @@ BRACE = re.compile(
     r"\s*(\}\s*)?(if|elif|else|while|for|def|class|try|except|finally|with)\b(.*[\w\])\"])?\s*\{\s*(#.*)?$"
 )
 """A block that begins as in C++: what Python says of it is said of a line below."""
+ODD_LINES_MAX = 3
+OUTERMOST = re.compile(r"(import|from)\s|if\s+__name__\b")
 COMMENTED = re.compile(r"\s*#[#\s]*((?:if|while|for|def|class|try|with)\b.*:)\s*$")
 """The first line of a block, commented out: Python speaks of the line below, which stands too far in."""
 REFUSED_LIMIT = 20
@@ -247,6 +249,10 @@ def syntax_fault(error, data):
     if head is not None:
         at, text = lines[head].index("#") + 1, lines[head]
         return fault("IndentationError", head + 1, at, "block commented out" + moved(lines, head), text=text)
+    odd = out_of_block(lines, line) if known and "unexpected indent" in str(error) else None
+    if odd is not None:
+        message = "ends its block too early: " + begin_with(blanks_of(lines[line - 1]))
+        return fault("IndentationError", odd + 1, 1, message, text=lines[odd])
     begins = {text[0] for text in lines if text[:1] in ("\t", " ") and text.strip()}
     return fault(
         type(error).__name__,
@@ -279,10 +285,31 @@ def commented_head(lines, line):
 def moved(lines, head):
     """Return with what the line has to begin, as the code above does; "" where it begins so."""
     above = (text for text in reversed(lines[:head]) if text.strip() and not text.lstrip().startswith("#"))
-    blanks, own = (text[: len(text) - len(text.lstrip())] for text in (next(above, ""), lines[head]))
+    blanks = blanks_of(next(above, ""))
+    return "" if blanks == blanks_of(lines[head]) else ": " + begin_with(blanks)
+
+
+def begin_with(blanks):
     counts = [(blanks.count("\t"), "tab"), (blanks.count(" "), "space")]
     words = ["%d %s%s" % (count, kind, "s" * (count > 1)) for count, kind in counts if count]
-    return "" if blanks == own else ": begin it with %s" % (" and ".join(words) or "no spaces")
+    return "begin it with %s" % (" and ".join(words) or "no spaces")
+
+
+def blanks_of(text):
+    return text[: len(text) - len(text.lstrip())]
+
+
+def out_of_block(lines, line):
+    """Return the index of the first of at most three lines right above that line which are further out than it, though
+    it goes on with the block above them; None where there are none."""
+    code = [n for n in range(line - 2, -1, -1) if lines[n].strip() and not lines[n].lstrip().startswith("#")]
+    own, *widths = [len(blanks_of(lines[n]).expandtabs()) for n in [line - 1, *code]]
+    odd = next((i for i, width in enumerate(widths) if width >= own), 0)
+    before = next((width for width in widths[odd:] if width <= own), None)
+    fits = (
+        0 < odd <= ODD_LINES_MAX and before == own and not any(OUTERMOST.match(lines[n]) for n in code[:odd])
+    )
+    return code[odd - 1] if fits else None
 
 
 def never_closed(data, line):

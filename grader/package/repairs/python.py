@@ -17,7 +17,7 @@ from grader.model.record import Record
 from grader.model.repair import RepairKind, as_code
 from grader.package.python import reason_of
 from grader.package.repairs.editing import Files
-from grader.syntax_fixes import COMMENTED_OUT, DELETE_LINE, Reason
+from grader.syntax_fixes import COMMENTED_OUT, DELETE_LINE, OUT_OF_BLOCK, Reason
 from grader.wording import join_words, plural
 
 EXAMINE = "grader.package.source_repair:examine"
@@ -177,7 +177,8 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
         return f"{place}: {reason.text or (error.message if error else 'not Python 3')}", fix
     names = ", ".join(dict.fromkeys(step.word for step in steps))
     calls = ", ".join(f"{one}()" for one in word.split(", "))
-    told = reason_of(COMMENTED_OUT if cause == "commented" else error.message if error else "").text
+    meant = {"commented": COMMENTED_OUT, "level": OUT_OF_BLOCK if error and first.line < error.line else ""}
+    told = reason_of(meant.get(cause) or (error.message if error else "")).text
     said, fix = (
         words.format(file=file, place=place, line=first.line, word=word, names=names, calls=calls, told=told)
         for words in WORDS[cause]
