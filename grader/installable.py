@@ -103,7 +103,7 @@ PYTHON_2 = {
 
 
 def exists_somewhere(name: str, own: Collection[str]) -> bool:
-    """Return whether a module or package that is not here is the machine's to have: its name is no slip of one of
+    """Return whether a module or package that is not here is the machine's to have: its name is not a slip of one of
     Python's, of ROS's or of the student's `own`, and stands in no handout for the student's package."""
     if name in known_packages() or name in sys.stdlib_module_names:
         return True

@@ -33,7 +33,7 @@ _COMMAND_AT_START = re.compile(r"^((?:[^\S\n]|\x1b\[[0-9;]*m)*):(?=:)", re.MULTI
 
 
 def steers(character: str) -> bool:
-    """Return whether it is no sign that can be seen: a control, format, private, unassigned or invisible character."""
+    """Return whether it cannot be seen: a control, format, private, unassigned or invisible character."""
     return unicodedata.category(character) in HIDDEN_CATEGORIES or ord(character) in INVISIBLE
 
 

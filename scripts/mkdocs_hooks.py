@@ -1,6 +1,6 @@
 """MkDocs hooks: links that leave docs/ go to the repository, where it has an address, and are plain words elsewhere.
-A terminal's copy button copies the commands alone, the empty corner of a table is no header, and what the theme writes
-against HTML's rules is put right.
+A terminal's copy button copies the commands alone, the empty corner of a table is not a header, and what the theme
+writes against HTML's rules is put right.
 """
 
 from __future__ import annotations

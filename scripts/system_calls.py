@@ -97,7 +97,7 @@ IOCTL_BITS = 32
 """What the kernel reads of a number that is 64 bits wide."""
 NETLINK_ROUTE = 0
 KINDS = 0xF
-"""The bits of a socket's type that are no flags."""
+"""The bits of a socket's type that are not flags."""
 FAMILIES_MAX = 45
 
 

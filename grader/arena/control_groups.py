@@ -82,7 +82,7 @@ def remove_groups(cgroups: Cgroups, arena: int) -> bool:
 
 
 def describe() -> str:
-    """Return for `grader doctor` what limits memory and tasks, and what is weaker where it is no control group."""
+    """Return for `grader doctor` what limits memory and tasks, and what is weaker where no control group does."""
     found = find_cgroups()
     memory = f"memory by {found.label}"
     tasks = f"tasks by cgroup v{found.pids.version}" if found.pids else "tasks by rlimits and a watchdog"

@@ -197,7 +197,7 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
 
     How it is measured
         By the tracebacks on stderr up to Ctrl-C in which a line of the package's own takes part. The one
-        that ends the whole process is no callback's.
+        that ends the whole process is not a callback's.
 
     How to fix
         Read the last line of the traceback, and the line of your file above it. Look at what the message

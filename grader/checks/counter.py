@@ -261,7 +261,7 @@ def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict 
 
 
 def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, params: StepParams) -> Verdict:
-    """Return that a clock is no counter, where the script reads its values from one: it skips when it is late."""
+    """Return that a clock is not a counter, where the script reads its values from one: it skips when it is late."""
     slips = slips_of(package, run, count.callerid, "clock-value")
     last = params.topic.rpartition("/")[2]
     slip = next((s for s in slips if s.message.rpartition("/")[2].lstrip("~") == last), None)

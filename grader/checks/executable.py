@@ -81,7 +81,7 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
 
 
 def _asked_first_line(found: SourceFile | None) -> str:
-    """Return the file's own first line where that is right: of several that are, it is no fault to have another one."""
+    """Return the file's own first line where that is right: of several that are, another one is no fault."""
     own = found is not None and found.shebang is not None and not any(shebang_obstacles(found))
     return f"#!{found.shebang.text}" if found and found.shebang and own else RIGHT_SHEBANG
 

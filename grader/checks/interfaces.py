@@ -164,7 +164,7 @@ def _faults(
 
 
 def _unreadable(found: Interface, fault: Fault, wanted: list[InterfaceField]) -> _Fault:
-    """Of a line that is no field, or of a `---` that is missing: it belongs below the last field of the first part."""
+    """Of a line that is not a field, or of a missing `---`: it belongs below the last field of the first part."""
     fix = fault.fix or "one field per line, type before name"
     line = fault.line
     if fault.kind == "OtherParts":

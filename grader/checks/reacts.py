@@ -201,7 +201,7 @@ def _nothing_to_judge(
 def _early(
     causes: Sequence[Reading], effects: Sequence[Reading], run: Run, params: ReactsParams
 ) -> Verdict | None:
-    """The effect without its cause: between a first message that is no cause, and the first that is one."""
+    """The effect without its cause: between a first message that is not a cause, and the first that is one."""
     to_s = run_seconds(run)
     if not params.not_before or not causes or params.cause.holds(causes[0]) or to_s is None:
         return None

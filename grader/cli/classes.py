@@ -345,7 +345,7 @@ def _drafts(course: CourseFile, marks: Sequence[LabMarks], *, drafts: bool) -> I
 
 
 def reviewer(named: str | None) -> str:
-    """Return who reviews: the name given, else git's. Raises UsageError for what is no name."""
+    """Return who reviews: the name given, else git's. Raises UsageError for what is not a name."""
     from grader.classes.review.cards import Wrong, author_of  # noqa: PLC0415 - only `grader review` has its library
     from grader.classes.review.serve import git_user  # noqa: PLC0415
 

@@ -62,7 +62,7 @@ class MessageType:
     """A message type with its definition and its MD5 sum. `find_text` returns the text of a `.msg` file, `full` is a
     definition with all its parts.
 
-    Raises ValueError where the type is nowhere, or its text is no definition.
+    Raises ValueError where the type is nowhere, or its text is not a definition.
     """
 
     def __init__(self, type: str, find_text: FindText = lambda _: None, *, full: str | None = None) -> None:  # noqa: A002 - ROS's own word
@@ -104,7 +104,7 @@ class MessageType:
 class ServiceTypes:
     """The request and the response of a service type, from the text of its `.srv` file (wiki.ros.org/srv).
 
-    Raises ValueError for a text that is no service definition, or needs a type that is nowhere.
+    Raises ValueError for a text that is not a service definition, or needs a type that is nowhere.
     """
 
     def __init__(self, type: str, text: str, find_text: FindText = lambda _: None) -> None:  # noqa: A002 - ROS's own word
@@ -292,7 +292,7 @@ def _repeat(field: Field, value: Mapping[str, Any]) -> list[Any]:
 def md5_of(type_: str, full: str) -> str:
     """Return the MD5 sum of a message type from its full definition, as `rosmsg md5` does.
 
-    Raises ValueError for what is no definition.
+    Raises ValueError for what is not a definition.
     """
     parts = dict(sections_of(type_, full))
     parse(type_, full)  # no loops, and all parts are there

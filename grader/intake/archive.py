@@ -76,8 +76,8 @@ class Unpacked:
 def unpack(path: Path, into: Path, limits: IntakeLimits) -> Unpacked:
     """Unpack the archive at `path` into the new folder `into`, in a child process.
 
-    Raises SubmissionError for what is no archive, is damaged, has a password, is too large or reaches out, OSError for
-    what this machine cannot read or write.
+    Raises SubmissionError for anything but an archive, or one that is damaged, has a password, is too large or reaches
+    out, OSError for what this machine cannot read or write.
     """
     name = brief(path.name)
     if path.stat().st_size > limits.packed_bytes:

@@ -93,7 +93,7 @@ def _below(inner: Candidate, outer: Candidate) -> bool:
 def is_slip(name: str, wanted: str) -> bool:
     """Return whether `name` is `wanted` but for capitals, `-` and `_`, and one letter.
 
-    Digits are no letters: `lab2` is another lab's package than `lab1`.
+    Digits are not letters: `lab2` is another lab's package than `lab1`.
     """
     one, other = (re.sub(r"[\s_-]", "", text.casefold()) for text in (name, wanted))
     digits = [re.sub(r"\D", "", text) for text in (one, other)]

@@ -204,7 +204,7 @@ def _https_host(url: str) -> str:
 
 def without_password(source: str) -> str:
     """SOURCE as it may be kept and shown: of `https://` nothing before the `@` of the server (a token may stand in
-    place of a user), of other schemes the user alone. What is no address stays as it is."""
+    place of a user), of other schemes the user alone. What is not an address stays as it is."""
     return _TORN.sub(r"\g<scheme>://…", _AUTHORITY.sub(_without_secret, source, count=1))
 
 

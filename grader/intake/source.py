@@ -250,7 +250,7 @@ def _without_password(scheme: str, authority: str) -> str:
 
 
 def identify(source: str | Source, submission_id: str | None = None) -> tuple[str, str] | None:
-    """Return the id and what may be shown of the source, as if it had been opened; None for what is no source."""
+    """Return the id and what may be shown of the source, as if it had been opened; None for what is not a source."""
     if isinstance(source, Source):
         return safe_name(submission_id if submission_id is not None else source.name), source.given
     try:

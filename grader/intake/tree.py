@@ -42,7 +42,7 @@ class Folder:
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """Whatever is no folder: `executable` is the owner's bit on this disk, `size_bytes` 0 for all but files."""
+    """Whatever is not a folder: `executable` is the owner's bit on this disk, `size_bytes` 0 for all but files."""
 
     path: str
     kind: Literal["file", "link", "other"]

@@ -301,7 +301,7 @@ class Requirements:
         it was at the same line, or what is absent is named.
         """
         verdict = self.verdicts[required]
-        # the line below which a call that is missing goes is no fault
+        # the line below which a call that is missing goes is not a fault
         is_missing = bool(verdict.sought_name("call") or verdict.sought_name("below"))
         same_line = not is_missing and not cited_lines(verdict.citations).isdisjoint(
             cited_lines(found.citations)

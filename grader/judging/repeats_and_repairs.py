@@ -183,7 +183,7 @@ def is_unmade(found: Verdict | CriterionResult) -> bool:
 
 
 def launched_in(package: PackageFacts | None) -> frozenset[str]:
-    """Return the names of the programs that launch files start: what they run is no module of another script."""
+    """Return the names of the programs that launch files start: what they run is not a module of another script."""
     packages = (package, *package.also) if package is not None else ()
     files = (file for one in packages for file in one.launch_files)
     return frozenset(node.type for file in files for node in file.nodes if node.type)
@@ -278,7 +278,7 @@ def _charges(
 
 def _lines_away(found: Verdict, repair: Repair) -> float:
     """Return how far the nearest line that a verdict cites is from the repaired one. The line below which a call that
-    is missing goes is no fault."""
+    is missing goes is not a fault."""
     if repair.line is None or found.sought_name("call") or found.sought_name("below"):
         return math.inf
     lines = [line for file, line in cited_lines(found.citations) if file == repair.file]

@@ -245,7 +245,7 @@ class SourceFile(Record):
     that file's facts; any other has `link_problem`, size 0 and the digest of its target's text. `python`
     marks files that are Python by name or shebang, `python_fault` those of them that ROS's Python does not
     compile. `shebang_problem` says why the system cannot start a script by its first line ("" where it can,
-    and for files that are no scripts), and `shebang_fault` whether more than that line is wrong. `sha256` is
+    and for files that are not scripts), and `shebang_fault` whether more than that line is wrong. `sha256` is
     empty for a file that cannot be read.
     """
 
@@ -283,7 +283,7 @@ class PythonSlip(Record):
     compile only names, types and rates are known.
 
     `message` says what is wrong on that line, `fix` what to do where that is always the same, and `name` is the
-    function or variable that both speak of. Of a kind that is no slip, `message` is what is written there: a name, a
+    function or variable that both speak of. Of a kind that is not a slip, `message` is what is written there: a name, a
     number or a text.
 
     `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and nodes

@@ -258,7 +258,7 @@ def as_python3(lines: list[str], at: int) -> Iterator[str]:
 
 
 def _fixed_statement(lines: list[str]) -> list[str] | None:
-    """The same as Python 3; None where it is no statement by itself, or nothing of it is Python 2."""
+    """The same as Python 3; None where it is not a statement by itself, or nothing of it is Python 2."""
     indentation = lines[0][: len(lines[0]) - len(lines[0].lstrip())]
     first = lines[0].strip()
     keyword = re.match(r"\w*", first)

@@ -45,7 +45,7 @@ def render_junit(result: GradingResult, prefix: str = "") -> bytes:
 
 
 class _Writer:
-    """`limit` is how long a text may be. What XML cannot hold is no sign that can be seen: it is written out."""
+    """`limit` is how long a text may be. What XML cannot hold is not a sign that can be seen: it is written out."""
 
     def __init__(self, limit: int, prefix: str) -> None:
         self._limit, self._prefix = limit, prefix

@@ -75,7 +75,7 @@ def arrange(result: GradingResult, rubric: Rubric | None = None) -> ReportView:
 
 
 def _advises(criterion: CriterionResult) -> bool:
-    """What costs nothing and could not be judged is no advice."""
+    """What costs nothing and could not be judged is not advice."""
     return not criterion.status.is_open and bool(criterion.hint or criterion.status is not Status.PASS)
 
 
@@ -399,7 +399,7 @@ STARTS = re.compile(
     |which|while|with|wrap|write|wrong|your)[,:;]?(?=\ )""",
     re.VERBOSE,
 )
-"""Words that a message or a hint begins with and that are no command, name or code."""
+"""Words that a message or a hint begins with and that are not command, name or code."""
 
 
 def sentence(text: str) -> str:

@@ -13,7 +13,7 @@ from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
 FRAME_KEYS = frozenset({"frame_id", "child_frame_id"})
 ANGLES = frozenset({"rotation_deg", "rpy_deg", "heading_deg"})
 UNEQUAL = 0.02
-"""So far from 1 is no quaternion's length whose numbers are rounded."""
+"""So far from 1 is not a quaternion's length whose numbers are rounded."""
 ROUNDED = 0.004
 """So much is 1.57 off from a quarter turn in radians, and 6.28 from a whole one."""
 

@@ -427,7 +427,7 @@ def _no_such(shape: Shape, path: object, given: dict[str, Any]) -> str:
 
 
 def _no_bounds(field: Field, given: dict[str, Any], what: str) -> str:
-    """Return why a field is no stamp, or is never within the bounds."""
+    """Return why a field is not a stamp, or is never within the bounds."""
     if STAMPED in given and field.type not in {"std_msgs/Header", "time"}:
         return f"{what} {field.type}, neither a Header nor a time"
     bounds = {key: given[key] for key in ("min", "max") if isinstance(given.get(key), int | float)}

@@ -302,7 +302,7 @@ def ask_evidence(run: Run) -> Ask:
 
 
 def _answer(text: object) -> Answer:
-    """Return what was answered; an empty one where it is no answer, as the student's code may have written it."""
+    """Return what was answered; an empty one where it is not an answer, as the student's code may have written it."""
     try:
         found = json.loads(text) if isinstance(text, str) else None
     except (ValueError, RecursionError):

@@ -111,7 +111,7 @@ def _is_slip_in_path(name: str, other: str, texts: list[tuple[KeyPath, str]]) ->
 
 
 def _last_word(path: KeyPath, text: str, rubric: dict[str, Any]) -> str:
-    """Return the part of a name by which others would know it; "" for a text that is no name of the student's."""
+    """Return the part of a name by which others would know it; "" for a text that is not a name of the student's."""
     if ONE_NAME.fullmatch(text) or (path[-1] in PLAIN_NAMES and text != path[-1]):
         return PurePosixPath(text).stem
     is_field = FIELDS & {*path[:-1]} and text == path[-1] and not _is_known_field(path, rubric)

@@ -195,7 +195,7 @@ class Actor:
             if sock.send(frame) == len(frame):
                 return
         except OSError:
-            pass  # gone, or not reading any more: either way it is no subscriber
+            pass  # gone, or not reading any more: either way it is not a subscriber
         topic.subscribers.pop(sock, None)
         self._whose.pop(sock, None)
         sock.close()

@@ -97,7 +97,7 @@ def _scratches(ours, stage, wall):
 
 
 def _arguments(wall, stage, scratches, fds):
-    """Yield bubblewrap's arguments. Words that are no text stand for what only the arena knows."""
+    """Yield bubblewrap's arguments. Words that are not text stand for what only the arena knows."""
     for word in wall:
         if isinstance(word, str):
             yield word

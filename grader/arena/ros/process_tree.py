@@ -183,7 +183,7 @@ GROWS = 25
 class Rest:
     """Whether a program has come to rest: it does little, and wakes again and again, as a loop or `spin()` does.
 
-    A long sleep is no rest, since no one knows what comes after it; a compiled program whose main thread waits for its
+    A long sleep is not a rest, since no one knows what comes after it; a compiled program whose main thread waits for
     others (`MultiThreadedSpinner`, `rosbag record`) rests as a loop does, and so does any whose threads all wait for
     each other, or for what comes (a lock that is taken twice). `since_s` is when the rest began, or None. It
     `spins` while its main thread wakes about twice a second (rospy), or waits for callbacks alone (roscpp).

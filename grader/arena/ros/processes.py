@@ -275,7 +275,7 @@ class Process:
         return None
 
     def _holds_too_much(self, tree, resident):
-        """Where no control group counts what is no process's resident page: files in memory, and shared memory."""
+        """Where no control group counts what is not a process's resident page: files in memory, and shared memory."""
         shared, maps = shared_memory(tree)
         written = sum(self._stage.used_bytes(name) for name in self.scratches)
         return resident + written + shared > self._limits["memory_bytes"] or maps > MAPS_MAX

@@ -35,7 +35,7 @@ def called_name(node):
 
 
 def dotted(node):
-    """Return `a.b.c` as it is written; what stands before the dots and is no name becomes an ellipsis."""
+    """Return `a.b.c` as it is written; what stands before the dots and is not a name becomes an ellipsis."""
     parts = []
     while isinstance(node, ast.Attribute):
         parts.append(node.attr)

@@ -211,7 +211,7 @@ def fault(kind, line, column, message, *, text="", opened=None, mixed=False):
 
 
 def undecodable(data):
-    """Return the fault of a file whose bytes are no text. `compile` forgives them in comments, running does not."""
+    """Return the fault of a file whose bytes are not text. `compile` forgives them in comments, running does not."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return fault("SyntaxError", 1, None, "the file is UTF-16")
     if b"\0" in data:

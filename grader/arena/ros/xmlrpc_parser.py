@@ -1,8 +1,8 @@
 """Reads XML-RPC as ROS's clients write it, and nothing that is made to break a reader.
 
 What is left out no client of ROS sends: document types, entities, comments, elements with long attributes, other
-encodings than UTF-8, `nil`, numbers that do not fit into 32 bits, names that are no text. The parser is expat, the rest
-Python's own `xmlrpc.client`.
+encodings than UTF-8, `nil`, numbers that do not fit into 32 bits, names that are not text. The parser is expat, the
+rest Python's own `xmlrpc.client`.
 """
 
 import re

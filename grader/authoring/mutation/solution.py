@@ -203,7 +203,7 @@ def find_reference(rubric: LoadedRubric) -> Reference:
 
 
 def reference_at(folder: Path) -> Reference:
-    """Return the user's own correct package. Raises UsageError where it is no folder."""
+    """Return the user's own correct package. Raises UsageError where it is not a folder."""
     if not folder.is_dir():
         raise UsageError(f"{folder} is not a folder", hint="--solution takes the folder of a correct package")
     return Reference(folder=folder)

@@ -222,7 +222,7 @@ def no_types(package: PackageFacts) -> Explained | None:
 
 
 def _no_definition(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    """Of a line that is no field."""
+    """Of a line that is not a field."""
     return no_types(package) or Explained(found.string, FIRST_ERROR_HINT)
 
 
@@ -329,7 +329,7 @@ def _missing_target(found: re.Match[str], _package: PackageFacts, _lines: Sequen
 
 
 def _depends(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    why = f"DEPENDS in catkin_package(…) names {found[1]}, which is no library that find_package(…) found"
+    why = f"DEPENDS in catkin_package(…) names {found[1]}, which is not a library that find_package(…) found"
     return Explained(why, f"take {found[1]} out of DEPENDS; ROS packages go after CATKIN_DEPENDS")
 
 

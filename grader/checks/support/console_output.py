@@ -136,7 +136,7 @@ def numbers_in(text: str) -> frozenset[int]:
 
 
 def _numbers(text: str, *, dashes: bool) -> Iterator[tuple[int, int]]:
-    """Yield each whole number with its offset. With `dashes`, a `-` after a letter or a dot is no sign."""
+    """Yield each whole number with its offset. With `dashes`, a `-` after a letter or a dot is not a sign."""
     if "x" in text or "X" in text:
         text = _HEX.sub(_blanks_for, text)
     if ":" in text or "-" in text:
@@ -187,7 +187,7 @@ def number_places(
 ) -> list[tuple[int, ...]] | None:
     """Return for each probe the offsets at which it was printed, at its time or later.
 
-    `texts` are other probes that the lines may show too; digits in them are no numbers. None where so many
+    `texts` are other probes that the lines may show too; digits in them are not numbers. None where so many
     numbers are printed that any probe would be among them. A `-` after a letter is a sign in all lines or in none.
     """
     hidden = re.compile("|".join(map(re.escape, sorted(texts, key=len, reverse=True))) or r"(?!)")

@@ -283,7 +283,7 @@ def wrong_class(source: str) -> Meaning | None:
 
 
 def _init_node(message: str, source: str) -> Meaning | None:
-    """Of `init_node(…)` without a name, or with one that is no text."""
+    """Of `init_node(…)` without a name, or with one that is not text."""
     if message == "init_node() missing 1 required positional argument: 'name'":
         return "a node needs a name", "write the node's name in the brackets, as a string"
     called = next(iter(_calls(source, "init_node")), None)

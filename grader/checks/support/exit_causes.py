@@ -409,7 +409,7 @@ def _operand(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
 
 
 def _other_side(frame: Frame, *, is_right: bool) -> str:
-    """Return the side of a sum that is no text: of the one that Python marks, or of the line's only one."""
+    """Return the side of a sum that is not text: of the one that Python marks, or of the line's only one."""
     source = frame.source[slice(*frame.marked)] if frame.marked else frame.source
     with suppress(SyntaxError, ValueError, RecursionError):
         nodes = list(ast.walk(parsed(source)))

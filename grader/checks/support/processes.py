@@ -171,7 +171,7 @@ def fell_silent(one: Life, run: Run) -> bool:
 
 
 def was_talking(one: Life, run: Run) -> bool:
-    """Whether it printed line after line until Ctrl-C, so that its silence afterwards is no loop that goes on."""
+    """Whether it printed line after line until Ctrl-C, so that its silence afterwards is not a loop that goes on."""
     end_ns = one.interrupt_ns or 0
     return sum(end_ns - TALKING_NS <= t <= end_ns for t, _ in run.lines(one.name)) >= TALKING_LINES
 

@@ -80,7 +80,7 @@ def path_in_package(package: PackageFacts, file: str) -> str | None:
 
 
 def paths_by_name(package: PackageFacts) -> dict[str, str]:
-    """Return the paths of all files that no build made and that are no editor's backups, by their names without
+    """Return the paths of all files that no build made and that are not an editor's backups, by their names without
     folders."""
     paths = (f.path for f in package.files if not is_product(f.path) and not f.path.endswith(BACKUPS))
     return {PurePosixPath(path).name: path for path in paths}

@@ -230,7 +230,7 @@ def _without_address(problem: GivenUp, source: Source) -> NetworkFailure:
 
 
 def _listing(mirror: Mirror) -> Listing:
-    """Raises GivenUp where asking again does not help: that is no fault of the mirror's."""
+    """Raises GivenUp where asking again does not help: that is not a fault of the mirror's."""
     try:
         return mirror.listing()
     except GitFailed as failure:

@@ -291,7 +291,7 @@ class Sheet:
 
 
 def read_sheet(path: Path) -> Sheet:
-    """Raises UsageError for what is no table of text."""
+    """Raises UsageError for what is not a table of text."""
     try:
         data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else b""
     except OSError as error:

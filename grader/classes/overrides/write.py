@@ -128,7 +128,7 @@ def _changed_text(path: Path, raw: bytes, changes: Sequence[tuple[str, str, Fiel
 
 
 def _data(path: Path, raw: bytes) -> dict[str, Any]:
-    """Raises RubricError where the file is no sound map."""
+    """Raises RubricError where the file is not a sound map."""
     source = parse(raw, str(path))
     faults = [source.fault(*fault) for fault in source.faults]
     if not isinstance(source.data, dict):

@@ -109,12 +109,12 @@ LISTED_MAX = 200
 
 
 def open_report(folder: Path, name: str) -> BinaryIO | None:
-    """One of `REPORTS`; None where there is none, or it is no file."""
+    """One of `REPORTS`; None where there is none, or it is not a file."""
     return _open(folder, (), name) if name in REPORTS else None
 
 
 def open_evidence(folder: Path, name: str) -> BinaryIO | None:
-    """Return a file of the evidence; None where there is none, or it is no file."""
+    """Return a file of the evidence; None where there is none, or it is not a file."""
     return _open(folder, (EVIDENCE,), name) if NAME.fullmatch(name) else None
 
 

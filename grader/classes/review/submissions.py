@@ -48,7 +48,7 @@ FILTERS_OF_ONE = {
 }
 """Those of a list of one criterion across the class."""
 ALL, ASKED, NOTED = "all", "asked", "noted"
-"""The last one is no filter: a person said something and left the points to the check."""
+"""The last one is not a filter: a person said something and left the points to the check."""
 HASH_CHARS = (7, 8, 10, 12)
 KEPT = frozenset(
     {

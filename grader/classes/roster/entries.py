@@ -335,7 +335,7 @@ def parse_time(text: str) -> datetime | None:
 
 
 def time_fault(text: str) -> str:
-    """Why `text` is no time; empty where it is one."""
+    """Why `text` is not a time; empty where it is one."""
     if parse_time(text) is not None:
         return ""
     if _DAY_AND_MONTH.fullmatch(text.strip()):

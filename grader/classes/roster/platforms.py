@@ -221,7 +221,7 @@ def unpack_download(path: Path, out: Path) -> Path:
     """Unpack the zip below `out` and return the folder; one that was unpacked there before is returned as it is.
 
     Raises:
-        UsageError: It is no zip file, is damaged or encrypted, or is itself one package.
+        UsageError: It is not a zip file, is damaged or encrypted, or is itself one package.
         HostError: The disk has no room for it.
 
     """

@@ -41,7 +41,7 @@ class Table(NamedTuple):
 
 
 def read_table(path: Path) -> Table:
-    """Raises UsageError where the file is no table of text at all; what is wrong with a row is said by the row."""
+    """Raises UsageError where the file is not a table of text at all; what is wrong with a row is said by the row."""
     lines = list(io.StringIO(_text(path), newline=""))
     found = _rows(lines, *_delimiter(lines))
     header = next(found, None)

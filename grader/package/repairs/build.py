@@ -190,8 +190,8 @@ def _replace_token(text: str, token: Token, new: str) -> str:
 
 
 def _close_bracket(files: Files) -> None:
-    """Take a call wholly out of its comment, or close the bracket at the end of the last line that is no comment, or in
-    a line of its own."""
+    """Take a call wholly out of its comment, or close the bracket at the end of the last line that is not a comment, or
+    on a line of its own."""
     text = _cmake(files)
     if commands_of(text.encode()) is not None:
         return

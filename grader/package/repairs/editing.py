@@ -23,7 +23,7 @@ from grader.package.xml import parse_xml, well_formed
 from grader.portable import BINARY, CLOEXEC, DIRECTORY, NOFOLLOW, READ
 
 TEXT_BYTES_MAX = 64_000
-"""Larger files are no student's work, and are left as they are."""
+"""Larger files are not a student's work, and are left as they are."""
 HAS_DIR_FD = os.open in os.supports_dir_fd
 BOM = b"\xef\xbb\xbf"
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
@@ -167,7 +167,7 @@ def changed_lines(before: str, after: str) -> tuple[int, str, str]:
     if end in (len(old) - start, len(new) - start):
         start, end = (start - 1, end) if start else (start, end - 1)
     if 0 < start == len(old) - 1 and old[-1] == new[-1] == "" and not end:
-        start, end = start - 1, 1  # behind the last line end is no line
+        start, end = start - 1, 1  # behind the last line end is not a line
     first, last = old[start : len(old) - end], new[start : len(new) - end]
     return start + 1, "\n".join(first), "\n".join(last)
 

@@ -46,7 +46,7 @@ class Turtle:
         return hypot(self.forward, self.sideways)
 
     def command(self, forward, sideways, turning):
-        """Velocities (m/s, m/s, rad/s) for the next second. Raises ValueError for what is no finite number."""
+        """Velocities (m/s, m/s, rad/s) for the next second. Raises ValueError for what is not a finite number."""
         _refuse_infinite(forward, sideways, turning)
         self.forward, self.sideways, self.turning = forward, sideways, turning
         self._steps_left = HOLD_STEPS
@@ -58,7 +58,7 @@ class Turtle:
             self._pen_color, self._pen_width = color, width or 1
 
     def teleport_to(self, x, y, theta):
-        """Takes place in the next step, as `teleport_by` does; both raise ValueError for what is no finite number."""
+        """Takes place in the next step, as `teleport_by` does; both raise ValueError for any but finite numbers."""
         _refuse_infinite(x, y, theta)
         self._teleports.append((False, x, y, theta))
 

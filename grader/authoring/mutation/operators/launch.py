@@ -203,7 +203,7 @@ YAML = (".yaml", ".yml")
 
 
 def leaves(text: str) -> list[Leaf]:
-    """Every value that is no map and no list: its key's path (`details/name/first`), the key, the value."""
+    """Every value that is neither a map nor a list: its key's path (`details/name/first`), the key, the value."""
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.YAMLError:
