@@ -67,8 +67,8 @@ def whole_file(target: Path) -> Iterator[Path]:
     """Open a new file beside `target`; it takes the target's place in the end, flushed to the disk.
 
     It is for its owner alone, whatever the umask. A link stays a link, and what is not a file (`/dev/stdout`, a pipe)
-    gets a copy. Raises OutputError, or HostError where the disk gives out; then `target` is as it was before, and nothing is
-    left beside it.
+    gets a copy. Raises OutputError, or HostError where the disk gives out; then `target` is as it was before, and
+    nothing is left beside it.
     """
     target = target.resolve() if target.is_symlink() else target
     special = target.exists() and not target.is_file()

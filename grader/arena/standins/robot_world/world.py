@@ -1,6 +1,6 @@
 """A world without ROS: its walls, read from YAML and from map_server's maps, and a robot with a laser among them.
 
-Metres, radians, seconds. A wall is a straight line ((x0, y0), (x1, y1)). Raises ValueError for anything but a floor plan.
+Metres, radians, seconds. A wall is a straight line ((x0, y0), (x1, y1)). Raises ValueError if it is no floor plan.
 """
 
 from math import atan2, ceil, cos, floor, hypot, inf, isfinite, pi, sin
