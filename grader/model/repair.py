@@ -56,7 +56,7 @@ BY_HAND: dict[RepairKind, str] = {
     "package-name": "a misspelt package name: it is the same in package.xml, in project(…) and in each pkg=",
     "launch-type": "type= without .py: it is the file's whole name, as ls shows it",
     "missing-import": "a name that is not imported: from std_msgs.msg import NAME",
-    "missing-call": "a name or call that is misspelt, missing or lacks its brackets: rospy.spin(), rate.sleep()",
+    "missing-call": "a name or call that is misspelt, missing, lacks its brackets or has an argument in the wrong form",
     "node-name": "a misspelt node name: rosnode list shows how it is called",
     "topic-name": "a misspelt topic: rostopic list shows how it is called",
     "parameter-name": "a misspelt parameter: rosparam list shows how it is called",

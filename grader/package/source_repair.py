@@ -18,6 +18,7 @@ from difflib import get_close_matches
 from itertools import chain
 from typing import Any
 
+from grader.package.argument_repair import unbound_variables, wrong_arguments
 from grader.package.syntax_repair import (
     Step,
     as_python3,
@@ -108,6 +109,8 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             _with_values_called,
             _with_calls,
             _with_callbacks,
+            _with_arguments,
+            _with_globals,
             _with_main,
             _with_spin,
         ):
@@ -443,6 +446,30 @@ def _with_callbacks(text: str) -> Iterator[Step]:
         after = _edit(text, [(*span, name) for span, name in spans])
         words = ", ".join(dict.fromkeys(name for _, name in spans))
         yield from _step("callback", min(span for span, _ in spans)[0] + 1, text, after, words)
+
+
+def _with_arguments(text: str) -> Iterator[Step]:
+    lines = text.split("\n")
+    for mistake in wrong_arguments(ast.parse(text)):
+        spans = [(span, new) for node, new in mistake.edits if (span := _span(lines, node))]
+        if len(spans) == len(mistake.edits):
+            after = _edit(text, [(*span, new) for span, new in spans])
+            for step in _step("argument", spans[0][0][0] + 1, text, after, mistake.why):
+                yield step
+                yield from _with_arguments(step["text"])
+                return
+
+
+def _with_globals(text: str) -> Iterator[Step]:
+    lines = text.split("\n")
+    for found in unbound_variables(ast.parse(text)):
+        at = found.first.lineno - 1
+        blanks = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
+        after = "\n".join([*lines[:at], f"{blanks}global {found.name}", *lines[at:]])
+        for step in _step("unbound", found.first.lineno, text, after, found.name):
+            yield step
+            yield from _with_globals(step["text"])
+            return
 
 
 def _is_callback(function: ast.FunctionDef) -> bool:

@@ -153,6 +153,39 @@ CASES = {
     "typographic": Case(swapped(TALKER, ("'talker'", "\u2018talker\u2019")), ["python-syntax"], "typographic quote"),
     "raw-input": Case(swapped(TALKER, ("    rospy.init", "    raw_input()\n    rospy.init")), ["python-syntax"],
         "raw_"),
+    **{
+        f"argument-{name}": Case(swapped(TALKER, *swaps), ["missing-call"] * kinds, says, after={TALKER: after})
+        for name, (swaps, kinds, says, after) in {
+            "type-in-quotes": ([("Int8, q", "'Int8', q")], 1, "the type is given as a string", "Int8, q"),
+            "message": ([("Int8, q", "Int8(), q")], 1, "`Int8()` is a message, not a type", "Int8, q"),
+            "order": ([("'numeric_chatter', Int8", "Int8, 'numeric_chatter'")], 1, "the topic's name comes first",
+                      "('numeric_chatter', Int8"),
+            "number": ([("size=10", "size='10'"), ("rospy.get_param('~rate', 10)", "'10'")], 2, "number, not a string",
+                       "Rate(10)"),
+            "of-sleep": ([("rate.sleep()", "rate.sleep(1)")], 1, "a Rate already knows", "rate.sleep()"),
+            "without-quotes": ([("'talker'", "main")], 1, "the name of the node has no quotes", "node('main'"),
+            "timer": ([("        rate.s", "        rospy.Timer(1 / 10, tick)\n        rate.s")], 1, "takes a Duration",
+                      "rospy.Timer(rospy.Duration(1 / 10), tick)"),
+            "callback": ([("\nmain()", "\nrospy.on_shutdown('main')\nmain()")], 1, "'main' is a string",
+                         "down(main)"),
+        }.items()
+    },
+    "variable-of-the-file": Case(
+        swapped(
+            TALKER,
+            ("\ndef main():", "\nn = 0\n\ndef main():"),
+            ("        rate.s", "        n += 1\n        rate.s"),
+        ),
+        ["missing-call"],
+        "write `global n` as the first line of the function",
+        after={TALKER: "def main():\n    global n\n"},
+    ),
+    "variables-of-their-own": Case(
+        {TALKER: SCRIPT, "src/own.py": "n = 0\ndef f(n):\n    n += 1\ndef g():\n    global n\n    n += 1\n"
+         "def h():\n    n = 1\n    n += 1\ndef i():\n    for n in (1,): print(n)\ndef j():\n"
+         "    def f(): return n\n    n = 1\n"},
+        [],
+    ),
     "sleep": Case(swapped(TALKER, ("rate.sleep()", "rate.sleep")), ["missing-call"],
         "rate.sleep is named but not called"),
     "main": Case(swapped(TALKER, ("\nmain()", "\nmain")), ["missing-call"], "line 13"),
@@ -399,7 +432,8 @@ CASES = {
     "another-node": Case(swapped(TALKER, ("'talker'", "'my_node'")), []),
     "import-of-everything": Case(swapped(TALKER, ("import Int8", "import *")), []),
     "sleep-with-an-argument": Case(
-        swapped(TALKER, ("rate.sleep()", "rate.sleep(0.5")), ["python-syntax"], after={TALKER: "rate.sleep(0.5)"},
+        swapped(TALKER, ("rate.sleep()", "rate.sleep(0.5")), ["python-syntax", "missing-call"],
+        after={TALKER: "rate.sleep()"},
     ),
     "nothing": Case({}, []),
 }  # fmt: skip

@@ -30,9 +30,10 @@ ATTEMPTS = 3
 
 Cause = Literal[
     "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
-    "old-name", "module", "import", "name", "attribute", "value", "call", "callback", "guard", "main", "spin",
+    "old-name", "module", "import", "name", "attribute", "value", "call", "callback", "argument",
+    "unbound", "guard", "main", "spin",
 ]  # fmt: skip
-CALLS = ("name", "attribute", "value", "call", "callback", "guard", "main", "spin")
+CALLS = ("name", "attribute", "value", "call", "callback", "argument", "unbound", "guard", "main", "spin")
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "import"), "missing-import"),
     **dict.fromkeys(CALLS, "missing-call"),
@@ -119,7 +120,8 @@ def _join_steps(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
         if (
             groups
             and groups[-1][0] == step.cause
-            and step.cause not in ("token", "indent", "module", "import", "name", "attribute")
+            and step.cause
+            not in ("token", "indent", "module", "import", "name", "attribute", "argument", "unbound")
         ):
             groups[-1][1].append(step)
         else:
@@ -207,6 +209,9 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "value": ("{place}: {word} is given a value with `=`, and has to be called", ""),
     "call": ("{place}: {word} is named but not called", "write {calls}"),
     "callback": ("{place}: {calls} is called where the function itself is meant", ""),
+    "argument": ("{place}: {word}", ""),
+    "unbound": ("{place}: the function assigns to {word}, so it is a variable of its own and has no value yet",
+     "write `global {word}` as the first line of the function"),
     "guard": ("{place}: `__name__` is never {word!r}", ""),
     "main": ("{place}: nothing calls {calls}", "add `if __name__ == '__main__':`, and {calls} below it"),
     "spin": ("{file} ends as soon as it has subscribed, because nothing keeps it running",
