@@ -16,7 +16,6 @@ from grader.intake import find_packages
 from grader.intake.choose import is_slip
 from grader.intake.find import (
     BUILD_SPACES,
-    MANIFEST,
     WORKSPACE_MARKS,
     Candidate,
     enclosing_package,
@@ -27,6 +26,7 @@ from grader.intake.gitdir import repository_around
 from grader.intake.names import is_archive_name, listing, printable
 from grader.intake.open import is_recording
 from grader.intake.tree import is_file, is_there
+from grader.model.package import CMAKE, MANIFEST
 from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
 from grader.rubric.load import LoadedRubric, find_rubric_for_package, load_rubric, packages_of_labs
@@ -383,7 +383,7 @@ def _beside(here: Path) -> FoundPackages | None:
 
 def _as_candidate(folder: Path) -> Candidate:
     name = manifest_name(folder, root=folder) or printable(folder.name)
-    return Candidate(path=".", folder=folder, manifest=name, has_cmake=is_file(folder / "CMakeLists.txt"))
+    return Candidate(path=".", folder=folder, manifest=name, has_cmake=is_file(folder / CMAKE))
 
 
 def short_path(folder: Path) -> str:

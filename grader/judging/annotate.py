@@ -60,7 +60,7 @@ from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO
 from grader.judging.facts import SOURCES, Facts, language_of, scripts_of, sources_of
-from grader.model.package import LaunchFile, PackageFacts, PythonSlip
+from grader.model.package import CMAKE, LaunchFile, PackageFacts, PythonSlip
 from grader.model.result import CriterionResult
 from grader.model.verdict import Citation, FileCitation, Status, Verdict
 from grader.rubric.model import Criterion, Rubric
@@ -476,9 +476,6 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
         ),
     }
     return verdict.model_copy(update=update)
-
-
-CMAKE = "CMakeLists.txt"
 
 
 def _cite_install(verdict: Verdict, package: PackageFacts, build: Run, called: str) -> Verdict:

@@ -20,6 +20,9 @@ from grader.model.submission import ModeSource
 from grader.model.verdict import FileCitation
 from grader.wording import is_one_edit
 
+MANIFEST, CMAKE = "package.xml", "CMakeLists.txt"
+"""The two files at the root of each package."""
+
 
 class Fault(Record):
     """Why a file cannot be read as what it should be.
@@ -131,8 +134,8 @@ def meant_manifest(name: str) -> str:
     if name == "manifest.xml":
         return f"{name} is rosbuild's, which catkin does not read: write package.xml, as catkin_create_pkg makes it"
     plain = re.sub(r"\s|\(\d+\)", "", name.casefold())
-    alike = plain == "package.xml" or is_one_edit(plain, "package.xml") or plain.startswith("package.xml.")
-    if name == "package.xml" or not alike:
+    alike = plain == MANIFEST or is_one_edit(plain, MANIFEST) or plain.startswith(f"{MANIFEST}.")
+    if name == MANIFEST or not alike:
         return ""
     return f"{name} has to be called package.xml: git mv {shlex.quote(name)} package.xml"
 
