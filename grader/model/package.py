@@ -93,28 +93,14 @@ class Manifest(Record):
 
 
 CMAKE_COMMANDS = (
-    *("add_action_files", "add_compile_options", "add_custom_target", "add_definitions", "add_dependencies"),
-    *("add_executable", "add_library", "add_message_files", "add_rostest", "add_service_files"),
-    *(
-        "catkin_add_nosetests",
-        "catkin_package",
-        "catkin_package_xml",
-        "catkin_install_python",
-        "catkin_python_setup",
-    ),
-    *("cmake_minimum_required", "find_package", "find_library", "generate_dynamic_reconfigure_options"),
-    *(
-        "generate_messages",
-        "include_directories",
-        "install",
-        "link_directories",
-        "list",
-        "message",
-        "project",
-    ),
-    *("set", "set_target_properties", "target_compile_features", "target_compile_options"),
-    *("target_include_directories", "target_link_libraries", "target_sources"),
-)
+    "add_action_files", "add_compile_options", "add_custom_target", "add_definitions", "add_dependencies",
+    "add_executable", "add_library", "add_message_files", "add_rostest", "add_service_files",
+    "catkin_add_nosetests", "catkin_package", "catkin_package_xml", "catkin_install_python", "catkin_python_setup",
+    "cmake_minimum_required", "find_package", "find_library", "generate_dynamic_reconfigure_options",
+    "generate_messages", "include_directories", "install", "link_directories", "list", "message", "project", "set",
+    "set_target_properties", "target_compile_features", "target_compile_options", "target_include_directories",
+    "target_link_libraries", "target_sources",
+)  # fmt: skip
 """Of CMake and catkin, those that a beginner's package calls."""
 ALIKE, SHORT = 0.88, 5
 """How alike two names of commands are that differ by one slip; in names of so few letters that says nothing."""
