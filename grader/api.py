@@ -98,8 +98,7 @@ def grade(
     """
     from grader import pipeline  # noqa: PLC0415 - loading a rubric needs nothing of it
 
-    if sandbox not in SANDBOXES:
-        raise UsageError(f"sandbox is {sandbox!r}", hint=f"it is one of {', '.join(SANDBOXES)}")
+    _check_sandbox(sandbox)
     given, loaded, folder = _text(source), _load_rubric(rubric), Path(out)
     check_writable(folder)
 
@@ -115,6 +114,11 @@ def grade(
         return pipeline.grade(given, loaded, folder, options, steps)
 
     return _run_stoppable(work, progress)
+
+
+def _check_sandbox(mode: str) -> None:
+    if mode not in SANDBOXES:
+        raise UsageError(f"sandbox is {mode!r}", hint=f"it is one of {', '.join(SANDBOXES)}")
 
 
 def judge(evidence: StrPath | Sequence[StrPath], rubric: StrPath | LoadedRubric) -> GradingResult:

@@ -39,6 +39,14 @@ FULL = {
 }
 
 
+def user_folder(kind: Literal["cache", "config"]) -> Path:
+    """Return the grader's folder for what it keeps of a user's, as the XDG base directory specification places it: a
+    relative path does not count. It may be relative where the user has no home."""
+    named = Path(os.environ.get(f"XDG_{kind.upper()}_HOME", ""))
+    base = named if named.is_absolute() else Path(os.path.expanduser("~"), f".{kind}")  # noqa: PTH111 - never raises
+    return base / "grader"
+
+
 def atomic_write(path: Path, data: bytes, *, public: bool = False) -> None:
     """Write `data` beside `path`, flush it to the disk, and rename it into place.
 

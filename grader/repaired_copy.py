@@ -24,14 +24,14 @@ from grader.judging.repeats_and_repairs import (
     launched_in,
     needs_build,
 )
-from grader.model.package import PackageFacts
+from grader.model.package import MANIFEST, PackageFacts
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
 from grader.model.submission import SourcePackage, Submission
 from grader.package.manifest import parse_manifest
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
-from grader.package.repairs.editing import MANIFEST, read_data
+from grader.package.repairs.editing import read_data
 from grader.rubric.model import Rubric
 
 REPAIRED, REPEATED = "repaired-1", "repeated-1"

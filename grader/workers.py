@@ -25,7 +25,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import dataclass
@@ -250,10 +250,7 @@ def run_each(
                 for future in done:
                     yield future.result()
         finally:
-            for worker in workers:
-                worker.interrupt()
-            wait(running)
-            _end(workers, template)
+            _end(workers, running, template)
 
 
 def _template(count: int, warm_up: str, env: Mapping[str, str] | None) -> Template | None:
@@ -263,7 +260,11 @@ def _template(count: int, warm_up: str, env: Mapping[str, str] | None) -> Templa
     return Template([*module_command("grader.workers"), warm_up], _environment(env))
 
 
-def _end(workers: Iterable[Worker], template: Template | None) -> None:
+def _end(workers: Sequence[Worker], running: Iterable[Future[Any]], template: Template | None) -> None:
+    """Interrupt what is running, wait until it has cleaned up, and end the processes."""
+    for worker in workers:
+        worker.interrupt()
+    wait(running)
     for worker in workers:
         worker.close()
     if template is not None:

@@ -35,7 +35,7 @@ from grader.arena.session import ArenaSession
 from grader.arena.workspace import Workspace, give_to, read_member
 from grader.errors import ArenaError, GraderError
 from grader.evidence.writer import EvidenceWriter
-from grader.files import atomic_write, open_untrusted, temporary_folder
+from grader.files import atomic_write, open_untrusted, temporary_folder, user_folder
 from grader.model import SandboxMode
 from grader.ros_env import find_ros
 from grader.rubric.course_packages import SCRIPT, folder_files
@@ -197,14 +197,14 @@ def _entries(path: str) -> list[str]:
 def read_kept(name: str, bytes_max: int = BYTES_MAX) -> bytes | None:
     """Return what was kept under that name; None where there is none that is whole and only this user's."""
     with suppress(OSError):
-        if _is_private(_folder().lstat()):
+        if _is_private(user_folder("cache").lstat()):
             return _verify_sum(_read(name, bytes_max))
     return None
 
 
 def keep(name: str, data: bytes) -> None:
     """Keep it, if that can be done here. Of the files that are kept, the newest stay."""
-    folder = _folder()
+    folder = user_folder("cache")
     with suppress(OSError, GraderError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if folder.is_symlink() or folder.stat().st_uid != os.geteuid():
@@ -220,18 +220,12 @@ def keep(name: str, data: bytes) -> None:
             old.unlink()
 
 
-def _folder() -> Path:
-    """Return the cache folder by the XDG base directory specification: a relative path does not count."""
-    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    return (named if named.is_absolute() else Path(os.path.expanduser("~"), ".cache")) / "grader"  # noqa: PTH111 - never raises
-
-
 def _is_private(status: os.stat_result) -> bool:
     return status.st_uid == os.geteuid() and stat.S_IMODE(status.st_mode) == stat.S_IRWXU
 
 
 def _read(name: str, bytes_max: int) -> bytes:
-    with open_untrusted(_folder(), name) as file:
+    with open_untrusted(user_folder("cache"), name) as file:
         status = os.fstat(file.fileno())
         own = status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE
         return file.read(bytes_max) if own else b""

@@ -265,17 +265,14 @@ class ProcessEnvironment:
     ) -> dict[str, Any]:
         """What the arena needs to start a process. With `copy` it gets a workspace of its own: the sources with the
         repairs, or `as_handed_in`, and what the build made. `build` is the build itself, `number` says how many others
-        the run starts before it. What the process writes to
-        `{collect}`, `collect_bytes` at most, becomes the file of that name in `workspace.kept`. `binds` are more
-        arguments of bubblewrap's."""
+        the run starts before it. What the process writes to `{collect}`, `collect_bytes` at most, becomes the file of
+        that name in `workspace.kept`. `binds` are more arguments of bubblewrap's."""
         boxed = self.sandbox.bubblewrap
         limits = self._limits(copy=copy)
         filtered = system_call_filter() if boxed else None
         first = self._words(copy=copy and boxed, build=build, number=number if boxed else 0)
-        collected = None
-        if collect is not None and boxed:
-            room = collect_bytes or self.limits.built_bytes
-            collected = {"file": str(self.workspace.kept / collect), "bytes": room}
+        room = collect_bytes or self.limits.built_bytes
+        collected = {"file": str(self.workspace.kept / collect), "bytes": room} if collect and boxed else None
         return {
             "name": name,
             "role": role,

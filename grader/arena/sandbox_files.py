@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from grader.model.package import MANIFEST
 from grader.ros_env import RosInstallation
 
 HOME = "/home/student"
@@ -45,7 +46,6 @@ EM = "lib/python3/dist-packages/em.py"
 STANDIN_SOURCES = Path(__file__).resolve().parent / "standins"
 SHEBANG = b"#!"
 SHARE = "share"
-MANIFEST = "package.xml"
 TWO_NAMES = {"rospy_tutorials": ("talker", "listener")}
 """Programs that the real package has with an ending, too."""
 LIBRARY = "python"

@@ -10,6 +10,7 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 from grader.arena.admission import Admission, Leave
 from grader.arena.outcome import describe_wait, find_outcome, next_look_s, waits
@@ -98,14 +99,7 @@ async def run_scenario(
     """
     admission = admission or Admission(None)
     warp = scenario.warp if scenario.clock == "warped" else 1.0
-    numbers = count()
-    starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place, numbers)]
-    typed_to = {step.type.process for step in scenario.steps if step.type is not None}
-    typed_to |= {start.name for start in scenario.start if start.tests is not None}
-    for start, spec in starts:
-        spec["stdin"] = start.name in typed_to
-        spec["keeps"] = scenario.keeps if spec["role"] == "student" else ()
-        spec["again"] = spec["name"] in scenario.started_again
+    starts = _starts(scenario, place)
     with EvidenceWriter(path, scenario=name, clock=scenario.clock, warp=warp, metadata=metadata) as writer:
         session = ArenaSession(place, writer, last_run=last_run, on_lateness=admission.note_lateness)
         if not any(spec["role"] == "student" for _, spec in starts):
@@ -127,6 +121,19 @@ async def run_scenario(
         except ArenaError as error:
             session.course(ScenarioEvent(event="end", outcome="host", detail=error.message))
     return RunCost(cpu_s=session.cpu_s, student_cpu_s=session.student_cpu_s)
+
+
+def _starts(scenario: Scenario, place: ProcessEnvironment) -> list[tuple[Start, dict[str, Any]]]:
+    """Return each process of the scenario with what the arena needs to start it."""
+    numbers = count()
+    starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place, numbers)]
+    typed_to = {step.type.process for step in scenario.steps if step.type is not None}
+    typed_to |= {start.name for start in scenario.start if start.tests is not None}
+    for start, spec in starts:
+        spec["stdin"] = start.name in typed_to
+        spec["keeps"] = scenario.keeps if spec["role"] == "student" else ()
+        spec["again"] = spec["name"] in scenario.started_again
+    return starts
 
 
 def _tell_what_is_known(

@@ -51,7 +51,7 @@ class ServedServices:
             now_ns, total = self._arena.ros_now_ns(), len(one.in_turn)
             answers = [types.response.encode(a, Moment(n, total, now_ns)) for n, a in enumerate(one.in_turn)]
         except ValueError as error:
-            self._refuse(one, str(error))
+            _refuse(one, self._arena, error)
             return
         fields = {"service": one.name, "type": one.type, "md5sum": types.md5sum, "delay_s": one.delay_s}
         encoded = [base64.b64encode(answer).decode() for answer in answers]
@@ -68,13 +68,6 @@ class ServedServices:
         if text is None:
             raise ValueError(f"there is no srv/{type_.partition('/')[2]}.srv")
         return ServiceTypes(type_, text, lambda name: place.type_text(name, "msg"))
-
-    def _refuse(self, one: Served, error: str) -> None:
-        """Note that the student's own type does not fit. Any other type is this machine's fault: raise ArenaError."""
-        if one.definition is not None or not self._arena.place.is_own(one.type):
-            raise ArenaError(f"the grader cannot offer {one.name}: {error}", hint="grader doctor")
-        about = {"topic": one.name, "type": one.type}
-        self._arena.note(ActorEvent(action="note", actor="grader", **about, detail=f"{MISFIT}{error}"))
 
     def _note_request(self, time_ns: int, fields: dict[str, Any]) -> None:
         one, live = self._served[fields["service"]], self._arena.live
@@ -103,6 +96,14 @@ class ServedServices:
             return False
 
 
+def _refuse(one: Served, arena: ArenaSession, error: ValueError) -> None:
+    """Note that the student's own type does not fit. Any other type is this machine's fault: raise ArenaError."""
+    if one.definition is not None or not arena.place.is_own(one.type):
+        raise ArenaError(f"the grader cannot offer {one.name}: {error}", hint="grader doctor") from error
+    about = {"topic": one.name, "type": one.type}
+    arena.note(ActorEvent(action="note", actor="grader", **about, detail=f"{MISFIT}{error}"))
+
+
 ACTIVE, PREEMPTED = 1, 2
 ENDS = {"succeeded": 3, "aborted": 4}
 """By number (actionlib_msgs/GoalStatus)."""
@@ -123,19 +124,14 @@ class ServedAction:
 
     def offer(self) -> None:
         """Advertise its topics, before anything is started."""
-        one, place = self._served, self._arena.place
+        one = self._served
         try:
             self._types = self._find()
             for feedback in one.feedback:
                 self._encode("feedback", {"feedback": feedback})
             self._encode("result", {"result": one.result})
         except ValueError as error:
-            if not place.is_own(one.type):
-                raise ArenaError(
-                    f"the grader cannot offer {one.name}: {error}", hint="grader doctor"
-                ) from error
-            about = {"topic": one.name, "type": one.type}
-            self._arena.note(ActorEvent(action="note", actor="grader", **about, detail=f"{MISFIT}{error}"))
+            _refuse(one, self._arena, error)
             self._types = {}
             return
         for name in SENT:

@@ -1,7 +1,7 @@
 """Drafts of rubrics for `grader rubric new`: what is run to look at a correct package, and the YAML that comes of it.
 
 A package's folder and facts come in, and `find_parts` gives what can be started. `first_look` and `second_look` give
-rubrics that only run it and judge nothing (`only_runs`). What was observed there becomes scenarios, criteria and points
+rubrics that only run it and judge nothing. What was observed there becomes scenarios, criteria and points
 (`assign_points`) on a `DraftSheet`, and `rubric_text` gives the YAML that people go on to edit.
 """
 
@@ -21,7 +21,6 @@ from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.rubric.consistency import TOTAL_POINTS
 from grader.rubric.load import LoadedRubric
-from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Param, Probe, Scenario, Start, Step, Until
 from grader.untrusted_text import line, visible, without_ci_commands
 
@@ -138,12 +137,12 @@ def _indent(data: object) -> str:
     return "".join(f"  {row}\n" if row else "\n" for row in rows)
 
 
-def _dump(data: object, *, flow: bool | None) -> str:
+def _dump(data: object, *, flow: bool | None, width: int = 110) -> str:
     """Names of topics and texts come from a program: where one holds what cannot be seen, letters are escaped."""
 
     def dump(*, letters: bool) -> str:
         return yaml.dump(
-            data, Dumper=_Dumper, sort_keys=False, allow_unicode=letters, width=110, default_flow_style=flow
+            data, Dumper=_Dumper, sort_keys=False, allow_unicode=letters, width=width, default_flow_style=flow
         )
 
     text = without_ci_commands(dump(letters=True))
@@ -152,7 +151,7 @@ def _dump(data: object, *, flow: bool | None) -> str:
 
 def dump_flow(data: object) -> str:
     """Return it as YAML on one line: `{topic: /in, count: 3}`."""
-    return " ".join(_dump(data, flow=True).split())
+    return _dump(data, flow=True, width=10_000).strip()
 
 
 def _one_line(text: str) -> str:
@@ -217,7 +216,7 @@ def first_look(package: str, parts: Parts) -> LoadedRubric:
     for name, launch in parts.launches.items():
         until = Until(alive_s=QUIET_LAUNCH_S, quiet_s=0.0, messages={})
         scenarios[name] = Scenario(title=launch, start=(Start(name=name, launch=launch),), until=until)
-    return only_runs(package, scenarios)
+    return LoadedRubric.to_record(package, scenarios)
 
 
 def second_look(package: str, parts: Parts, seen: Mapping[str, Observed]) -> LoadedRubric | None:
@@ -255,7 +254,7 @@ def second_look(package: str, parts: Parts, seen: Mapping[str, Observed]) -> Loa
                 start=(Start(name=name, script=script),),
                 until=Until(messages=counting),
             )
-    return only_runs(package, scenarios) if scenarios else None
+    return LoadedRubric.to_record(package, scenarios) if scenarios else None
 
 
 def probe_for(topic: str, kind: str) -> Probe | None:
@@ -272,17 +271,6 @@ def step_for(topic: str, kind: str) -> RubricEntry:
     values = SAMPLES.get(kind)
     sent: RubricEntry = {"values": list(values)} if values else {"value": {}, "count": MESSAGES}
     return {"publish": {"topic": topic, "type": kind, **sent, "rate_hz": 1 / ANSWERS_S}}
-
-
-def only_runs(package: str, scenarios: Mapping[str, Scenario]) -> LoadedRubric:
-    """Return a rubric for recording."""
-    first = next(iter(scenarios), None)
-    criterion = Criterion.model_validate(
-        {"id": "recorded", "title": "Recorded", "points": 0, "check": "none", "scenario": first}
-    )
-    about = {"schema": "grader.rubric/1", "id": "look", "title": "A look", "version": "0", "package": package}
-    rubric = Rubric.model_validate({**about, "scenarios": dict(scenarios), "criteria": (criterion,)})
-    return LoadedRubric(rubric=rubric, path=Path(), digest="")
 
 
 def _is_node(path: Path) -> bool:

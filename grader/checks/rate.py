@@ -17,14 +17,7 @@ from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
 from grader.checks.support.processes import PublishedTopic, life_of, observed_until_ns, slips_of
 from grader.checks.support.text import LOOP, both, loop_rate
-from grader.checks.support.topics import (
-    Sender,
-    call_in_comment,
-    cite,
-    nothing_sent,
-    sent_by,
-    whole_until_ns,
-)
+from grader.checks.support.topics import Sender, call_in_comment, cite, nothing_sent, sent_by, whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import LaunchParam, PackageFacts, PythonSlip

@@ -8,13 +8,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import ProcessName, check
-from grader.checks.support.console_output import (
-    LOOKED_AT,
-    both_from_ns,
-    heard_of,
-    printed_times,
-    sent_by,
-)
+from grader.checks.support.console_output import LOOKED_AT, both_from_ns, heard_of, printed_times, sent_by
 from grader.checks.support.exit_causes import explain_end, lifetime_text
 from grader.checks.support.processes import (
     NO_SCRIPT_HINT,

@@ -25,9 +25,9 @@ from grader.classes.batch.run import GRADEBOOK, INDEX, RESULTS, Watcher
 from grader.classes.gradebook import GradebookRow
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.cli.output import say, say_json
-from grader.model.batch import MISSING, ROSTER
-from grader.model.result import CriterionResult
+from grader.model.batch import ROSTER
 from grader.model.verdict import Status
+from grader.report.class_page.submissions import state_of
 from grader.untrusted_text import line
 from grader.wording import first_few, number, plural
 
@@ -114,7 +114,7 @@ def list_attention(folder: BatchFolder) -> Iterator[str]:
     """Yield why each submission that is not graded is not, then how to go on with them."""
     found: Counter[str] = Counter()
     for row in folder.rows():
-        state = _row_state(row)
+        state = state_of(row.result)
         found[state] += 1
         if state == "error":
             error = row.result.error
@@ -124,9 +124,9 @@ def list_attention(folder: BatchFolder) -> Iterator[str]:
         for override in row.result.overrides:
             if override.changed:
                 yield f"{row.entry.id}: {override.criterion}: a person decided, and the check says something else now"
-    for state, words in NEXT_STEPS.items():
-        if found[state]:
-            yield words.format(count=found[state], folder=folder.path, overrides=folder.path / OVERRIDES)
+    for name, words in NEXT_STEPS.items():
+        if found[name]:
+            yield words.format(count=found[name], folder=folder.path, overrides=folder.path / OVERRIDES)
 
 
 def _name(row: GradebookRow) -> str:
@@ -136,22 +136,8 @@ def _name(row: GradebookRow) -> str:
     return row.entry.id if told or not row.entry.where else f"{row.entry.id} ({row.entry.where})"
 
 
-def _row_state(row: GradebookRow) -> str:
-    """Return the result's status, or `missing` if there is none yet, or `manual` if only people's criteria are open."""
-    result = row.result
-    if result.error is not None and result.error.kind == MISSING:
-        return "missing"
-    if result.status == "inconclusive" and {c.status for c in _waiting(row)} == {Status.MANUAL}:
-        return "manual"
-    return result.status
-
-
-def _waiting(row: GradebookRow) -> tuple[CriterionResult, ...]:
-    return tuple(c for c in row.result.criteria if c.status in OPEN and c.counts)
-
-
 def _open(row: GradebookRow) -> str:
-    names = [f"{c.id} ({OPEN[c.status]})" for c in _waiting(row)]
+    names = [f"{c.id} ({OPEN[c.status]})" for c in row.result.criteria if c.status in OPEN and c.counts]
     return first_few(names, CRITERIA_SHOWN)
 
 

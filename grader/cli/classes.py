@@ -142,6 +142,11 @@ def allowed_folders(folders: Sequence[Path], *, remote_only: bool) -> Local:
     return Local(folders=tuple(folder.absolute() for folder in folders), remote_only=remote_only)
 
 
+def read_listed(path: Path, out: Path, local: Local) -> Roster:
+    """Return the roster at `path`; a platform's download is unpacked into `out` first."""
+    return read_roster(unpack_download(path, out) if is_download(path) else path, local)
+
+
 def with_package(roster: Roster, package: str) -> Roster:
     """Return the roster with `package` in every row that names none."""
     entries = (e if e.package else e.model_copy(update={"package": package}) for e in roster.entries)
@@ -203,10 +208,8 @@ def grade_lab(path: Path, name: str, asked: CourseRequest) -> ExitCode:
     loaded = load_rubric(source)
     if lab.roster is None:
         raise UsageError(f"{path}: {name} has no roster", hint="name it there: roster: lab1.csv")
-    out, listed = course.results(name), course.beside(lab.roster)
-    local = allowed_folders(asked.allow_local, remote_only=False)
-    listed = unpack_download(listed, out) if is_download(listed) else listed
-    roster = read_roster(listed, local)
+    out, local = course.results(name), allowed_folders(asked.allow_local, remote_only=False)
+    roster = read_listed(course.beside(lab.roster), out, local)
 
     def options(folder: Path) -> BatchOptions:
         return BatchOptions(

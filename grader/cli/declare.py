@@ -251,6 +251,9 @@ BookTemplate = Annotated[
     Path | None, Option("--template", "FILE", "the platform's own export, to be filled in with the points")
 ]
 BookColumn = Annotated[str, Option("--column", "NAME", "the platform's name for the column of points")]
+AuthorOption = Annotated[
+    str | None, Option("--author", "NAME", "who publishes (default: git config user.name)")
+]
 DraftsFlag = Annotated[
     bool, Flag("--drafts", "take results as they are now, also where others are published")
 ]

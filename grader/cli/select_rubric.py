@@ -16,7 +16,6 @@ from grader.intake import find_packages
 from grader.intake.choose import is_slip
 from grader.intake.find import (
     BUILD_SPACES,
-    MANIFEST,
     WORKSPACE_MARKS,
     Candidate,
     enclosing_package,
@@ -27,10 +26,11 @@ from grader.intake.gitdir import repository_around
 from grader.intake.names import is_archive_name, listing, printable
 from grader.intake.open import is_recording
 from grader.intake.tree import is_file, is_there
+from grader.model.package import CMAKE, MANIFEST
 from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
 from grader.rubric.load import LoadedRubric, find_rubric_for_package, load_rubric, packages_of_labs
-from grader.rubric.model import Criterion, Rubric
+from grader.rubric.model import Rubric
 from grader.rubric.scenario import Scenario, Start, Until
 from grader.wording import closest
 
@@ -271,7 +271,7 @@ def _list_labs(known: dict[str, str]) -> str:
 def rubric_to_record(
     package: str, scripts: Sequence[str], launches: Sequence[str], seconds: float
 ) -> LoadedRubric:
-    """Return a rubric that only says what to run and for how long; its criterion is never judged."""
+    """Return a rubric that runs these files for so long. Raises UsageError."""
     if not 0 < seconds <= MAX_SECONDS:
         raise UsageError(f"--seconds must be more than 0 and at most {MAX_SECONDS}, not {seconds:g}")
     starts = [Start(name=_start_name(i, file), script=file) for i, file in enumerate(scripts, 1)]
@@ -280,18 +280,7 @@ def rubric_to_record(
     ]
     until = Until(limit_s=seconds, first_message_s=seconds, silent_s=seconds, messages={})
     scenario = Scenario(title="As asked on the command line", start=tuple(starts), until=until)
-    criterion = Criterion.model_validate(
-        {"id": "recorded", "title": "Recorded", "points": 0, "check": "none", "scenario": "record"}
-    )
-    made = {
-        "schema": "grader.rubric/1",
-        "id": "record",
-        "title": "Recording",
-        "version": "0",
-        "package": package,
-    }
-    rubric = Rubric.model_validate({**made, "scenarios": {"record": scenario}, "criteria": (criterion,)})
-    return LoadedRubric(rubric=rubric, path=Path(), digest="")
+    return LoadedRubric.to_record(package, {"record": scenario})
 
 
 def _start_name(number: int, file: str) -> str:
@@ -383,7 +372,7 @@ def _beside(here: Path) -> FoundPackages | None:
 
 def _as_candidate(folder: Path) -> Candidate:
     name = manifest_name(folder, root=folder) or printable(folder.name)
-    return Candidate(path=".", folder=folder, manifest=name, has_cmake=is_file(folder / "CMakeLists.txt"))
+    return Candidate(path=".", folder=folder, manifest=name, has_cmake=is_file(folder / CMAKE))
 
 
 def short_path(folder: Path) -> str:

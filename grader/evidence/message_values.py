@@ -11,13 +11,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, TypeGuard
 
-from grader.evidence.decode import (
-    Decoder,
-    Encoder,
-    FindText,
-    definition,
-    full_definition,
-)
+from grader.evidence.decode import Decoder, Encoder, FindText, definition, full_definition
 from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, parse, sections_of
 from grader.installable import noetic_messages
 from grader.model.message_definitions import DIVIDER

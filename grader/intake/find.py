@@ -13,13 +13,13 @@ from lxml import etree
 from grader.errors import SubmissionError
 from grader.intake.names import LONGEST_PACKAGE_NAME, encodable, printable
 from grader.intake.tree import NO_CONTENT, Folder, is_file, is_there, read_file, walk
+from grader.model.package import CMAKE, MANIFEST
 
 # Where catkin puts what it makes: a copy of a package in there is none.
 BUILD_SPACES = frozenset({"build", "devel", "install"})
 FOLDERS_LOOKED_AT, ENTRIES_LOOKED_AT, SECONDS_LOOKED = 3000, 300_000, 3.0
 IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "AMENT_IGNORE", "COLCON_IGNORE"})
 WORKSPACE_MARKS = (".catkin_workspace", ".catkin_tools", "src/CMakeLists.txt")
-MANIFEST = "package.xml"
 _LARGEST_BYTES = 1 << 20
 
 
@@ -149,7 +149,7 @@ def _candidate(root: Path, folder: Folder, ignored_by: str | None) -> Candidate 
     if MANIFEST in files:
         name = manifest_name(place, root=root)
         return Candidate(path=folder.path, folder=place, manifest=name, ignored_by=ignored_by)
-    has_cmake = "CMakeLists.txt" in files
+    has_cmake = CMAKE in files
     if not has_cmake and "src" not in folder.folders:
         return None
     return Candidate(

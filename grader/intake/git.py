@@ -18,11 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from grader.host_programs import (
-    find_user_program,
-    loading_environment,
-    with_absolute_paths,
-)
+from grader.host_programs import find_user_program, loading_environment, with_absolute_paths
 from grader.intake.credentials import Access, is_refusal, scrubbed
 from grader.portable import kill_group
 

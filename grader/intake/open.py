@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -39,6 +39,7 @@ from grader.intake.tree import NO_CONTENT, Entry, file_digest, is_there, list_en
 from grader.model.submission import RecordedSubmission, SourcePackage, Submission
 
 _OTHERS_AT_MOST = 200
+GIT_S = 120.0
 _SUFFIX = re.compile(r"\.(bag|bag\.active|bag\.orig|mcap|db3)$", re.IGNORECASE)
 _MAGIC = (b"#ROSBAG V", b"\x89MCAP0\r\n", b"SQLite format 3\0")
 
@@ -82,7 +83,7 @@ def open_submission(
     package: str | WantedPackage,
     workdir: Path,
     submission_id: str | None = None,
-    git_timeout_s: float = 120.0,
+    git_timeout_s: float = GIT_S,
     limits: IntakeLimits | None = None,
 ) -> Submission:
     """Return the submission that `source` names, with the lab's `package` found in it; it may be read already.
@@ -125,14 +126,14 @@ def open_recording(source: str | Source, *, submission_id: str | None = None) ->
 
 
 def open_recorded(
-    source: str | Source, *, workdir: Path, submission_id: str | None = None, git_timeout_s: float = 120.0
+    source: str | Source, *, workdir: Path, submission_id: str | None = None
 ) -> RecordedSubmission:
     """Return the submission of a lab that asks for recordings alone: as `open_submission`, and no package is looked
     for."""
     parsed = _parse(source)
     with _base(workdir) as base:
         try:
-            git = Git(base / "git-home", timeout_s=git_timeout_s)
+            git = Git(base / "git-home", timeout_s=GIT_S)
             submission = _all_recordings(open_source(parsed, git, base, IntakeLimits()), git)
         except OSError as error:
             raise unreadable(parsed.given, error) from error
@@ -258,48 +259,46 @@ def _locate(opened: Opened, wanted: WantedPackage) -> Located | None:
 def describe(located: Located, git: Git, limits: IntakeLimits) -> Submission:
     """Return the record that the next room reads. Raises OSError for a file that cannot be read."""
     opened, choice = located.opened, located.choice
-    chosen = choice.package
     repositories = Repositories(git, opened.leave_out, root=opened.root, known=opened.repository)
-    content = package_content(chosen.folder, limits=limits, leave_out=opened.leave_out)
-    modes = _modes(opened, chosen, content.entries, repositories)
-    taken = {chosen.name, *(one.package.name for one in located.also.values())}
+    main = _read(opened, choice, repositories, limits)
+    taken = {choice.package.name, *(one.package.name for one in located.also.values())}
     others = [c for c in located.candidates if c.has_manifest and not c.ignored_by and c.name not in taken]
-    notes = remarks(chosen.folder, content.entries, content.left_out)
-    digest = tree_digest(chosen.folder, content.entries, modes.executable, content.left_out)
-    also = {name: _besides(located, name, repositories, limits) for name in located.also}
+    also = {name: _read(opened, one, repositories, limits) for name, one in located.also.items()}
     return Submission(
         id=safe_name(opened.name),
         source=opened.source.given,
         root=opened.root,
-        commit=_commit(opened, chosen, modes, repositories),
+        commit=_commit(opened, choice.package, main.modes, repositories),
         archive_sha256=opened.archive_sha256,
-        digest=_digest_of_all(digest, also.values()),
-        package=_package(chosen, modes, content, _right_in_git(opened, chosen, content, git)),
+        digest=_digest_of_all(main.digest, also),
+        package=main.package,
         packages=tuple(_others(opened, others[:_OTHERS_AT_MOST], repositories, limits)),
-        also=tuple(one.package for one in also.values()),
+        also=tuple(one.package.model_copy(update={"asked": name}) for name, one in also.items()),
         hints=(
-            *(*opened.hints, *choice.hints, *modes.hints, *content.hints, *notes),
+            *(*opened.hints, *main.hints),
             *(f"{name}: {hint}" for name, one in also.items() for hint in one.hints),
         ),
     )
 
 
-class _Besides(NamedTuple):
-    """A package that the lab asks for besides the main one."""
+class _Read(NamedTuple):
+    """A package that the lab asks for, and what its files are."""
 
     package: SourcePackage
+    modes: Modes
     digest: str
     hints: tuple[str, ...]
 
 
-def _besides(located: Located, name: str, repositories: Repositories, limits: IntakeLimits) -> _Besides:
-    opened, choice = located.opened, located.also[name]
+def _read(opened: Opened, choice: Choice, repositories: Repositories, limits: IntakeLimits) -> _Read:
+    """Return the chosen package. Raises OSError for a file that cannot be read."""
     chosen = choice.package
     content = package_content(chosen.folder, limits=limits, leave_out=opened.leave_out)
     modes = _modes(opened, chosen, content.entries, repositories)
     right = _right_in_git(opened, chosen, content, repositories.git)
-    return _Besides(
-        package=_package(chosen, modes, content, right).model_copy(update={"asked": name}),
+    return _Read(
+        package=_package(chosen, modes, content, right),
+        modes=modes,
         digest=tree_digest(chosen.folder, content.entries, modes.executable, content.left_out),
         hints=(
             *(*choice.hints, *modes.hints, *content.hints),
@@ -308,11 +307,11 @@ def _besides(located: Located, name: str, repositories: Repositories, limits: In
     )
 
 
-def _digest_of_all(digest: str, also: Collection[_Besides]) -> str:
+def _digest_of_all(digest: str, also: Mapping[str, _Read]) -> str:
     """Return the main package's digest, with those of the others where there are any."""
     if not also:
         return digest
-    parts = [digest, *(f"{one.package.asked} {one.digest}" for one in also)]
+    parts = [digest, *(f"{name} {one.digest}" for name, one in also.items())]
     return sha256("\n".join(parts).encode()).hexdigest()
 
 

@@ -25,18 +25,10 @@ from grader.checks.support.topics import SYSTEM_TOPICS, account_for_losses, expl
 from grader.errors import EvidenceError
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
-from grader.judging.annotate import (
-    add_advice,
-    add_later_faults,
-    choose_hint_language,
-    cite_commented_call,
-    cite_find,
-    cite_name,
-    cite_words,
-    fill_slots,
-    show_lines,
-)
+from grader.judging.annotate import add_advice, choose_hint_language, fill_slots
+from grader.judging.cited_lines import cite_commented_call, cite_find, cite_name, cite_words, show_lines
 from grader.judging.facts import NOT_RUN, Facts, try_facts, views_of
+from grader.judging.later_faults import add_later_faults
 from grader.judging.repeats_and_repairs import (
     apply_repaired_copy,
     drop_unrepeated_losses,

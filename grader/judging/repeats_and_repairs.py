@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from grader.checks.support.text import texts_in
 from grader.evidence.events import CATKIN_MAKE, PACKAGE_RUN
 from grader.evidence.run import Run
-from grader.model.package import PackageFacts
+from grader.model.package import CMAKE, MANIFEST, PackageFacts
 from grader.model.repair import Repair, advice_on, place_of
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines, failed, share_text
@@ -37,8 +37,7 @@ SEEN_IN_RUNS = {"missing-import", "missing-call", "topic-name", "node-name", "pa
 DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
 """The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
-CMAKE = "CMakeLists.txt"
-OF_PACKAGES = {"package.xml", CMAKE}
+OF_PACKAGES = {MANIFEST, CMAKE}
 GENERATION = re.compile(r"generate_messages|message_generation|add_(message|service|action)_files")
 """Without these in CMakeLists.txt, a build can succeed that makes nothing of the package's own definitions."""
 NUMBER = re.compile(r"\d+(\.\d+)?")

@@ -20,6 +20,9 @@ from grader.model.submission import ModeSource
 from grader.model.verdict import FileCitation
 from grader.wording import is_one_edit
 
+MANIFEST, CMAKE = "package.xml", "CMakeLists.txt"
+"""The two files at the root of each package."""
+
 
 class Fault(Record):
     """Why a file cannot be read as what it should be.
@@ -90,28 +93,14 @@ class Manifest(Record):
 
 
 CMAKE_COMMANDS = (
-    *("add_action_files", "add_compile_options", "add_custom_target", "add_definitions", "add_dependencies"),
-    *("add_executable", "add_library", "add_message_files", "add_rostest", "add_service_files"),
-    *(
-        "catkin_add_nosetests",
-        "catkin_package",
-        "catkin_package_xml",
-        "catkin_install_python",
-        "catkin_python_setup",
-    ),
-    *("cmake_minimum_required", "find_package", "find_library", "generate_dynamic_reconfigure_options"),
-    *(
-        "generate_messages",
-        "include_directories",
-        "install",
-        "link_directories",
-        "list",
-        "message",
-        "project",
-    ),
-    *("set", "set_target_properties", "target_compile_features", "target_compile_options"),
-    *("target_include_directories", "target_link_libraries", "target_sources"),
-)
+    "add_action_files", "add_compile_options", "add_custom_target", "add_definitions", "add_dependencies",
+    "add_executable", "add_library", "add_message_files", "add_rostest", "add_service_files",
+    "catkin_add_nosetests", "catkin_package", "catkin_package_xml", "catkin_install_python", "catkin_python_setup",
+    "cmake_minimum_required", "find_package", "find_library", "generate_dynamic_reconfigure_options",
+    "generate_messages", "include_directories", "install", "link_directories", "list", "message", "project", "set",
+    "set_target_properties", "target_compile_features", "target_compile_options", "target_include_directories",
+    "target_link_libraries", "target_sources",
+)  # fmt: skip
 """Of CMake and catkin, those that a beginner's package calls."""
 ALIKE, SHORT = 0.88, 5
 """How alike two names of commands are that differ by one slip; in names of so few letters that says nothing."""
@@ -131,8 +120,8 @@ def meant_manifest(name: str) -> str:
     if name == "manifest.xml":
         return f"{name} is rosbuild's, which catkin does not read: write package.xml, as catkin_create_pkg makes it"
     plain = re.sub(r"\s|\(\d+\)", "", name.casefold())
-    alike = plain == "package.xml" or is_one_edit(plain, "package.xml") or plain.startswith("package.xml.")
-    if name == "package.xml" or not alike:
+    alike = plain == MANIFEST or is_one_edit(plain, MANIFEST) or plain.startswith(f"{MANIFEST}.")
+    if name == MANIFEST or not alike:
         return ""
     return f"{name} has to be called package.xml: git mv {shlex.quote(name)} package.xml"
 

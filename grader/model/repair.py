@@ -110,12 +110,8 @@ def as_code(line: str) -> str:
     return line if "`" in line else f"`{line}`"
 
 
-def advice_of(repair: Repair) -> str:
-    """Return where and how the repair is done by hand: ``package.xml: below line 9 add `<depend>rospy</depend>` ``."""
-    return ": ".join(_where_and_how(repair))
-
-
 def _where_and_how(repair: Repair) -> tuple[str, str]:
+    """Return where and how it is done by hand: `package.xml`, ``below line 9 add `<depend>rospy</depend>` ``."""
     new, added = repair.after.split("\n"), _added(repair.before, repair.after)
     if repair.fix != "; ".join(added):
         below = len(new) > 1 and new[0] == repair.before and repair.line is not None

@@ -16,11 +16,9 @@ from typing import Any, NamedTuple
 
 from cmake_parser import ast as nodes
 
-from grader.model.package import CMakeCall, CMakeFacts, Fault
+from grader.model.package import CMAKE, CMakeCall, CMakeFacts, Fault
 from grader.package.cmake_parse import commands_of, parse_cmake
 from grader.package.reading import printable, read_markup
-
-CMAKE_FILE = "CMakeLists.txt"
 
 # What steers CMake or only talks; everything else is a fact.
 _LEFT_OUT = frozenset(
@@ -74,10 +72,10 @@ def refine_cmake(
     calls = read_trace(trace, names, root)
     if facts.source == "trace" or not calls:
         return facts
-    reached = max(call.line for call in calls if call.file == CMAKE_FILE)
+    reached = max(call.line for call in calls if call.file == CMAKE)
     returned = any(call.name == "return" for call in calls)
     stopped = not returned and facts.last_line is not None and reached < facts.last_line
-    rest = tuple(c for c in facts.calls if stopped and c.file == CMAKE_FILE and c.line > reached)
+    rest = tuple(c for c in facts.calls if stopped and c.file == CMAKE and c.line > reached)
     return CMakeFacts(
         file=facts.file,
         source="trace",
@@ -108,13 +106,11 @@ def read_trace(trace: Path, names: tuple[str, ...], root: str | None = None) -> 
         for call in calls
         if call.file.startswith(prefix)
     )
-    return inside if any(call.file == CMAKE_FILE for call in inside) else ()
+    return inside if any(call.file == CMAKE for call in inside) else ()
 
 
 def _guessed_root(calls: list[CMakeCall], names: tuple[str, ...]) -> str | None:
-    folders = dict.fromkeys(
-        posixpath.dirname(c.file) for c in calls if posixpath.basename(c.file) == CMAKE_FILE
-    )
+    folders = dict.fromkeys(posixpath.dirname(c.file) for c in calls if posixpath.basename(c.file) == CMAKE)
     named = [f for f in folders if posixpath.basename(f) in names]
     if named:
         return named[0]

@@ -16,11 +16,10 @@ from cmake_parser import CMakeError, Token, parse_raw, parse_tree, resolve_args,
 from cmake_parser import ast as nodes
 from cmake_parser.interpreter import Context
 
-from grader.model.package import CMakeCall, CMakeFacts, Fault
+from grader.model.package import CMAKE, CMakeCall, CMakeFacts, Fault
 from grader.package.reading import printable, read_markup
 from grader.wording import lines_text
 
-_CMAKE_FILE = "CMakeLists.txt"
 _CALLS_MAX = 5_000
 _DEPTH_MAX = 20
 STEPS_MAX = 20_000
@@ -74,17 +73,17 @@ def parse_cmake(folder: Path, name: str) -> CMakeFacts | None:
 
     Never raises; `fault` says why CMake would not read the file, and the calls are then those before it.
     """
-    data = read_markup(folder, _CMAKE_FILE, FILE_BYTES_MAX)
+    data = read_markup(folder, CMAKE, FILE_BYTES_MAX)
     if isinstance(data, Fault):
-        is_link = (folder / _CMAKE_FILE).is_symlink()
+        is_link = (folder / CMAKE).is_symlink()
         if data.kind == "Missing" and not is_link:
             return None
-        return CMakeFacts(file=_CMAKE_FILE, source="parser", calls=(), fault=data)
+        return CMakeFacts(file=CMAKE, source="parser", calls=(), fault=data)
     reader = _Reader(folder, name)
-    tree, fault = parse_tree_of(data, _CMAKE_FILE)
-    reader.run(tree, _CMAKE_FILE, 0)
+    tree, fault = parse_tree_of(data, CMAKE)
+    reader.run(tree, CMAKE, 0)
     return CMakeFacts(
-        file=_CMAKE_FILE,
+        file=CMAKE,
         source="parser",
         calls=tuple(reader.calls),
         fault=fault or reader.fault,
@@ -99,7 +98,7 @@ class _Reader:
         self.folder = folder
         self.calls: list[CMakeCall] = []
         self.fault: Fault | None = None
-        self.read = {_CMAKE_FILE}
+        self.read = {CMAKE}
         self.steps = self.letters = 0
         self.left_bytes = FILE_BYTES_MAX
         self.variables = _Variables()
@@ -186,7 +185,7 @@ class _Reader:
 
     def _include(self, name: str, place: str, file: str, depth: int) -> None:
         """Read a file of the same package; modules of CMake and of other packages are none of its facts."""
-        place = place if name == "include" else posixpath.join(place, _CMAKE_FILE)
+        place = place if name == "include" else posixpath.join(place, CMAKE)
         path = posixpath.normpath(posixpath.join(posixpath.dirname(file), place))
         if path in self.read or path.startswith(("/", "../")) or "\0" in path:
             return

@@ -35,23 +35,10 @@ _VALUE_CHARS_MAX = 4_000
 _TRUE, _FALSE = frozenset({"true", "1"}), frozenset({"false", "0"})
 
 Remaps = tuple[tuple[str, str], ...]
-_NODE_ATTRIBUTES = frozenset(
-    {
-        *(
-            "pkg",
-            "type",
-            "name",
-            "args",
-            "machine",
-            "respawn",
-            "respawn_delay",
-            "required",
-            "ns",
-            "clear_params",
-        ),
-        *("output", "cwd", "launch-prefix", "if", "unless"),
-    }
-)
+_NODE_ATTRIBUTES = frozenset({
+    "pkg", "type", "name", "args", "machine", "respawn", "respawn_delay", "required", "ns", "clear_params", "output",
+    "cwd", "launch-prefix", "if", "unless",
+})  # fmt: skip
 
 
 class Find(Protocol):

@@ -16,12 +16,11 @@ from catkin_pkg.condition import evaluate_condition
 from catkin_pkg.package import InvalidPackage, Package, parse_package_string
 from lxml import etree
 
-from grader.model.package import Dependency, Fault, Manifest, Person
+from grader.model.package import MANIFEST, Dependency, Fault, Manifest, Person
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_xml
 from grader.syntax_fixes import Reason
 
-MANIFEST = "package.xml"
 _TEXT_CHARS_MAX = 4_000
 _TAGS = 600
 _CONDITIONS = 200

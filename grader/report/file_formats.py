@@ -62,112 +62,64 @@ class Format:
 
 _UNREADABLE = "exit code 3"
 _FAULT = "exit code 2, with file and line"
+_NOT_READ = "the grader does not read it again"
 
-FORMATS: dict[str, Format] = {
-    one.name: one
-    for one in (
-        Format(
-            is_=version.RESULT,
-            title="Result",
-            where="`<out>/<submission>/result.json`, and each line of `results.jsonl` (with `roster` beside it)",
-            by="grader",
-            says="`schema`",
-            newer=f"{_UNREADABLE}; in a class, before anything is written",
-            additions=(
-                Addition(1, "SubmissionInfo.name", "no roster gave a name"),
-                Addition(1, "GradingResult.rubric_origin", "it is not known where the rubric came from"),
-            ),
+
+def _by_grader(
+    is_: Versioned,
+    title: str,
+    where: str,
+    newer: str,
+    *,
+    says: str = "`schema`",
+    additions: tuple[Addition, ...] = (),
+) -> Format:
+    return Format(is_=is_, title=title, where=where, by="grader", says=says, newer=newer, additions=additions)
+
+
+def _by_person(
+    is_: Versioned, title: str, where: str, says: str = "`schema`; without it, a file is read as version 1"
+) -> Format:
+    return Format(is_=is_, title=title, where=where, by="person", says=says, newer=_FAULT)
+
+
+_FORMATS = (
+    _by_grader(
+        version.RESULT,
+        "Result",
+        "`<out>/<submission>/result.json`, and each line of `results.jsonl` (with `roster` beside it)",
+        f"{_UNREADABLE}; in a class, before anything is written",
+        additions=(
+            Addition(1, "SubmissionInfo.name", "no roster gave a name"),
+            Addition(1, "GradingResult.rubric_origin", "it is not known where the rubric came from"),
         ),
-        Format(
-            is_=version.EVIDENCE,
-            title="Evidence",
-            where="`<out>/<submission>/evidence/*.mcap`",
-            by="grader",
-            says="`format` in the metadata record `grader.evidence`, as a number",
-            newer=_UNREADABLE,
-        ),
-        Format(
-            is_=version.RUBRIC,
-            title="Rubric",
-            where="`rubrics/<lab>.yaml`, and every file that is given with `--rubric`",
-            by="person",
-            says="`schema`; without it, a file is read as version 1",
-            newer=_FAULT,
-        ),
-        Format(
-            is_=version.OVERRIDES,
-            title="Overrides",
-            where="`<out>/overrides.yaml`",
-            by="person",
-            says="`schema`; without it, a file is read as version 1",
-            newer=_FAULT,
-        ),
-        Format(
-            is_=version.COMMENTS,
-            title="Comments",
-            where="`<out>/comments.yaml`",
-            by="person",
-            says="`schema`; without it, a file is read as version 1",
-            newer=_FAULT,
-        ),
-        Format(
-            is_=version.RUN,
-            title="Run of a class",
-            where="`<out>/run.json`",
-            by="grader",
-            says="`schema`",
-            newer="exit code 2",
-        ),
-        Format(
-            is_=version.PUBLISHED,
-            title="Published results",
-            where="each line of `<out>/published.jsonl`",
-            by="grader",
-            says="`schema`",
-            newer="exit code 2",
-        ),
-        Format(
-            is_=version.SENT,
-            title="Sent feedback",
-            where="each line of `<out>/sent.jsonl`",
-            by="grader",
-            says="`schema`",
-            newer="exit code 2",
-        ),
-        Format(
-            is_=version.COURSE,
-            title="Course",
-            where="`course.yaml`",
-            by="person",
-            says="`schema`; without it, a file is read as version 1",
-            newer=_FAULT,
-        ),
-        Format(
-            is_=version.SIMILARITY,
-            title="Similarity",
-            where="`<out>/similarity.json`",
-            by="grader",
-            says="`schema`",
-            newer="the grader does not read it again",
-        ),
-        Format(
-            is_=version.MUTANTS,
-            title="Mutants of a lab",
-            where="`fixtures/<lab>.yaml`, and `mutants/<lab>.yaml` beside a rubric of your own",
-            by="person",
-            says="`schema`, which has to be there",
-            newer=_FAULT,
-        ),
-        Format(
-            is_=version.RUBRIC_TEST,
-            title="Test of a rubric",
-            where="what `grader rubric test --json` prints",
-            by="grader",
-            says="`schema`",
-            newer="the grader does not read it again",
-        ),
-    )
-}
+    ),
+    _by_grader(
+        version.EVIDENCE,
+        "Evidence",
+        "`<out>/<submission>/evidence/*.mcap`",
+        _UNREADABLE,
+        says="`format` in the metadata record `grader.evidence`, as a number",
+    ),
+    _by_person(
+        version.RUBRIC, "Rubric", "`rubrics/<lab>.yaml`, and every file that is given with `--rubric`"
+    ),
+    _by_person(version.OVERRIDES, "Overrides", "`<out>/overrides.yaml`"),
+    _by_person(version.COMMENTS, "Comments", "`<out>/comments.yaml`"),
+    _by_grader(version.RUN, "Run of a class", "`<out>/run.json`", "exit code 2"),
+    _by_grader(version.PUBLISHED, "Published results", "each line of `<out>/published.jsonl`", "exit code 2"),
+    _by_grader(version.SENT, "Sent feedback", "each line of `<out>/sent.jsonl`", "exit code 2"),
+    _by_person(version.COURSE, "Course", "`course.yaml`"),
+    _by_grader(version.SIMILARITY, "Similarity", "`<out>/similarity.json`", _NOT_READ),
+    _by_person(
+        version.MUTANTS,
+        "Mutants of a lab",
+        "`fixtures/<lab>.yaml`, and `mutants/<lab>.yaml` beside a rubric of your own",
+        says="`schema`, which has to be there",
+    ),
+    _by_grader(version.RUBRIC_TEST, "Test of a rubric", "what `grader rubric test --json` prints", _NOT_READ),
+)
+FORMATS: dict[str, Format] = {one.name: one for one in _FORMATS}
 
 
 Schema = dict[str, Any]

@@ -11,11 +11,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from grader.model.package import MANIFEST
 from grader.rubric.scenario import FOLDER_PATTERN, ROSTEST_ENDING
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import did_you_mean
 
-MANIFEST = "package.xml"
 FILES_MAX = 500
 BYTES_MAX = 20_000_000
 IGNORED = frozenset({"build", "devel", "install", "__pycache__"})

@@ -7,7 +7,6 @@ A rubric that brings files along (checks, packages, a starter) cannot be fetched
 from __future__ import annotations
 
 import hashlib
-import os
 import re
 import time
 from http.client import HTTPException, HTTPMessage
@@ -18,7 +17,7 @@ from urllib.parse import urlsplit
 from urllib.request import HTTPRedirectHandler, Request, build_opener
 
 from grader.errors import HostError, UsageError
-from grader.files import atomic_write, make_folder, read_untrusted
+from grader.files import atomic_write, make_folder, read_untrusted, user_folder
 
 BYTES_MAX = 1 << 20
 TIMEOUT_S, WHOLE_S = 20.0, 60.0
@@ -40,7 +39,7 @@ def fetch_rubric(url: str, digest: str) -> Path:
             hint="write #sha256: and the digest after it, as `grader rubric validate` prints it",
         )
     name = re.sub(r"[^\w.-]", "", urlsplit(url).path.rpartition("/")[2]).removesuffix(".yaml").strip(".")
-    file = _cache() / digest / f"{name or 'rubric'}.yaml"
+    file = user_folder("cache") / "rubrics" / digest / f"{name or 'rubric'}.yaml"
     kept = read_untrusted(file, BYTES_MAX)
     if kept is not None and hashlib.sha256(kept).hexdigest() == digest:
         return file
@@ -97,9 +96,3 @@ def _download(url: str) -> bytes:
 
 def _printable(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text)[:300]
-
-
-def _cache() -> Path:
-    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    home = named if named.is_absolute() else Path(os.path.expanduser("~"), ".cache")  # noqa: PTH111 - never raises
-    return home / "grader" / "rubrics"

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from grader.errors import RubricError, UsageError
-from grader.files import atomic_write
+from grader.files import atomic_write, user_folder
 from grader.rubric.yaml_lines import texts_at
 from grader.wording import did_you_mean
 
@@ -92,10 +92,8 @@ def remove_folder(folder: Path) -> Path:
 
 
 def config_file() -> Path:
-    """Return the file that holds these folders, one a line, as the XDG base directory specification places it."""
-    named = Path(os.environ.get("XDG_CONFIG_HOME", ""))
-    home = named if named.is_absolute() else Path(os.path.expanduser("~"), ".config")  # noqa: PTH111 - never raises
-    return home / "grader" / "rubrics"
+    """Return the file that holds these folders, one a line."""
+    return user_folder("config") / "rubrics"
 
 
 def known_labs() -> tuple[LabFile, ...]:

@@ -22,6 +22,7 @@ from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics
 from grader.rubric.made_up import draw_values, faults_of_sample, made_up_faults, sample_data, with_values
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.own_checks import Beside, known_checks, read_instructor, run_checks_file
+from grader.rubric.scenario import Scenario
 from grader.rubric.spelling import doubtful_names, misspelt_names
 from grader.rubric.yaml_lines import Source, Value, as_map, read_source
 
@@ -52,6 +53,17 @@ class LoadedRubric(Record):
         if self.own is None or self.rubric.checks is None:
             return known_checks(folder, {})
         return known_checks(folder, run_checks_file(folder.resolve() / self.rubric.checks, self.own).checks)
+
+    @classmethod
+    def to_record(cls, package: str, scenarios: Mapping[str, Scenario]) -> LoadedRubric:
+        """Return a rubric that only says what to run; its criterion is never judged."""
+        first = next(iter(scenarios), None)
+        criterion = Criterion.model_validate(
+            {"id": "recorded", "title": "Recorded", "points": 0, "check": "none", "scenario": first}
+        )
+        about = {"schema": "grader.rubric/1", "id": "record", "title": "Recording", "version": "0"}
+        made = {**about, "package": package, "scenarios": dict(scenarios), "criteria": (criterion,)}
+        return cls(rubric=Rubric.model_validate(made), path=Path(), digest="")
 
     def of_submission(self, digest: str) -> LoadedRubric:
         """Return the rubric with the values that are made up for the submission whose content has this digest."""

@@ -15,15 +15,13 @@ from grader.checks.support.text import LOOP, in_language, init, publisher, set_p
 from grader.evidence.run import Run
 from grader.integrations.bundle import Bundle, add_lab
 from grader.judging import judge
-from grader.judging.annotate import (
+from grader.judging.annotate import add_advice, choose_hint_language, fill_slots
+from grader.judging.cited_lines import (
     LINE_CHARS,
-    add_advice,
-    choose_hint_language,
     cite_commented_call,
     cite_find,
     cite_name,
     cite_words,
-    fill_slots,
     show_lines,
 )
 from grader.judging.facts import Facts, try_facts

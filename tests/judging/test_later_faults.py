@@ -8,7 +8,7 @@ import pytest
 
 from grader.checks.support.text import could_say, texts_of_cpp
 from grader.judging import judge
-from grader.judging.annotate import cite_words
+from grader.judging.cited_lines import cite_words
 from grader.judging.facts import try_facts
 from grader.judging.judge import Judgement, judge_all_runs
 from grader.model.verdict import FileCitation, partial

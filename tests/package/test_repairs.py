@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, advice_of
+from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, advice_on
 from grader.model.submission import chmod_hint
 from grader.package.repairs import NotRepairable, Wanted, apply_repair, find_repairs
 from grader.package.repairs.editing import changed_lines
@@ -447,7 +447,7 @@ def test_a_mistake_is_found_and_repaired(name: str, tmp_path: Path) -> None:
         script.chmod(0o755)
     found = repair_all(folder, case.wanted)
     assert [repair.kind for repair in found] == case.kinds
-    said = [*(one.message for one in found), "; ".join(advice_of(one) for one in found)]
+    said = [*(one.message for one in found), "; ".join(part for one in found for part in advice_on([one]))]
     assert case.says in "\n".join(said)
     assert all(repair.fix and not repair.message.endswith(".") for repair in found)
     assert find_repairs(folder, facts_of(folder), case.wanted) == ()

@@ -23,8 +23,29 @@ def walk(tree):
     return tree.all_nodes
 
 
-def is_call(node, name):
-    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == name
+def is_call(node, *names):
+    """Return whether it is a call `a.b()`, `b` being one of the names."""
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in names
+
+
+def calls_in(node, *names):
+    """Return all such calls in a node, itself included."""
+    return [n for n in getattr(node, "all_nodes", None) or ast.walk(node) if is_call(n, *names)]
+
+
+def functions_in(tree):
+    """Return the functions and methods of a module by their names."""
+    return {n.name: n for n in walk(tree) if isinstance(n, ast.FunctionDef)}
+
+
+def argument(call, place, keyword):
+    """Return the argument of a call at that place or of that name, as a list of one; an empty one where it has none."""
+    return call.args[place : place + 1] or [k.value for k in call.keywords if k.arg == keyword]
+
+
+def text_of(node):
+    """Return a text as it is written in the source, "" of all else."""
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
 
 
 def called_name(node):
@@ -66,8 +87,7 @@ def graph_names(tree):
             continue
         anonymous = [k for k in node.keywords if k.arg == "anonymous" and getattr(k.value, "value", True)]
         owner = owners.get(id(node), "") or ("anonymous" if anonymous else "")
-        names = node.args[:1] or [k.value for k in node.keywords if k.arg == "name"]
-        name = published_type(node)
+        names, name = argument(node, 0, "name"), published_type(node)
         if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
             yield slip(names[0].lineno, kind, names[0].value, name=owner)
         if names and name.isidentifier() and kind != "node-name":
@@ -76,7 +96,7 @@ def graph_names(tree):
 
 def published_type(call):
     """Return the name of the class that a `Publisher(…)` or `Subscriber(…)` is given, "" where it has none."""
-    types = call.args[1:2] or [k.value for k in call.keywords if k.arg == "data_class"]
+    types = argument(call, 1, "data_class")
     if types and called_name(types[0]) == "numpy_msg":
         types = types[0].args
     return dotted(types[0]).rpartition(".")[2] if types else ""
@@ -150,7 +170,7 @@ def without_quotes(tree, known):
         return (own or node.id not in known) and len(node.id) > 1
 
     values = [n for n in walk(tree) if isinstance(n, ast.Subscript)]
-    keyed = any(isinstance(key_of(n), ast.Constant) and isinstance(key_of(n).value, str) for n in values)
+    keyed = any(text_of(key_of(n)) for n in values)
     reads = any(called_name(n) in ("get_param", "get_param_cached") for n in walk(tree))
     found = {}
     for value in values if keyed or reads else ():
@@ -344,8 +364,9 @@ def undefined(node, tree):
     if isinstance(used, ast.Call):
         return why, "above line %d, define it with `def %s(…):`, or import it" % (line, name)
     types = {published_type(n) for n in walk(tree) if called_name(n) == "Publisher"} - {""}
-    sent = [n for n in walk(tree) if is_call(n, "publish") and node in n.args]
-    if sent or (isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)):
+    if any(node in n.args for n in calls_in(tree, "publish")) or (
+        isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)
+    ):
         kind = types.pop() if len(types) == 1 else "<Type>"
         return why, "above line %d, create the message: `%s = %s()`" % (line, name, kind)
     return why, "above line %d, write `%s = …`, with the value that it should have" % (line, name)
@@ -424,7 +445,7 @@ def counter_slips(tree):
     for loop in walk(tree):
         body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
         inside = [n for one in body for n in ast.walk(one)]
-        sent = [i for i, one in enumerate(body) if any(is_call(n, "publish") for n in ast.walk(one))]
+        sent = [i for i, one in enumerate(body) if calls_in(one, "publish")]
         added = {dotted(t): n for n in inside for t in increments(n)} if sent else {}
         for name, node in added.items():
             set_at = [i for i, one in enumerate(body) if name in (dotted(t) for t in constants_in([one]))]
@@ -455,7 +476,7 @@ def uncounted(tree):
         for at, loop in enumerate(body[:-1] if isinstance(body, list) else ()):
             after = body[at + 1]
             ends = not isinstance(loop, ast.While) or any(isinstance(n, ast.Break) for n in ast.walk(loop))
-            sent = [names_in(n) for n in ast.walk(loop) if is_call(n, "publish")]
+            sent = [names_in(n) for n in calls_in(loop, "publish")]
             for name in () if ends else (dotted(t) for t in increments(after)):
                 if any(name in names for names in sent):
                     message = "`%s` is counted below the loop on line %d, which does not end before the node"

@@ -7,7 +7,19 @@ Nothing is executed. Python 3.8, standard library only.
 import ast
 import difflib
 
-from script_names import TEXT_LIMIT, bound_names, called_name, dotted, is_call, slip, walk
+from script_names import (
+    TEXT_LIMIT,
+    argument,
+    bound_names,
+    called_name,
+    calls_in,
+    dotted,
+    functions_in,
+    is_call,
+    slip,
+    text_of,
+    walk,
+)  # fmt: skip
 
 
 def object_slips(tree):
@@ -146,13 +158,13 @@ def callbacks(tree):
     """Functions that ROS calls with another number of values than they take, and those that are called where the
     function itself is meant.
     """
-    functions = {n.name: n for n in walk(tree) if isinstance(n, ast.FunctionDef)}
+    functions = functions_in(tree)
     for node in walk(tree):
         name = called_name(node)
         if name not in CALLBACKS:
             continue
         keyword, place, values = CALLBACKS[name]
-        given = [k.value for k in node.keywords if k.arg == keyword] + node.args[place : place + 1]
+        given = argument(node, place, keyword)
         if (
             not given
             and dotted(node.func) == "rospy.Subscriber"
@@ -163,7 +175,7 @@ def callbacks(tree):
             yield slip(node.lineno, "callback-missing", "`Subscriber(…)` gets no callback", fix=fix)
         values += any(k.arg == "callback_args" for k in node.keywords) or len(node.args) > place + 1
         for one in given[:1]:
-            text = one.value if isinstance(one, ast.Constant) and isinstance(one.value, str) else ""
+            text = text_of(one)
             if text.isidentifier():
                 message, fix = "'%s' is a string, not a function" % text, "write `%s`, without quotes" % text
                 yield slip(one.lineno, "callback-called", message, fix=fix, name=text)
@@ -191,8 +203,7 @@ def callbacks(tree):
 def subscribed_again(tree):
     """Yield each `Subscriber(…)` in a loop that runs until the node ends: each turn makes another one."""
     for loop in walk(tree):
-        endless = isinstance(loop, ast.While) and any(is_call(n, "is_shutdown") for n in ast.walk(loop.test))
-        if endless and not any(is_call(n, "spin") for n in ast.walk(loop)):
+        if isinstance(loop, ast.While) and calls_in(loop.test, "is_shutdown") and not calls_in(loop, "spin"):
             made = next((n for n in ast.walk(loop) if called_name(n) == "Subscriber"), None)
             if made is not None:
                 message = "the loop on line %d makes the Subscriber on line %d again and again"

@@ -11,10 +11,13 @@ import sys
 # `-I` leaves this folder out
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
 from script_names import (
+    argument,
     assigned_late,
     called_name,
+    calls_in,
     counter_slips,
     dotted,
+    functions_in,
     graph_names,
     is_call,
     is_increment,
@@ -22,8 +25,9 @@ from script_names import (
     resets,
     said_texts,
     slip,
+    text_of,
     walk,
-)
+)  # fmt: skip
 from script_objects import callbacks, hidden_names, object_slips, queue_sizes, subscribed_again
 
 SLIPS_LIMIT = 100
@@ -63,12 +67,12 @@ def slips(tree):
     )  # fmt: skip
     for find in finders:
         found += find(tree)
-    published = next((n for n in walk(tree) if is_call(n, "publish")), None)
-    if published is not None and counts(tree):
+    published = calls_in(tree, "publish")
+    if published and counts(tree):
         message = "" if knows_time(tree) else "the script counts, and reads no clock"
         message = message or sends_no_time(tree)
         if message:
-            found.append(slip(published.lineno, "no-clock", message))
+            found.append(slip(published[0].lineno, "no-clock", message))
     calls = {called_name(n): n.lineno for n in walk(tree) if isinstance(n, ast.Call)}
     if "init_node" not in calls and ("Publisher" in calls or "Subscriber" in calls or does_something(tree)):
         fix = "make it a node: `rospy.init_node(…)`, then its topics, then `rospy.spin()` or a loop"
@@ -95,17 +99,16 @@ def loop_rates(tree):
     for node in walk(tree):
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
             bound.setdefault(ast.dump(node.targets[0]).replace("Store()", "Load()"), []).append(node.value)
-
         elif isinstance(node, (ast.While, ast.For)):
-            looped.update(id(inner) for inner in ast.walk(node) if is_call(inner, "sleep"))
+            looped.update(map(id, calls_in(node, "sleep")))
 
     def given(node):
         values = bound.get(ast.dump(node), [node])
         return values[0] if len(values) == 1 else node
 
-    for node in walk(tree):
-        timed = next((name for name in ("Rate", "sleep", "Timer") if is_call(node, name)), None)
-        if timed is None or not node.args or (timed == "sleep" and id(node) not in looped):
+    for node in calls_in(tree, "Rate", "sleep", "Timer"):
+        timed = node.func.attr
+        if not node.args or (timed == "sleep" and id(node) not in looped):
             continue
         value = given(node.args[0])
         if is_call(value, "Duration") and value.args:
@@ -134,8 +137,7 @@ def never_run(tree):
     of_class = {id(f): c.name for c in walk(tree) if isinstance(c, ast.ClassDef) for f in c.body}
     for node in walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name not in named and not node.decorator_list:
-            works = any(is_call(inner, work) for inner in ast.walk(node) for work in WORKS)
-            if works and not node.name.startswith("__"):
+            if calls_in(node, *WORKS) and not node.name.startswith("__"):
                 message, owner = "nothing calls `%s()`" % node.name, of_class.get(id(node), "")
                 owner = owner and (objects.get(owner) or owner + "()") + "."
                 yield slip(node.lineno, "never-called", message, name=owner + node.name)
@@ -152,16 +154,12 @@ def never_reached(tree):
     """Loops without an end before the first `publish(…)`, `Publisher(…)` and the like that comes behind them in the
     same block, in a function or class of this file too.
     """
-    own = {
-        n.name
-        for n in walk(tree)
-        if isinstance(n, (ast.FunctionDef, ast.ClassDef))
-        and any(is_call(inner, name) for inner in ast.walk(n) for name in MAKES)
-    }
+    parts = [n for n in walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))]
+    own = {n.name for n in parts if calls_in(n, *MAKES)}
 
     def word(node):
         name = called_name(node)
-        return name if name in own or (is_call(node, name) and name in ("publish", *MAKES)) else None
+        return name if name in own or is_call(node, "publish", *MAKES) else None
 
     for node in walk(tree):
         for block in (getattr(node, "body", None), getattr(node, "orelse", None)):
@@ -190,7 +188,7 @@ def stopped_loops(tree):
     turned = dict(turns(tree))
     for loop in walk(tree):
         once = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
-        if once and not turned[loop][1] and any(is_call(n, "publish") for n in ast.walk(loop)):
+        if once and not turned[loop][1] and calls_in(loop, "publish"):
             message = "the `if` on line %d runs what follows it once" % loop.lineno
             fix = "write `while` instead of `if` on line %d" % loop.lineno
             yield slip(loop.lineno, "loop-left", message, fix=fix)
@@ -200,11 +198,9 @@ def stopped_loops(tree):
             )
             fix = "on line %d, write `while not %s():`" % (loop.lineno, dotted(loop.test.func))
             yield slip(loop.lineno, "loop-left", message, fix=fix)
-        inside = list(ast.walk(loop)) if isinstance(loop, (ast.While, ast.For)) else []
-        if not any(is_call(n, "publish") for n in inside):
+        if not isinstance(loop, (ast.While, ast.For)) or not calls_in(loop, "publish"):
             continue
-        spin = next((n for n in inside if is_call(n, "spin")), None)
-        if spin is not None:
+        for spin in calls_in(loop, "spin")[:1]:
             message = "the loop stops at the spin() on line %d, which waits until the node ends" % spin.lineno
             fix = "remove spin(): the loop keeps the node alive"
             yield slip(spin.lineno, "spin-in-loop", message, fix=fix)
@@ -240,19 +236,13 @@ WAITS = ("sleep", "spin", "spin_once", "wait_for_message", "wait_for_service", "
 def sleepless_loops(tree):
     """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them."""
     loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For))]
-    sleeps = [n for n in walk(tree) if is_call(n, "sleep") and isinstance(n.func, ast.Attribute)]
+    sleeps = calls_in(tree, "sleep")
     for loop in loops:
-        inside = list(ast.walk(loop))
-        waits = any(is_call(n, name) for n in inside for name in WAITS)
-        inner = [
-            n
-            for n in inside
-            if n is not loop and n in loops and any(is_call(m, "publish") for m in ast.walk(n))
-        ]
+        inner = [n for n in ast.walk(loop) if n is not loop and n in loops and calls_in(n, "publish")]
         before = [n for n in sleeps if n.lineno < loop.lineno and dotted(n.func) not in PAUSES]
         outside = [n for n in sleeps if n.lineno > loop.lineno] or before
         yield from sleeps_in_if(loop)
-        if waits or inner or not outside or not any(is_call(n, "publish") for n in inside):
+        if calls_in(loop, *WAITS) or inner or not outside or not calls_in(loop, "publish"):
             continue
         name = dotted(outside[0].func) or "sleep"
         message = "`%s()` is outside the loop on line %d" % (name, loop.lineno)
@@ -264,9 +254,8 @@ def sleepless_loops(tree):
 
 def sleeps_in_if(loop):
     """Yield the only `sleep()` of a loop that publishes in each of its turns, where it stands in an `if`."""
-    inside = [n for one in loop.body for n in ast.walk(one)]
     plain = [one for one in loop.body if isinstance(one, ast.Expr) and is_call(one.value, "publish")]
-    sleeps = [n for n in inside if any(is_call(n, name) for name in WAITS)]
+    sleeps = [n for one in loop.body for n in calls_in(one, *WAITS)]
     for one in loop.body:
         within = one.body if isinstance(one, ast.If) and not one.orelse else []
         own = [n for n in within if isinstance(n, ast.Expr) and is_call(n.value, "sleep")]
@@ -285,9 +274,7 @@ def sleeps_twice(tree):
         if len(at) != 2:
             continue
         between, around = body[at[0] + 1 : at[1]], body[: at[0]] + body[at[1] + 1 :]
-        publish = [
-            any(is_call(n, "publish") for one in part for n in ast.walk(one)) for part in (between, around)
-        ]
+        publish = [any(calls_in(one, "publish") for one in part) for part in (between, around)]
         if sorted(publish) == [False, True]:
             lines = (body[at[0]].lineno, body[at[1]].lineno)
             message = "the loop sleeps on line %d and again on line %d" % lines
@@ -296,10 +283,9 @@ def sleeps_twice(tree):
 
 def waiting_callbacks(tree):
     """Callbacks of topics that do not come to their end, or late: no further message is read before."""
-    functions = {n.name: n for n in walk(tree) if isinstance(n, ast.FunctionDef)}
+    functions = functions_in(tree)
     for node in walk(tree):
-        given = node.args[2:3] if called_name(node) == "Subscriber" else []
-        given += [k.value for k in getattr(node, "keywords", ()) if given == [] and k.arg == "callback"]
+        given = argument(node, 2, "callback") if called_name(node) == "Subscriber" else []
         own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
         inside = list(ast.walk(own)) if own is not None else []
         for inner in inside if node not in inside else ():
@@ -348,9 +334,7 @@ def read_parameter(node):
     """Return the name in `get_param('name')`, also within `float(…)`."""
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
         node = node.args[0] if node.func.id in ("float", "int") else node
-    if is_call(node, "get_param") and node.args and isinstance(node.args[0], ast.Constant):
-        return node.args[0].value if isinstance(node.args[0].value, str) else None
-    return None
+    return text_of(node.args[0]) if is_call(node, "get_param") and node.args else ""
 
 
 def counts(tree):
@@ -391,7 +375,7 @@ def sends_no_time(tree):
     """Return what is to be said where what is published comes from counting alone, though the script may read a clock
     for something else, or for the value that it counts on from; "" otherwise."""
     source = Source(tree)
-    found = source.reached([arg for n in walk(tree) if is_call(n, "publish") for arg in n.args])
+    found = source.reached([arg for n in calls_in(tree, "publish") for arg in n.args])
     if found.clock or found.unknown or not found.counts:
         return ""
     if source.reached(source.starts).clock:
@@ -402,16 +386,14 @@ def sends_no_time(tree):
 def clock_values(tree):
     """Topics whose values are read from a clock in each turn, and not counted."""
     source = Source(tree)
-    for node in walk(tree):
-        if not is_call(node, "publish"):
-            continue
+    for node in calls_in(tree, "publish"):
         makers = source.bound.get(dotted(node.func.value), [])
         named = [
             m.args[0] for m in makers if isinstance(m, ast.Call) and m.args and called_name(m) == "Publisher"
         ]
         found = source.reached(node.args)
-        name = named[0].value if len(named) == 1 and isinstance(named[0], ast.Constant) else None
-        if found.clock and not found.counts and not found.unknown and isinstance(name, str):
+        name = text_of(named[0]) if len(named) == 1 else ""
+        if name and found.clock and not found.counts and not found.unknown:
             yield slip(node.lineno, "clock-value", name)
 
 
@@ -420,7 +402,7 @@ class Source:
 
     def __init__(self, tree):
         self.bound, self.starts = {}, []
-        self.functions = {n.name: n for n in walk(tree) if isinstance(n, ast.FunctionDef)}
+        self.functions = functions_in(tree)
         places = dict(turns(tree))
         given = []
         for node in walk(tree):
@@ -497,7 +479,7 @@ def deaf_loops(tree):
         if not inside or any(map(is_shutdown, inside)):
             continue
         caught = [h for n in inside if isinstance(n, ast.Try) for h in n.handlers if goes_on(h)]
-        wakes = any(is_call(n, "sleep") and dotted(n.func) != "time.sleep" for n in inside)
+        wakes = any(dotted(n.func) != "time.sleep" for n in calls_in(loop, "sleep"))
         asks = "check `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
         for handler in caught[:1]:
             message = "the `except` on line %d catches what Ctrl-C raises, and the loop on line %d goes on"

@@ -115,24 +115,19 @@ def slips_of_the_rest(text):
     """Return which names a file that does not parse gives to its node and topics, as far as the rest of it says."""
     lines = first_version(text.splitlines())
     for _ in range(REFUSED_LIMIT):
-        tree, at = parse_lines(lines)
-        if tree is not None:
+        try:
+            tree = ast.parse("\n".join(lines))
+        except SyntaxError as error:
+            at = (error.lineno or 0) - 1
+        except (ValueError, RecursionError, MemoryError):
+            break
+        else:
             return [one for one in slips(tree) if one["kind"] in OF_NAMES]
         if not 0 <= at < len(lines) or not lines[at].strip():
             break
         indentation = re.match(r"\s*", lines[at]).group()
         lines[at] = "" if lines[at].lstrip() == "pass" else indentation + "pass"
     return []
-
-
-def parse_lines(lines):
-    """Return the tree, or the place (from 0) of the line that Python refuses; -1 where that is not known."""
-    try:
-        return ast.parse("\n".join(lines)), -1
-    except SyntaxError as error:
-        return None, (error.lineno or 0) - 1
-    except (ValueError, RecursionError, MemoryError):
-        return None, -1
 
 
 def first_version(lines):

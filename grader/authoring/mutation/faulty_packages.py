@@ -13,11 +13,10 @@ from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-import yaml
-
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.package_tree import Tree, TreeFile
 from grader.authoring.mutation.solution import Site, Solution
+from grader.authoring.rubric_draft import dump_flow
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import (
     AppendText,
@@ -40,7 +39,6 @@ from grader.rubric.find import rubrics_folder, short_path
 from grader.rubric.load import LoadedRubric, refuse_newer
 from grader.rubric.model import Rubric
 from grader.rubric.yaml_lines import Fault, KeyPath, Source, as_map, as_maps, read_source
-from grader.untrusted_text import visible
 from grader.wording import did_you_mean, first_few
 
 FILES_SHOWN = 8
@@ -142,20 +140,9 @@ def mutants_text(rubric: str, mutants: dict[str, Mutant], results: Sequence[Muta
 
 def _mutant_text(name: str, mutant: Mutant, costs: dict[str, str]) -> str:
     edits = [edit.model_dump(by_alias=True, exclude_unset=True) for edit in mutant.edits]
-    lines = [f"    expect: {_flow(costs)}", "    edits:", *(f"      - {_flow(edit)}" for edit in edits)]
+    made = [f"      - {dump_flow(edit)}" for edit in edits]
+    lines = [f"    expect: {dump_flow(costs)}", "    edits:", *made]
     return "\n".join([f"  {name}:", *lines, ""])
-
-
-def _flow(data: object) -> str:
-    """Return a map as YAML on one line, with invisible letters escaped."""
-
-    def dump(*, letters: bool) -> str:
-        return yaml.safe_dump(
-            data, default_flow_style=True, sort_keys=False, allow_unicode=letters, width=10_000
-        ).strip()
-
-    text = dump(letters=True)
-    return text if visible(text, lines=True) == text else dump(letters=False)
 
 
 SHOWN_PLACES = 6

@@ -15,11 +15,10 @@ from cmake_parser.error import CMakeParseError
 from grader.authoring.mutation.package_tree import Tree, TreeFile, read_tree
 from grader.authoring.mutation.source_edits import Document, Script, TextEdit, apply_edits, line_at
 from grader.errors import UsageError
+from grader.model.package import CMAKE, MANIFEST
 from grader.rubric.find import rubrics_folder
 from grader.rubric.load import LoadedRubric
 
-MANIFEST = "package.xml"
-CMAKE = "CMakeLists.txt"
 BUILT = frozenset({"build", "devel", "install"})
 PYTHON_SHEBANG = re.compile(rb"#!\s*\S*(?:python|env +python)")
 

@@ -181,7 +181,8 @@ def _missing_include(found: re.Match[str], _package: PackageFacts, _lines: Seque
 
 
 def _missing_launch(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    return _missing_file(_below(found[1], package), package, f"roslaunch_add_file_check(…) names {found[1]}")
+    words = f"roslaunch_add_file_check(…) names {found[1]}"
+    return _missing_files([_below(found[1], package)], package, words)
 
 
 def _missing_source(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -189,10 +190,9 @@ def _missing_source(found: re.Match[str], package: PackageFacts, _lines: Sequenc
     named = [word for call in made for word in call.args if posixpath.splitext(word)[1] in CPP_SUFFIXES]
     absent = [word for word in dict.fromkeys(named) if package.file(word) is None]
     if len(absent) > 1 and found[1] in absent:
-        return _missing_files(
-            absent, package, f"targets are built from {join_words(absent)}", "the calls that name them"
-        )
-    return _missing_file(found[1], package, f"a target is built from {found[1]}")
+        words = f"targets are built from {join_words(absent)}"
+        return _missing_files(absent, package, words, "the calls that name them")
+    return _missing_files([found[1]], package, f"a target is built from {found[1]}")
 
 
 def no_types(package: PackageFacts) -> Explained | None:
@@ -254,41 +254,36 @@ def _late_project(found: re.Match[str], package: PackageFacts, _lines: Sequence[
 
 def _missing_message(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     path = _below(found[1], package)
-    return _missing_file(path, package, f"add_{found[2]}_files(…) names {path}")
+    return _missing_files([path], package, f"add_{found[2]}_files(…) names {path}")
 
 
 def _missing_script(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     path, there = _below(found[1], package), {f.path for f in package.files}
     named = [one for one in installed(package) if one.call.name == "catkin_install_python" and one.known]
     others = [_below(one.path, package) for one in named if not one.path.startswith("$")]
-    absent = [
-        one
-        for one in dict.fromkeys((path, *others))
-        if one not in there and one.removeprefix("./") not in there
-    ]
-    if len(absent) > 1:
-        return _missing_files(
-            absent, package, f"catkin_install_python(…) names {join_words(absent)}", "that call"
-        )
-    return _missing_file(path, package, f"catkin_install_python(…) names {path}")
+    absent = [p for p in dict.fromkeys((path, *others)) if there.isdisjoint((p, p.removeprefix("./")))]
+    paths = absent if len(absent) > 1 else [path]
+    return _missing_files(paths, package, f"catkin_install_python(…) names {join_words(paths)}")
 
 
-def _missing_files(paths: Sequence[str], package: PackageFacts, words: str, where: str) -> Explained:
-    """Several that one edit puts right: with the paths of those that lie elsewhere in the package."""
+def _missing_files(
+    paths: Sequence[str], package: PackageFacts, words: str, where: str = "that call"
+) -> Explained:
+    """Return what `words` says of files that are not in the package, with the paths of those that lie elsewhere in it.
+
+    `where` is what names them.
+    """
     near = {path: found[0] for path in paths if (found := near_names(path, (f.path for f in package.files)))}
+    seen = f"; there is {join_words(dict.fromkeys(near.values()))}" if near else ""
+    if len(paths) == 1:
+        hint = f"add {paths[0]} and push it, or remove it from {where}"
+        hint = f"write {near[paths[0]]} there" if near else hint
+        return Explained(f"{words}, which is not in the package{seen}", hint)
     hints = [f"write {right} instead of {path}" for path, right in near.items()]
     if rest := [path for path in paths if path not in near]:
         them = "them" if len(rest) > 1 else "it"
         hints.append(f"add {join_words(rest)} and push {them}, or take {them} out of {where}")
-    seen = f"; there is {join_words(dict.fromkeys(near.values()))}" if near else ""
     return Explained(f"{words}, which are not in the package{seen}", "; ".join(hints))
-
-
-def _missing_file(path: str, package: PackageFacts, words: str) -> Explained:
-    near = near_names(path, (f.path for f in package.files))
-    seen = f"; there is {near[0]}" if near else ""
-    hint = f"write {near[0]} there" if near else f"add {path} and push it, or remove it from that call"
-    return Explained(f"{words}, which is not in the package{seen}", hint)
 
 
 def _below(path: str, package: PackageFacts) -> str:

@@ -107,15 +107,10 @@ def _index(_message: str, source: str, marked: tuple[int, int] | None) -> Meanin
 
 def _subscript(source: str, marked: tuple[int, int] | None) -> ast.Subscript | None:
     """Return the only `x[i]` of the line, or the one that is marked."""
-    begun = re.sub(r"^el(?=if\b)", "", source)
-    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-        tree = parsed(f"{begun} pass" if begun.rstrip().endswith(":") else begun)
-        found = [
-            n for n in ast.walk(tree) if isinstance(n, ast.Subscript) and not isinstance(n.slice, ast.Slice)
-        ]
-        pointed = [n for n in found if marked and (n.col_offset, n.end_col_offset) == marked]
-        return (pointed or found)[0] if pointed or len(found) == 1 else None
-    return None
+    every = [n for n in ast.walk(_tree(re.sub(r"^el(?=if\b)", "", source))) if isinstance(n, ast.Subscript)]
+    found = [n for n in every if not isinstance(n.slice, ast.Slice)]
+    pointed = [n for n in found if marked and (n.col_offset, n.end_col_offset) == marked]
+    return (pointed or found)[0] if pointed or len(found) == 1 else None
 
 
 def _key(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning:
@@ -312,10 +307,8 @@ def _parameter(message: str, source: str) -> Meaning | None:
 
 def _calls(source: str, *names: str) -> list[ast.Call]:
     """Return the calls in a line of source, of functions or methods with one of these names."""
-    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-        found = [n for n in ast.walk(parsed(source)) if isinstance(n, ast.Call)]
-        return [n for n in found if getattr(n.func, "attr", getattr(n.func, "id", "")) in names]
-    return []
+    found = [n for n in ast.walk(_tree(source)) if isinstance(n, ast.Call)]
+    return [n for n in found if getattr(n.func, "attr", getattr(n.func, "id", "")) in names]
 
 
 def _topic(message: str, source: str) -> Meaning:

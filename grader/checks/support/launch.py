@@ -35,14 +35,9 @@ NOT_EXECUTED = (2, 126, 127)
 UNRESOLVED = "$("
 ATTRIBUTES = ("pkg", "type", "name")
 _ERRORS = (
-    "ERROR: cannot launch",
-    "RLException",
-    "Invalid ",
-    "ERROR:",
-    "process has died",
-    "roslaunch:",
+    "ERROR: cannot launch", "RLException", "Invalid ", "ERROR:", "process has died", "roslaunch:",
     "Resource not found",
-)
+)  # fmt: skip
 _SUBSTITUTION = re.compile(r"\\\$\\\(([^)]*)\\\)")
 # Students print such lines too: between brackets is no other bracket, so that a line is looked through once.
 _UNSET = re.compile(r"requires the '(\w+)' arg to be set")

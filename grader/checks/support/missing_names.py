@@ -31,18 +31,9 @@ _KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
 NO_MODULE = re.compile(r"No module named '(\w+)'$")
 _HIDDEN = re.compile(r"'(\w+)\.[\w.]+'; '\1' is not a package|partially initialized module '(\w+)'")
 KEYWORDS = (
-    *("anonymous", "log_level", "disable_signals", "argv", "queue_size", "latch", "tcp_nodelay", "headers"),
-    *(
-        "callback",
-        "callback_args",
-        "buff_size",
-        "subscriber_listener",
-        "data_class",
-        "oneshot",
-        "timeout",
-        "default",
-    ),
-)
+    "anonymous", "log_level", "disable_signals", "argv", "queue_size", "latch", "tcp_nodelay", "headers", "callback",
+    "callback_args", "buff_size", "subscriber_listener", "data_class", "oneshot", "timeout", "default",
+)  # fmt: skip
 """Arguments of rospy's functions that are given by their names."""
 ATTRIBUTES = {
     "rospy": (

@@ -117,14 +117,19 @@ class Sender:
         raise NotImplementedError
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class FeedbackForm:
-    """`sender` is `module:class` in this package; `purpose` is a line for people; `options` are those it takes."""
+    """`sender` is `module:class` in this package; `purpose` is a line for people; `takes` are its options."""
 
     name: str
     sender: str
     purpose: str
-    options: frozenset[str] = frozenset()
+    takes: str
+
+    @property
+    def options(self) -> frozenset[str]:
+        """Each option that it takes."""
+        return frozenset(self.takes.split())
 
     def open(self, settings: SendSettings) -> Sender:
         """Return the sender. Raises UsageError if a setting is missing, HostError if a server cannot be reached."""
@@ -133,49 +138,35 @@ class FeedbackForm:
         return made
 
 
+_OF_FORGES = "a comment on the commit that was graded, or an issue"
 _FORMS = (
     FeedbackForm(
-        name="folder",
-        sender="files:FeedbackFolder",
-        purpose="a folder for each student, with `report.md` and `report.html`",
-        options=frozenset({"--out"}),
+        "folder",
+        "files:FeedbackFolder",
+        "a folder for each student, with `report.md` and `report.html`",
+        "--out",
     ),
     FeedbackForm(
-        name="moodle",
-        sender="files:Moodle",
-        purpose="Moodle's zip of feedback files, with `report.html` for each student",
-        options=frozenset({"--out"}),
+        "moodle",
+        "files:Moodle",
+        "Moodle's zip of feedback files, with `report.html` for each student",
+        "--out",
     ),
     FeedbackForm(
-        name="canvas",
-        sender="files:CanvasFiles",
-        purpose="Canvas' zip for re-upload: the reports under the names of the submitted files",
-        options=frozenset({"--out"}),
+        "canvas",
+        "files:CanvasFiles",
+        "Canvas' zip for re-upload: the reports under the names of the submitted files",
+        "--out",
     ),
     FeedbackForm(
-        name="email",
-        sender="mail:Mail",
-        purpose="a mail to each student: as files, or through a server with `--smtp`",
-        options=frozenset({"--out", "--smtp", "--from"}),
+        "email",
+        "mail:Mail",
+        "a mail to each student: as files, or through a server with `--smtp`",
+        "--out --smtp --from",
     ),
-    FeedbackForm(
-        name="git",
-        sender="branch:Branch",
-        purpose="a branch `feedback` in each student's repository",
-        options=frozenset({"--branch"}),
-    ),
-    FeedbackForm(
-        name="github",
-        sender="forges:GitHubComments",
-        purpose="a comment on the commit that was graded, or an issue",
-        options=frozenset({"--issues", "--public"}),
-    ),
-    FeedbackForm(
-        name="gitlab",
-        sender="forges:GitLabComments",
-        purpose="a comment on the commit that was graded, or an issue",
-        options=frozenset({"--issues", "--public"}),
-    ),
+    FeedbackForm("git", "branch:Branch", "a branch `feedback` in each student's repository", "--branch"),
+    FeedbackForm("github", "forges:GitHubComments", _OF_FORGES, "--issues --public"),
+    FeedbackForm("gitlab", "forges:GitLabComments", _OF_FORGES, "--issues --public"),
 )
 FORMS: Mapping[str, FeedbackForm] = {form.name: form for form in _FORMS}
 FORGES = tuple(form.name for form in _FORMS if "--issues" in form.options)

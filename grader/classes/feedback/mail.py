@@ -10,7 +10,6 @@ import re
 import smtplib
 import ssl
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from datetime import datetime, timezone
 from email.headerregistry import Address
@@ -146,7 +145,7 @@ class MailServer:
     Without TLS nothing is sent but to a server on this machine. What the server puts off is tried again.
     """
 
-    def __init__(self, address: str, sender: str, sleep: Callable[[float], None] = time.sleep) -> None:
+    def __init__(self, address: str, sender: str) -> None:
         parts = urlsplit(address if "://" in address else f"smtp://{address}")
         try:
             port = parts.port
@@ -163,7 +162,7 @@ class MailServer:
             raise UsageError("--smtp: this is not the address of a mail server", hint=hint)
         self.host, self.port = parts.hostname, port or PORTS[parts.scheme]
         self.tls = parts.scheme == "smtps"
-        self.sender, self._sleep = sender, sleep
+        self.sender = sender
         self._smtp: smtplib.SMTP | None = None
 
     def connect(self) -> None:
@@ -212,7 +211,7 @@ class MailServer:
                 self.close()
                 if not left:
                     raise NotSent(f"{self.host}: {_reply_text(error)}") from error
-            self._sleep(WAIT_S)
+            time.sleep(WAIT_S)
         raise AssertionError
 
     def _reconnect(self) -> None:

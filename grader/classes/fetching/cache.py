@@ -18,7 +18,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from grader.files import lock, open_lock, wait_for_lock
+from grader.files import lock, open_lock, user_folder, wait_for_lock
 from grader.portable import CLOEXEC, DIRECTORY, NOFOLLOW, user_id
 
 BYTES_MAX = 4 << 30
@@ -105,14 +105,13 @@ class MirrorFolder:
 
 def cache_folder() -> Path | None:
     """Return the folder for all mirrors; None where it cannot be had for this user alone."""
-    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    base = named if named.is_absolute() else Path(os.path.expanduser("~"), ".cache")  # noqa: PTH111 - never raises
-    if not base.is_absolute():
+    own = user_folder("cache")
+    if not own.is_absolute():
         return None
     with suppress(OSError):
-        base.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if _is_own(base / "grader") and _is_own(base / "grader" / "repositories"):
-            return base / "grader" / "repositories"
+        own.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if _is_own(own) and _is_own(own / "repositories"):
+            return own / "repositories"
     return None
 
 

@@ -92,15 +92,12 @@ def batch(
     """Grade a class, or continue a batch that was stopped."""
     with loading():
         from grader.classes.batch.run import BatchOptions
-        from grader.classes.roster import read_roster
-        from grader.classes.roster.platforms import is_download, unpack_download
         from grader.cli import classes
         from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric)
     out = out or DEFAULT_OUT
     local = classes.allowed_folders(allow_local, remote_only=remote_only)
-    listed = unpack_download(roster, out) if is_download(roster) else roster
-    named = classes.with_package(read_roster(listed, local), package or "")
+    named = classes.with_package(classes.read_listed(roster, out, local), package or "")
     options = BatchOptions(
         out=out,
         jobs=jobs or classes.default_jobs(loaded, static=static),

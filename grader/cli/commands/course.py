@@ -9,6 +9,7 @@ from grader.cli.declare import (
     PUBLISH_EXIT_CODES,
     STATIC,
     Argument,
+    AuthorOption,
     BookColumn,
     BookForm,
     BookTemplate,
@@ -70,9 +71,7 @@ def publish(
     course: Annotated[Path, COURSE],
     lab: Annotated[str, LAB],
     dry_run: Annotated[bool, Flag("--dry-run", "only show what would be published and sent")] = False,
-    author: Annotated[
-        str | None, Option("--author", "NAME", "who publishes (default: git config user.name)")
-    ] = None,
+    author: AuthorOption = None,
 ) -> ExitCode:
     """Publish one lab of a course, and return it to the students by the course's form of feedback."""
     with loading():

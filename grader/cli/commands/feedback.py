@@ -12,6 +12,7 @@ from grader.cli.declare import (
     PUBLISH_EXIT_CODES,
     REQUESTS_EXIT_CODES,
     Argument,
+    AuthorOption,
     Flag,
     JsonFlag,
     Option,
@@ -43,9 +44,7 @@ def publish(
         bool, Flag("--dry-run", "only show what would be published, and what changes")
     ] = False,
     show_hidden: Annotated[bool, Flag("--show-hidden", "show students the hidden criteria, too")] = False,
-    author: Annotated[
-        str | None, Option("--author", "NAME", "who publishes (default: git config user.name)")
-    ] = None,
+    author: AuthorOption = None,
     as_json: JsonFlag = False,
 ) -> ExitCode:
     """Publish a class's results: gradebooks and feedback have them from then on.

@@ -60,31 +60,23 @@ def check(
 
     Hidden criteria are left out. If there are packages of several labs, they are checked one after the other.
     """
-    _refuse_together(
-        (
-            staged and (watch or not static),
-            "--staged goes with --static, and not with --watch",
-            "add --static",
-        ),
-        ((dry_run or yes) and not fix, "--dry-run and --yes go with --fix", "add --fix"),
-        (
-            fix and (staged or watch or as_json),
-            "--fix goes with none of --staged, --watch and --json",
-            "fix first",
-        ),
-    )
+    if staged and (watch or not static):
+        raise UsageError("--staged goes with --static, and not with --watch", hint="add --static")
+    if (dry_run or yes) and not fix:
+        raise UsageError("--dry-run and --yes go with --fix", hint="add --fix")
+    if fix and (staged or watch or as_json):
+        raise UsageError("--fix goes with none of --staged, --watch and --json", hint="fix first")
     with loading():
         from grader.cli.checking import check_packages
         from grader.cli.select_rubric import choose_all
         from grader.pipeline import GradeOptions
         from grader.rubric.load import checkout_around
-    keep_files = watch or out is not None
     options = GradeOptions(
         sandbox=sandbox,
         package=package or "",
         static_only=static,
         keep_hidden=False,
-        files=keep_files,
+        files=watch or out is not None,
         repository=checkout_around(Path(path)),
     )
     chosen = choose_all(Path(path), rubric, package or "")
@@ -97,13 +89,6 @@ def check(
     return check_packages(
         path, chosen, options, watch=watch, out=out, as_json=as_json, staged=staged, full=full
     )
-
-
-def _refuse_together(*pairs: tuple[bool, str, str]) -> None:
-    """Raise UsageError for options that do not go together: whether they are given, what is wrong, and a hint."""
-    for given, message, hint in pairs:
-        if given:
-            raise UsageError(message, hint=hint)
 
 
 @command("explain", group=STUDENTS)

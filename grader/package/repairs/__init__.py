@@ -12,12 +12,11 @@ from __future__ import annotations
 import re
 from pathlib import Path, PurePosixPath
 
-from grader.model.package import PackageFacts, SourceFile
+from grader.model.package import MANIFEST, PackageFacts, SourceFile
 from grader.model.repair import DEFAULT_SHARES, KINDS, Repair, RepairKind
 from grader.package.repairs.build import rename_package, repair_cmake, repair_manifest
 from grader.package.repairs.editing import (
     BOM,
-    MANIFEST,
     Files,
     NotRepairable,
     make_executable,

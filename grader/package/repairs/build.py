@@ -11,11 +11,11 @@ from cmake_parser.ast import Command, Token
 
 from grader.installable import noetic_messages
 from grader.model.message_definitions import meant_type
-from grader.model.package import PackageFacts, meant_command
+from grader.model.package import CMAKE, MANIFEST, PackageFacts, meant_command
 from grader.model.repair import RepairKind
 from grader.package.cmake_parse import commands_of, join_half_comment
 from grader.package.manifest import parse_manifest
-from grader.package.repairs.editing import CMAKE, MANIFEST, Files, naming_files, rename_word, repair_xml
+from grader.package.repairs.editing import Files, naming_files, rename_word, repair_xml
 from grader.package.repairs.files import is_own
 from grader.package.repairs.names import CPP, Wanted, is_near
 from grader.package.xml import parse_xml

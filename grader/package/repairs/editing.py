@@ -17,6 +17,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from grader.files import atomic_write, open_untrusted
+from grader.model.package import CMAKE, MANIFEST
 from grader.model.repair import Repair, RepairKind, added_lines
 from grader.package.reading import LEFT_OUT
 from grader.package.xml import parse_xml, well_formed
@@ -27,7 +28,6 @@ TEXT_BYTES_MAX = 64_000
 HAS_DIR_FD = os.open in os.supports_dir_fd
 BOM = b"\xef\xbb\xbf"
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
-MANIFEST, CMAKE = "package.xml", "CMakeLists.txt"
 NAMING = (".launch", ".launch.xml", ".test")
 
 

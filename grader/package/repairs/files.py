@@ -6,14 +6,12 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import PurePosixPath
 
-from grader.model.package import PackageFacts, SourceFile
+from grader.model.package import CMAKE, MANIFEST, PackageFacts, SourceFile
 from grader.model.repair import Repair, RepairKind
 from grader.model.submission import chmod_hint
 from grader.package.reading import LEFT_OUT
 from grader.package.repairs.editing import (
     BOM,
-    CMAKE,
-    MANIFEST,
     UTF16,
     Files,
     as_text,

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import Any, Literal
 
-from grader.model.package import LaunchFile, PackageFacts, SlipKind
+from grader.model.package import MANIFEST, LaunchFile, PackageFacts, SlipKind
 from grader.model.record import Record
 from grader.model.repair import RepairKind
 from grader.package.launch import parse_launch
 from grader.package.manifest import parse_manifest
-from grader.package.repairs.editing import MANIFEST, Files, repair_xml
+from grader.package.repairs.editing import Files, repair_xml
 from grader.package.repairs.python import Name
 from grader.rubric.model import Criterion, Rubric
 from grader.wording import is_one_edit, plural

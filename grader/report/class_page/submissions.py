@@ -98,7 +98,7 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
         name=line(entry.name, CHARS),
         group=line(entry.group, CHARS),
         folder=result.submission.id if _has_reports(result) else "",
-        state=_state(result),
+        state=state_of(result),
         points=result.points,
         letters="".join(
             LETTERS[found.status] if found and not found.left_out else ABSENT for found in judged
@@ -133,7 +133,8 @@ def _has_reports(result: GradingResult) -> bool:
     return result.error is None or result.error.kind not in {MISSING, ROSTER}
 
 
-def _state(result: GradingResult) -> SubmissionState:
+def state_of(result: GradingResult) -> SubmissionState:
+    """Return the result's status, or `missing` if there is none yet, or `manual` if only people's criteria are open."""
     if result.error is not None and result.error.kind == MISSING:
         return "missing"
     if result.status == "inconclusive" and not _still_open(result.criteria):

@@ -11,8 +11,9 @@ from cmake_parser.ast import Command, Token
 
 from grader.authoring.mutation.package_tree import Tree
 from grader.authoring.mutation.registry import Finder, operator
-from grader.authoring.mutation.solution import CMAKE, MANIFEST, CodePlace, Solution
+from grader.authoring.mutation.solution import CodePlace, Solution
 from grader.authoring.mutation.source_edits import Document, Element, TextEdit, whole_lines
+from grader.model.package import CMAKE, MANIFEST
 
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 DEPENDENCIES = ("depend", "build_depend", "build_export_depend", "exec_depend", "run_depend")

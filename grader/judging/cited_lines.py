@@ -1,0 +1,179 @@
+"""Which lines of the student's files a verdict cites, and their text.
+
+A verdict and the files that were recorded come in; the verdict goes out with the lines that it names words or calls of
+(`Verdict.said`, `Verdict.sought`). No status changes; a check that knows a line itself has cited it already.
+"""
+
+from __future__ import annotations
+
+import re
+
+from grader.checks.cmake import NOT_CALLED, below_catkin_package
+from grader.checks.support.launch import find_launch
+from grader.checks.support.scripts import (
+    SourceLine,
+    commented_call,
+    commented_calls,
+    lines_that_publish,
+    lines_that_say,
+    lines_that_set,
+)
+from grader.evidence.run import Run
+from grader.judging.facts import Facts, scripts_of, sources_of
+from grader.model.package import CMAKE, PackageFacts
+from grader.model.verdict import Citation, FileCitation, Status, Verdict
+from grader.rubric.model import Criterion
+from grader.wording import join_words, lines_text
+
+LINE_CHARS = 200
+"""A longer line stays out of the result."""
+LINES_READ = 2_000
+SAYS = {
+    "hears": r"\b(?:printf?|log\w+|write|ROS_\w+)\s*\(|\bc(?:out|err)\s*<<",
+    "logs": r"\b(?:log\w+|ROS_\w+)\s*\(",
+}
+"""The checks of what a node says, and what a line of Python or C++ calls that says them."""
+
+
+def cite_words(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
+    """Return the verdict; one on other words or values than the lab's with the line of the script that makes, or that
+    publishes them, if it is plain which one does."""
+    package = facts.package_of(criterion)
+    placed = any(isinstance(one, FileCitation) for one in verdict.citations)
+    lost = verdict.status in {Status.PARTIAL, Status.FAIL} and not verdict.unjudged
+    field = criterion.parameters.get("field")
+    if not (field or criterion.check in {*SAYS, "message"}) or placed or not lost or package is None:
+        return verdict
+    if package is not facts.package:
+        return verdict
+    paths = scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
+    lines = [
+        SourceLine(path, number, text)
+        for path in sorted(paths)
+        for number, text in enumerate(build.file_lines(path)[:LINES_READ], 1)
+        if len(text) <= LINE_CHARS and not text.lstrip().startswith(("#", "//"))
+    ]
+    said = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
+    found = lines_that_set(lines, str(field)) if field else said
+    if field or criterion.check == "message":
+        published = lines_that_publish(lines, str(criterion.parameters.get("topic", "")))
+        # of several, the one that is published; of none, what is published has nothing of it
+        found = found if len(found) == 1 else [one for one in published if one in found] or published
+    elif not found and verdict.status is Status.PARTIAL:
+        found = [one for one in lines if re.search(SAYS[criterion.check], one.text)]
+    if len(found) != 1:
+        return verdict
+    place = FileCitation(file=found[0].file, line=found[0].number)
+    return verdict.model_copy(update={"citations": (place, *verdict.citations)})
+
+
+def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: Run) -> Verdict:
+    """Return the verdict; one on a call that is missing in CMakeLists.txt cites the line below which it goes, or those
+    in which it is commented out."""
+    if not verdict.status.is_lost or package is None or package.cmake is None:
+        return verdict
+    if called := verdict.sought_name("call"):
+        return _cite_install(verdict, package, build, called)
+    found = commented_calls(package, build.file_lines(CMAKE)[:LINES_READ], verdict.sought_names("uncalled"))
+    if not found:
+        return verdict
+    told = "; ".join(f"{name}(…) is commented out on {lines_text(*place)}" for name, place in found.items())
+    places = join_words(lines_text(*place) for place in found.values())
+    update = {
+        "message": f"{verdict.message}; {told}",
+        "hint": f"remove the # from {places} of {CMAKE}: {verdict.hint}",
+        "citations": (
+            *(FileCitation(file=CMAKE, line=first + 1) for first, _ in found.values()),
+            *verdict.citations,
+        ),
+    }
+    return verdict.model_copy(update=update)
+
+
+def _cite_install(verdict: Verdict, package: PackageFacts, build: Run, called: str) -> Verdict:
+    file = next((one.file for one in verdict.citations if isinstance(one, FileCitation)), CMAKE)
+    place = commented_call(build.file_lines(file)[:LINES_READ], called)
+    if place is None:
+        return verdict
+    where = lines_text(*place)
+    update = {
+        "message": verdict.message.replace(NOT_CALLED, f"{NOT_CALLED}: it is commented out on {where}", 1),
+        "hint": f"in place of {where} {verdict.hint.removesuffix(below_catkin_package(package))}, without # before it",
+        "citations": (FileCitation(file=file, line=place[0] + 1),),
+    }
+    return verdict.model_copy(update=update)
+
+
+def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | None, build: Run) -> Verdict:
+    """Return the verdict; one on a package that roslaunch does not find cites the lines of the launch file that name
+    it."""
+    absent = verdict.sought_name("package")
+    if package is None or not absent or not verdict.status.is_lost:
+        return verdict
+    asked = find_launch(package, str(criterion.parameters.get("launch", "")))
+    name = re.compile(rf"""\$\(find\s+{re.escape(absent)}\)|pkg\s*=\s*["']{re.escape(absent)}["']""")
+    for file in (
+        (asked,) if asked is not None else package.launch_files
+    ):  # one by another name was judged on a copy
+        lines = [n for n, text in enumerate(build.file_lines(file.path)[:LINES_READ], 1) if name.search(text)]
+        if lines:
+            of_file = "" if asked is not None else f" of {file.path}"
+            where = f"line{'s' * (len(lines) > 1)} {join_words(map(str, lines))}{of_file}"
+            hint = f"write the package's exact name on {where}, push {absent} if it is your own, or remove it"
+            cited = tuple(FileCitation(file=file.path, line=n) for n in lines)
+            return verdict.model_copy(update={"hint": hint, "citations": cited})
+    return verdict
+
+
+def cite_name(verdict: Verdict, build: Run) -> Verdict:
+    """Return the verdict; one on a dependency cites the line that has its name: a tag that is commented out, or that of
+    a `find_package(…)` over several lines."""
+    place = next((one for one in verdict.citations if isinstance(one, FileCitation) and one.line), None)
+    undeclared, lacked = verdict.sought_name("dependency"), verdict.sought_name("component")
+    if place is None or place.line is None or not (undeclared or lacked):
+        return verdict
+    message, hint = verdict.message, verdict.hint
+    lines = [text[:LINE_CHARS] for text in build.file_lines(place.file)[:LINES_READ]]
+    if undeclared:
+        name = re.escape(undeclared)
+        tag = re.compile(rf"\s*<!--\s*<(depend|exec_depend|run_depend)>\s*{name}\s*</\1>\s*-->")
+        line = next((number for number, text in enumerate(lines, 1) if tag.match(text)), None)
+        message = f"{message}: line {line} has it in a comment"
+        hint = f"remove `<!--` and `-->` from line {line}"
+    else:
+        word = re.compile(rf"[^#]*\b{re.escape(lacked)}\b")
+        inside = enumerate(lines[place.line - 1 :], place.line)
+        line = next((number for number, text in inside if word.match(text)), None)
+    if line is None:
+        return verdict
+    cited = tuple(
+        FileCitation(file=place.file, line=line) if one is place else one for one in verdict.citations
+    )
+    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+
+
+def show_lines(verdict: Verdict, build: Run) -> Verdict:
+    """Return a verdict whose cited lines have their text; one that loses nothing, or cites none, stays as it is."""
+    if not verdict.status.is_lost or not any(isinstance(c, FileCitation) for c in verdict.citations):
+        return verdict
+    cited = tuple(_with_text(citation, build) for citation in verdict.citations)
+    return verdict.model_copy(update={"citations": cited})
+
+
+def _with_text(citation: Citation, build: Run) -> Citation:
+    if not isinstance(citation, FileCitation) or citation.line is None:
+        return citation
+    if citation.line == 1 and citation.column is None:
+        return citation  # it stands for the whole file
+    lines = build.file_lines(citation.file)
+    text = lines[citation.line - 1].rstrip() if 0 < citation.line <= len(lines) else ""
+    if not text.strip() or len(text) > LINE_CHARS:
+        return citation
+    if not citation.source:
+        return citation.model_copy(update={"source": text})
+    if citation.end_column is None or text.strip() != citation.source:
+        return citation
+    # Python prints a line without its indentation, and its carets stand below that
+    indent = len(text) - len(text.lstrip())
+    begin, end = (citation.column or 1) + indent, citation.end_column + indent
+    return citation.model_copy(update={"source": text, "column": begin, "end_column": end})

@@ -1,0 +1,277 @@
+"""What a node or a launch file would be marked down for next, once the mistake that hides it is fixed.
+
+The verdicts of a submission come in; in those that could not judge a node, the hint goes on with what its sources show.
+Only plain values in sources count, no status changes, and what a check says of what it saw is none of this file's.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import PurePosixPath
+
+from grader.checks.messages import code_of
+from grader.checks.support.console_output import probes_on
+from grader.checks.support.launch import NOT_STARTED, find_launch, refusal, refusals, unset_arg_fixes
+from grader.checks.support.launch_names import find_renaming
+from grader.checks.support.missing_names import name_slip
+from grader.checks.support.text import (
+    SAID_DATA,
+    SAID_VALUE,
+    SECONDS,
+    VALUE,
+    could_say,
+    in_language,
+    in_source,
+    in_words,
+    says,
+    texts_in,
+    texts_of_cpp,
+)
+from grader.evidence.events import PACKAGE_RUN
+from grader.evidence.run import Run
+from grader.installable import NOTHING_TO_DO
+from grader.judging.cited_lines import LINE_CHARS, LINES_READ
+from grader.judging.facts import SOURCES, Facts, scripts_of, sources_of
+from grader.model.package import PackageFacts, PythonSlip
+from grader.model.verdict import Verdict
+from grader.rubric.model import Criterion, Rubric
+from grader.wording import join_words, significant
+
+NAMES_SHOWN = 3
+OF_LAUNCHES = ("launch-runs", "launch-connects")
+OF_TOPICS = ("hears", "topic-type")
+"""Checks that say by themselves that a node is on another topic, and not of which type."""
+RATE_SHARE = 0.05
+"""By so much a rate that a script asks for may differ from the right one."""
+
+
+def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Facts) -> dict[str, Verdict]:
+    """Return the verdicts; where there was nothing to judge of a node, the hint goes on with what its source shows of
+    the criteria that were not reached."""
+    later: dict[str, list[str]] = {}
+    retyped: dict[str, tuple[str, str]] = {}
+    for criterion in rubric.criteria:
+        verdict = verdicts[criterion.id]
+        package = facts.package_of(criterion)
+        if (
+            package is None
+            or criterion.visibility != "visible"
+            or not (verdict.status.is_lost or verdict.of_machine)
+        ):
+            continue
+        told = later.setdefault(verdict.blocked_by or criterion.id, [])
+        if verdict.blocked_by and criterion.check == "launch-runs":
+            own = _of_its_file(criterion, verdicts, rubric)
+            for one in _later_in_launch(criterion, package, facts):
+                later.setdefault(own or verdict.blocked_by, []).append(
+                    one if own else f"for {criterion.id}, {one}"
+                )
+        elif criterion.check in OF_LAUNCHES and (
+            file := find_launch(package, str(criterion.parameters["launch"]))
+        ):
+            told += unset_arg_fixes(file, verdict.hint)
+        elif verdict.unjudged or verdict.of_machine or criterion.check in OF_TOPICS:
+            own_later = Later(criterion, verdict, package, facts)
+            told += own_later.faults()
+            retyped |= own_later.retyped
+    return {name: _with_later(verdict, later.get(name, ()), retyped) for name, verdict in verdicts.items()}
+
+
+def _of_its_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: Rubric) -> str | None:
+    """Return the criterion that is lost by the launch file itself: what comes next in the file is told there."""
+    file = launched.parameters.get("launch")
+    of_file = (c.id for c in rubric.criteria if c.scenario is None and c.parameters.get("launch") == file)
+    return next((i for i in of_file if verdicts[i].status.is_lost and not verdicts[i].blocked_by), None)
+
+
+def _imports_again(fix: str, hint: str) -> bool:
+    """Return whether it is an import that the hint has already, in other words."""
+    code = re.findall(r"`((?:import|from) [^`]+)`", fix)
+    return bool(code) and fix.endswith("at the top") and all(f"`{one}`" in hint for one in code)
+
+
+def _with_later(verdict: Verdict, later: Iterable[str], retyped: Mapping[str, tuple[str, str]]) -> Verdict:
+    hint, said = verdict.hint, in_language(verdict.hint, "python")
+    new = [one for one in dict.fromkeys(later) if one.removeprefix("publish ") not in said]
+    told = [one for one in new if not _imports_again(one, hint)]
+    if not told or not hint:
+        return verdict
+    # what is not wanted is not imported first
+    for wanted, other in (retyped[one] for one in told if one in retyped):
+        package, _, name = wanted.partition("/")
+        hint = re.sub(rf"from \w+\.msg import {other}\b", f"from {package}.msg import {name}", hint)
+    if verdict.of_machine:
+        hint = f"{join_words(told)}. {hint.replace(NOTHING_TO_DO, 'For the rest, ', 1)}"
+        return verdict.model_copy(update={"hint": hint})
+    return verdict.model_copy(update={"hint": f"{hint}; then {join_words(told)}"})
+
+
+class Later:
+    """What a criterion that was not reached would be lost by next, as far as the sources say so in plain values."""
+
+    def __init__(self, criterion: Criterion, verdict: Verdict, package: PackageFacts, facts: Facts) -> None:
+        self._criterion, self._verdict, self._package = criterion, verdict, package
+        self._rubric, self._run = facts.rubric, facts.runs.get(criterion.scenario or "")
+        self._build = facts.runs.get(PACKAGE_RUN)
+        self._wanted = criterion.parameters
+        self._topic = str(self._wanted.get("topic", ""))
+        scripts = scripts_of(criterion, facts.rubric, package)
+        self._slips = [slip for slip in package.slips if slip.file in scripts]
+        self._paths = scripts | sources_of(criterion, facts.rubric, package)
+        self._slips += self._texts_of_cpp()
+        self._ran = not verdict.cause
+        """Names are told already then, and only what is behind them is not."""
+        self.retyped: dict[str, tuple[str, str]] = {}
+        """Of faults of a type: the one that the lab wants, and the one that the script has."""
+
+    def faults(self) -> Iterator[str]:
+        """Yield how each is repaired."""
+        by_check = {
+            "rate": self._rate, "node-name": self._node_name, "hears": self._heard, "topic-type": self._published,
+            "message": self._message, "logs": self._logged, "copies": self._copied,
+        }  # fmt: skip
+        if not self._ran:
+            yield from self._names()
+        yield from by_check[self._criterion.check]() if self._criterion.check in by_check else ()
+
+    def _of(self, *kinds: str) -> list[PythonSlip]:
+        return [slip for slip in self._slips if slip.kind in kinds]
+
+    def _texts_of_cpp(self) -> Iterator[PythonSlip]:
+        for path in sorted(path for path in self._paths if PurePosixPath(path).suffix in SOURCES):
+            lines = self._build.file_lines(path)[:LINES_READ] if self._build is not None else []
+            for kind, line, text in texts_of_cpp(text[:LINE_CHARS] for text in lines):
+                yield PythonSlip(file=path, line=line, kind=kind, message=text)
+
+    def _names(self) -> Iterator[str]:
+        """Names that are not there; an `except` of one is not reached."""
+        for slip in self._of("misspelt", "undefined"):
+            lines = self._build.file_lines(slip.file) if self._build is not None else []
+            caught = slip.line <= len(lines) and lines[slip.line - 1].lstrip().startswith("except")
+            if (one := name_slip(slip, self._package)) is not None and not caught:
+                yield one.fix
+
+    def _rate(self) -> Iterator[str]:
+        hz, numbers = float(str(self._wanted["rate_hz"])), self._of("rate-number")
+        if len(numbers) == 1 and abs(float(numbers[0].message) - hz) > RATE_SHARE * hz:
+            yield f"make it {significant(hz)} Hz on {_line(numbers[0])}, which asks for {numbers[0].message} Hz"
+        for slip in self._of("not-called"):
+            if "sleep" in slip.name:
+                yield f"on {_line(slip)}, {slip.fix}"
+
+    def _node_name(self) -> Iterator[str]:
+        own, names = self._of("node-name"), list(texts_in(self._wanted.get("names")))
+        if self._ran or len(own) != 1 or not names or f"init_node('{names[0]}'" in self._verdict.hint:
+            return
+        if own[0].message.lstrip("/") not in names:
+            yield f"name the node {names[0]} on {_line(own[0])}, not {own[0].message}"
+        if own[0].name == "anonymous" and self._wanted.get("anonymous") == "forbidden":
+            yield f"remove anonymous=True from {_line(own[0])}"
+
+    def _copied(self) -> Iterator[str]:
+        started = [one.script for one in self._rubric.scenarios[self._criterion.scenario or ""].start]
+        twice = {PurePosixPath(one).name for one in started if one and started.count(one) > 1}
+        for slip in self._of("node-name"):
+            if PurePosixPath(slip.file).name in twice and not slip.name:
+                yield f"write anonymous=True on {_line(slip)}, since two of it run at once"
+
+    def _published(self) -> Iterator[str]:
+        published, kind = self._of("publisher"), str(self._wanted.get("type", ""))
+        lines = [one.line for one in published if f"/{one.message.lstrip('/')}" == self._topic]
+        if len(published) == 1 and not lines and not self._ran:
+            yield f"publish on {self._topic} on {_line(published[0])}, not on {published[0].message}"
+        if len(published) > 1 and not lines:
+            names = join_words(f"{one.message} (line {one.line})" for one in published[:NAMES_SHOWN])
+            yield f"publish {kind} on {self._topic}: {published[0].file} publishes on {names}"
+        types = [one for one in self._of("publisher-type") if one.line in lines or len(published) <= 1]
+        types = types if not (self._ran and lines) else []
+        if len(types) == 1 and types[0].message != kind.rpartition("/")[2]:
+            yield self._retype("publish", kind, types[0])
+
+    def _heard(self) -> Iterator[str]:
+        scenario = self._rubric.scenarios.get(self._criterion.scenario or "")
+        probes = scenario.probes if scenario is not None else ()
+        sent = [probe.type for probe in probes if probe.topic == self._topic]
+        heard, types = self._of("subscriber"), self._of("subscriber-type")
+        own = sent[0].rpartition("/")[2] if sent else ""
+        elsewhere = len(heard) == 1 and f"/{heard[0].message.lstrip('/')}" != self._topic
+        if elsewhere and not self._ran:
+            yield f"subscribe to {self._topic} on {_line(heard[0])}, not to {heard[0].message}"
+        other = sent and len(types) == 1 and types[0].message != own
+        if other and (elsewhere or (not heard and f"/{types[0].message}" not in self._verdict.message)):
+            yield self._retype("subscribe with", sent[0], types[0])
+        template, said = str(self._wanted.get("template", VALUE)), self._of("prints")
+        said = [one for one in said if SAID_DATA in one.message]
+        unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
+        if not unheard or template == VALUE or any(says(one.message, template) for one in said):
+            return
+        if len(said) == 1 >= len({one.line for one in heard}):  # else it may be another callback
+            yield f"print '{in_words(template)}' on {_line(said[0])}, not '{in_source(said[0].message)}'"
+        elif self._lacks_words(template.partition(VALUE)[0]):
+            yield f"print '{in_words(template)}'"
+        elif other and not said and len(self._of("prints")) == 1:  # a field that the right type does not have
+            yield f"print the `data` of the message on {_line(self._of('prints')[0])}"
+
+    def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> str:
+        fault = f"{verb} {wanted} on {_line(slip)}, not {slip.message}"
+        self.retyped[fault] = wanted, slip.message
+        return fault
+
+    def _lacks_words(self, words: str) -> bool:
+        """Return whether the words stand in no line of the sources, which are known."""
+        lines = [
+            line.partition("#" if path.endswith(".py") else "//")[0]
+            for path in self._paths
+            for line in (self._build.file_lines(path) if self._build is not None else ())
+        ]
+        return bool(lines) and not any(
+            words.strip().casefold() in " ".join(line.split()).casefold() for line in lines
+        )
+
+    def _message(self) -> Iterator[str]:
+        template = str(self._wanted.get("template", ""))
+        said = list({one.message: one for one in self._of("publishes")}.values())
+        code = in_language(code_of(template), "python")
+        if len(said) != 1:
+            if not said and self._lacks_words(template.partition(SECONDS)[0]):
+                yield f"publish `{code}`"
+            return
+        text = said[0].message
+        if text in {SAID_VALUE, SAID_DATA} and self._lacks_words(template.partition(SECONDS)[0]):
+            yield f"publish `{code}` on {_line(said[0])}"
+        if len(self._of("publisher")) > 1:  # it may be another topic's
+            yield f"publish `{code}`"
+            return
+        sample = template.replace(SECONDS, "1234567890.25")
+        if not could_say(text, sample):
+            words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code
+            yield f"publish `{words}` on {_line(said[0])}, not '{in_source(text)}'"
+        elif SECONDS in template and self._of("no-clock"):
+            yield f"publish the time on {_line(said[0])}, `{code}`: the script only counts"
+
+    def _logged(self) -> Iterator[str]:
+        text, said = str(self._wanted.get("text", "")), self._of("prints")
+        if len(said) == 1 and "{" not in said[0].message and text not in said[0].message:
+            yield f"log {text!r} on {_line(said[0])}, not {said[0].message!r}"
+
+
+def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) -> Iterator[str]:
+    """Yield what a launch file would be lost by next: what roslaunch said of it, and namespaces of the lab's nodes."""
+    wanted, run = criterion.parameters, facts.runs.get(criterion.scenario or "")
+    file = find_launch(package, str(wanted.get("launch", "")))
+    names = {PurePosixPath(script).name for script in texts_in(wanted.get("scripts"))}
+    if file is None or file.fault is not None:
+        return
+    refused = refusal(run, package) if isinstance(run, Run) else None
+    if refused is not None and refused.refused != NOT_STARTED and not any(refusals(package, file)):
+        yield f"{refused.hint}: {refused.why}"
+    yield from unset_arg_fixes(file, refused.hint if refused is not None else "")
+    nodes = [one for one in file.brings if one.type in names]
+    if topic := wanted.get("topic"):
+        renaming = find_renaming(package, nodes, str(topic))
+        yield from [f"in {file.path} {renaming.fix}"] if renaming else []
+
+
+def _line(slip: PythonSlip) -> str:
+    return f"line {slip.line} of {slip.file}"
