@@ -330,6 +330,8 @@ def _why_unnamed(
     if near:
         one = names[near[0]]
         why = f"line {one.call.line}: {shown(one.path)} is named, but does not exist; the script is {path}"
+        if one.path.rstrip(",;") == path:
+            why = f"line {one.call.line}: in {shown(one.path)}, the {one.path[-1]} counts as part of the name"
         return Lack(why, f"write {path} in place of {shown(one.path)}", _line(one))
     why = "catkin_install_python(…) does not name {}"
     if any(one.kind == "PROGRAMS" and is_bin(one.destination or "", package) for one in of_python):
