@@ -252,7 +252,9 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     callers = (c.callerid for c in run.student_channels(params.topic))
     if slow := _asked_slow(found, run, package, params):
         return slow
-    slip = next((s for one in callers for s in slips_of(package, run, one, "spin-in-loop")), None)
+    slip = next(
+        (s for one in callers for s in slips_of(package, run, one, "spin-in-loop", "unregistered")), None
+    )
     if slip is not None:
         return failed(f"{message}: {slip.message}", hint=slip.fix, citations=(slip.place,))
     hint = f"publish in a loop `{LOOP}`, not a fixed number of times"
@@ -303,7 +305,8 @@ def _by_number(
 def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdict:
     """Return the verdict with the line that asks for another rate."""
     where = f"{slip.file}, line {slip.line}"
-    message = f"{verdict.message}; {where} asks for {slip.message} Hz"
+    said = f"{slip.name}(…) is given two numbers: {slip.fix}" if slip.fix else f"asks for {slip.message} Hz"
+    message = f"{verdict.message}; {where} {said}" if not slip.fix else f"{verdict.message}; {where}: {said}"
     right = f"{slip.name}({significant(1 / params.rate_hz)})" if slip.name else ""
     right = right or loop_rate(significant(params.rate_hz))
     hint = f"make it {significant(params.rate_hz)} Hz in {where}: use {right}"

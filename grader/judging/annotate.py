@@ -18,6 +18,7 @@ from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch import (
     NOT_STARTED,
     find_launch,
+    later_fixes,
     node_slip,
     not_executable,
     own_script,
@@ -174,7 +175,9 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
         ):
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
-        if verdict.blocked_by and criterion.check == "launch-runs":
+        if verdict.blocked_by and criterion.check == "launch-xml":
+            told += [f"for {criterion.id}, {one}" for one in _later_in_file(criterion, package)]
+        elif verdict.blocked_by and criterion.check == "launch-runs":
             own = _of_its_file(criterion, verdicts, rubric)
             for one in _later_in_launch(criterion, package, facts):
                 later.setdefault(own or verdict.blocked_by, []).append(
@@ -369,6 +372,14 @@ class Later:
             yield f"log {text!r} on {_line(said[0])}, not {said[0].message!r}"
 
 
+def _later_in_file(criterion: Criterion, package: PackageFacts) -> Iterator[str]:
+    """Yield what a launch file would be lost by once the scripts that it lacks are written."""
+    file = find_launch(package, str(criterion.parameters.get("launch", "")))
+    if file is not None:
+        for script in texts_in(criterion.parameters.get("scripts")):
+            yield from later_fixes(file, script)
+
+
 def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) -> Iterator[str]:
     """Yield what a launch file would be lost by next: what roslaunch said of it, and namespaces of the lab's nodes."""
     wanted, run = criterion.parameters, facts.runs.get(criterion.scenario or "")
@@ -453,6 +464,32 @@ def cite_words(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run)
         return verdict
     place = FileCitation(file=found[0].file, line=found[0].number)
     return verdict.model_copy(update={"citations": (place, *verdict.citations)})
+
+
+def cite_quoted(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
+    """Return the verdict; one on a name that a script has in quotes in place of another one cites its lines."""
+    package, names = facts.package_of(criterion), verdict.sought_names("quoted")
+    placed = any(isinstance(one, FileCitation) for one in verdict.citations)
+    if package is None or package is not facts.package or not names or placed or not verdict.status.is_lost:
+        return verdict
+    quoted = re.compile(rf"""(["'])(?:{"|".join(map(re.escape, names))})\1""")
+    paths = sorted(
+        scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
+    )
+    places = [
+        FileCitation(file=path, line=number)
+        for path in paths
+        for number, text in enumerate(build.file_lines(path)[:_LINES_READ], 1)
+        if len(text) <= LINE_CHARS and quoted.search(text)
+    ]
+    if not 0 < len(places) <= QUOTED_MAX:
+        return verdict
+    where = join_words(f"line {one.line} of {one.file}" for one in places)
+    update = {"hint": f"on {where}: {verdict.hint}", "citations": (*places, *verdict.citations)}
+    return verdict.model_copy(update=update)
+
+
+QUOTED_MAX = 3
 
 
 def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: Run) -> Verdict:

@@ -32,6 +32,7 @@ from grader.judging.annotate import (
     cite_commented_call,
     cite_find,
     cite_name,
+    cite_quoted,
     cite_words,
     fill_slots,
     show_lines,
@@ -113,6 +114,7 @@ def judge_all_runs(
     if build is not None:
         for criterion in rubric.criteria:
             placed = cite_words(verdicts[criterion.id], criterion, facts, build)
+            placed = cite_quoted(placed, criterion, facts, build)
             placed = cite_commented_call(placed, facts.package_of(criterion), build)
             placed = cite_find(placed, criterion, facts.package_of(criterion), build)
             shown[criterion.id] = show_lines(cite_name(placed, build), build)

@@ -43,6 +43,8 @@ OBVIOUS_NAMES = {
 }
 NAME_CHARS_MIN = 4
 """Shorter names differ by one letter because they are different names."""
+SIZE = re.compile(r"^U|\d+")
+"""What sets number types of one kind apart: `UInt8`, `Int16`."""
 SLIP_CHARS = 3
 OF_ROS = {
     "rosbag", "roscpp", "rosgraph", "roslaunch", "roslib", "rosmsg", "rosnode", "rosparam", "rospkg", "rosservice",
@@ -66,6 +68,7 @@ ROSPY = frozenset(NAMES_OF_ROSPY.split())
 GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "logerr")
 LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
 CALLED = frozenset({"is_shutdown", "sleep", "spin"})
+QUOTED = re.compile(r"[\w.]+\.(sleep|spin)\([\w.]*\)")
 TAKE_FUNCTIONS = {"Subscriber", "Timer", "Service", "on_shutdown", "signal"}
 ROLES = {
     "Publisher": "publisher",
@@ -107,6 +110,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             _with_attributes,
             _with_values_called,
             _with_calls,
+            _with_quoted_calls,
             _with_callbacks,
             _with_main,
             _with_spin,
@@ -270,6 +274,9 @@ def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
             after = _import_meant(text, name) or _add_import(text, f"import {name}", "", "")
         elif name in of_messages:
             after = _add_import(text, f"import {of_messages[name]}", "", "")
+        elif name in packages and (meant := _imported_instead(tree, name, packages[name], types)):
+            yield from _with_class(text, name, meant)
+            return
         elif name in packages:
             after = _add_import(
                 text, f"from {packages[name]}.msg import {name}", f"{packages[name]}.msg", name
@@ -279,6 +286,27 @@ def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
         for step in _step("import", missing[name], text, after, name):
             text = step["text"]
             yield step
+
+
+def _imported_instead(tree: ast.Module, name: str, package: str, types: list[str]) -> str:
+    """Return the lab's type that the script imports and never uses, where it uses another size of it: Int8 for Int16;
+    "" where there is none."""
+    of_lab = {kind.partition("/")[2] for kind in types if kind.startswith(f"{package}/")}
+    froms = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module == f"{package}.msg"]
+    imported = {a.name for n in froms for a in n.names if a.asname is None}
+    used = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
+    same = (one for one in sorted(imported & of_lab - used) if SIZE.sub("", one) == SIZE.sub("", name))
+    return "" if name in of_lab else next(same, "")
+
+
+def _with_class(text: str, name: str, meant: str) -> Iterator[Step]:
+    """`Int8` in place of each `Int16`."""
+    lines = text.split("\n")
+    uses = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name) and n.id == name]
+    spans = [span for n in uses if (span := _span(lines, n))]
+    if spans:
+        after = _edit(text, [(*span, meant) for span in spans])
+        yield from _step("name", min(spans)[0] + 1, text, after, name)
 
 
 def _import_meant(text: str, name: str) -> str:
@@ -411,6 +439,18 @@ def _with_calls(text: str) -> Iterator[Step]:
         yield from _step("call", min(spans)[0] + 1, text, after, ", ".join(words))
 
 
+def _with_quoted_calls(text: str) -> Iterator[Step]:
+    """`"rospy.spin()"`: a call that stands alone in quotes."""
+    lines = text.split("\n")
+    for node in ast.walk(ast.parse(text)):
+        value = node.value if isinstance(node, ast.Expr) else None
+        code = value.value if isinstance(value, ast.Constant) and isinstance(value.value, str) else ""
+        span = _span(lines, value) if value is not None and QUOTED.fullmatch(code) else None
+        if span is not None:
+            yield from _step("quoted", span[0] + 1, text, _edit(text, [(*span, code)]), code)
+            return
+
+
 def _uncalled_expressions(node: ast.AST) -> Iterator[ast.expr]:
     """Yield what stands there by itself and says nothing: a statement, or a condition."""
     if isinstance(node, ast.Expr):
@@ -527,7 +567,7 @@ def _names(text: str) -> list[dict[str, Any]]:
     if syntax_error(text) is not None:
         return []
     tree, lines = ast.parse(text), text.split("\n")
-    constants = _constants(tree)
+    constants, keys = _constants(tree), _keys_read(tree)
     found = []
     for role, node in _named_texts(tree):
         given = constants.get(node.id) if isinstance(node, ast.Name) else node
@@ -536,7 +576,20 @@ def _names(text: str) -> list[dict[str, Any]]:
         span = _span(lines, given)
         if span is not None and _is_literal(lines[span[0]][span[1] : span[2]], given.value):
             place = {"line": span[0] + 1, "start": span[1], "end": span[2]}
-            found.append({"role": role, "value": given.value, **place})
+            found.append({"role": role, "value": given.value, **place, "keys": keys.get(id(node), [])})
+    return found
+
+
+def _keys_read(tree: ast.Module) -> dict[int, list[str]]:
+    """Return for the first argument of a call, by its identity, the keys that are read of what the call gives:
+    `first` of `get_param('name')['first']`, and of `name['first']` below `name = get_param('name')`."""
+    calls = {ast.unparse(n.targets[0]): n.value for n in ast.walk(tree) if isinstance(n, ast.Assign)}
+    found: dict[int, list[str]] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
+            of = node.value if isinstance(node.value, ast.Call) else calls.get(ast.unparse(node.value))
+            if isinstance(of, ast.Call) and of.args and isinstance(node.slice.value, str):
+                found.setdefault(id(of.args[0]), []).append(node.slice.value)
     return found
 
 

@@ -322,6 +322,18 @@ CASES = {
         after={"config/my.yaml": "\n  y"},
     ),
     "key-at-its-level": Case({"config/my.yaml": LEVELS.replace("\n  y", "\n    y")}, [], wanted=NESTED),
+    "dots-for-slashes": Case(
+        swapped(TALKER, ("    rate = ", "    name = rospy.get_param('details.name')\n    rate = ")), ["parameter-name"],
+        "the parameter details.name should be /details/name", after={TALKER: "get_param('details/name')"},
+    ),
+    "dots-where-the-next-line-reads-a-key": Case(
+        swapped(TALKER, ("    rate = ", "    d = rospy.get_param('details.name')\n    print(d['name'])\n    rate = ")),
+        ["parameter-name"], "the parameter details.name should be /details", after={TALKER: "get_param('details')"},
+    ),
+    "call-in-quotes": Case(swapped(TALKER, ("rate.sleep()", "'rate.sleep()'")), ["missing-call"],
+                           "rate.sleep() is in quotes", after={TALKER: "        rate.sleep()"}),
+    "type-that-is-imported": Case(swapped(TALKER, ("'numeric_chatter', Int8", "'numeric_chatter', Int16")),
+                                  ["missing-call"], "Int16 is not defined", after={TALKER: "'numeric_chatter', Int8"}),
     "spin": Case({TALKER: SPINS}, ["missing-call"], after={TALKER: "Int8, print)\n    rospy.spin()\n"}),
     "launch-file-by-what-it-starts": Case(
         {LAUNCHED: None, "src/trial.launch": LAUNCH}, ["file-name"], wanted=STARTED,

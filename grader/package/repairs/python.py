@@ -30,9 +30,9 @@ ATTEMPTS = 3
 
 Cause = Literal[
     "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
-    "old-name", "module", "import", "name", "attribute", "value", "call", "callback", "guard", "main", "spin",
+    "old-name", "module", "import", "name", "attribute", "value", "call", "quoted", "callback", "guard", "main", "spin",
 ]  # fmt: skip
-CALLS = ("name", "attribute", "value", "call", "callback", "guard", "main", "spin")
+CALLS = ("name", "attribute", "value", "call", "quoted", "callback", "guard", "main", "spin")
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "import"), "missing-import"),
     **dict.fromkeys(CALLS, "missing-call"),
@@ -56,13 +56,15 @@ class _Step(Record):
 
 
 class Name(Record):
-    """A text in a script that names something; `start` and `end` are columns of its line, from 0."""
+    """A text in a script that names something; `start` and `end` are columns of its line, from 0. `keys` are those that
+    the script reads of a parameter."""
 
     role: Literal["publisher", "subscriber", "node", "param", "set-param", "key"]
     value: str
     line: int
     start: int
     end: int
+    keys: tuple[str, ...] = ()
 
 
 class _Entry(Record):
@@ -205,6 +207,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "attribute": ("{place}: there is no {word}", ""),
     "value": ("{place}: {word} is given a value with `=`, and has to be called", ""),
     "call": ("{place}: {word} is named but not called", "write {calls}"),
+    "quoted": ("{place}: {word} is in quotes, so it never runs", ""),
     "callback": ("{place}: {calls} is called where the function itself is meant", ""),
     "guard": ("{place}: `__name__` is never {word!r}", ""),
     "main": ("{place}: nothing calls {calls}", "add `if __name__ == '__main__':`, and {calls} below it"),
