@@ -446,6 +446,7 @@ def test_slips_that_hide_what_was_meant(tmp_path, text, kinds):
         ("from nosuch import rate\nrate = 10\nprint(rate)\n", ["unused-import", "lacking-import"]),
         ("import nosuch as n\nprint(n)\n", ["lacking-import"]),
         ("from json import dumps\n", ["unused-import"]),
+        ("from json import rate\nrate = 10\nprint(rate)\n", ["unused-import"]),
         ("from nosuch import *\n", ["lacking-import"]),
         ("from . import nosuch\nimport os\n", []),
         ("try:\n    import nosuch\nexcept ImportError:\n    pass\n", []),
@@ -468,3 +469,22 @@ def test_the_second_number_of_a_duration_counts_nanoseconds(tmp_path, pause, hz)
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "rate-number"]
     assert [s.message for s in slips] == [hz]
     assert all(("nanoseconds" in s.fix) == (pause.startswith("0, ")) for s in slips)
+
+
+@pytest.mark.parametrize(
+    ("code", "fixes"),
+    [
+        ("buffer.lookup_transform(odom, laser, rospy.Time(0))", ["'odom'", "'laser'"]),
+        ("base.child_frame_id = base_link", ["'base_link'"]),
+        ("rospy.Publisher(chatter, String, queue_size=1)", ["'chatter'"]),
+        ("rospy.init_node(talker)", ["'talker'"]),
+        ("chatter = 'chatter'\nrospy.Publisher(chatter, String, queue_size=1)", []),
+        ("print(chatter)", []),
+    ],
+)
+def test_names_that_ros_is_given_without_quotes(tmp_path, code, fixes):
+    (tmp_path / "a.py").write_text(
+        f"import rospy, tf2_ros\nfrom std_msgs.msg import String\nbuffer = base = 1\n{code}\n"
+    )
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if "without quotes" in s.message]
+    assert [s.fix for s in slips] == [f"on line 4, write `{fix}`" for fix in fixes]

@@ -598,7 +598,7 @@ def imports(tree):
         )
         module = modules[0].partition(".")[0]
         bound = [alias.asname or alias.name.partition(".")[0] for alias in node.names]
-        if len(modules) > 1 or getattr(node, "level", 0) or module in PLAIN_MODULES:
+        if len(modules) > 1 or getattr(node, "level", 0) or module in PLAIN_MODULES - {"numpy"}:
             continue
         if not used.intersection(bound) and bound != ["*"] and "__all__" not in used:
             fix = "delete line %d: nothing in the script uses `%s`" % (node.lineno, "`, `".join(bound))
