@@ -69,6 +69,7 @@ GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "lo
 LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
 CALLED = frozenset({"is_shutdown", "sleep", "spin"})
 QUOTED = re.compile(r"[\w.]+\.(sleep|spin)\([\w.]*\)")
+OF_TWO_FRAMES = {"lookup_transform", "can_transform", "lookupTransform", "canTransform", "waitForTransform"}
 TAKE_FUNCTIONS = {"Subscriber", "Timer", "Service", "on_shutdown", "signal"}
 ROLES = {
     "Publisher": "publisher",
@@ -106,6 +107,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             lambda t: _with_modules(t, types),
             lambda t: _with_classes(t, types),
             lambda t: _with_imports(t, types),
+            _with_quotes,
             _with_names,
             _with_attributes,
             _with_values_called,
@@ -365,6 +367,58 @@ def _with_names(text: str) -> Iterator[Step]:
                     yield step
                     yield from _with_names(text)
                     return
+
+
+def _with_quotes(text: str) -> Iterator[Step]:
+    """`Publisher(chatter, …)`, for `Publisher('chatter', …)`: a name without a value, where ROS is told one; and
+    `details[name]`, where the name stands for a key of parameters."""
+    tree, lines = ast.parse(text), text.split("\n")
+    known = _bound(tree) | set(dir(builtins))
+    if "*" in known:
+        return
+    stored: dict[str, list[int]] = {}
+    for name in (n for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)):
+        stored.setdefault(name.id, []).append(name.lineno)
+    texts = [n for n in _texts_of_ros(tree) if isinstance(n, ast.Name)]
+    missing = [n for n in texts if n.id not in known and not _meant_by(n.id, set(stored))]
+    assigned = [n for n in ast.walk(tree) if isinstance(n, ast.Assign)]
+    own = {id(inner): _last(n.targets[0]) for n in assigned for inner in ast.walk(n.value)}
+    keys = [
+        n
+        for n in _keys_of_parameters(tree)
+        if n.id not in known or (stored.get(n.id) == [n.lineno] and own.get(id(n)) == n.id)
+    ]
+    spans = [(span, n.id) for n in (*missing, *keys) if (span := _span(lines, n))]
+    if spans:
+        after = _edit(text, [(*span, f"'{name}'") for span, name in spans])
+        words = ", ".join(dict.fromkeys(name for _, name in sorted(spans)))
+        yield from _step("quotes", min(spans)[0][0] + 1, text, after, words)
+
+
+def _texts_of_ros(tree: ast.Module) -> Iterator[ast.expr]:
+    """Yield what stands where ROS is told the name of a node, a topic, a parameter or a frame."""
+    yield from (node for _, node in _named_texts(tree))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and _last(node.func) in OF_TWO_FRAMES:
+            yield from node.args[:2]
+        elif isinstance(node, ast.Assign) and _last(node.targets[0]) in ("frame_id", "child_frame_id"):
+            yield node.value
+
+
+def _keys_of_parameters(tree: ast.Module) -> Iterator[ast.Name]:
+    """Yield the names in the brackets behind what `get_param(…)` gives."""
+    read = {
+        ast.unparse(n.targets[0])
+        for n in ast.walk(tree)
+        if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call) and _last(n.value.func) == "get_param"
+    }
+    for node in ast.walk(tree):
+        root: ast.expr | None = node if isinstance(node, ast.Subscript) else None
+        while isinstance(root, ast.Subscript):
+            root = root.value
+        of_call = isinstance(root, ast.Call) and _last(root.func) == "get_param"
+        if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Name) and root is not None:
+            yield from [node.slice] if of_call or ast.unparse(root) in read else []
 
 
 def _meant_by(name: str, own: set[str]) -> str:

@@ -478,13 +478,14 @@ def test_the_second_number_of_a_duration_counts_nanoseconds(tmp_path, pause, hz)
         ("base.child_frame_id = base_link", ["'base_link'"]),
         ("rospy.Publisher(chatter, String, queue_size=1)", ["'chatter'"]),
         ("rospy.init_node(talker)", ["'talker'"]),
+        ("def talk():\n    pass\nrospy.init_node(talker)", ["'talker'"]),
         ("chatter = 'chatter'\nrospy.Publisher(chatter, String, queue_size=1)", []),
         ("print(chatter)", []),
     ],
 )
 def test_names_that_ros_is_given_without_quotes(tmp_path, code, fixes):
-    (tmp_path / "a.py").write_text(
-        f"import rospy, tf2_ros\nfrom std_msgs.msg import String\nbuffer = base = 1\n{code}\n"
-    )
+    text = f"import rospy\nfrom std_msgs.msg import String\nbuffer = base = 1\n{code}\n"
+    (tmp_path / "a.py").write_text(text)
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if "without quotes" in s.message]
-    assert [s.fix for s in slips] == [f"on line 4, write `{fix}`" for fix in fixes]
+    last = text.count("\n")
+    assert [s.fix for s in slips] == [f"on line {last}, write `{fix}`" for fix in fixes]

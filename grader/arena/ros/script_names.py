@@ -99,6 +99,7 @@ def misspelt(tree):
     outside = {id(n) for n in outside_methods(tree)}
     unbound = unbound_names(tree, known)
     keys, texts = without_quotes(tree, known), where_texts_stand(tree)
+    stored = {n.id for n in names if isinstance(n.ctx, ast.Store)}
     for node in names:
         if id(node) in outside and (node.id == "self" or node.id not in known):
             message = "line %d is in the class, but in none of its methods, so it runs before them"
@@ -108,7 +109,9 @@ def misspelt(tree):
             message = "the key `%s` is written here without quotes" % node.id
             fix = "on line %d, write `%s`" % (node.lineno, keys[id(node)])
             yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
-        elif node.id not in known and (near := spelt_alike(node.id, own, attributes)):
+        elif node.id not in known and (
+            near := spelt_alike(node.id, stored if id(node) in texts else own, attributes)
+        ):
             fix = "write %s instead of %s" % (near, node.id)
             yield slip(node.lineno, "misspelt", "did you mean %s?" % near, fix=fix, name=node.id)
         elif node.id not in known and (argument := unread_argument(node, tree)):

@@ -291,13 +291,17 @@ def call_in_comment(package: PackageFacts, run: Run, call: str) -> PythonSlip | 
     return next((s for s in found if s.name.rpartition(" ")[2] == call), None)
 
 
-def copied_topic(package: PackageFacts, run: Run, kind: Literal["publisher", "subscriber"]) -> str:
-    """Return the lines of one running script that name the same topic: one is copied and not changed; "" for none."""
+def copied_topic(
+    package: PackageFacts, run: Run, kind: Literal["publisher", "subscriber"], topic: str = ""
+) -> str:
+    """Return the lines of one running script that name the same topic, this one if any is given: one is copied and not
+    changed; "" for none."""
     scripts = {one.start.script for one in lives(run)}
     places: dict[tuple[str, str], list[int]] = {}
     for slip in package.slips:
-        if slip.kind == kind and slip.file in scripts:
-            places.setdefault((slip.file, slip.message.strip("/")), []).append(slip.line)
+        name = slip.message.strip("/")
+        if slip.kind == kind and slip.file in scripts and name == (topic.strip("/") or name):
+            places.setdefault((slip.file, name), []).append(slip.line)
     found = ((file, sorted(set(lines))) for (file, _), lines in places.items())
     return next((f"lines {join_words(map(str, n))} of {file}" for file, n in found if len(n) > 1), "")
 

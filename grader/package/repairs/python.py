@@ -30,9 +30,10 @@ ATTEMPTS = 3
 
 Cause = Literal[
     "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
-    "old-name", "module", "import", "name", "attribute", "value", "call", "quoted", "callback", "guard", "main", "spin",
+    "old-name", "module", "import", "name", "quotes", "attribute", "value", "call", "quoted", "callback", "guard",
+    "main", "spin",
 ]  # fmt: skip
-CALLS = ("name", "attribute", "value", "call", "quoted", "callback", "guard", "main", "spin")
+CALLS = ("name", "quotes", "attribute", "value", "call", "quoted", "callback", "guard", "main", "spin")
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "import"), "missing-import"),
     **dict.fromkeys(CALLS, "missing-call"),
@@ -184,6 +185,8 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
         words.format(file=file, place=place, line=first.line, word=word, names=names, calls=calls, told=told)
         for words in WORDS[cause]
     )
+    if cause == "quotes":
+        fix = _rewritten(before, after)
     if cause in {"tabs", "level"}:
         fix = _required_indentation(before, after, fix)
     return said, fix if cause != "old-name" or word == "raw_input" else ""
@@ -204,6 +207,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "import": ("{place} uses {word}, which is not imported", ""),
     "module": ("{place}: messages are not imported from {word}", ""),
     "name": ("{place}: {word} is not defined", ""),
+    "quotes": ("{place}: quotes are missing around {word}", ""),
     "attribute": ("{place}: there is no {word}", ""),
     "value": ("{place}: {word} is given a value with `=`, and has to be called", ""),
     "call": ("{place}: {word} is named but not called", "write {calls}"),
