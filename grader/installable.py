@@ -29,6 +29,8 @@ ROS_2 = {
     "rosidl_runtime_py",
 }
 """No machine for ROS 1 has these."""
+OF_ROS = {"dynamic_reconfigure", "genmsg", "rosgraph_msgs", "rosunit"}
+"""Packages of ROS that Debian has for Python alone."""
 NOTHING_TO_DO = "nothing for you to do: "
 ON_THE_MACHINE = f"{NOTHING_TO_DO}tell your instructor. On the grading machine: "
 """How every hint begins that only the instructor can follow: grading again changes nothing before."""
@@ -124,14 +126,24 @@ def nearest_module(name: str, own: Collection[str]) -> str:
     return ""
 
 
-def install_hint(name: str, lines: Iterable[str] = (), *, module: bool = False) -> str:
+def is_python_module(name: str) -> bool:
+    """Return whether it is a known module of Python that is none of ROS's."""
+    return name not in OF_ROS and all(
+        one.startswith((PIP, "python3-")) for one in known_packages().get(name, ("",))
+    )
+
+
+def install_hint(
+    name: str, lines: Iterable[str] = (), *, module: bool = False, also: Iterable[str] = ()
+) -> str:
     """Return what the grading machine needs, by the distribution of ROS that these lines of output name. `module`: it
-    is imported in Python, and may be none of ROS's."""
+    is imported in Python, and may be none of ROS's; `also` are known ones besides."""
     ros = next((found[1] for found in map(_PREFIX.search, lines) if found), "")
     known, what = name in known_packages(), "module" if module else "package"
     own = "" if known else f"; a {what} of the student's own has to be pushed with this package"
     command = install_command(name, ros) if known or not module else f"install the Python module {name}"
-    return f"{ON_THE_MACHINE}{command}, then grade again{own}"
+    commands = ", ".join([command, *map(install_command, also)])
+    return f"{ON_THE_MACHINE}{commands}, then grade again{own}"
 
 
 def install_command(name: str, ros: str = "") -> str:

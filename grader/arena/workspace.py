@@ -30,6 +30,7 @@ from grader.model.submission import SourcePackage, Submission
 from grader.package.manifest import read_manifest
 from grader.package.reading import printable
 
+CATKIN_IGNORE = "CATKIN_IGNORE"
 IGNORED = {".git", "build", "devel", "install", "__pycache__"}
 SHEBANG = b"#!/usr/bin/env python3\n"
 ABSOLUTE_PYTHON = re.compile(r"/(\w+/)*python3?")
@@ -126,6 +127,8 @@ def _with_repairs(workspace: Workspace, facts: PackageFacts, scripts: Iterable[s
     for file in facts.files:
         _give_python(package_copy / file.path, file, shims)
         _give_browsers(package_copy / file.path, file)
+    if facts.file(CATKIN_IGNORE) is not None and not (package_copy / CATKIN_IGNORE).is_dir():
+        (package_copy / CATKIN_IGNORE).unlink(missing_ok=True)  # the build alone is lost by it
     if facts.manifest is None:
         _replace_manifest(package_copy / "package.xml", workspace.folder)
     return workspace.model_copy(update={"repairs": repairs})

@@ -13,7 +13,7 @@ from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.fields import differences, fields_text
 from grader.checks.support.processes import GlobalName, plain_type
 from grader.checks.support.text import near_names, shown
-from grader.checks.support.topics import cite, no_node, nodes_on, published_topics, topics_with
+from grader.checks.support.topics import cite, no_node, nodes_on, published_topics, run_slip, topics_with
 from grader.evidence.events import ActorEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -262,6 +262,9 @@ def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> V
         return absent
     if end := explain_error(package, run):
         return end.verdict(failed, f"{what}: {end.cause}")
+    if slip := run_slip(package, run, "not-started", "not-called"):
+        why = f"{what}: {slip.message} ({slip.file}, line {slip.line})"
+        return unjudged(why, hint=slip.fix, measured="no action server", citations=(slip.place,))
     others = f"; there is {join_words(servers)}" if servers else ""
     hint = f"actionlib.SimpleActionServer('{bare}', …, auto_start=False), and then start()"
     return unjudged(f"{what}{others}", hint=hint, measured=join_words(servers) or "no action server")

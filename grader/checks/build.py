@@ -10,6 +10,7 @@ from grader.checks.registry import NoParams, check
 from grader.checks.support.build_errors import FIRST_ERROR_HINT, UNKNOWN_COMMAND, explain_error_of_build
 from grader.checks.support.build_output import first_error
 from grader.checks.support.exit_causes import explain_end
+from grader.checks.support.launch import IGNORE
 from grader.checks.support.processes import Life, lives
 from grader.checks.support.scripts import (
     cmake_calls,
@@ -87,9 +88,10 @@ def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
         machine does not exist there.
 
     How it is measured
-        By the exit code of `catkin_make`; the first error that it printed is quoted. Nodes are run all the
-        same, from their sources. A script is there where `catkin_install_python` puts it into `devel/lib`,
-        or where `rosrun` finds it in the package; whether it is executable is judged elsewhere.
+        By the exit code of `catkin_make`; the first error that it printed is quoted. A package with a file
+        `CATKIN_IGNORE` is not built at all. Nodes are run all the same, from their sources. A script is there where
+        `catkin_install_python` puts it into `devel/lib`, or where `rosrun` finds it in the package; whether it is
+        executable is judged elsewhere.
 
     How to fix
         Clone your repository into a new workspace, run `catkin_make`, and fix the first error: the later
@@ -98,8 +100,17 @@ def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
     scripts = f", and {join_words(params.scripts)} there to run" if params.scripts else ""
     verdict = judge_build(package, build)
     if verdict.status is Status.PASS:
-        verdict = _lost_scripts(package, params.scripts) or verdict
+        verdict = _hidden(package) or _lost_scripts(package, params.scripts) or verdict
     return verdict.about(expected=f"{verdict.expected or EXPECTED}{scripts}")
+
+
+def _hidden(package: PackageFacts) -> Verdict | None:
+    """Return the loss of a package that tells catkin to pass it over."""
+    if package.file(IGNORE) is None:
+        return None
+    message = f"catkin_make builds nothing of the package: {IGNORE} hides it from catkin"
+    place = (FileCitation(file=IGNORE),)
+    return failed(message, measured="not built", hint=f"git rm {IGNORE}", citations=place)
 
 
 def judge_build(package: PackageFacts, build: Run) -> Verdict:

@@ -127,13 +127,12 @@ def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: Ex
 def _syntax_verdict(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -> Verdict:
     where = f"line {fault.line}" if fault.line else "cannot be parsed"
     others = f"; it also {' and '.join(o.why for o in obstacles)}" if obstacles else ""
-    fixes = [
-        syntax_hint(fault),
-        *(o.fix for o in obstacles),
-    ]
+    hint = syntax_hint(fault)
+    why = (fault.cause or fault.message) if fault.fix and fault.fix in hint else fault.explanation
+    fixes = [hint, *(o.fix for o in obstacles)]
     source = f", {where}: {shown(fault.source.strip())}" if fault.source.strip() else ""
     return failed(
-        f"{file.path} {where}: {fault.kind}: {fault.explanation}{others}",
+        f"{file.path} {where}: {fault.kind}: {why}{others}",
         measured=f"{file.path}: {_mode(file)}, {_first_line(file)}{source}",
         hint="; ".join(fixes),
         citations=(fault.place, *((_cite_shebang(file),) if any(shebang_obstacles(file)) else ())),

@@ -14,6 +14,7 @@ from grader.checks.support.launch import (
     find_launch,
     has_program,
     illegal_name,
+    later_fixes,
     node_slip,
     nodes_of_program,
     nodes_of_script,
@@ -133,7 +134,8 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
         return None
     if not _exists(package, name) and not any(name in {one.target, one.name} for one in programs(package)):
         message = f"there is no {name} in the package that a <node> could start"
-        return unjudged(message, hint=add_hint(package, script)).lost_by("file-missing", script)
+        hint = "; then ".join((add_hint(package, script), *later_fixes(file, name)))
+        return unjudged(message, hint=hint).lost_by("file-missing", script)
     meant = (_slip_for(package, node, name) for node in file.brings if _is_meant(node, name))
     slip = next(filter(None, meant), None)
     return slip.verdict() if slip else _no_node(file, package.name, name)
@@ -189,13 +191,11 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
         kind = "" if (name, line) in file.commented else f', and write type="{name}" in it'
         hint = f"take the <node> on line {line} out of the comment: remove `<!--` before it and `-->` after it{kind}"
         return failed(message, hint=hint, citations=cited)
-    if off := next(
-        (one for one in file.switched_off if PurePosixPath(one[0]).stem == PurePosixPath(name).stem), None
-    ):
+    stem = PurePosixPath(name).stem
+    if off := next((one for one in file.switched_off if PurePosixPath(one[0]).stem == stem), None):
         cited = (FileCitation(file=file.path, line=off[1]),)
         message = f"{message}: {off[2]} on line {off[1]} leaves the one that is there out"
-        hint = f"remove {off[2]} from line {off[1]}, or give its <arg> the other default"
-        return failed(message, hint=hint if "$(arg" in off[2] else hint.partition(",")[0], citations=cited)
+        return failed(message, hint="; then ".join(later_fixes(file, name)), citations=cited)
     swapped = next(
         (n for n in file.nodes if n.pkg in {name, PurePosixPath(name).stem} and n.type == pkg), None
     )

@@ -29,7 +29,15 @@ from grader.checks.support.text import (
     shown,
     subscriber,
 )
-from grader.checks.support.topics import call_in_comment, cite, misfit, refused_type, run_slip, topics_with
+from grader.checks.support.topics import (
+    call_in_comment,
+    cite,
+    copied_topic,
+    misfit,
+    refused_type,
+    run_slip,
+    topics_with,
+)
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts, PythonSlip
 from grader.model.record import Record
@@ -167,7 +175,10 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         message = f"the node ended before it subscribed to {topic}: {end.cause}"
         return end.verdict(unjudged, message, measured="ended")
     verdict = differing or misfit(run, topic)
-    if verdict is None and topic in subscribed:
+    slip = run_slip(package, run, "unregistered")
+    if verdict is None and slip is not None:
+        verdict = _taken_off(f"the node stops listening to {topic} before anything is sent", slip)
+    elif verdict is None and topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
         verdict = inconclusive(message, hint="grade again")
     elif verdict is None and (slip := run_slip(package, run, "never-reached")):
@@ -180,13 +191,34 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         near = near_names(topic, subscribed)
         other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""
         hint = f"add {subscriber(topic, '…, callback')}"
-        if len(subscribed) == 1 and not near:
+        if copied := copied_topic(package, run, "subscriber"):
+            other = f"{other}, on {copied}"
+            hint = f"write {topic} on the one of {copied} whose callback is for it"
+        elif len(subscribed) == 1 and not near:
             hint = f"{hint}, or rename {subscribed[0]} if that is meant to be it"
         meant = near or (subscribed if len(subscribed) == 1 else [])
         cited = named_at(package, run, "subscriber", meant[0]) if meant else ()
         verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint, citations=cited)
         verdict = verdict.about(said=" ".join(meant))
     return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))
+
+
+def _taken_off(message: str, slip: PythonSlip) -> Verdict:
+    return failed(
+        f"{message}: {slip.message} ({slip.file})",
+        hint=f"in {slip.file}, {slip.fix}",
+        citations=(slip.place,),
+    )
+
+
+def _unregistered(
+    package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe]
+) -> Verdict | None:
+    """The node took its subscriber off the topic: nothing that came from some message on was printed."""
+    slip = run_slip(package, run, "unregistered")
+    if slip is None or list(missing) != list(probes[-len(missing) :]):
+        return None
+    return _taken_off(f"{len(missing)} of {plural(len(probes), 'message')} not printed", slip)
 
 
 def _judge_missing(
@@ -203,6 +235,7 @@ def _judge_missing(
         or _judge_error(package, run)
         or _some_numbers(probes, missing, lines)
         or _subscribed_again(package, run, probes, missing)
+        or _unregistered(package, run, probes, missing)
         or _only_again(probes, missing)
         or _waiting(package, run, probes, missing)
         or _some_in_other_words(probes, missing, lines, params)

@@ -327,10 +327,14 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
         for c in calls
         if c.name == "project" and c.args[:1] == (found.name,)
     ]
-    nodes = [(file, node) for file in package.launch_files for node in file.nodes if node.pkg == found.name]
-    places += dict.fromkeys(
-        f'pkg="{name}" in {node.file or file.path}, line {node.line}' for file, node in nodes
-    )
+    lines: dict[str, dict[str, None]] = {}
+    for launch in package.launch_files:
+        for node in launch.nodes:
+            if node.pkg == found.name:
+                lines.setdefault(node.file or launch.path, {})[str(node.line)] = None
+    places += [
+        f'pkg="{name}" in {file}, line{"s" * (len(own) > 1)} {join_words(own)}' for file, own in lines.items()
+    ]
     search = f"`grep -rnw {found.name} .` shows whether it stands anywhere else, as in $(find {found.name})"
     return f"write {join_words(places[:PLACES_SHOWN])}; {search}"
 

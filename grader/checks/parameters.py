@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
 from pathlib import PurePosixPath
 from typing import Annotated, Any
 
 from grader.checks.registry import ProcessName, Refers, check
-from grader.checks.support.console_output import printed_lines
+from grader.checks.support.console_output import Line, printed_lines
 from grader.checks.support.fields import differences, value_text
 from grader.checks.support.parameters import (
+    Given,
     Key,
     absolute_name,
     describe_missing,
@@ -284,7 +286,8 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
     How it is measured
         The parameters have values that the grader makes up for this run. Each has to be on stdout, on stderr or
         on /rosout; a number has to stand for itself (`12` is not in `127`). Each value earns its
-        share. Where the student's file has another name in a parameter's place (`First` for `first`), which is judged
+        share; two that are printed only on lines with each other's name (`First name: Lovelace`) earn none. Where the
+        student's file has another name in a parameter's place (`First` for `first`), which is judged
         elsewhere, the value of that one will do.
 
     How to fix
@@ -304,14 +307,44 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
         )
     ]
     expected = f"the values of {join_words(params.names)} on the server are printed"
+    exchanged = _exchanged(params.names, known, lines) if not missing else None
     verdict = (
         _not_printed(package, build, run, params, missing)
         if missing
+        else _beside_wrong_label(params, exchanged)
+        if exchanged is not None
         else passed(f"prints the values of {join_words(params.names)} that are on the server")
     )
     cited = cite(run, "/grader/console")
     measured = f"{len(params.names) - len(missing)} of {plural(len(params.names), 'value')} printed"
     return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cited))
+
+
+def _exchanged(
+    names: Sequence[str], known: Mapping[str, Given], lines: Sequence[Line]
+) -> tuple[str, str] | None:
+    """Return two parameters each of which is printed only on lines that have the other's name, and not its own."""
+
+    def has_value(name: str, line: Line) -> bool:
+        return name in known and is_printed(known[name].value, [line])
+
+    def labels(line: Line) -> list[str]:
+        words = {word.casefold() for word in re.findall(r"[A-Za-z]+", line.text)}
+        return [name for name in names if name.rpartition("/")[2].casefold() in words]
+
+    found = [(name, labels(line)) for name in names for line in lines if has_value(name, line)]
+    for one, other in combinations(names, 2):
+        beside = [[label for name, label in found if name == asked] for asked in (one, other)]
+        if beside == [[[other]] * len(beside[0]), [[one]] * len(beside[1])] and all(beside):
+            return one, other
+    return None
+
+
+def _beside_wrong_label(params: ParamsReadParams, exchanged: tuple[str, str]) -> Verdict:
+    first, second = (name.rpartition("/")[2] for name in exchanged)
+    message = f"{join_words(exchanged)} are exchanged: each is printed on the line of the other"
+    hint = f"print the value of {first} on the line that says {first}, and that of {second} on the other"
+    return _share_printed(params, exchanged, message, hint)
 
 
 def _not_printed(

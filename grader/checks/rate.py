@@ -15,9 +15,17 @@ from grader.checks.support.clocks import NO_EXCUSE, Lateness, excused, lateness
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
-from grader.checks.support.processes import PublishedTopic, life_of, observed_until_ns, slips_of
+from grader.checks.support.processes import PublishedTopic, life_of, lives, observed_until_ns, slips_of
 from grader.checks.support.text import LOOP, both, loop_rate
-from grader.checks.support.topics import Sender, call_in_comment, cite, nothing_sent, sent_by, whole_until_ns
+from grader.checks.support.topics import (
+    Sender,
+    call_in_comment,
+    cite,
+    copied_topic,
+    nothing_sent,
+    sent_by,
+    whole_until_ns,
+)
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import LaunchParam, PackageFacts, PythonSlip
@@ -208,9 +216,20 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
         return None
     seen = f"{plural(len(found.times_ns), 'message')} in {seconds(found.span_ns)}"
     if end := explain_early_end(package, run):
-        return end.verdict(unjudged, f"only {seen} on {params.topic}: the node ended ({end.cause})")
+        verdict = end.verdict(unjudged, f"only {seen} on {params.topic}: the node ended ({end.cause})")
+        if not end.by_itself or run.foreign or _has_rate(package, run):
+            return verdict
+        paced = f"rate = rospy.Rate({significant(params.rate_hz)}) above the loop, rate.sleep() in it"
+        return verdict.model_copy(update={"hint": f"{verdict.hint}; then let it wait: {paced}"})
     message = f"only {seen} on {params.topic}, a rate needs {params.min_window_s:g} s"
     return inconclusive(message, hint="record for longer" if run.foreign else "grade again")
+
+
+def _has_rate(package: PackageFacts, run: Run) -> bool:
+    """Return whether a script that runs asks for a rate somewhere, or is none of Python."""
+    scripts = {one.start.script for one in lives(run)}
+    python = any(file.python for file in package.files if file.path in scripts)
+    return not python or any(s.kind.startswith("rate-") for s in package.slips if s.file in scripts)
 
 
 def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
@@ -222,7 +241,11 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
     in_bounds = params.low_hz * (1 - ROUNDING) <= mean_hz <= params.high_hz * (1 + ROUNDING)
     if in_bounds and even:
         return None
-    other = _fell_silent(found, run, package, params) or _bursts(found, outside, even, params)
+    other = (
+        _fell_silent(found, run, package, params)
+        or _published_twice(found, run, package, params)
+        or _bursts(found, outside, even, params)
+    )
     if other is not None:
         return other
     wrong = _wrong_mean(found, params)
@@ -245,7 +268,9 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     callers = (c.callerid for c in run.student_channels(params.topic))
     if slow := _asked_slow(found, run, package, params):
         return slow
-    slip = next((s for one in callers for s in slips_of(package, run, one, "spin-in-loop")), None)
+    slip = next(
+        (s for one in callers for s in slips_of(package, run, one, "spin-in-loop", "unregistered")), None
+    )
     if slip is not None:
         return failed(f"{message}: {slip.message}", hint=slip.fix, citations=(slip.place,))
     hint = f"publish in a loop `{LOOP}`, not a fixed number of times"
@@ -262,6 +287,15 @@ def _asked_slow(found: Rhythm, run: Run, package: PackageFacts, params: RatePara
     asked_hz = f"{significant(params.rate_hz)} Hz"
     message = f"{params.topic} is too slow: {count} in {seconds(found.span_ns)} instead of {asked_hz}"
     return _with_line(failed(message), slow, params)
+
+
+def _published_twice(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
+    """The node has two publishers of the topic, one of which may be meant for another one."""
+    copied = copied_topic(package, run, "publisher", params.topic)
+    if not copied or found.mean_hz <= params.high_hz:
+        return None
+    message = f"{_wrong_mean(found, params).message}: {copied} publish on it"
+    return failed(message, hint=f"give the one of {copied} that is for another topic that topic's name")
 
 
 def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -> Verdict | None:
@@ -296,7 +330,8 @@ def _by_number(
 def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdict:
     """Return the verdict with the line that asks for another rate."""
     where = f"{slip.file}, line {slip.line}"
-    message = f"{verdict.message}; {where} asks for {slip.message} Hz"
+    said = f"{slip.name}(…) is given two numbers: {slip.fix}" if slip.fix else f"asks for {slip.message} Hz"
+    message = f"{verdict.message}; {where} {said}" if not slip.fix else f"{verdict.message}; {where}: {said}"
     right = f"{slip.name}({significant(1 / params.rate_hz)})" if slip.name else ""
     right = right or loop_rate(significant(params.rate_hz))
     hint = f"make it {significant(params.rate_hz)} Hz in {where}: use {right}"

@@ -192,7 +192,14 @@ def _not_sent(
         f"{wrong} for {name}" for name in wanted if name not in names for wrong in near_names(name, names)
     ]
     other = f" ({shown(join_words(near))})" if near else ""
-    return failed(f"{params.name} is not sent; there is {_edge_words(edges)}{other}", hint=hint)
+    verdict = failed(f"{params.name} is not sent; there is {_edge_words(edges)}{other}", hint=hint)
+    return verdict.seeking("quoted", *_frames_instead(edges, wanted))
+
+
+def _frames_instead(edges: Sequence[tuple[str, str]], wanted: tuple[str, str]) -> list[str]:
+    """Return the frames in place of the wanted one, in transforms that have the other."""
+    pairs = [(edge, at) for edge in edges for at in (0, 1) if edge[at] == wanted[at]]
+    return list(dict.fromkeys(edge[1 - at] for edge, at in pairs))
 
 
 def _other_topic(own: Sequence[Sent], params: TransformParams) -> Verdict | None:

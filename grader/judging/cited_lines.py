@@ -67,6 +67,32 @@ def cite_words(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run)
     return verdict.model_copy(update={"citations": (place, *verdict.citations)})
 
 
+def cite_quoted(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
+    """Return the verdict; one on a name that a script has in quotes in place of another one cites its lines."""
+    package, names = facts.package_of(criterion), verdict.sought_names("quoted")
+    placed = any(isinstance(one, FileCitation) for one in verdict.citations)
+    if package is None or package is not facts.package or not names or placed or not verdict.status.is_lost:
+        return verdict
+    quoted = re.compile(rf"""(["'])(?:{"|".join(map(re.escape, names))})\1""")
+    paths = sorted(
+        scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
+    )
+    places = [
+        FileCitation(file=path, line=number)
+        for path in paths
+        for number, text in enumerate(build.file_lines(path)[:LINES_READ], 1)
+        if len(text) <= LINE_CHARS and quoted.search(text)
+    ]
+    if not 0 < len(places) <= QUOTED_MAX:
+        return verdict
+    where = join_words(f"line {one.line} of {one.file}" for one in places)
+    update = {"hint": f"on {where}: {verdict.hint}", "citations": (*places, *verdict.citations)}
+    return verdict.model_copy(update=update)
+
+
+QUOTED_MAX = 3
+
+
 def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: Run) -> Verdict:
     """Return the verdict; one on a call that is missing in CMakeLists.txt cites the line below which it goes, or those
     in which it is commented out."""

@@ -26,7 +26,14 @@ from grader.errors import EvidenceError
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.judging.annotate import add_advice, choose_hint_language, fill_slots
-from grader.judging.cited_lines import cite_commented_call, cite_find, cite_name, cite_words, show_lines
+from grader.judging.cited_lines import (
+    cite_commented_call,
+    cite_find,
+    cite_name,
+    cite_quoted,
+    cite_words,
+    show_lines,
+)
 from grader.judging.facts import NOT_RUN, Facts, try_facts, views_of
 from grader.judging.later_faults import add_later_faults
 from grader.judging.repeats_and_repairs import (
@@ -105,6 +112,7 @@ def judge_all_runs(
     if build is not None:
         for criterion in rubric.criteria:
             placed = cite_words(verdicts[criterion.id], criterion, facts, build)
+            placed = cite_quoted(placed, criterion, facts, build)
             placed = cite_commented_call(placed, facts.package_of(criterion), build)
             placed = cite_find(placed, criterion, facts.package_of(criterion), build)
             shown[criterion.id] = show_lines(cite_name(placed, build), build)

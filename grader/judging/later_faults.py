@@ -12,7 +12,14 @@ from pathlib import PurePosixPath
 
 from grader.checks.messages import code_of
 from grader.checks.support.console_output import probes_on
-from grader.checks.support.launch import NOT_STARTED, find_launch, refusal, refusals, unset_arg_fixes
+from grader.checks.support.launch import (
+    NOT_STARTED,
+    find_launch,
+    later_fixes,
+    refusal,
+    refusals,
+    unset_arg_fixes,
+)
 from grader.checks.support.launch_names import find_renaming
 from grader.checks.support.missing_names import name_slip
 from grader.checks.support.text import (
@@ -61,7 +68,9 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
         ):
             continue
         told = later.setdefault(verdict.blocked_by or criterion.id, [])
-        if verdict.blocked_by and criterion.check == "launch-runs":
+        if verdict.blocked_by and criterion.check == "launch-xml":
+            told += [f"for {criterion.id}, {one}" for one in _later_in_file(criterion, package)]
+        elif verdict.blocked_by and criterion.check == "launch-runs":
             own = _of_its_file(criterion, verdicts, rubric)
             for one in _later_in_launch(criterion, package, facts):
                 later.setdefault(own or verdict.blocked_by, []).append(
@@ -254,6 +263,14 @@ class Later:
         text, said = str(self._wanted.get("text", "")), self._of("prints")
         if len(said) == 1 and "{" not in said[0].message and text not in said[0].message:
             yield f"log {text!r} on {_line(said[0])}, not {said[0].message!r}"
+
+
+def _later_in_file(criterion: Criterion, package: PackageFacts) -> Iterator[str]:
+    """Yield what a launch file would be lost by once the scripts that it lacks are written."""
+    file = find_launch(package, str(criterion.parameters.get("launch", "")))
+    if file is not None:
+        for script in texts_in(criterion.parameters.get("scripts")):
+            yield from later_fixes(file, script)
 
 
 def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) -> Iterator[str]:

@@ -268,7 +268,8 @@ def _charges(
         possible = [c for c in criteria if repair in needs[c.id]]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
-        counting = [c.id for c in (*named, *failing, *possible) if c.points > 0]
+        builds = [c for c in possible if repair.kind in OF_BUILDS and c.check == BUILD]
+        counting = [c.id for c in (*builds, *named, *failing, *possible) if c.points > 0]
         other = [name for name in counting if name not in misnamed]
         charges[repair] = set((counting if named else other or counting)[:1])
         misnamed |= charges[repair] if named else set()

@@ -57,7 +57,8 @@ class Fault(Record):
     @property
     def advice(self) -> str:
         """What to do in which line; "" where that is not known."""
-        where = f"line {self.line}: " if self.line else ""
+        named = self.line is None or self.fix.startswith("below line ")
+        where = "" if named else f"line {self.line}: "
         return f"{where}{self.fix}" if self.fix else ""
 
 
@@ -263,7 +264,8 @@ SlipKind = Literal[
     "defined-twice", "subscribed-again",
     "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
-    "prints", "argument-text",
+    "prints", "argument-text", "unused-import", "lacking-import", "unregistered",
+    "not-started",
 ]  # fmt: skip
 
 
@@ -300,7 +302,10 @@ class PythonSlip(Record):
     `subscriber-type`: the message type on that line. `argument-text`: no slip, but where an argument of the command
     line is kept as a text; `fix` is the line with a number in its place. `defined-twice`: a callback that a second
     function of its name hides, or a call of an imported name that a class hides. `subscribed-again`: a
-    `Subscriber(…)` that a loop makes in each of its turns.
+    `Subscriber(…)` that a loop makes in each of its turns. `unused-import` and `lacking-import`: no slips, but an
+    import of the module `message` whose names nothing in the script uses, or that Python did not find where the files
+    were read. `unregistered`: a `Publisher` or `Subscriber` that is taken off its topic. `not-started`: an action
+    server that waits for a `start()` that no line calls.
     """
 
     file: str

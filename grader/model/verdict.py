@@ -101,7 +101,7 @@ class Mistake(Record):
         return self.kind in {"file-missing", "file-elsewhere"}
 
 
-SoughtKind = Literal["call", "uncalled", "below", "component", "dependency", "package"]
+SoughtKind = Literal["call", "uncalled", "below", "component", "dependency", "package", "quoted"]
 
 
 class Sought(Record):
@@ -110,7 +110,7 @@ class Sought(Record):
     kind: SoughtKind
     """The command that installs scripts, where `CMakeLists.txt` does not call it; another one that it does not call;
     the one below which that goes, and is cited; a package that the machine lacks and `find_package(…)` names, that
-    `package.xml` does not declare, or that roslaunch does not find."""
+    `package.xml` does not declare, or that roslaunch does not find; or what a script has in quotes."""
     name: str
 
 
@@ -203,7 +203,7 @@ def joined(losses: Sequence[Verdict]) -> Verdict | None:
     first = next((one for one in different if not one.unjudged), different[0])
     update = {
         "message": "; ".join(one.message for one in different),
-        "hint": "; ".join(dict.fromkeys(one.hint for one in different)),
+        "hint": "; ".join(dict.fromkeys(clause for one in different for clause in one.hint.split("; "))),
         "citations": tuple(dict.fromkeys(place for one in different for place in one.citations)),
     }
     return first.model_copy(update=update)

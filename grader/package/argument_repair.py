@@ -32,11 +32,8 @@ def wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
     """Yield what calls of rospy's are given in another form than they take it."""
     types, of_rospy = _imported(tree, "msg"), _imported(tree, "rospy")
     functions = {one.name for one in tree.body if isinstance(one, ast.FunctionDef)}
-    values = _values(tree)
+    values = [(t, n.value) for n in ast.walk(tree) if isinstance(n, ast.Assign) for t in n.targets]
     rates = {ast.unparse(target) for target, value in values if _called(value) == "Rate"}
-    bound = {target.id for target, _ in values if isinstance(target, ast.Name)}
-    bound |= {name for one in ast.walk(tree) for name in _names_bound(one)} - functions
-    bound -= {"*"} & (types | of_rospy)
     for call in (n for n in ast.walk(tree) if isinstance(n, ast.Call)):
         name = _called(call)
         if name == "sleep" and isinstance(call.func, ast.Attribute) and ast.unparse(call.func.value) in rates:
@@ -48,7 +45,7 @@ def wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
             yield from _of_topic(call, types) if name in {"Publisher", "Subscriber"} else ()
             yield from _numbers(call, name)
             yield from _callback(call, name, functions)
-            yield from _without_quotes(call, name, bound, types)
+            yield from _without_quotes(call, name, functions)
 
 
 def _of_topic(call: ast.Call, types: set[str]) -> Iterator[Argument]:
@@ -90,10 +87,10 @@ def _callback(call: ast.Call, name: str, functions: set[str]) -> Iterator[Argume
                 yield Argument([(one, one.value)], f"'{one.value}' is a string, not a function")
 
 
-def _without_quotes(call: ast.Call, name: str, bound: set[str], types: set[str]) -> Iterator[Argument]:
-    """Of a node's or topic's name that is written without quotes, and is nothing else in the file but a function."""
+def _without_quotes(call: ast.Call, name: str, functions: set[str]) -> Iterator[Argument]:
+    """Of a node's or topic's name that is written without quotes, and is the name of a function."""
     first = call.args[0] if call.args and name in {"init_node", "Publisher", "Subscriber"} else None
-    if isinstance(first, ast.Name) and not _is_type(first.id, types) and not {first.id, "*"} & bound:
+    if isinstance(first, ast.Name) and first.id in functions:
         what = "node" if name == "init_node" else "topic"
         yield Argument([(first, repr(first.id))], f"the name of the {what} has no quotes")
 
@@ -140,22 +137,6 @@ def _imported(tree: ast.Module, ending: str) -> set[str]:
         if isinstance(one, ast.ImportFrom) and f".{one.module}".endswith(f".{ending}")
         for a in one.names
     }
-
-
-def _values(tree: ast.Module) -> list[tuple[ast.expr, ast.expr]]:
-    return [(t, n.value) for n in ast.walk(tree) if isinstance(n, ast.Assign) for t in n.targets]
-
-
-def _names_bound(node: ast.AST) -> set[str]:
-    if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
-        return {node.id}
-    if isinstance(node, ast.arg):
-        return {node.arg}
-    if isinstance(node, ast.Import | ast.ImportFrom):
-        return {(a.asname or a.name).partition(".")[0] for a in node.names}
-    if isinstance(node, ast.ClassDef):
-        return {node.name}
-    return set(node.names) if isinstance(node, ast.Global) else set()
 
 
 def _called(node: ast.AST | None) -> str:

@@ -277,7 +277,7 @@ def reason_of(
         )
     if (empty := _EMPTY_BLOCK.match(message)) and _NEXT_BLOCK.match(text) and "class" not in message:
         why = f"there are only comments in the block on line {empty[1]}"
-        return Reason(why, "write below it what it should do")
+        return Reason(why, f"below line {empty[1]}, write what it should do")
     reason = reason_of_line(text) if vague else Reason()
     if vague and opened is not None and not reason.why:
         reason = _never_closed(opened)

@@ -44,6 +44,8 @@ OBVIOUS_NAMES = {
 }
 NAME_CHARS_MIN = 4
 """Shorter names differ by one letter because they are different names."""
+SIZE = re.compile(r"^U|\d+")
+"""What sets number types of one kind apart: `UInt8`, `Int16`."""
 SLIP_CHARS = 3
 OF_ROS = {
     "rosbag", "roscpp", "rosgraph", "roslaunch", "roslib", "rosmsg", "rosnode", "rosparam", "rospkg", "rosservice",
@@ -67,6 +69,8 @@ ROSPY = frozenset(NAMES_OF_ROSPY.split())
 GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "logerr")
 LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
 CALLED = frozenset({"is_shutdown", "sleep", "spin"})
+QUOTED = re.compile(r"[\w.]+\.(sleep|spin)\([\w.]*\)")
+OF_TWO_FRAMES = {"lookup_transform", "can_transform", "lookupTransform", "canTransform", "waitForTransform"}
 TAKE_FUNCTIONS = {"Subscriber", "Timer", "Service", "on_shutdown", "signal"}
 ROLES = {
     "Publisher": "publisher",
@@ -104,10 +108,12 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             lambda t: _with_modules(t, types),
             lambda t: _with_classes(t, types),
             lambda t: _with_imports(t, types),
+            _with_quotes,
             _with_names,
             _with_attributes,
             _with_values_called,
             _with_calls,
+            _with_quoted_calls,
             _with_callbacks,
             _with_arguments,
             _with_globals,
@@ -273,6 +279,9 @@ def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
             after = _import_meant(text, name) or _add_import(text, f"import {name}", "", "")
         elif name in of_messages:
             after = _add_import(text, f"import {of_messages[name]}", "", "")
+        elif name in packages and (meant := _imported_instead(tree, name, packages[name], types)):
+            yield from _with_class(text, name, meant)
+            return
         elif name in packages:
             after = _add_import(
                 text, f"from {packages[name]}.msg import {name}", f"{packages[name]}.msg", name
@@ -282,6 +291,27 @@ def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
         for step in _step("import", missing[name], text, after, name):
             text = step["text"]
             yield step
+
+
+def _imported_instead(tree: ast.Module, name: str, package: str, types: list[str]) -> str:
+    """Return the lab's type that the script imports and never uses, where it uses another size of it: Int8 for Int16;
+    "" where there is none."""
+    of_lab = {kind.partition("/")[2] for kind in types if kind.startswith(f"{package}/")}
+    froms = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module == f"{package}.msg"]
+    imported = {a.name for n in froms for a in n.names if a.asname is None}
+    used = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
+    same = (one for one in sorted(imported & of_lab - used) if SIZE.sub("", one) == SIZE.sub("", name))
+    return "" if name in of_lab else next(same, "")
+
+
+def _with_class(text: str, name: str, meant: str) -> Iterator[Step]:
+    """`Int8` in place of each `Int16`."""
+    lines = text.split("\n")
+    uses = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name) and n.id == name]
+    spans = [span for n in uses if (span := _span(lines, n))]
+    if spans:
+        after = _edit(text, [(*span, meant) for span in spans])
+        yield from _step("name", min(spans)[0] + 1, text, after, name)
 
 
 def _import_meant(text: str, name: str) -> str:
@@ -340,6 +370,58 @@ def _with_names(text: str) -> Iterator[Step]:
                     yield step
                     yield from _with_names(text)
                     return
+
+
+def _with_quotes(text: str) -> Iterator[Step]:
+    """`Publisher(chatter, …)`, for `Publisher('chatter', …)`: a name without a value, where ROS is told one; and
+    `details[name]`, where the name stands for a key of parameters."""
+    tree, lines = ast.parse(text), text.split("\n")
+    known = _bound(tree) | set(dir(builtins))
+    if "*" in known:
+        return
+    stored: dict[str, list[int]] = {}
+    for name in (n for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)):
+        stored.setdefault(name.id, []).append(name.lineno)
+    texts = [n for n in _texts_of_ros(tree) if isinstance(n, ast.Name)]
+    missing = [n for n in texts if n.id not in known and not _meant_by(n.id, set(stored))]
+    assigned = [n for n in ast.walk(tree) if isinstance(n, ast.Assign)]
+    own = {id(inner): _last(n.targets[0]) for n in assigned for inner in ast.walk(n.value)}
+    keys = [
+        n
+        for n in _keys_of_parameters(tree)
+        if n.id not in known or (stored.get(n.id) == [n.lineno] and own.get(id(n)) == n.id)
+    ]
+    spans = [(span, n.id) for n in (*missing, *keys) if (span := _span(lines, n))]
+    if spans:
+        after = _edit(text, [(*span, f"'{name}'") for span, name in spans])
+        words = ", ".join(dict.fromkeys(name for _, name in sorted(spans)))
+        yield from _step("quotes", min(spans)[0][0] + 1, text, after, words)
+
+
+def _texts_of_ros(tree: ast.Module) -> Iterator[ast.expr]:
+    """Yield what stands where ROS is told the name of a node, a topic, a parameter or a frame."""
+    yield from (node for _, node in _named_texts(tree))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and _last(node.func) in OF_TWO_FRAMES:
+            yield from node.args[:2]
+        elif isinstance(node, ast.Assign) and _last(node.targets[0]) in ("frame_id", "child_frame_id"):
+            yield node.value
+
+
+def _keys_of_parameters(tree: ast.Module) -> Iterator[ast.Name]:
+    """Yield the names in the brackets behind what `get_param(…)` gives."""
+    read = {
+        ast.unparse(n.targets[0])
+        for n in ast.walk(tree)
+        if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call) and _last(n.value.func) == "get_param"
+    }
+    for node in ast.walk(tree):
+        root: ast.expr | None = node if isinstance(node, ast.Subscript) else None
+        while isinstance(root, ast.Subscript):
+            root = root.value
+        of_call = isinstance(root, ast.Call) and _last(root.func) == "get_param"
+        if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Name) and root is not None:
+            yield from [node.slice] if of_call or ast.unparse(root) in read else []
 
 
 def _meant_by(name: str, own: set[str]) -> str:
@@ -412,6 +494,18 @@ def _with_calls(text: str) -> Iterator[Step]:
         after = _edit(text, [(line, end, end, "()") for line, _, end in spans])
         words = dict.fromkeys(ast.unparse(n) for n in sorted(named, key=lambda n: n.lineno))
         yield from _step("call", min(spans)[0] + 1, text, after, ", ".join(words))
+
+
+def _with_quoted_calls(text: str) -> Iterator[Step]:
+    """`"rospy.spin()"`: a call that stands alone in quotes."""
+    lines = text.split("\n")
+    for node in ast.walk(ast.parse(text)):
+        value = node.value if isinstance(node, ast.Expr) else None
+        code = value.value if isinstance(value, ast.Constant) and isinstance(value.value, str) else ""
+        span = _span(lines, value) if value is not None and QUOTED.fullmatch(code) else None
+        if span is not None:
+            yield from _step("quoted", span[0] + 1, text, _edit(text, [(*span, code)]), code)
+            return
 
 
 def _uncalled_expressions(node: ast.AST) -> Iterator[ast.expr]:
@@ -554,7 +648,7 @@ def _names(text: str) -> list[dict[str, Any]]:
     if syntax_error(text) is not None:
         return []
     tree, lines = ast.parse(text), text.split("\n")
-    constants = _constants(tree)
+    constants, keys = _constants(tree), _keys_read(tree)
     found = []
     for role, node in _named_texts(tree):
         given = constants.get(node.id) if isinstance(node, ast.Name) else node
@@ -563,7 +657,20 @@ def _names(text: str) -> list[dict[str, Any]]:
         span = _span(lines, given)
         if span is not None and _is_literal(lines[span[0]][span[1] : span[2]], given.value):
             place = {"line": span[0] + 1, "start": span[1], "end": span[2]}
-            found.append({"role": role, "value": given.value, **place})
+            found.append({"role": role, "value": given.value, **place, "keys": keys.get(id(node), [])})
+    return found
+
+
+def _keys_read(tree: ast.Module) -> dict[int, list[str]]:
+    """Return for the first argument of a call, by its identity, the keys that are read of what the call gives:
+    `first` of `get_param('name')['first']`, and of `name['first']` below `name = get_param('name')`."""
+    calls = {ast.unparse(n.targets[0]): n.value for n in ast.walk(tree) if isinstance(n, ast.Assign)}
+    found: dict[int, list[str]] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
+            of = node.value if isinstance(node.value, ast.Call) else calls.get(ast.unparse(node.value))
+            if isinstance(of, ast.Call) and of.args and isinstance(node.slice.value, str):
+                found.setdefault(id(of.args[0]), []).append(node.slice.value)
     return found
 
 

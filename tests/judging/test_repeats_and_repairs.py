@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -356,9 +357,46 @@ def test_a_build_that_the_manifest_blocks_is_judged_on_the_copy() -> None:
     assert (build.status.value, build.points, build.hint) == ("partial", 5, "")
 
 
-def built(package: dict[str, Any], *, exit_code: int) -> dict[str, Run]:
+def test_a_line_of_the_build_is_charged_to_a_build_that_another_fault_blocks() -> None:
+    line = Repair(
+        kind="build-line",
+        file="CMakeLists.txt",
+        line=1,
+        before="vcmake_minimum_required(VERSION 3.0.2)",
+        after="cmake_minimum_required(VERSION 3.0.2)",
+        message="there is no command vcmake_minimum_required",
+        fix="cmake_minimum_required(VERSION 3.0.2)",
+    )
+    script = "src/numeric_talker.py"
+    asked = rubric(
+        {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}},
+        {"id": "talker", "check": "executable", "with": {"path": script}},
+        {"id": "build", "check": "build", "requires": ["manifest"]},
+    )
+    install = ["catkin_install_python", "PROGRAMS", script, "DESTINATION", "lib/other"]
+    package = {
+        "manifest": {"name": "other"},
+        "cmake": {"calls": [install]},
+        "files": [{"path": script, "executable": False, "shebang": "#!/usr/bin/env python3"}],
+    }
+    said = [
+        "CMake Error at lab1/CMakeLists.txt:1 (vcmake_minimum_required):",
+        '  Unknown CMake command "vcmake_minimum_required".',
+    ]
+    runs = built(package, exit_code=1, said=said)
+    assert [c.status.value for c in judge(asked, runs)] == ["fail", "fail", "blocked"]
+    copy = built(package, exit_code=0)["package"]
+    about = {**copy.metadata, "repairs": json.dumps([line.model_dump()])}
+    manifest, talker, build = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
+    assert (manifest.repaired, talker.status.value, build.points) == (None, "partial", 0)
+    assert build.hint == f"CMakeLists.txt line 1: write `{line.after}`"
+
+
+def built(package: dict[str, Any], *, exit_code: int, said: Sequence[str] = ()) -> dict[str, Run]:
     made = {"name": "catkin_make", "role": "build", "exit_s": 3, "exit_code": exit_code}
-    return build_runs({"runs": {"package": {"package": package, "processes": [made]}}})
+    console = [{"process": "catkin_make", "stream": "stderr", "lines": [*said]}] if said else []
+    run = {"package": package, "processes": [made], "console": console}
+    return build_runs({"runs": {"package": run}})
 
 
 @pytest.mark.parametrize(

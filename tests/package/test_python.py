@@ -95,11 +95,11 @@ def assert_cases(report):
     [
         (
             "def f():\n    # to do\n\nif __name__ == '__main__':\n    f()\n",
-            "in the block on line 1: write below it",
+            "in the block on line 1: below line 1, write",
         ),
         (
             "class A:\n    def f(self):\n    def g(self):\n        pass\n",
-            "in the block on line 2: write below it",
+            "in the block on line 2: below line 2, write",
         ),
         ("class A:\ndef f(self):\n    pass\n", "must be indented"),
         ("def f():\nx = 1\n", "must be indented"),

@@ -362,6 +362,37 @@ CASES = {
         after={"config/my.yaml": "\n  y"},
     ),
     "key-at-its-level": Case({"config/my.yaml": LEVELS.replace("\n  y", "\n    y")}, [], wanted=NESTED),
+    "dots-for-slashes": Case(
+        swapped(TALKER, ("    rate = ", "    name = rospy.get_param('details.name')\n    rate = ")), ["parameter-name"],
+        "the parameter details.name should be /details/name", after={TALKER: "get_param('details/name')"},
+    ),
+    "dots-where-the-next-line-reads-a-key": Case(
+        swapped(TALKER, ("    rate = ", "    d = rospy.get_param('details.name')\n    print(d['name'])\n    rate = ")),
+        ["parameter-name"], "the parameter details.name should be /details", after={TALKER: "get_param('details')"},
+    ),
+    "names-without-quotes": Case(
+        swapped(TALKER, ("'numeric_chatter'", "numeric_chatter"), ("'talker'", "talker")), ["missing-call"],
+        "quotes are missing around talker, numeric_chatter", after={TALKER: "Publisher('numeric_chatter', Int8"},
+    ),
+    "keys-without-quotes": Case(
+        swapped(TALKER, ("    rate = ", "    all = rospy.get_param('details')\n    name = all[name]\n    rate = ")),
+        ["missing-call"], "quotes are missing around name", after={TALKER: "name = all['name']"},
+    ),
+    "keys-that-are-variables": Case(
+        swapped(TALKER, ("    rate =", "    d = rospy.get_param('details')\n    for k in d: print(d[k])\n    rate =")),
+        [],
+    ),
+    "name-like-that-of-a-variable": Case(
+        swapped(TALKER, ("'talker'", "noode"), ("def main():", "def main():\n    node = 'talker'")), ["missing-call"],
+        after={TALKER: "init_node(node)"},
+    ),
+    "name-of-a-variable": Case(
+        swapped(TALKER, ("'numeric_chatter', Int8", "topic, Int8"), ("main():", "main(topic='numeric_chatter'):")), [],
+    ),
+    "call-in-quotes": Case(swapped(TALKER, ("rate.sleep()", "'rate.sleep()'")), ["missing-call"],
+                           "rate.sleep() is in quotes", after={TALKER: "        rate.sleep()"}),
+    "type-that-is-imported": Case(swapped(TALKER, ("'numeric_chatter', Int8", "'numeric_chatter', Int16")),
+                                  ["missing-call"], "Int16 is not defined", after={TALKER: "'numeric_chatter', Int8"}),
     "spin": Case({TALKER: SPINS}, ["missing-call"], after={TALKER: "Int8, print)\n    rospy.spin()\n"}),
     "launch-file-by-what-it-starts": Case(
         {LAUNCHED: None, "src/trial.launch": LAUNCH}, ["file-name"], wanted=STARTED,

@@ -40,6 +40,7 @@ def node(body: str) -> str:
 
 
 LOOP = "    while not rospy.is_shutdown():\n"
+SERVER = "    s = SimpleActionServer('a', A, f, auto_start=False)\n"
 CALLED = "if __name__ == '__main__':\n    main()\n"
 
 
@@ -79,6 +80,15 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("commented-out", 6, "remove the `#` from line 6"), ("commented-out", 7, "`sleep(…)` is commented out")]),
         ("def f(m):\n    # rospy.loginfo('I heard %s', m.data)\n    # print('old')\n    pass\n",
          [("commented-out", 2, "`loginfo(…)` is commented out")]),
+        (node("    'rospy.spin()'\n") + CALLED,
+         [("commented-out", 4, "in quotes, so it never runs: remove the quotes")]),
+        (node("    p = 'rospy.spin()'\n    rospy.spin()\n") + CALLED, []),
+        (node("    s = rospy.Subscriber('a', A, print)\n    s.unregister()\n    rospy.spin()\n") + CALLED,
+         [("unregistered", 5, "line 5 takes `s` off its topic: delete line 5")]),
+        ("def end():\n    s.unregister()\nrospy.on_shutdown(end)\nrospy.spin()\n", []),
+        (node(SERVER + "    rospy.spin()\n") + CALLED,
+         [("not-started", 4, "below line 4, write `s.start()`")]),
+        (node(SERVER + "    s.start()\n    rospy.spin()\n") + CALLED, []),
         ("def f(m):\n    pass\nrospy.Subscriber('a', A, 'f')\n", [("callback-called", 3, "write `f`, without quotes")]),
         (node("    if not rospy.is_shutdown():\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "write `while` instead of `if` on line 4")]),
@@ -426,3 +436,56 @@ def test_slips_that_hide_what_was_meant(tmp_path, text, kinds):
         s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in looked_for or "after it" in s.message
     ]
     assert {s.kind for s in found} == kinds
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("import rospy\nrospy.spin()\n", []),
+        ("import nosuch\n", ["unused-import", "lacking-import"]),
+        ("from nosuch import rate\nrate = 10\nprint(rate)\n", ["unused-import", "lacking-import"]),
+        ("import nosuch as n\nprint(n)\n", ["lacking-import"]),
+        ("from json import dumps\n", ["unused-import"]),
+        ("from json import rate\nrate = 10\nprint(rate)\n", ["unused-import"]),
+        ("from nosuch import *\n", ["lacking-import"]),
+        ("from . import nosuch\nimport os\n", []),
+        ("try:\n    import nosuch\nexcept ImportError:\n    pass\n", []),
+    ],
+)
+def test_imports_that_are_not_used_or_not_there(tmp_path, text, found):
+    (tmp_path / "a.py").write_text(text)
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.kind for s in slips if s.kind in ("unused-import", "lacking-import")] == found
+    assert all("line 1" in s.fix for s in slips if s.kind == "unused-import")
+
+
+@pytest.mark.parametrize(
+    ("pause", "hz"),
+    [("0, 1", "1000000000"), ("0, 100000000", "10"), ("1, 0", "1"), ("0.1", "10"), ("2", "0.5")],
+)
+def test_the_second_number_of_a_duration_counts_nanoseconds(tmp_path, pause, hz):
+    text = f"import rospy\npause = rospy.Duration({pause})\nwhile True:\n    rospy.sleep(pause)\n"
+    (tmp_path / "a.py").write_text(text)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "rate-number"]
+    assert [s.message for s in slips] == [hz]
+    assert all(("nanoseconds" in s.fix) == (pause.startswith("0, ")) for s in slips)
+
+
+@pytest.mark.parametrize(
+    ("code", "fixes"),
+    [
+        ("buffer.lookup_transform(odom, laser, rospy.Time(0))", ["'odom'", "'laser'"]),
+        ("base.child_frame_id = base_link", ["'base_link'"]),
+        ("rospy.Publisher(chatter, String, queue_size=1)", ["'chatter'"]),
+        ("rospy.init_node(talker)", ["'talker'"]),
+        ("def talk():\n    pass\nrospy.init_node(talker)", ["'talker'"]),
+        ("chatter = 'chatter'\nrospy.Publisher(chatter, String, queue_size=1)", []),
+        ("print(chatter)", []),
+    ],
+)
+def test_names_that_ros_is_given_without_quotes(tmp_path, code, fixes):
+    text = f"import rospy\nfrom std_msgs.msg import String\nbuffer = base = 1\n{code}\n"
+    (tmp_path / "a.py").write_text(text)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if "without quotes" in s.message]
+    last = text.count("\n")
+    assert [s.fix for s in slips] == [f"on line {last}, write `{fix}`" for fix in fixes]

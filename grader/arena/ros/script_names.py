@@ -118,7 +118,8 @@ def misspelt(tree):
     known = own | set(dir(builtins)) | MODULE_NAMES | imported_otherwise(tree, {n.id for n in names})
     outside = {id(n) for n in outside_methods(tree)}
     unbound = unbound_names(tree, known)
-    keys = without_quotes(tree, known)
+    keys, texts = without_quotes(tree, known), where_texts_stand(tree)
+    stored = {n.id for n in names if isinstance(n.ctx, ast.Store)}
     for node in names:
         if id(node) in outside and (node.id == "self" or node.id not in known):
             message = "line %d is in the class, but in none of its methods, so it runs before them"
@@ -128,13 +129,19 @@ def misspelt(tree):
             message = "the key `%s` is written here without quotes" % node.id
             fix = "on line %d, write `%s`" % (node.lineno, keys[id(node)])
             yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
-        elif node.id not in known and (near := spelt_alike(node.id, own, attributes)):
+        elif node.id not in known and (
+            near := spelt_alike(node.id, stored if id(node) in texts else own, attributes)
+        ):
             fix = "write %s instead of %s" % (near, node.id)
             yield slip(node.lineno, "misspelt", "did you mean %s?" % near, fix=fix, name=node.id)
         elif node.id not in known and (argument := unread_argument(node, tree)):
             message = "the argument of `%s` is called `%s`" % argument
             fix = "write %s instead of %s" % (argument[1], node.id)
             yield slip(node.lineno, "misspelt", message, fix=fix, name=node.id)
+        elif id(node) in unbound and id(node) in texts:
+            message = "`%s` is written here without quotes" % node.id
+            fix = "on line %d, write `'%s'`" % (node.lineno, node.id)
+            yield slip(node.lineno, "undefined", message, fix=fix, name=node.id)
         elif id(node) in unbound:
             message, fix = undefined(node, tree) if node.id not in known else known_elsewhere(node, tree)
             if message:
@@ -184,6 +191,26 @@ def without_quotes(tree, known):
             for key in map(key_of, [n for n in ast.walk(value) if isinstance(n, ast.Subscript)]):
                 if isinstance(key, ast.Name) and is_key(key):
                     found.setdefault(id(key), dotted(node) + text)
+    return found
+
+
+FRAMES = ("frame_id", "child_frame_id")
+OF_TWO_FRAMES = ("lookup_transform", "can_transform", "lookupTransform", "canTransform", "waitForTransform")
+OF_NAMES = (
+    "init_node", "Publisher", "Subscriber", "Service", "ServiceProxy", "get_param", "has_param", "set_param",
+    "delete_param", "wait_for_message", "wait_for_service", "SimpleActionServer", "SimpleActionClient",
+)  # fmt: skip
+
+
+def where_texts_stand(tree):
+    """Return the identities of what stands where ROS is given a name: of a node, a topic, a parameter or a frame."""
+    found = set()
+    for node in walk(tree):
+        name = called_name(node)
+        if name in OF_NAMES or name in OF_TWO_FRAMES:
+            found.update(map(id, node.args[: 2 if name in OF_TWO_FRAMES else 1]))
+        elif isinstance(node, ast.Assign) and getattr(node.targets[0], "attr", "") in FRAMES:
+            found.add(id(node.value))
     return found
 
 

@@ -212,6 +212,32 @@ def subscribed_again(tree):
                 yield slip(made.lineno, "subscribed-again", message % lines[::-1], fix=fix % lines)
 
 
+def taken_off(tree):
+    """Yield where a `Publisher` or `Subscriber` is unregistered, but for what a function does at the node's end."""
+    at_end = {
+        dotted(arg).rpartition(".")[2] for n in walk(tree) if is_call(n, "on_shutdown") for arg in n.args
+    }
+    functions = [n for n in walk(tree) if isinstance(n, ast.FunctionDef) and n.name in at_end]
+    spared = {inner for function in functions for inner in ast.walk(function)}
+    for node in walk(tree):
+        if is_call(node, "unregister") and not node.args and node not in spared:
+            message = "line %d takes `%s` off its topic" % (node.lineno, dotted(node.func.value))
+            yield slip(node.lineno, "unregistered", message, fix="delete line %d" % node.lineno)
+
+
+def unstarted_servers(tree):
+    """Yield each `SimpleActionServer(…, auto_start=False)` where nothing in the script calls or names a `start`."""
+    started = any(isinstance(n, ast.Attribute) and n.attr == "start" for n in walk(tree))
+    given = {id(n.value): dotted(n.targets[0]) for n in walk(tree) if isinstance(n, ast.Assign)}
+    for node in walk(tree):
+        waits = [k for k in getattr(node, "keywords", ()) if k.arg == "auto_start"]
+        waits = [k for k in waits if getattr(k.value, "value", None) is False]
+        if called_name(node) == "SimpleActionServer" and waits and not started:
+            message = "the action server of line %d is never started" % node.lineno
+            fix = "below line %d, write `%s.start()`" % (node.end_lineno, given.get(id(node), "server"))
+            yield slip(node.lineno, "not-started", message, fix=fix)
+
+
 def hidden_names(tree):
     """Yield callbacks that are defined twice, so that the first one is never called; and calls of a name that a line
     imports and a class below it takes."""

@@ -5,6 +5,7 @@ script asks for. Names and texts are for `script_names.py`. Nothing is executed.
 """
 
 import ast
+import importlib.util
 import os
 import sys
 
@@ -28,7 +29,15 @@ from script_names import (
     text_of,
     walk,
 )  # fmt: skip
-from script_objects import callbacks, hidden_names, object_slips, queue_sizes, subscribed_again
+from script_objects import (
+    callbacks,
+    hidden_names,
+    object_slips,
+    queue_sizes,
+    subscribed_again,
+    taken_off,
+    unstarted_servers,
+)
 
 SLIPS_LIMIT = 100
 """Of a file."""
@@ -63,7 +72,8 @@ def slips(tree):
     finders = (
         misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice, callbacks,
         waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
-        without_effect, assigned_late, hidden_names, subscribed_again,
+        without_effect, assigned_late, hidden_names, subscribed_again, imports,
+        taken_off, unstarted_servers,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
@@ -111,15 +121,31 @@ def loop_rates(tree):
         if not node.args or (timed == "sleep" and id(node) not in looped):
             continue
         value = given(node.args[0])
-        if is_call(value, "Duration") and value.args:
+        whole = nanoseconds_apart(value) if is_call(value, "Duration") else None
+        if is_call(value, "Duration") and value.args and not whole:
             value = given(value.args[0])
-        name, number = read_parameter(value) if timed == "Rate" else None, constant(value, given)
-        if name:
-            yield slip(value.lineno, "rate-parameter", name)
-        elif number:
-            hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
-            pause = dotted(node.func) if timed == "sleep" else ""
-            yield slip(value.lineno, "rate-number", hz, name=pause)
+        yield from loop_rate(node, timed, value, whole or constant(value, given))
+
+
+def loop_rate(call, timed, value, number):
+    """Yield the rate that a `Rate(…)`, `sleep(…)` or `Timer(…)` asks for: of the last two, `number` is in seconds."""
+    name = read_parameter(value) if timed == "Rate" else None
+    if name:
+        yield slip(value.lineno, "rate-parameter", name)
+    elif number:
+        hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
+        pause, fix = dotted(call.func) if timed == "sleep" else "", ""
+        if is_call(value, "Duration"):
+            pause, fix = dotted(value.func), "its second number counts nanoseconds, so it is %.9g s" % number
+        yield slip(value.lineno, "rate-number", hz, fix=fix, name=pause)
+
+
+def nanoseconds_apart(call):
+    """Return how many seconds `Duration(0, 100)` is, of whole seconds and of nanoseconds; None of any other call."""
+    parts = [getattr(one, "value", None) for one in call.args]
+    if len(parts) != 2 or not all(type(one) is int and 0 <= one < 1 << 31 for one in parts) or not parts[1]:
+        return None
+    return parts[0] + parts[1] * 1e-9
 
 
 WORKS = ("init_node", "publish", "spin", "sendTransform", "send_goal")
@@ -538,6 +564,39 @@ def asked(node, functions):
     if name in ("input", "raw_input"):
         return None if name in functions else name
     return name if name in ("sys.stdin.read", "sys.stdin.readline", "sys.stdin.readlines") else None
+
+
+IMPORTS_LIMIT = 30
+
+
+def imports(tree):
+    """Imports of what nothing in the script uses, and of modules that this Python does not find; the standard library's
+    and rospy are there and cost nothing."""
+    names = [n for n in walk(tree) if isinstance(n, ast.Name)]
+    used = {n.id for n in names} - {n.id for n in names if isinstance(n.ctx, ast.Store)}
+    tried = {id(n) for one in walk(tree) if isinstance(one, ast.Try) for n in ast.walk(one)}
+    found = [n for n in walk(tree) if isinstance(n, (ast.Import, ast.ImportFrom)) and id(n) not in tried]
+    for node in found[:IMPORTS_LIMIT]:
+        modules = (
+            [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module or ""]
+        )
+        module = modules[0].partition(".")[0]
+        bound = [alias.asname or alias.name.partition(".")[0] for alias in node.names]
+        if len(modules) > 1 or getattr(node, "level", 0) or module in PLAIN_MODULES - {"numpy"}:
+            continue
+        if not used.intersection(bound) and bound != ["*"] and "__all__" not in used:
+            fix = "delete line %d: nothing in the script uses `%s`" % (node.lineno, "`, `".join(bound))
+            yield slip(node.lineno, "unused-import", module, fix=fix, name=bound[0])
+        if not is_there(module):
+            yield slip(node.lineno, "lacking-import", module, name=bound[0])
+
+
+def is_there(module):
+    """Return whether Python finds a module, without importing it."""
+    try:
+        return importlib.util.find_spec(module) is not None
+    except (ImportError, ValueError, AttributeError):
+        return False
 
 
 def without_effect(tree):

@@ -158,24 +158,32 @@ def argument_texts(text):
 
 
 COMMENTED_CALL = re.compile(
-    r"\s*#[#\s]*((?:([\w.]+) *= *)?[\w.]*\b(Publisher|Subscriber|Service|init_node|publish|sleep|spin|"
+    r"\s*(?:#[#\s]*|(?P<quotes>\'{3}|\"{3}|[\'\"]))"
+    r"(?P<code>(?:(?P<target>[\w.]+) *= *)?[\w.]*\b"
+    r"(?P<call>Publisher|Subscriber|Service|init_node|publish|sleep|spin|"
     r"log\w+(?=\(.*\w\.data\b)|print(?=\(.*\w\.data\b))\(.*\))"
-    r"\s*(?:#.*)?"
+    r"(?(quotes)(?P=quotes))\s*(?:#.*)?"
 )
 
 
 def commented_calls(text):
-    """Yield calls of ROS that are commented out; `name` is the call, behind what it is given to: `pub = Publisher`."""
+    """Yield calls of ROS that are commented out, or put in quotes; `name` is the call, behind what it is given to:
+    `pub = Publisher`."""
     for number, line in enumerate(text.splitlines(), 1):
         found = COMMENTED_CALL.fullmatch(line[:TEXT_LIMIT])
-        code, target, call = found.groups() if found else ("", "", "")
+        quotes, code, target, call = found.group("quotes", "code", "target", "call") if found else [""] * 4
         with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
             if code and ast.parse(code):
                 name = "%s = %s" % (target, call) if target else call
-                message = "`%s(…)` is commented out" % call
-                yield slip(
-                    number, "commented-out", message, fix="remove the `#` from line %d" % number, name=name
+                message = "`%s(…)` is %s" % (
+                    call,
+                    "in quotes, so it never runs" if quotes else "commented out",
                 )
+                fix = "remove the %s line %d" % (
+                    "quotes around the call on" if quotes else "`#` from",
+                    number,
+                )
+                yield slip(number, "commented-out", message, fix=fix, name=name)
 
 
 def bare_except(tree, name):

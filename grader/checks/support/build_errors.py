@@ -411,6 +411,16 @@ def _no_semicolon(found: re.Match[str], _package: PackageFacts, _lines: Sequence
     return Explained(f"{found.string}: a `;` is missing", f"write a `;` at the end {where}")
 
 
+def _no_semicolon_above(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+    """Where what the compiler did not expect begins its line, the statement above has no end."""
+    place = re.search(r":(\d+):", found.string)
+    source = re.compile(rf"\s*{place[1]} \|\s*{re.escape(found[1])}") if place else None
+    if source is None or not any(source.match(line) for line in lines):
+        return Explained(found.string, FIRST_ERROR_HINT)
+    hint = f"write a `;` at the end of the last line of code above line {place[1] if place else ''}"
+    return Explained(f"{found.string}: a `;` is missing above it", hint)
+
+
 def _no_brace(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     return Explained(
         f"{found.string}: a `}}` is missing",
@@ -531,6 +541,7 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"cannot find -l(\S+?)(?::|$)", _missing_link),
     (r"([\w+./-]+): No such file or directory", _missing_header),
     (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
+    (r"expected initializer before '([^']+)'", _no_semicolon_above),
     (r"expected '}' at end of input", _no_brace),
     (r"'([^']+)' was not declared in this scope(?:; did you mean '([^']+)')?", _explain_undeclared),
     (r"'([^']+)::(\w+)' has not been declared", _no_type),

@@ -38,11 +38,18 @@ from grader.checks.support.scripts import OF_INTERFACES, SYNTAX, path_in_package
 from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, shown
 from grader.evidence.events import STOPPED
 from grader.evidence.run import Run
-from grader.installable import ON_THE_MACHINE, exists_somewhere, install_hint, known_packages
+from grader.installable import (
+    NOTHING_TO_DO,
+    ON_THE_MACHINE,
+    exists_somewhere,
+    install_hint,
+    is_python_module,
+    known_packages,
+)
 from grader.model.package import Fault, PackageFacts, PythonSlip
 from grader.model.verdict import Citations, FileCitation, Verdict, machine_lacks
 from grader.syntax_fixes import COMMENTED_OUT, corrected, parsed, without_brace
-from grader.wording import seconds
+from grader.wording import join_words, seconds
 
 OTHER_NAMES_SHOWN = 3
 """Names of the same script that are not defined either."""
@@ -249,10 +256,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     unbuilt = None if hiding else unmade(found, package)
     cause, hint = unbuilt or (cause, hint)
     if lacking := _lacking(found, package):
-        where = f" ({place.file}, line {place.line})" if place else ""
-        cause = f"{shown(found.text)}{where}: this grading machine lacks {lacking}"
-        hint = install_hint(lacking, module=_is_module(lacking, package))
-        return Ending(cause, hint, (place,) if place else (), of_machine=True)
+        return _of_machine(found, lacking, place, package)
     if broken := _broken(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""
         cause = f"{shown(found.text)}{where}: raised by a file of this grading machine, {broken}"
@@ -265,6 +269,8 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         place = source.python_fault.place
     if place is not None and misplaced is None:
         cause, hint = _by_other_lines(found, place, package) or (cause, hint)
+    if place is not None and found.kind in IMPORT_ERRORS and unbuilt is None and not hiding:
+        hint = _unused_import(place, package) or hint
     said = re.sub(r" \(/\S+/__init__\.py\)$", "", found.text)
     if (guess := _BY_PYTHON.search(said)) and (hasattr(builtins, guess[1]) or "did you mean" in cause):
         said = said.removesuffix(guess[0])
@@ -276,6 +282,34 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(said.rstrip('.'))}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else (), unbuilt=unbuilt is not None)
+
+
+def _of_machine(found: Traceback, lacking: str, place: FileCitation | None, package: PackageFacts) -> Ending:
+    """Explain an import of what exists and this machine lacks, with what else the script needs of the kind."""
+    where = f" ({place.file}, line {place.line})" if place else ""
+    others = [name for name in _lacking_too(place, package) if name != lacking]
+    cause = f"{shown(found.text)}{where}: this grading machine lacks {join_words([lacking, *others])}"
+    hint = install_hint(lacking, module=_is_module(lacking, package), also=others)
+    if place is not None and (unused := _unused_import(place, package)):
+        needed = hint.replace(NOTHING_TO_DO, "If you need it, ", 1)
+        hint = f"{unused}. {needed}"
+    return Ending(cause, hint, (place,) if place else (), of_machine=True)
+
+
+def _lacking_too(place: FileCitation | None, package: PackageFacts) -> tuple[str, ...]:
+    """Return the modules of Python, none of ROS's, that the script imports and that were not there either."""
+    slips = (
+        s for s in package.slips if place is not None and (s.file, s.kind) == (place.file, "lacking-import")
+    )
+    return tuple(dict.fromkeys(s.message for s in slips if is_python_module(s.message)))
+
+
+def _unused_import(place: FileCitation, package: PackageFacts) -> str:
+    """Return that the import on that line is not needed; "" where it is, or another name of the file is not there."""
+    own = [s for s in package.slips if s.file == place.file]
+    if any(s.kind in {"undefined", "misspelt"} for s in own):
+        return ""
+    return next((s.fix for s in own if (s.kind, s.line) == ("unused-import", place.line)), "")
 
 
 def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
@@ -296,6 +330,9 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
         return next(((s.message, s.fix) for s in here if re.search(rf"\b{s.name}\b", found.message)), None)
     if found.kind == "SerializationError" and _NUMBER_WANTED.search(found.message):
         return _no_number(found, place, package)
+    if found.kind == "ROSException" and "unregistered()" in found.message:
+        gone = (s for s in package.slips if (s.kind, s.file) == ("unregistered", place.file))
+        return next(((s.message, s.fix) for s in gone), None)
     late = found.kind in {"ROSInitException", "ROSException"} and "init_node" in found.message
     return _late_init(place, package) if late else None
 
@@ -333,7 +370,11 @@ def _asks_for_input(
 ) -> tuple[str, str] | None:
     """Return the cause and the hint of a script that asks for input and has a Rate already."""
     rated = {one.file for one in package.slips if one.kind.startswith("rate-")}
+    asking = sorted({s.line for s in package.slips if s.kind == "input" and place and s.file == place.file})
     source = found.own_frames[-1].source if found.own_frames else ""
+    if found.kind == "EOFError" and len(asking) > 1:
+        lines = join_words(map(str, asking))
+        return CAUSES["EOFError"][0], f"write values in the code in place of each `input()`: lines {lines}"
     if found.kind == "EOFError" and (number := _NUMBER_ASKED.search(source)):
         return CAUSES["EOFError"][0], f"write a number in the code in place of `{number[0]}…))`"
     if found.kind != "EOFError" or place is None or place.file not in rated:

@@ -204,6 +204,22 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
     return None
 
 
+def later_fixes(file: LaunchFile, script: str) -> Iterator[str]:
+    """Yield what lets the file start a script that is meant in it: an `if` or `unless` that leaves its node out, and
+    its whole name as `type`."""
+    name = PurePosixPath(script).name
+    stem = PurePosixPath(name).stem
+    off = [(kind, line, said) for kind, line, said in file.switched_off if PurePosixPath(kind).stem == stem][
+        :1
+    ]
+    for _, line, said in off:
+        other = ", or give its <arg> the other default" if "$(arg" in said else ""
+        yield f"remove {said} from line {line}{other}"
+    named = [(kind, f"in the <node> below line {line}") for kind, line, _ in off]
+    named += [(node.type, f"on line {node.line}") for node in file.brings if node.type == stem]
+    yield from (f'write type="{name}" {place}, not type="{kind}"' for kind, place in named if kind != name)
+
+
 def illegal_name(node: LaunchNode) -> Slip | None:
     """Return a name at which roslaunch only warns, and which other tools stumble over."""
     name = node.name or ""

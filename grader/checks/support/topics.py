@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Literal
 
@@ -15,6 +16,7 @@ from grader.checks.support.text import (
     both,
     near_names,
     publisher,
+    shown,
     subscriber,
     texts_in,
 )
@@ -151,6 +153,10 @@ def _not_advertised(package: PackageFacts, run: Run, topic: str, of_node: Callab
         return _commented_out(what, slip, of_node).about(measured=measured)
     if not published:
         return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
+    if copied := copied_topic(package, run, "publisher"):
+        hint = f"write {topic} on the one of {copied} that is for it"
+        message = f"{what}; the node publishes on {join_words(published)}, on {copied}"
+        return of_node(message, measured=measured, hint=hint)
     hint += f", or rename {join_words(published, 'or')} if that is meant to be it"
     verdict = of_node(f"{what}; the node publishes on {join_words(published)}", measured=measured, hint=hint)
     return verdict.about(citations=named_at(package, run, "publisher", next(iter(published))))
@@ -174,6 +180,15 @@ def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Calla
         return verdict.model_copy(update={"cause": deaf.message})
     if slip := call_in_comment(package, run, "publish"):
         return _commented_out(message, slip, of_node)
+    return _by_what_is_heard(run, message, of_node)
+
+
+def _by_what_is_heard(run: Run, message: str, of_node: Callable[..., Verdict]) -> Verdict:
+    """Return the verdict on a node that may wait for something: a frame that is not sent, or a message."""
+    if frame := _unknown_frame(run):
+        why = f"{message}: the node looks up the frame {shown(frame)}, and tf knows none of that name"
+        hint = "write the name of a frame that is sent: `rosrun tf view_frames` draws them"
+        return of_node(why, measured="no message", hint=hint).seeking("quoted", frame)
     if heard := _heard_topics(run):
         answering = f"publish in the callback of {join_words(heard)}, or in the loop"
         hint = both(
@@ -187,6 +202,23 @@ def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Calla
         )
     hint = f"call publish(…) inside the loop `{LOOP}`"
     return of_node(message, measured="no message", hint=hint)
+
+
+_LOOKED_UP = re.compile(r"\"([^\"]{1,80})\" passed to lookupTransform argument \w+ does not exist")
+
+
+def _unknown_frame(run: Run) -> str:
+    """Return the frame that a node looks up in vain to the end, as what it prints says; "" for none."""
+    found = [m[1] for one in lives(run) for _, c in run.lines(one.name) if (m := _LOOKED_UP.search(c.line))]
+    sent = {
+        name
+        for channel in run.channels
+        if channel.topic in {"/tf", "/tf_static"}
+        for value in channel.values
+        for one in (value or {}).get("transforms") or ()
+        for name in (one.get("child_frame_id"), one.get("header", {}).get("frame_id"))
+    }
+    return next((name for name in found[-1:] if name not in sent), "")
 
 
 def _heard_topics(run: Run) -> list[str]:
@@ -257,6 +289,21 @@ def call_in_comment(package: PackageFacts, run: Run, call: str) -> PythonSlip | 
     scripts = {one.start.script for one in lives(run)}
     found = (s for s in package.slips if s.kind == "commented-out" and s.file in scripts)
     return next((s for s in found if s.name.rpartition(" ")[2] == call), None)
+
+
+def copied_topic(
+    package: PackageFacts, run: Run, kind: Literal["publisher", "subscriber"], topic: str = ""
+) -> str:
+    """Return the lines of one running script that name the same topic, this one if any is given: one is copied and not
+    changed; "" for none."""
+    scripts = {one.start.script for one in lives(run)}
+    places: dict[tuple[str, str], list[int]] = {}
+    for slip in package.slips:
+        name = slip.message.strip("/")
+        if slip.kind == kind and slip.file in scripts and name == (topic.strip("/") or name):
+            places.setdefault((slip.file, name), []).append(slip.line)
+    found = ((file, sorted(set(lines))) for (file, _), lines in places.items())
+    return next((f"lines {join_words(map(str, n))} of {file}" for file, n in found if len(n) > 1), "")
 
 
 def _commented_out(what: str, slip: PythonSlip, of_node: Callable[..., Verdict]) -> Verdict:

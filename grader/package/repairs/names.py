@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from grader.model.package import MANIFEST, LaunchFile, PackageFacts, SlipKind
 from grader.model.record import Record
-from grader.model.repair import RepairKind
+from grader.model.repair import RepairKind, as_code
 from grader.package.launch import parse_launch
 from grader.package.manifest import parse_manifest
 from grader.package.repairs.editing import Files, repair_xml
@@ -191,17 +191,54 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
     wanted = wanted.model_copy(update={"params": (*wanted.params, *(f"/{node}/{p}" for p in wanted.private))})
     asked_of = {"node": wanted.nodes, "publisher": wanted.topics, "subscriber": wanted.topics}
     branches = [f"/{'/'.join(branch)}" for branch in _branches(wanted)]
+    names = _repair_dots(files, file, names, branches)
     for role in ROLES:
         asked = asked_of.get(role, branches)
         given = [name for name in names if name.role == role]
         used = {_resolve(name, node) for name in given}
         absent = [w for w in asked if _bare(w, role) not in used]
         for name in dict.fromkeys(given):
-            right = next((w for w in absent if _is_slip(name, w, node)), "")
+            near = (w for w in absent if _is_slip(name, w, node) and _has_keys(w, name.keys, branches))
+            right = next(near, "")
             if right and _resolve(name, node) not in {_bare(w, role) for w in asked}:
                 literal = _literal(name, right, node)
                 _replace_literal(files, file, name, literal, literal if literal.startswith("~") else right)
                 node = literal if role == "node" else node
+
+
+def _repair_dots(files: Files, file: str, names: Sequence[Name], branches: Sequence[str]) -> list[Name]:
+    """Find the parameters whose parts are written with dots between them, all as one repair, and return the others."""
+    meant = {}
+    for name in names:
+        whole = f"/{name.value.strip('/').replace('.', '/')}"
+        if KINDS[name.role] == "parameter-name" and "." in name.value and whole in branches:
+            above = (w for w in (whole, *_above(whole)) if _has_keys(w, name.keys, branches))
+            meant[name] = next(above, "")
+    text, wrong = files.text(file), [name for name, right in meant.items() if right]
+    if text is None or not wrong:
+        return list(names)
+    lines = text.split("\n")
+    for name in sorted(wrong, key=lambda one: -one.start):
+        right, line = meant[name], lines[name.line - 1]
+        right = right if name.value.startswith("/") else right.strip("/")
+        lines[name.line - 1] = line[: name.start] + line[name.start :].replace(name.value, right, 1)
+    told = f"line {wrong[0].line} of {file}: the parameter {wrong[0].value} should be {meant[wrong[0]]}"
+    numbers = sorted({name.line for name in wrong})
+    written = [f"write {as_code(lines[n - 1].strip())}" for n in numbers]
+    more = [f"on line {n}, {one}" for n, one in zip(numbers[1:], written[1:], strict=True)]
+    fix = "; ".join([written[0], *more]) if more else ""
+    files.change("parameter-name", file, "\n".join(lines), told, fix)
+    return [name for name in names if name not in wrong]
+
+
+def _above(param: str) -> Iterator[str]:
+    """Yield what a parameter lies below, the nearest first."""
+    yield from (str(path) for path in PurePosixPath(param).parents if str(path) != "/")
+
+
+def _has_keys(param: str, keys: Sequence[str], branches: Sequence[str]) -> bool:
+    """Return whether the lab's parameters below this one are all that a script reads of it."""
+    return all(f"{param}/{key}" in branches for key in keys)
 
 
 def repair_script_keys(files: Files, file: str, names: Sequence[Name], wanted: Wanted) -> None:
@@ -441,10 +478,10 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
 def _repair_find(files: Files, file: str, own: str) -> None:
     """Replace what is nearly the package's name in each `$(find …)` of a launch file."""
     text = files.text(file) or ""
-    for found in re.findall(r"\$\(find +([\w-]+) *\)", text):
-        if is_near(found, own):
+    for place in re.finditer(r"\$\(find +([\w-]+) *\)", text):
+        if is_near(found := place[1], own):
             after = re.sub(rf"(\$\(find +){re.escape(found)}(?= *\))", rf"\g<1>{own}", files.text(file) or "")
-            line = text[: text.index(found)].count("\n") + 1
+            line = text[: place.start()].count("\n") + 1
             files.change(
                 "package-name", file, after, f"line {line} of {file}: $(find {found}) should be $(find {own})"
             )

@@ -30,10 +30,13 @@ ATTEMPTS = 3
 
 Cause = Literal[
     "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
-    "old-name", "module", "import", "name", "attribute", "value", "call", "callback", "argument",
+    "old-name", "module", "import", "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument",
     "unbound", "guard", "main", "spin",
 ]  # fmt: skip
-CALLS = ("name", "attribute", "value", "call", "callback", "argument", "unbound", "guard", "main", "spin")
+CALLS = (
+    "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "guard", "main",
+    "spin",
+)  # fmt: skip
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "import"), "missing-import"),
     **dict.fromkeys(CALLS, "missing-call"),
@@ -57,13 +60,15 @@ class _Step(Record):
 
 
 class Name(Record):
-    """A text in a script that names something; `start` and `end` are columns of its line, from 0."""
+    """A text in a script that names something; `start` and `end` are columns of its line, from 0. `keys` are those that
+    the script reads of a parameter."""
 
     role: Literal["publisher", "subscriber", "node", "param", "set-param", "key"]
     value: str
     line: int
     start: int
     end: int
+    keys: tuple[str, ...] = ()
 
 
 class _Entry(Record):
@@ -185,6 +190,8 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
         words.format(file=file, place=place, line=first.line, word=word, names=names, calls=calls, told=told)
         for words in WORDS[cause]
     )
+    if cause == "quotes":
+        fix = _rewritten(before, after)
     if cause in {"tabs", "level"}:
         fix = _required_indentation(before, after, fix)
     return said, fix if cause != "old-name" or word == "raw_input" else ""
@@ -205,9 +212,11 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "import": ("{place} uses {word}, which is not imported", ""),
     "module": ("{place}: messages are not imported from {word}", ""),
     "name": ("{place}: {word} is not defined", ""),
+    "quotes": ("{place}: quotes are missing around {word}", ""),
     "attribute": ("{place}: there is no {word}", ""),
     "value": ("{place}: {word} is given a value with `=`, and has to be called", ""),
     "call": ("{place}: {word} is named but not called", "write {calls}"),
+    "quoted": ("{place}: {word} is in quotes, so it never runs", ""),
     "callback": ("{place}: {calls} is called where the function itself is meant", ""),
     "argument": ("{place}: {word}", ""),
     "unbound": ("{place}: the function assigns to {word}, so it is a variable of its own and has no value yet",
