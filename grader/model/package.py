@@ -274,7 +274,7 @@ SlipKind = Literal[
     "defined-twice", "subscribed-again",
     "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
-    "prints", "argument-text",
+    "prints", "argument-text", "start-value", "added-first",
 ]  # fmt: skip
 
 
@@ -311,7 +311,8 @@ class PythonSlip(Record):
     `subscriber-type`: the message type on that line. `argument-text`: no slip, but where an argument of the command
     line is kept as a text; `fix` is the line with a number in its place. `defined-twice`: a callback that a second
     function of its name hides, or a call of an imported name that a class hides. `subscribed-again`: a
-    `Subscriber(…)` that a loop makes in each of its turns.
+    `Subscriber(…)` that a loop makes in each of its turns. `start-value` and `added-first`: no slips, but where a
+    counter, `name`, gets its first number, `message`, and where a loop adds one to it before it publishes.
     """
 
     file: str

@@ -14,6 +14,7 @@ from script_names import (
     assigned_late,
     called_name,
     counter_slips,
+    counter_starts,
     dotted,
     graph_names,
     is_call,
@@ -59,7 +60,7 @@ def slips(tree):
     finders = (
         misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice, callbacks,
         waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
-        without_effect, assigned_late, hidden_names, subscribed_again,
+        counter_starts, without_effect, assigned_late, hidden_names, subscribed_again,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
