@@ -26,7 +26,7 @@ from grader.model.submission import Submission
 from grader.package import read_packages
 from grader.ros_env import why_nodes_cannot_run
 from grader.ros_packages import look_for
-from grader.rubric.load import LoadedRubric, needs_ros, rates_of, select_started, watched_of
+from grader.rubric.load import LoadedRubric, cancels_of, needs_ros, rates_of, select_started, watched_of
 from grader.rubric.made_up import KEY
 from grader.rubric.model import Rubric
 from grader.wording import join_words
@@ -107,6 +107,7 @@ def make_recorder(
         beside=job.rubric.path.parent,
         rates=rates_of(rubric),
         watched=watched_of(rubric),
+        cancels=cancels_of(rubric),
         mode=options.sandbox,
         progress=job.progress,
         recorded=options.reused,

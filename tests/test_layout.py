@@ -85,7 +85,8 @@ ALLOWED = {
         *BASE, "arena.interruption", "arena.workspace", "faults", "files", "intake", "package", "pipeline", "report",
         "results", "rubric"
     },
-    "integrations": BASE | {"faults", "files", "intake", "judging", "pipeline", "report", "results", "rubric"},
+    "integrations": BASE
+    | {"faults", "files", "installable", "intake", "judging", "pipeline", "report", "results", "rubric"},
     "cli": {
         *BASE, "arena", "authoring", "checks", "classes", "evidence", "faults", "files", "integrations", "intake",
         "host_programs", "installable", "judging", "package", "pipeline", "report", "results", "ros_env",

@@ -76,6 +76,7 @@ class Recorder:
         beside: Path | None = None,
         rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
         watched: Mapping[str, float] | None = None,
+        cancels: Mapping[str, Mapping[str, float]] | None = None,
         recorded: Mapping[str, Path] | None = None,
         stop: Stop | None = None,
         about: Mapping[str, str] | None = None,
@@ -86,6 +87,7 @@ class Recorder:
         self._stop = stop
         self._rates = rates or {}
         self._watched = watched or {}
+        self._cancels = cancels or {}
         self._rubric = rubric
         self._beside = beside
         self._progress = progress
@@ -266,6 +268,7 @@ class Recorder:
                     tell=tell,
                     rates=self._rates.get(name, ()),
                     watched_s=self._watched.get(name, 0.0),
+                    cancels=self._cancels.get(name),
                     admission=self._admission,
                     last_run=self._runs[name] == RETRIES,
                     beside=self._beside,

@@ -87,6 +87,7 @@ async def run_scenario(
     tell: Tell,
     rates: tuple[RateBounds, ...] = (),
     watched_s: float = 0.0,
+    cancels: Mapping[str, float] | None = None,
     admission: Admission | None = None,
     last_run: bool = False,
     beside: Path | None = None,
@@ -95,7 +96,8 @@ async def run_scenario(
 
     Processes are started when `admission` lets them: others wait until they are up. A window in which nothing but
     `rates` is to be seen ends when they are clear. For `watched_s`, nodes are watched even where nothing more can come.
-    `beside` is the rubric's folder.
+    `cancels` says for how many seconds the result of an action's last goal is waited for once it is cancelled. `beside`
+    is the rubric's folder.
     """
     admission = admission or Admission(None)
     warp = scenario.warp if scenario.clock == "warped" else 1.0
@@ -112,7 +114,8 @@ async def run_scenario(
                 arena.course(ScenarioEvent(event="begin"))
                 at_once = {spec["name"] for start, spec in starts if start.name not in scenario.started_later}
                 async with release_when_up(leave, at_once, arena):
-                    outcome, detail = await _run(scenario, starts, arena, tell, beside)
+                    steps = StepRunner(scenario, starts, arena, tell, beside=beside, cancels=cancels)
+                    outcome, detail = await _run(scenario, starts, arena, tell, steps)
                     if outcome == "complete":
                         await _watch_on(arena, watched_s)
                 await stop(scenario.start, arena, warped=scenario.clock == "warped")
@@ -164,13 +167,13 @@ async def _run(
     starts: list[tuple[Start, ProcessSpec]],
     arena: ArenaSession,
     tell: Tell,
-    beside: Path | None,
+    steps: StepRunner,
 ) -> tuple[str, str]:
     tell("starting the managed roscore")
     if scenario.clock == "warped":
         arena.send(do="warp", warp=scenario.warp, step_s=CLOCK_STEP_S)
     set_params(scenario.params, arena)
-    async with StepRunner(scenario, starts, arena, tell, beside=beside) as runner:
+    async with steps as runner:
         runner.advertise()
         arena.live.started_s = time.monotonic()
         for start, spec in starts:

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import math
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from collections.abc import Set as AbstractSet
 from contextlib import suppress
 from dataclasses import replace
@@ -66,11 +67,13 @@ class StepRunner:
         tell: Tell,
         *,
         beside: Path | None = None,
+        cancels: Mapping[str, float] | None = None,
     ) -> None:
         self._scenario = scenario
         self._starts = starts
         self._results: dict[str, MessageType] = {}
         self._goals = 0
+        self._cancels = cancels or {}
         self._beside = beside or Path()
         self._bags: dict[str, tuple[Channel, ...]] = {}
         self._stopped: set[str] = set()
@@ -530,14 +533,27 @@ class StepRunner:
             self._note("note", action.name, f"the grader cannot send the goal: {error}")
             return
         self._tell(f"waiting for the result of {action.name}")
-        left_s, found = action.limit_s, None
+        left_s, found, since = action.limit_s, None, ""
         if action.cancel_after_s is not None:
             found = await self._result(action, name, action.cancel_after_s)
             if found is None:
                 self._send(cancel, {"id": name}, 0, 1, {"action": "cancel", **about})
+                left_s, since = self._patience_s(action), " after it was cancelled"
         found = found or await self._result(action, name, left_s)
-        value_, detail = found or (None, f"no result within {left_s:g} s")
+        value_, detail = found or (None, f"no result within {left_s:g} s{since}")
         self._arena.note(ActorEvent(action="result", actor="grader", **about, value=value_, detail=detail))
+
+    def _patience_s(self, action: Action) -> float:
+        """Return how long the result of a goal that is cancelled is waited for. Before another goal, it is the server
+        that has to have an end."""
+        last = [
+            step.action for step in self._scenario.steps if step.action and step.action.name == action.name
+        ][-1]
+        return (
+            min(action.limit_s, self._cancels.get(action.name, math.inf))
+            if action is last
+            else action.limit_s
+        )
 
     async def _result(self, action: Action, name: str, limit_s: float) -> tuple[Any, str] | None:
         """Return the result of that goal and the word for its status."""

@@ -21,6 +21,10 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
 
+GOES_ON_NS = 1_000_000_000
+"""Feedback so long after a goal was cancelled says that the server goes on with it."""
+CANCELLED_MORE_S = 5.0
+"""So much longer than `within_s`, at least, the result of a goal that is cancelled is waited for."""
 HINTS = {
     "SUCCEEDED": "end the callback with server.set_succeeded(result)",
     "ABORTED": "end the callback with server.set_aborted(result)",
@@ -50,6 +54,14 @@ class ActionResultParams(Record):
     def of_feedback_alone(self) -> bool:
         """Whether nothing is asked of the goal's end."""
         return self.feedback > 0 and not self.model_fields_set & {"status", "result", "within_s"}
+
+    @property
+    def after_cancel_s(self) -> float | None:
+        """How long after a goal is cancelled its result still matters, to tell a late one from none; None: as long as
+        the step waits."""
+        if self.of_feedback_alone:
+            return 0.0
+        return None if self.within_s is None else max(2 * self.within_s, self.within_s + CANCELLED_MORE_S)
 
     @property
     def words(self) -> str:
@@ -161,11 +173,20 @@ def _no_result(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
     if end := explain_error(package, run):
         return end.verdict(failed, f"{said}: {end.cause}")
     message = f"{said}: {shown(goal.end.detail) if goal.end else ''}"
-    verdict = failed(
-        message,
-        hint="every path through the callback must end with set_succeeded, set_aborted or set_preempted",
-    )
-    return excused(verdict.once(), run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
+    hint = "every path through the callback must end with set_succeeded, set_aborted or set_preempted"
+    verdict = failed(message, hint=hint).once()
+    if _goes_on(run, goal, params):
+        verdict = failed(f"{said}: it goes on, though it was cancelled", hint=HINTS["PREEMPTED"])
+    return excused(verdict, run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
+
+
+def _goes_on(run: Run, goal: Goal, params: ActionResultParams) -> bool:
+    """Whether feedback on a goal still comes long after it was cancelled."""
+    reports = run.student_channels(f"{params.action}/feedback")
+    stopped_ns, until_ns = goal.cancelled_ns, goal.ended_ns or run.end_ns
+    if stopped_ns is None:
+        return False
+    return any(stopped_ns + GOES_ON_NS < t <= until_ns for channel in reports for t in channel.times_ns)
 
 
 def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResultParams) -> Verdict:

@@ -175,6 +175,12 @@ def _fault(
     if left:
         nearest = min(left, key=lambda one: len(list(_differences(one, wanted, params))))
         found = join_words(map(str, _differences(nearest, wanted, params)))
+        if swapped := _swapped(nearest, wanted, params):
+            by_name = ", ".join(f"{field}=…" for field in nearest.fields or {})
+            message = f"{params.service} is called with {join_words(swapped)} swapped: {found}"
+            return failed(
+                message, hint=f"pass the request's fields by name, so that none is swapped: ({by_name})"
+            )
         message = f"{params.service} is called with {found}"
         return failed(
             message, hint="pass the request's fields by name, with the values that the handout asks for"
@@ -185,6 +191,26 @@ def _fault(
     if end := explain_early_end(package, run) or explain_error(package, run):
         return end.verdict(failed, f"{what}: {end.cause}")
     return failed(what, hint=f"{plural(len(params.wanted), 'call')} are expected: call it again").once()
+
+
+def _swapped(one: Request, wanted: dict[str, Any], params: CallsParams) -> list[str]:
+    """Return the fields of which each has the value of another one; none where it is not so."""
+    fields = one.fields or {}
+    wrong = [
+        key
+        for key in wanted
+        if key in fields and any(differences(fields[key], wanted[key], params.tolerance))
+    ]
+    asked = [wanted[key] for key in wrong]
+    for key in wrong:
+        fits = (
+            n for n, value in enumerate(asked) if not any(differences(fields[key], value, params.tolerance))
+        )
+        number = next(fits, None)
+        if number is None:
+            return []
+        del asked[number]
+    return wrong
 
 
 def _never(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:

@@ -28,6 +28,7 @@ from grader.wording import join_words
 NOT_CALLED = "no catkin_install_python(…) is called"
 NO_FILE = "there is no CMakeLists.txt"
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
+CALLS_SHOWN, ARGS_SHOWN = 6, 12
 
 
 class CMakeParams(Record):
@@ -67,7 +68,7 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
     # what is missing may stand behind the line that cannot be read
     wrong = [one for one in _wrong(facts, names) if facts.fault is None or one.line is not None]
     named = [c for c in facts.calls if c.name in {"project", "find_package", "catkin_package"}]
-    measured = ", ".join(f"{c.name}({' '.join(c.args[:3])})" for c in named[:6]) or "none of the three calls"
+    measured = ", ".join(map(_call_text, named[:CALLS_SHOWN])) or "none of the three calls"
     fault = facts.fault
     if not wrong and fault is None:
         places = tuple(FileCitation(file=c.file, line=c.line) for c in named[:3])
@@ -88,6 +89,11 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
     verdict = verdict.seeking("uncalled", *(one.uncalled for one in wrong if one.uncalled))
     above = [one.below for one in wrong if one.below is not None]
     return verdict.seeking("below", above[0].name) if above and len(above) == len(wrong) else verdict
+
+
+def _call_text(call: CMakeCall) -> str:
+    args = call.args if len(call.args) <= ARGS_SHOWN else (*call.args[:ARGS_SHOWN], "…")
+    return f"{call.name}({' '.join(args)})"
 
 
 def _no_file(package: PackageFacts, wanted: str) -> Verdict:

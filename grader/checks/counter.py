@@ -87,11 +87,37 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
     if not found:
         return _nothing(package, run, params.topic).about(expected=expected)
     first = found[0]
-    return judge_start(first, run, params).about(
+    verdict = _cite_start(judge_start(first, run, params), first, run, package, params)
+    return verdict.about(
         expected=expected,
         measured=first_values(first.values),
-        citations=(cite(run, params.topic, first.times_ns[0], first.times_ns[0]),),
+        citations=(*verdict.citations, cite(run, params.topic, first.times_ns[0], first.times_ns[0])),
     )
+
+
+def _cite_start(
+    verdict: Verdict, first: Count, run: Run, package: PackageFacts, params: StartParams
+) -> Verdict:
+    """Return a lost verdict with the line that gives the counter its value, or adds one before it is published."""
+    if verdict.status is not Status.FAIL:
+        return verdict
+    value = first.values[0]
+    starts = slips_of(package, run, first.callerid, "start-value")
+    added = slips_of(package, run, first.callerid, "added-first")
+    wrong = [one for one in starts if int(one.message) == value]
+    early = [
+        one for one in added if {s.message for s in starts if s.name == one.name} == {str(int(value) - 1)}
+    ]
+    if len(early) == 1 and value - params.start == 1:
+        slip, what = early[0], f"adds one to `{early[0].name}` before the first value is published"
+        hint = f"move line {slip.line} of {slip.file} below publish(…)"
+    elif len(wrong) == 1 and not added:
+        slip, what = wrong[0], f"sets `{wrong[0].name}` to {wrong[0].message}"
+        hint = f"on line {slip.line} of {slip.file}, set `{slip.name}` to {params.start}"
+    else:
+        return verdict
+    message = f"{verdict.message}; line {slip.line} of {slip.file} {what}"
+    return verdict.model_copy(update={"message": message, "hint": hint, "citations": (slip.place,)})
 
 
 def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from grader.checks.registry import ProcessName, Refers, check
 from grader.checks.support.console_output import Line, printed_lines
-from grader.checks.support.fields import differences, value_text
+from grader.checks.support.fields import differences, is_number, value_text
 from grader.checks.support.parameters import (
     Given,
     Key,
@@ -567,7 +567,7 @@ def param_value(package: PackageFacts, build: Run, run: Run, params: ParamValueP
     verdict = (
         _not_there(package, run, without_system_params(held), params)
         if got is MISSING
-        else _given_before(package, build, params, got) or _judge_value(got, params)
+        else _given_before(package, build, params, got) or _judge_value(package, build, got, params)
     )
     cited = cite(run, "/grader/param")
     return verdict.about(
@@ -610,13 +610,41 @@ def _value_below(leaves: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 -
     return {part: _value_below(leaves, f"{name}/{part}") for part in dict.fromkeys(parts)} or MISSING
 
 
-def _judge_value(got: object, params: ParamValueParams) -> Verdict:
+def _judge_value(package: PackageFacts, build: Run, got: object, params: ParamValueParams) -> Verdict:
     wrong = [str(one) for one in differences(got, params.value, EXACT)]
     if not wrong:
         return passed(f"{params.name} is {shown(value_text(got))}")
-    hint = "write numbers without quotes, and text in quotes" if "(text, not" in wrong[0] else ""
+    hint = _kind_hint(got, params.value) or f"rosparam get {params.name} shows it; set it to the lab's value"
+    places = _given_at(package, build, absolute_name(params.name))
+    if len(places) == 1:
+        hint = f"{places[0].file}, line {places[0].line}: {hint}"
     message = shown(f"{params.name} is {join_words(wrong)}")
-    return failed(message, hint=hint or f"rosparam get {params.name} shows it; set it to the lab's value")
+    return failed(message, hint=hint, citations=places[:1] if len(places) == 1 else ())
+
+
+def _kind_hint(got: object, wanted: object) -> str:
+    """Return how a value of the right kind is written; empty where the kind is right."""
+    if isinstance(got, dict) and isinstance(wanted, dict):
+        return next(filter(None, (_kind_hint(got[key], wanted[key]) for key in wanted if key in got)), "")
+    if isinstance(wanted, bool) and not isinstance(got, bool):
+        return f"write {str(wanted).lower()} without quotes ({wanted} in Python)"
+    if isinstance(wanted, str) and not isinstance(got, str):
+        return f'write text in quotes: "{wanted}"'
+    if is_number(wanted) and not is_number(got):
+        return f"write {value_text(wanted)}, a number without quotes"
+    return ""
+
+
+def _given_at(package: PackageFacts, build: Run, name: str) -> tuple[FileCitation, ...]:
+    """Return the lines of launch and YAML files that give this parameter a value."""
+    launched = [
+        one for file in package.launch_files for one in file.params if absolute_name(one.name) == name
+    ]
+    found = [FileCitation(file=one.file, line=one.line) for one in launched]
+    for file in (f.path for f in package.files if f.path.endswith((".yaml", ".yml"))):
+        keys = [key for key in _keys_of(build, file) if key.path and name.endswith(key.path)]
+        found += [FileCitation(file=file, line=key.line) for key in keys]
+    return tuple(dict.fromkeys(found))
 
 
 def _not_there(package: PackageFacts, run: Run, names: Iterable[str], params: ParamValueParams) -> Verdict:

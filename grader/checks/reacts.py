@@ -143,7 +143,9 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         _nothing_to_judge(package, run, effects, own, params)
         or _early(causes, effects, run, params)
         or _never_caused(causes, run, params)
-        or _judge_unanswered(answers, run, params, _instead(causes, effects, params))
+        or _judge_unanswered(
+            answers, run, params, _instead(causes, effects, params) or _other_answer(answers, effects, params)
+        )
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.cause.words}")
     )
     times = [one.after_s for one in answers if one.after_s is not None]
@@ -251,6 +253,22 @@ def _instead(
     words = f"it came when {field} was {value_text(then)}"
     hint = f"look at the condition in the callback of {topic}: it holds for {value_text(then)} and not for"
     return words, f"{hint} {value_text(wanted)}"
+
+
+def _other_answer(
+    answers: Sequence[Answer], effects: Sequence[Reading], params: ReactsParams
+) -> tuple[str, str] | None:
+    """Return, in words, what comes upon the cause where the effect never does, and what to look at."""
+    at_ns = answers[0].at_ns if answers else math.inf
+    came = next((one for one in effects if one.time_ns >= at_ns and one.values), None)
+    if came is None or params.effect.value is None or any(map(params.effect.holds, effects)):
+        return None
+    field = params.effect.field
+    hint = f"in the callback of {params.cause.topic}, look at what you publish on {params.effect.topic}: "
+    return (
+        f"{field} is {value_text(came.values[0])} then",
+        f"{hint}{field} has to be {value_text(params.effect.value)}",
+    )
 
 
 def _judge_unanswered(

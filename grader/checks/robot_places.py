@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from grader.checks.registry import Refers, check
 from grader.checks.robot_path import metres, spot
 from grader.checks.support.clocks import Lateness, excused, run_seconds
+from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
     MOVED_M,
     Area,
@@ -29,7 +30,7 @@ from grader.checks.support.geometry import (
     stands,
     track,
 )
-from grader.checks.support.processes import GlobalName, observed_until_ns
+from grader.checks.support.processes import GlobalName, named_at, observed_until_ns
 from grader.checks.support.text import subscriber
 from grader.checks.support.topics import SYSTEM_TOPICS, cite, no_message, nodes_on
 from grader.evidence.run import Run
@@ -44,6 +45,8 @@ STALLED_MS = 1000.0
 STILL_S = 0.5
 """A robot's speed at the end is that of so long a time."""
 SLOW_M_S = 0.02
+SILENT_S, GAPS = 1.5, 5.0
+"""Positions have ended where none came for so long, and for so many of their gaps, before the run's end."""
 ROUNDING = 1e-9
 SAME_M = 0.005
 NEARLY = 1.25
@@ -141,6 +144,7 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
     if verdict is None and found is not None and asked is not None:
         judged = path_to_judge(found, asked, params)
         verdict = _judge_arrival(judged, asked, params) if judged else _too_late(asked, params)
+        verdict = _fell_silent(package, run, judged, asked, params) or verdict
         verdict = _excused_end(verdict, judged, run, params) if judged else verdict
     assert verdict is not None  # noqa: S101 - one of them always is
     return verdict.about(
@@ -244,6 +248,29 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> 
         return failed(message, hint=turn if away else "drive faster, or take a shorter way")
     hint = f"stop only where the distance is less than {significant(params.tolerance_m)} m"
     return failed(at, hint=hint)
+
+
+def _fell_silent(
+    package: PackageFacts, run: Run, judged: Sequence[Pose], asked: Stretch, params: EndsAtParams
+) -> Verdict | None:
+    """Return the loss where the student's own positions end long before the run does, on the way: where the robot went
+    then, no one knows."""
+    sent = [c for c in run.channels if c.topic == params.topic and c.messages]
+    own = run.student_channels(params.topic)
+    if not judged or len(sent) > len(own) or any("Twist" in channel.type for channel in sent):
+        return None
+    silent_s, gap_s = asked.to_s - judged[-1].time_s, (judged[-1].time_s - judged[0].time_s) / len(judged)
+    if silent_s < max(SILENT_S, GAPS * gap_s) or any(map(params.is_near, judged)) or stands(judged):
+        return None
+    if _speed_m_s(judged) <= SLOW_M_S:
+        return None
+    message = f"the positions on {params.topic} end {silent_s:.1f} s before the run does, at {spot(judged[-1].point)}, "
+    message += f"on the way to {spot(params.goal)}"
+    if end := explain_early_end(package, run):
+        return end.verdict(failed, f"{message}: the node ended ({end.cause})")
+    hint = f"publish on {params.topic} for as long as the node runs, not only for a while"
+    cited = named_at(package, run, "publisher", params.topic)
+    return failed(message, hint=hint, citations=cited)
 
 
 def _speed_m_s(path: Sequence[Pose]) -> float:

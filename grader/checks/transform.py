@@ -252,7 +252,7 @@ def _other_value(seen: Sequence[Seen], params: TransformParams) -> Verdict | Non
     hint = "the translation is in metres, and the angles of quaternion_from_euler in radians"
     why = _why(value, wanted, params)
     message = f"{params.name} is wrong {count}{why}; it is {_text(value)}, not {_text(wanted)}"
-    return failed(message, hint=hint)
+    return failed(message, hint=_axes(value, wanted, params)[1] or hint)
 
 
 def _why(value: Transform, wanted: Transform, params: TransformParams) -> str:
@@ -264,7 +264,29 @@ def _why(value: Transform, wanted: Transform, params: TransformParams) -> str:
     metres, degrees = value.apart(wanted)
     if metres <= params.tolerance_m:
         return f": the rotation is off by {degrees:.0f}°"
+    if axes := _axes(value, wanted, params)[0]:
+        return f": {axes}"
     return ": the rotation is right" if degrees <= params.tolerance_deg else ""
+
+
+def _axes(value: Transform, wanted: Transform, params: TransformParams) -> tuple[str, str]:
+    """Return which axes of the translation are swapped or turned around, and how to write them; empty if none is."""
+    x, y, z = value.at
+
+    def fits(at: Vector) -> bool:
+        near = math.dist(value.at, wanted.at) > params.tolerance_m
+        return near and math.dist(at, wanted.at) <= params.tolerance_m + 1e-6
+
+    for first, second, at in (("x", "y", (y, x, z)), ("x", "z", (z, y, x)), ("y", "z", (x, z, y))):
+        if fits(at):
+            hint = (
+                f"translation.{first} is {first}, and translation.{second} is {second}: look at their order"
+            )
+            return f"its {first} and {second} are swapped", hint
+    for axis, at in (("x", (-x, y, z)), ("y", (x, -y, z)), ("z", (x, y, -z))):
+        if fits(at):
+            return f"its {axis} has the wrong sign", "x points forward, y to the left and z up"
+    return "", ""
 
 
 def _text(value: Transform) -> str:
@@ -335,6 +357,7 @@ def _wrong_pose(
         f"it is {_text(value)} while {params.pose_of} says {_text(pose)}",
     )
     if not old:
+        hint = _axes(value, pose, params)[1] or hint
         return failed(f"{what}{_why(value, pose, params)}; {says}", hint=hint)
     verdict = failed(f"{what}: it is that of an older pose; {says}", hint=hint)
     if len(judged) > FEW and len({_text(one.value) for one in judged if one.value}) == 1:

@@ -132,7 +132,7 @@ def _check_lines(check: Check, *, more: str = "") -> Iterator[Paragraph]:
         yield from _section(check, heading)
     yield from _parameter_lines(check.params, "What a rubric can set")
     for record, words in inner_records(check.params).items():
-        yield from _parameter_lines(record, f"Keys of a {words}")
+        yield from _parameter_lines(record, f"Keys of {words}")
     yield "", 0
 
 

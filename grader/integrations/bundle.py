@@ -10,6 +10,7 @@ import base64
 import hashlib
 import io
 import os
+import shlex
 import sys
 import zipfile
 from collections.abc import Callable, Iterator
@@ -23,10 +24,12 @@ from pydantic import ValidationError
 
 from grader.errors import GraderError, InternalError, UsageError
 from grader.files import atomic_write
+from grader.installable import PIP, known_packages
 from grader.model import SandboxMode
 from grader.model.record import Record
 from grader.model.result import GradingResult
 from grader.rubric.load import LoadedRubric, read_beside_rubric
+from grader.rubric.model import Needs
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -214,6 +217,30 @@ def add_lab(bundle: Bundle, rubric: LoadedRubric, folder: str) -> str:
     for name, data in read_beside_rubric(rubric).items():
         bundle.add(f"{folder}/{name}", data, executable=data.startswith(b"#!"))
     return path
+
+
+def needs_script(needs: Needs) -> bytes:
+    """Return the script that installs what a rubric needs besides ROS and the grader; empty where that is nothing."""
+    apt, pip, unknown = list(needs.apt), list(needs.pip), []
+    for name in needs.ros:
+        packages = known_packages().get(name, ())
+        own = [one for one in packages if not one.startswith(PIP)]
+        apt += own
+        pip += [one.removeprefix(PIP) for one in packages if one not in own]
+        unknown += [] if packages else [name]
+    if not (apt or pip or unknown):
+        return b""
+    lines = [template("needs.sh").decode()]
+    lines += [
+        f"apt-get install -y --no-install-recommends {shlex.join([*apt, *(['python3-pip'] if pip else [])])}\n"
+    ]
+    lines += (
+        [f"PIP_BREAK_SYSTEM_PACKAGES=1 python3 -m pip install --no-cache-dir {shlex.join(pip)}\n"]
+        if pip
+        else []
+    )
+    lines += [f"echo 'setup: install the ROS package {name} here yourself' >&2\n" for name in unknown]
+    return "".join(lines).encode()
 
 
 def template(name: str) -> bytes:

@@ -16,6 +16,7 @@ from grader.integrations.bundle import (
     BundleSettings,
     ContainerLayout,
     add_lab,
+    needs_script,
     system_script,
     template,
     wheel,
@@ -29,6 +30,9 @@ from grader.rubric.load import LoadedRubric
 from grader.wording import number
 
 ENTRYPOINT = "/usr/local/bin/grade-question"
+NEEDS_LINES = (
+    b"COPY needs.sh /tmp/needs.sh\nRUN bash /tmp/needs.sh && rm -rf /tmp/needs.sh /var/lib/apt/lists/*\n"
+)
 
 
 def gradescope_autograder(rubric: LoadedRubric, settings: BundleSettings) -> bytes:
@@ -40,6 +44,8 @@ def gradescope_autograder(rubric: LoadedRubric, settings: BundleSettings) -> byt
     bundle.add("setup.sh", template("gradescope-setup.sh"), executable=True)
     run = template("run_autograder").replace(b"@SECONDS@", str(settings.grading_s).encode())
     bundle.add("run_autograder", run, executable=True)
+    if needs := needs_script(rubric.rubric.needs):
+        bundle.add("needs.sh", needs, executable=True)
     path = add_lab(bundle, rubric, "rubric")
     bundle.add(SETTINGS_FILE, settings.model_copy(update={"rubric": path}).to_json())
     return bundle.zipped()
@@ -80,13 +86,18 @@ GRADESCOPE = ContainerLayout(
 
 
 def prairielearn_question(rubric: LoadedRubric, settings: BundleSettings, image: str) -> Bundle:
-    """Return the folder `question/` for a course, and `image/`, the files of a Docker image that suits every lab."""
+    """Return the folder `question/` for a course, and `image/`, the files of a Docker image: it suits every lab that
+    needs nothing besides."""
     bundle = Bundle()
     name, data = wheel()
     bundle.add(f"image/{name}", data)
     bundle.add("image/system.sh", system_script(), executable=True)
     bundle.add("image/grade-question", template("grade-question"), executable=True)
-    bundle.add("image/Dockerfile", template("prairielearn.Dockerfile"))
+    dockerfile = template("prairielearn.Dockerfile")
+    if needs := needs_script(rubric.rubric.needs):
+        bundle.add("image/needs.sh", needs, executable=True)
+        dockerfile = dockerfile.replace(b"ENTRYPOINT", NEEDS_LINES + b"ENTRYPOINT")
+    bundle.add("image/Dockerfile", dockerfile)
     lab = add_lab(bundle, rubric, "question/tests/rubric").removeprefix("question/tests/")
     bundle.add(f"question/tests/{SETTINGS_FILE}", settings.model_copy(update={"rubric": lab}).to_json())
     bundle.add("question/info.json", _info(rubric, settings, image))

@@ -264,8 +264,8 @@ SlipKind = Literal[
     "defined-twice", "subscribed-again",
     "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
-    "prints", "argument-text", "unused-import", "lacking-import", "unregistered",
-    "not-started",
+    "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
+    "added-first",
 ]  # fmt: skip
 
 
@@ -305,7 +305,8 @@ class PythonSlip(Record):
     `Subscriber(…)` that a loop makes in each of its turns. `unused-import` and `lacking-import`: no slips, but an
     import of the module `message` whose names nothing in the script uses, or that Python did not find where the files
     were read. `unregistered`: a `Publisher` or `Subscriber` that is taken off its topic. `not-started`: an action
-    server that waits for a `start()` that no line calls.
+    server that waits for a `start()` that no line calls. `start-value` and `added-first`: no slips, but where a
+    counter, `name`, gets its first number, `message`, and where a loop adds one to it before it publishes.
     """
 
     file: str

@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from grader.checks import CHECKS, Check
+from grader.checks.actions import ActionResultParams
 from grader.errors import RubricError, UsageError
 from grader.model.message_rate import RateBounds
 from grader.model.record import Record
@@ -333,6 +334,22 @@ def watched_of(rubric: Rubric) -> dict[str, float]:
         for one in check.references(criterion.parameters) if check and criterion.scenario else ():
             if one.to == "watched_s" and isinstance(one.value, int | float):
                 found[criterion.scenario or ""] = max(found[criterion.scenario or ""], one.value)
+    return dict(found)
+
+
+def cancels_of(rubric: Rubric) -> dict[str, dict[str, float]]:
+    """Return, by scenario and action, for how many seconds the result of the last goal is waited for once that is
+    cancelled, where the criteria say how soon it has to come."""
+    found: dict[str, dict[str, float]] = defaultdict(dict)
+    for name, scenario in rubric.scenarios.items():
+        goals = Counter(step.action.name for step in scenario.steps if step.action is not None)
+        for action, number in goals.items():
+            own = [c.parameters for c in rubric.criteria if (c.check, c.scenario) == ("action-result", name)]
+            params = [ActionResultParams.model_validate(one) for one in own]
+            asked = [one.after_cancel_s for one in params if (one.action, one.goal) == (action, number)]
+            known = [seconds for seconds in asked if seconds is not None]
+            if known and len(known) == len(asked):
+                found[name][action] = max(known)
     return dict(found)
 
 

@@ -3,7 +3,6 @@ demands of which one excludes the other."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -14,8 +13,9 @@ from pydantic import ValidationError
 from grader.checks.reacts import Condition
 from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
+from grader.rubric.durations import Asked, late_faults, longest_s, often_faults, within_faults
 from grader.rubric.message_fields import PATH_PARTS
-from grader.rubric.scenario import Action, Scenario, Step, Until
+from grader.rubric.scenario import Scenario, Until
 from grader.rubric.standins import FIELD_M, robot_of
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
@@ -27,8 +27,6 @@ MANY = 3
 """A recording may hold so many times the messages that a scenario waits for, as it is closed a little later."""
 FEWEST = 2
 """Of fewer messages than these, nobody sees a rate."""
-FASTEST_HZ = 100
-"""No lab asks for rows of a table, or feedback, more often than this."""
 POSITIONS = ("", "pose", "position", "point", "pose.position", "pose.pose.position")
 """Where in messages `x` and `y` are."""
 
@@ -39,7 +37,7 @@ def reach_faults(
     """Yield what the runs of a rubric's scenarios cannot show."""
     yield from _too_many(rubric, scenarios, checks)
     yield from _too_few(rubric, scenarios)
-    yield from _too_late(scenarios)
+    yield from late_faults(scenarios)
     criteria = list(as_maps(rubric.get("criteria")))
     for index, criterion in criteria:
         path, given = ("criteria", index, "with"), as_map(criterion.get("with"))
@@ -47,22 +45,13 @@ def reach_faults(
         others = [
             one for n, one in criteria if n != index and one.get("scenario") == criterion.get("scenario")
         ]
-        about = _Asked(path, str(criterion.get("check")), given, str(criterion.get("scenario")), scenario)
-        yield from _too_often(about)
+        about = Asked(path, str(criterion.get("check")), given, str(criterion.get("scenario")), scenario)
+        yield from often_faults(about)
+        yield from within_faults(about)
         yield from _never_sent(about, others)
         if about.check in {"ends-at", "path", "stays-within"}:
             yield from _too_far(about, others)
-    yield from _contradictions(criteria)
-
-
-class _Asked(NamedTuple):
-    """A criterion: the place of its parameters, its check, they, its scenario's name, and that."""
-
-    path: KeyPath
-    check: str
-    given: dict[str, Any]
-    name: str
-    scenario: dict[str, Any]
+    yield from _contradictions(criteria, scenarios)
 
 
 def _too_many(
@@ -112,89 +101,10 @@ def _too_few(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> It
             yield from (((*path, "rate_hz"), fault) for fault in _seldom(rate_hz, window_s))
 
 
-def _too_late(scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
-    """Yield calls and answers of the grader's that come after the end of the run at its latest."""
-    for name, scenario in scenarios.items():
-        limit_s = as_map(scenario.get("until")).get("limit_s", Until.model_fields["limit_s"].default)
-        if "steps" in scenario or scenario.get("clock") == "warped" or not is_number(limit_s):
-            continue
-        for key in ("calls", "serves"):
-            for index, one in as_maps(scenario.get(key)):
-                delay_s = one.get("delay_s")
-                if is_number(delay_s) and delay_s >= limit_s:
-                    fault = f"that is {delay_s:g} s, and the run is over after {limit_s:g} s (limit_s)"
-                    yield ("scenarios", name, key, index, "delay_s"), fault
-
-
 def _seldom(rate_hz: float, window_s: float) -> Iterator[str]:
     if 0 < window_s * rate_hz < FEWEST:
         each = f"at {rate_hz:g} Hz a message comes each {1 / rate_hz:g} s, and window_s is {window_s:g} s"
         yield f"{each}: it is messages a second"
-
-
-def _read_step(written: dict[str, Any]) -> Step | None:
-    try:
-        return Step.model_validate_json(json.dumps(written), strict=True)
-    except (ValidationError, TypeError):
-        return None
-
-
-def steps_s(scenario: dict[str, Any]) -> float | None:
-    """Return how long a scenario's steps last; None where something of theirs has to come first."""
-    steps = [_read_step(written) for _, written in as_maps(scenario.get("steps"))]
-    for step in steps:
-        if step is None or step.call or step.action or step.play or (step.wait and step.wait.seconds is None):
-            return None
-        if step.published is not None and step.published.background:
-            return None
-    return sum(step.lasts_s for step in steps if step is not None)
-
-
-def _longest_s(scenario: dict[str, Any]) -> float | None:
-    """Return how long a run lasts at most, in the time of its clock; None where that is not known."""
-    until = as_map(scenario.get("until"))
-    first_s, limit_s = (
-        until.get(key, Until.model_fields[key].default) for key in ("first_message_s", "limit_s")
-    )
-    warp = scenario.get("warp", Scenario.model_fields["warp"].default)
-    warp = warp if scenario.get("clock") == "warped" else 1
-    if {"probes", "calls", "recording"} & scenario.keys() or not all(
-        map(is_number, (first_s, limit_s, warp))
-    ):
-        return None
-    total_s = limit_s * warp if "until" in scenario or "steps" not in scenario else 0.0
-    steps = [_read_step(written) for _, written in as_maps(scenario.get("steps"))]
-    for step in steps:
-        if step is None or step.call or step.action or step.play:
-            return None
-        waits = (step.wait is not None and step.wait.seconds is None) or step.published is not None
-        limit_s = step.wait.limit_s if step.wait is not None else None
-        total_s += step.lasts_s + (warp * (first_s if limit_s is None else limit_s) if waits else 0)
-    return float(total_s)
-
-
-def _too_often(about: _Asked) -> Iterator[Fault]:
-    """Yield rows and feedback of which more are asked for than come in that time, however fast a node is."""
-    rows, longest_s = about.given.get("rows_at_least"), _longest_s(about.scenario)
-    if about.check == "file-left" and is_number(rows) and longest_s and rows > FASTEST_HZ * longest_s:
-        fault = f"{rows} rows in {longest_s:g} s, which {about.name} lasts at most, are more than {FASTEST_HZ} a second"
-        yield (*about.path, "rows_at_least"), fault
-    goals = [
-        one for one in given_steps(about.scenario, "action") if one.get("name") == about.given.get("action")
-    ]
-    number, asked = about.given.get("goal", 1), about.given.get("feedback")
-    if (
-        about.check == "action-result"
-        and is_number(asked)
-        and isinstance(number, int)
-        and 0 < number <= len(goals)
-    ):
-        goal = goals[number - 1]
-        lasting = [goal.get("limit_s", Action.model_fields["limit_s"].default), goal.get("cancel_after_s")]
-        longest_s = min((s for s in lasting if is_number(s)), default=math.inf)
-        if asked > FASTEST_HZ * longest_s:
-            fault = f"{asked} in {longest_s:g} s, which the step gives the goal, are more than {FASTEST_HZ} a second"
-            yield (*about.path, "feedback"), fault
 
 
 class TooShort(ValueError):
@@ -251,7 +161,7 @@ def _values_at(value: object, parts: Sequence[str]) -> list[Any] | None:
     return _values_at(items[int(part[1:-1])], parts[1:])
 
 
-def _never_sent(about: _Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fault]:
+def _never_sent(about: Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fault]:
     """Yield items that no list has which the grader sends, and causes of which none is ever sent."""
     for key, asked in (("", about.given), ("cause", as_map(about.given.get("cause")))):
         topic, field = asked.get("topic"), asked.get("field")
@@ -261,7 +171,7 @@ def _never_sent(about: _Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fau
         parts = PATH_PARTS.findall(field)
         yield from (((*at, "field"), fault) for fault in _past_the_end(topic, parts, field, about.scenario))
         sent = _sent_on(topic, about.scenario)
-        if not sent or any(as_map(one.get("with")).get("topic") == topic for one in others):
+        if not sent or any(_is_published(topic, one) for one in others):
             continue
         lengths = [_length(value, parts) for value in sent]
         found = [_values_at(one, parts) if n is None else [] for one, n in zip(sent, lengths, strict=True)]
@@ -273,6 +183,11 @@ def _never_sent(about: _Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fau
         plain = all(is_number(one) for values in found for one in values or ())
         if cause and plain and not any(cause.holds(Reading(0, tuple(values or ()), "")) for values in found):
             yield at, f"nothing that {about.name} sends on {topic} is so: {cause.words}"
+
+
+def _is_published(topic: str, criterion: dict[str, Any]) -> bool:
+    """Whether a criterion may ask the student for messages on this topic; one that is heard, the grader sends."""
+    return as_map(criterion.get("with")).get("topic") == topic and criterion.get("check") != "hears"
 
 
 def _length(value: object, parts: Sequence[str]) -> int | None:
@@ -338,7 +253,7 @@ class _Robot(NamedTuple):
     field_m: float | None = None
 
 
-def _robot(about: _Asked, others: Sequence[dict[str, Any]]) -> _Robot:
+def _robot(about: Asked, others: Sequence[dict[str, Any]]) -> _Robot:
     topic = str(about.given.get("topic"))
     if world := robot_of(about.scenario):
         fastest = world.get("max_linear")
@@ -356,11 +271,11 @@ def _robot(about: _Asked, others: Sequence[dict[str, Any]]) -> _Robot:
     return _Robot(middle, min(speeds, default=None), FIELD_M if topic == "/turtle1/pose" else None)
 
 
-def _too_far(about: _Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fault]:
+def _too_far(about: Asked, others: Sequence[dict[str, Any]]) -> Iterator[Fault]:
     """Yield places that the robot of the scenario cannot come to."""
-    given, robot, longest_s = about.given, _robot(about, others), _longest_s(about.scenario)
-    farthest_m = robot.fastest_m_s * longest_s if robot.fastest_m_s and longest_s else math.inf
-    limit = f"{longest_s or 0:g} s at {robot.fastest_m_s or 0:g} m/s are {farthest_m:.3g} m"
+    given, robot, most_s = about.given, _robot(about, others), longest_s(about.scenario)
+    farthest_m = robot.fastest_m_s * most_s if robot.fastest_m_s and most_s else math.inf
+    limit = f"{most_s or 0:g} s at {robot.fastest_m_s or 0:g} m/s are {farthest_m:.3g} m"
     least_m, tolerance_m = given.get("least_m"), given.get("tolerance_m")
     if about.check == "stays-within":
         if is_number(least_m) and least_m > farthest_m:
@@ -392,7 +307,7 @@ def _outside(x: float, y: float) -> str:
 
 
 def _goal_faults(
-    about: _Asked, others: Sequence[dict[str, Any]], robot: _Robot, farthest_m: float, limit: str
+    about: Asked, others: Sequence[dict[str, Any]], robot: _Robot, farthest_m: float, limit: str
 ) -> Iterator[Fault]:
     given, goal, tolerance_m = about.given, _spot(about.given.get("goal")), about.given["tolerance_m"]
     number, within_s = given.get("number", 1), given.get("within_s")
@@ -437,35 +352,64 @@ def _pair(spot: tuple[float, float]) -> str:
 
 
 class _Demand(NamedTuple):
-    """Between which values a criterion wants a field, in every message or in some."""
+    """Between which values a criterion wants a field, or which word or truth value, in every message or in some."""
 
     low: float
     high: float
     every: bool
+    word: str | bool | None = None
+    is_cause: bool = False
+
+    def excludes(self, other: _Demand) -> bool:
+        """Whether no messages satisfy both."""
+        if not (self.every or other.every):
+            return False
+        if self.word is None or other.word is None:
+            return self.word is other.word and (self.low > other.high or self.high < other.low)
+        return type(self.word) is type(other.word) and self.word != other.word
 
 
-def _contradictions(criteria: Sequence[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+def _contradictions(
+    criteria: Sequence[tuple[int, dict[str, Any]]], scenarios: dict[str, dict[str, Any]]
+) -> Iterator[Fault]:
     """Yield criteria that no run passes which passes an earlier one."""
     before: dict[tuple[str, ...], list[tuple[str, _Demand]]] = {}
     for index, criterion in criteria:
-        given, check = as_map(criterion.get("with")), str(criterion.get("check"))
-        asked = as_map(given.get("effect")) if check == "reacts" else given
-        at = ("criteria", index, "with", *(("effect",) if check == "reacts" else ()))
-        of = given.get("of", "student")
-        key = tuple(map(str, (criterion.get("scenario"), asked.get("topic"), asked.get("field"), of)))
-        for demand in _demands(check, asked) if criterion.get("scenario") else ():
-            for name, other in before.get(key, ()):
-                if (demand.every or other.every) and (demand.low > other.high or demand.high < other.low):
-                    both = (
-                        f"{name} wants {asked.get('field')} of {asked.get('topic')} otherwise in the same run"
-                    )
-                    yield (
-                        at,
-                        both
-                        if demand.every and other.every
-                        else f"{both}: give one of them when: first, last or any",
-                    )
+        name = str(criterion.get("scenario"))
+        for part, asked, demand in _demanded(criterion, scenarios.get(name, {})):
+            at = ("criteria", index, "with", *part)
+            of = asked.get("of", "student")
+            key = tuple(map(str, (name, asked.get("topic"), asked.get("field"), of)))
+            for earlier, other in before.get(key, ()):
+                if demand.excludes(other):
+                    wants = f"{earlier} wants {asked.get('field')} of {asked.get('topic')} otherwise in the same run"
+                    both = demand.every and other.every
+                    yield at, wants if both else f"{wants}: {_way_out(demand, other)}"
             before.setdefault(key, []).append((str(criterion.get("id")), demand))
+
+
+def _way_out(*demands: _Demand) -> str:
+    is_cause = any(demand.is_cause for demand in demands)
+    return "so the cause never comes" if is_cause else "give one of them when: first, last or any"
+
+
+def _demanded(
+    criterion: dict[str, Any], scenario: dict[str, Any]
+) -> Iterator[tuple[KeyPath, dict[str, Any], _Demand]]:
+    """Yield what a criterion wants of a run's messages: where it says so, its parameters there, and the demand.
+
+    A cause is one where the grader sends none on its topic: the student's node has to.
+    """
+    given, check = as_map(criterion.get("with")), str(criterion.get("check"))
+    if "scenario" not in criterion:
+        return
+    parts: list[tuple[KeyPath, dict[str, Any]]] = [((), given)]
+    if check == "reacts":
+        parts = [((key,), as_map(given.get(key))) for key in ("cause", "effect")]
+    for part, asked in parts:
+        if part != ("cause",) or _sent_on(str(asked.get("topic")), scenario) == []:
+            is_cause = part == ("cause",)
+            yield from ((part, asked, one._replace(is_cause=is_cause)) for one in _demands(check, asked))
 
 
 def _demands(check: str, asked: dict[str, Any]) -> Iterator[_Demand]:
@@ -480,5 +424,7 @@ def _demands(check: str, asked: dict[str, Any]) -> Iterator[_Demand]:
         for one in _items(asked.get("values")) if "values" in asked else [value]:
             if is_number(one):
                 yield _Demand(one - tolerance, one + tolerance, every)
+            elif isinstance(one, str | bool):
+                yield _Demand(0, 0, every, one)
     if value is None and is_number(low) and is_number(high) and check != "field-equals":
         yield _Demand(low, high, every)

@@ -15,9 +15,10 @@ from grader.checks.registry import Check, Reference
 from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
 from grader.ros_packages import TypeKind, ros_packages
 from grader.rubric.arguments import argument_faults
+from grader.rubric.durations import steps_s
 from grader.rubric.frames import frame_faults
 from grader.rubric.message_fields import field_faults, services_in
-from grader.rubric.reachable import reach_faults, steps_s
+from grader.rubric.reachable import reach_faults
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
 from grader.rubric.spelling import texts_in
 from grader.rubric.standins import PROGRAMS, asked_faults, only_publisher, parameter_faults

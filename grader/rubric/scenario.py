@@ -249,7 +249,8 @@ class Action(Record):
     cancel_after_s: StepSeconds | None = None
     """Cancels the goal so long after it was sent, where no result has come by then; null: never."""
     limit_s: StepSeconds = 30.0
-    """Without a result within this, the run goes on."""
+    """Without a result within this, the run goes on. The last goal of an action, once cancelled, is waited for no
+    longer than twice the `within_s` of its criteria, or 5 s more than that."""
 
 
 class Play(Record):

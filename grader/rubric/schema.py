@@ -76,9 +76,12 @@ def parameters(record: type[Record]) -> list[Parameter]:
 
 
 def inner_records(record: type[Record]) -> dict[type[Record], str]:
-    """Return the records that a record's fields consist of, at any depth, with their words (`condition`)."""
+    """Return the records that a record's fields consist of, at any depth, with their words (`a condition`)."""
     annotations = [field.annotation for field in record.model_fields.values()]
-    return {kind: _words_of(kind) for one in annotations for kind in _records(one)}
+    kinds = dict.fromkeys(kind for one in annotations for kind in _records(one))
+    return {
+        kind: words if words.endswith("s") else f"a {words}" for kind in kinds for words in [_words_of(kind)]
+    }
 
 
 def about(record: type[Record]) -> str:

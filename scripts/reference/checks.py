@@ -31,7 +31,7 @@ def check_section(check: Check) -> str:
     if check.params.model_fields:
         lines += [about(check.params), "", *_rows(check.params, "parameter")]
     for record, words in inner_records(check.params).items():
-        lines += [f"**A {words}.** {about(record)}", "", *_rows(record, "key")]
+        lines += [f"**Keys of {words}.** {about(record)}", "", *_rows(record, "key")]
     return "\n".join(lines)
 
 

@@ -107,9 +107,11 @@ def run(
     *,
     beside: Path | None = None,
     watched_s: float = 0.0,
+    cancels: Mapping[str, float] | None = None,
 ) -> Run:
     """Record a scenario and read it back. `beside` is the rubric's folder."""
-    asyncio.run(_bounded(repaired(place), scenario, path, beside, watched_s))
+    about = {"beside": beside, "watched_s": watched_s, "cancels": cancels}
+    asyncio.run(_bounded(repaired(place), scenario, path, about))
     return load_run(path)
 
 
@@ -128,16 +130,10 @@ def run_script(
 
 
 async def _bounded(
-    place: ProcessEnvironment, scenario: Scenario, path: Path, beside: Path | None, watched_s: float
+    place: ProcessEnvironment, scenario: Scenario, path: Path, about: Mapping[str, object]
 ) -> None:
-    about = {
-        "path": path,
-        "metadata": {},
-        "tell": lambda _: None,
-        "beside": beside,
-        "watched_s": watched_s,
-    }
-    await asyncio.wait_for(run_scenario("run", scenario, place, **about), RUN_S)  # type: ignore[arg-type]
+    more = {"path": path, "metadata": {}, "tell": lambda _: None, **about}
+    await asyncio.wait_for(run_scenario("run", scenario, place, **more), RUN_S)  # type: ignore[arg-type]
 
 
 def exit_of(run: Run, name: str = "node") -> object:

@@ -275,6 +275,30 @@ def test_goals_have_results_and_can_be_cancelled(tmp_path: Path) -> None:
     assert any("no field targt" in detail for _, _, detail in _did(seen, "note"))
 
 
+@pytest.mark.parametrize(
+    ("goals", "since"), [(1, "1 s after it was cancelled"), (2, "3 s after it was cancelled")]
+)
+def test_the_last_goal_that_is_cancelled_is_waited_for_no_longer_than_it_is_judged(
+    tmp_path: Path, goals: int, since: str
+) -> None:
+    find = action_texts("lab/Count", COUNT).get
+    goal, result = (MessageType(f"lab/CountAction{part}", find).definition for part in ("Goal", "Result"))
+    heedless = SERVER.format(goal=goal, result=result).replace("end(m.id, 2, -1)", "None")
+    about = {"name": "/count", "type": "lab/Count", "limit_s": 3}
+    last = [{"action": {**about, "goal": {"target": 5}}}] if goals > 1 else []
+    scenario = Scenario.model_validate(
+        {
+            "title": "steps",
+            "start": [{"name": "server", "script": "scripts/server.py"}],
+            "steps": [{"action": {**about, "goal": {"target": -1}, "cancel_after_s": 0.3}}, *last],
+        }
+    )
+    with make_place({"scripts/server.py": heedless, "action/Count.action": COUNT}) as place:
+        seen = run(place, scenario, tmp_path / "run.mcap", cancels={"/count": 1.0})
+    assert _did(seen, "result")[0] == ("/count", None, f"no result within {since}")
+    assert len(_did(seen, "result")) == goals
+
+
 def test_an_action_that_the_package_lacks_is_noted(tmp_path: Path) -> None:
     steps = [{"action": {"name": "/count", "type": "lab/Count"}}]
     seen = _run(tmp_path, {"scripts/frames.py": FRAMES}, steps)

@@ -7,6 +7,7 @@ import csv
 import hashlib
 import io
 import json
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -16,6 +17,7 @@ import pytest
 
 from grader.cli.main import run
 from grader.integrations.bundle import wheel
+from grader.rubric.find import rubrics_folder
 from tests.instructor.samples import GREETING, OWN, TESTS, write_rubric
 
 LAB = "york-ele00118m-lab7"
@@ -153,6 +155,30 @@ def test_prairielearn_gets_a_question_and_the_files_of_its_image(tmp_path) -> No
     assert (out / "question" / "tests" / "rubric" / f"{LAB}.yaml").is_file()
     assert (out / "image" / "grade-question").stat().st_mode & 0o111
     assert {path.name for path in (out / "image").iterdir()} >= {"Dockerfile", "system.sh", wheel()[0]}
+
+
+def test_what_a_lab_needs_besides_is_installed_in_the_containers(tmp_path) -> None:
+    """The course's package goes along; the script is sound, and quotes what a rubric says."""
+    needs = "needs: {ros: [rostest, tf2_ros], apt: [espeak], pip: [transforms3d]}"
+    lab = rubrics_folder() / "examples" / "cpp-and-python.yaml"
+    shutil.copytree(lab.parent / "distance_tests", tmp_path / "distance_tests")
+    rubric = tmp_path / "lab.yaml"
+    rubric.write_text(
+        lab.read_text(encoding="utf-8").replace("needs: {ros: [rostest]}", needs), encoding="utf-8"
+    )
+    archive = exported(tmp_path, lab=str(rubric))
+    script = archive.read("needs.sh").decode()
+    assert "rubric/distance_tests/test/pair.test" in archive.namelist()
+    assert "apt-get install -y --no-install-recommends espeak" in script
+    assert " python3-tf2-ros " in script
+    assert "python3 -m pip install --no-cache-dir transforms3d\n" in script
+    assert subprocess.run(["/bin/bash", "-n"], input=script.encode(), check=False).returncode == 0
+    out = tmp_path / "question"
+    assert run(["export", "prairielearn", str(rubric), "--out", str(out), "--image", "me/ros"]) == 0
+    assert (out / "image" / "needs.sh").read_text(encoding="utf-8") == script
+    lines = (out / "image" / "Dockerfile").read_text(encoding="utf-8").splitlines()
+    assert [line.split()[0] for line in lines[-4:]] == ["COPY", "COPY", "RUN", "ENTRYPOINT"]
+    assert "needs.sh" not in exported(tmp_path).namelist()
 
 
 @pytest.mark.full

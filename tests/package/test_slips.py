@@ -234,6 +234,24 @@ def test_where_a_counter_goes_back_is_known(tmp_path, code, found):
     assert [(s.message, s.kind, s.line) for s in slips if s.kind.startswith("reset")] == found
 
 
+@pytest.mark.parametrize(
+    ("code", "found"),
+    [
+        ("n = 0\nwhile True:\n    n += 1\n    pub.publish(n)", [("start-value", 1, "0"), ("added-first", 3, "")]),
+        ("n = 1\nwhile True:\n    pub.publish(n)\n    n += 1", [("start-value", 1, "1")]),
+        ("n = 1\nwhile True:\n    pub.publish(n)\n    n += 1\n    if n > 9:\n        n = 0", [("start-value", 1, "1")]),
+        ("def f():\n    if n > 9:\n        n = 0\n    n += 1", []),
+        ("n = 1\nm = 2\npub.publish(n)", []),
+        ("class A:\n    def __init__(self):\n        self.n = 3\n    def f(self):\n        self.n = self.n + 1",
+         [("start-value", 3, "3")]),
+    ],
+)  # fmt: skip
+def test_where_a_counter_begins_is_known(tmp_path, code, found):
+    (tmp_path / "a.py").write_text(code + "\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [(s.kind, s.line, s.message) for s in slips if s.kind in {"start-value", "added-first"}] == found
+
+
 def test_what_is_left_of_a_file_that_does_not_parse(tmp_path):
     conflict = (
         "import rospy\n<<<<<<< HEAD\npub = rospy.Publisher('mine', String)\n=======\n"

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from grader.rubric.find import rubrics_folder
+from grader.rubric.load import cancels_of, load_rubric
 from tests.rubric.samples import faults, spoiled
 
 
@@ -102,3 +106,28 @@ def test_probes_that_make_no_sense(probe, fault, tmp_path):
 def test_what_a_run_does_makes_sense(old, new, fault, tmp_path):
     found = faults(spoiled(tmp_path, (old, new)))
     assert any(f": scenarios.real{fault}" in line for line in found), found
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "waited_s"),
+    [
+        ("", "", None),
+        ("      - action: {name: /count, type: counting/Count, goal: {target: -1}, limit_s: 5}\n", "", 5.5),
+        (", goal: {target: -1}, limit_s: 5}", ", goal: {target: -1}, cancel_after_s: 2, limit_s: 5}", None),
+        (", goal: 3, status: ABORTED", ", goal: 3, within_s: 8, status: ABORTED", 16),
+    ],
+    ids=["the last is not bounded", "the last one", "the last has no within_s", "twice"],
+)
+def test_how_long_the_result_of_a_goal_is_waited_for_once_that_is_cancelled(
+    old: str, new: str, waited_s: float | None, tmp_path: Path
+) -> None:
+    text = (
+        (rubrics_folder() / "examples" / "action-server.yaml").read_text(encoding="utf-8").replace(old, new)
+    )
+    if "target: -1" not in text:
+        text = text[: text.index("  - {id: aborts")].replace(
+            "points: 20, check: action-result", "points: 30, check: action-result"
+        )
+    path = tmp_path / "lab.yaml"
+    path.write_text(text.replace("target: -1}, limit_s: 5", "target: -1}, limit_s: 10"), encoding="utf-8")
+    assert cancels_of(load_rubric(str(path)).rubric).get("goals", {}).get("/count") == waited_s

@@ -253,6 +253,17 @@ def test_a_slip_of_the_list_is_refused(examples: Path, slip: dict[str, str]) -> 
     assert faults(path) == [f"spoiled.yaml:{slip['fault']}"]
 
 
+def test_more_rows_than_come_of_a_few_messages(examples: Path) -> None:
+    sent = "steps: [{publish: {topic: /steps, type: std_msgs/Float64, values: [1, 2, 0.25]}}]"
+    path = _spoiled(examples, "record-and-replay", "steps: [{play: {bag: bags/walk.bag}}]", sent)
+    text = path.read_text(encoding="utf-8").replace("rows_at_least: 8", "rows_at_least: 300")
+    path.write_text(text, encoding="utf-8")
+    told = "replay sends the node 3 messages, and is over 7.3 s after its start: so many rows never come"
+    assert faults(path) == [f"spoiled.yaml:50: criteria[6].with.rows_at_least: {told}"]
+    path.write_text(text.replace("rows_at_least: 300", "rows_at_least: 200"), encoding="utf-8")
+    assert load_rubric(str(path)).rubric.id == "record-and-replay"
+
+
 def test_a_goal_outside_of_the_box_that_another_criterion_keeps_the_robot_in(examples: Path) -> None:
     path = _spoiled(examples, "go-to-goal", "box: [[0.5, 0.5],", "box: [[6, 6],")
     fault = "is outside of the box that inside keeps it in"
@@ -331,6 +342,13 @@ def test_a_name_that_is_a_letter_off_is_refused(examples: Path, slip: tuple[str,
         ("service-client", '"20000000000", "5"', '"20000000000 or so", "5"'),
         ("record-and-replay", "rows_at_least: 8", "rows_at_least: 80"),
         ("action-server", "feedback: 5}", "feedback: 50}"),
+        ("action-server", "within_s: 1.5", "within_s: 5"),
+        ("avoid-obstacles", "within_s: 1.5", "within_s: 15"),
+        (
+            "service-own-type",
+            "{start: server}]",
+            "{start: server}, {call: {service: /clamp, type: own_service/Clamp, delay_s: 10}}]",
+        ),
     ],
 )
 def test_what_may_be_right_is_taken(examples: Path, name: str, old: str, new: str) -> None:

@@ -492,6 +492,29 @@ def counter_slips(tree):
                     yield slip(line, "reset-early", message % node.lineno, fix=fix, name=name)
 
 
+def counter_starts(tree):
+    """Where a counter gets its first number, and where a loop adds one before it publishes: no slips."""
+    loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For))]
+    later = {id(n) for loop in loops for n in ast.walk(loop) if n is not loop}
+    for node in walk(tree):
+        if isinstance(node, ast.If):
+            later |= {
+                id(one) for one in node.body if {dotted(t) for t in constants_in([one])} & reset_in(node)
+            }
+    changed = [n for n in walk(tree) if isinstance(n, (ast.Assign, ast.AugAssign))]
+    counted = {dotted(t) for n in changed for t in increments(n)}
+    for node in changed:
+        value = whole(node.value) if isinstance(node, ast.Assign) else None
+        if value is not None and id(node) not in later and dotted(node.targets[0]) in counted:
+            yield slip(node.lineno, "start-value", "%d" % value, name=dotted(node.targets[0]))
+    for loop in loops:
+        sent = [i for i, one in enumerate(loop.body) if any(is_call(n, "publish") for n in ast.walk(one))]
+        for at, one in enumerate(loop.body):
+            for name in (dotted(t) for t in increments(one)):
+                if sent and at < sent[0]:
+                    yield slip(one.lineno, "added-first", "", name=name)
+
+
 def uncounted(tree):
     for node in walk(tree):
         value = node.value if isinstance(node, ast.Assign) else None

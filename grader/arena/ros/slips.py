@@ -17,6 +17,7 @@ from script_names import (
     called_name,
     calls_in,
     counter_slips,
+    counter_starts,
     dotted,
     functions_in,
     graph_names,
@@ -72,7 +73,7 @@ def slips(tree):
     finders = (
         misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice, callbacks,
         waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
-        without_effect, assigned_late, hidden_names, subscribed_again, imports,
+        counter_starts, without_effect, assigned_late, hidden_names, subscribed_again, imports,
         taken_off, unstarted_servers,
     )  # fmt: skip
     for find in finders:

@@ -1,0 +1,212 @@
+"""How long a scenario's run lasts, and what a criterion asks for that is not done by then."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from pydantic import ValidationError
+
+from grader.checks.support.fields import is_number
+from grader.rubric.scenario import ROSTEST_ENDING, Action, Probe, Scenario, Step, Until
+from grader.rubric.step_faults import ROWS_PER_MESSAGE, given_steps
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
+from grader.wording import plural
+
+FASTEST_HZ = 100
+"""No lab asks for rows of a table, or feedback, more often than this."""
+ROWS_HZ, ROWS_LONGER_S = 30, 5.0
+"""So many rows a second a node may write that hears few messages, and so much longer than these last."""
+SUBSCRIBE_S, ANSWER_S = 6.0, 10.0
+"""How long a run waits for a subscriber of one more topic, and for the answer of a service."""
+SEEN = ("messages", "connected", "heard", "nodes", "opened")
+"""Conditions of `until` that hold soon after the grader's last message, or not at all."""
+
+
+class Asked(NamedTuple):
+    """A criterion: the place of its parameters, its check, they, its scenario's name, and that."""
+
+    path: KeyPath
+    check: str
+    given: dict[str, Any]
+    name: str
+    scenario: dict[str, Any]
+
+
+def late_faults(scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield calls and answers of the grader's that come after the end of the run at its latest."""
+    for name, scenario in scenarios.items():
+        limit_s = _until(scenario, "limit_s")
+        if scenario.get("clock") == "warped" or not is_number(limit_s):
+            continue
+        path: KeyPath = ("scenarios", name)
+        kinds = () if "steps" in scenario else ("calls", "serves")
+        delayed = [((*path, key, n), one) for key in kinds for n, one in as_maps(scenario.get(key))]
+        steps = as_maps(scenario.get("steps"))
+        delayed += [((*path, "steps", n, "call"), as_map(step.get("call"))) for n, step in steps]
+        for at, one in delayed:
+            delay_s = one.get("delay_s")
+            if is_number(delay_s) and delay_s >= limit_s:
+                over = f"that is {delay_s:g} s, and the run is over after {limit_s:g} s (limit_s)"
+                longer = (
+                    f"{delay_s:g} s is longer than the run may last after its steps (limit_s, {limit_s:g} s): "
+                    f"write a step wait: {{seconds: {delay_s:g}}} before it, or a shorter delay"
+                )
+                yield (*at, "delay_s"), longer if "steps" in at else over
+
+
+def _until(scenario: dict[str, Any], key: str) -> Any:  # noqa: ANN401 - whatever the rubric has
+    return as_map(scenario.get("until")).get(key, Until.model_fields[key].default)
+
+
+def _read_step(written: dict[str, Any]) -> Step | None:
+    try:
+        return Step.model_validate_json(json.dumps(written), strict=True)
+    except (ValidationError, TypeError):
+        return None
+
+
+def _read_steps(scenario: dict[str, Any]) -> list[Step] | None:
+    """Return the calls and steps of a scenario; None where one is not valid, which is said elsewhere."""
+    written = [{"call": call} for _, call in as_maps(scenario.get("calls"))]
+    steps = [_read_step(one) for one in (*written, *(step for _, step in as_maps(scenario.get("steps"))))]
+    known = [step for step in steps if step is not None]
+    return known if len(known) == len(steps) else None
+
+
+def steps_s(scenario: dict[str, Any]) -> float | None:
+    """Return how long a scenario's steps last; None where something of theirs has to come first."""
+    steps = [_read_step(written) for _, written in as_maps(scenario.get("steps"))]
+    for step in steps:
+        if step is None or step.call or step.action or step.play or (step.wait and step.wait.seconds is None):
+            return None
+        if step.published is not None and step.published.background:
+            return None
+    return sum(step.lasts_s for step in steps if step is not None)
+
+
+def _probed(scenario: dict[str, Any]) -> tuple[int, float]:
+    """Return how many messages the probes are, and how many seconds they take."""
+    count, lasting_s = 0, 0.0
+    for _, probe in as_maps(scenario.get("probes")):
+        made = [probe.get(key, 0) for key in ("text", "integers")]
+        listed = [probe.get(key) for key in ("among", "values")]
+        among, values = (len(one) if isinstance(one, list) else 0 for one in listed)
+        times, rate_hz = (probe.get(key, Probe.model_fields[key].default) for key in ("times", "rate_hz"))
+        if all(map(is_number, (*made, times, rate_hz))) and rate_hz > 0:
+            number = sum(made) + among + values * times
+            count, lasting_s = count + number, lasting_s + number / rate_hz
+    return count, lasting_s
+
+
+def longest_s(scenario: dict[str, Any]) -> float | None:
+    """Return how long a run lasts at most once its last process is started, in the time of its clock; None where
+    that is not known."""
+    first_s, limit_s = _until(scenario, "first_message_s"), _until(scenario, "limit_s")
+    warp = scenario.get("warp", Scenario.model_fields["warp"].default)
+    warp = warp if scenario.get("clock") == "warped" else 1
+    steps, starts = _read_steps(scenario), [start for _, start in as_maps(scenario.get("start"))]
+    if steps is None or "recording" in scenario or not all(map(is_number, (first_s, limit_s, warp))):
+        return None
+    if any("tests" in one or str(one.get("program")).endswith(ROSTEST_ENDING) for one in starts):
+        return None
+    waits_s = total_s = 0.0
+    if "until" in scenario or "steps" not in scenario:
+        waits_s += limit_s
+    if "probes" in scenario:
+        waits_s += first_s + SUBSCRIBE_S + _probed(scenario)[1]
+    for step in steps:
+        if step.play:
+            return None
+        total_s += step.lasts_s
+        waits_s += _waits_s(step, first_s)
+    return float(total_s + warp * waits_s)
+
+
+def _waits_s(step: Step, first_s: float) -> float:
+    """Return how long a step may wait for the student's nodes."""
+    if step.call is not None:
+        return first_s + step.call.delay_s + ANSWER_S
+    if step.action is not None:
+        return 2 * first_s + (step.action.cancel_after_s or 0) + step.action.limit_s
+    if step.wait is not None and step.wait.seconds is None:
+        return first_s if step.wait.limit_s is None else step.wait.limit_s
+    return first_s if step.published is not None else 0.0
+
+
+def often_faults(about: Asked) -> Iterator[Fault]:
+    """Yield rows and feedback of which more are asked for than come in that time, however fast a node is."""
+    rows = about.given.get("rows_at_least")
+    if about.check == "file-left" and is_number(rows):
+        yield from (((*about.path, "rows_at_least"), fault) for fault in _too_many_rows(rows, about))
+    goal = _goal(about)
+    asked = about.given.get("feedback")
+    if goal is not None and is_number(asked):
+        lasting_s = min(
+            (s for s in (_limit_s(goal), goal.get("cancel_after_s")) if is_number(s)), default=math.inf
+        )
+        if asked > FASTEST_HZ * lasting_s:
+            fault = f"{asked} in {lasting_s:g} s, which the step gives the goal, are more than {FASTEST_HZ} a second"
+            yield (*about.path, "feedback"), fault
+
+
+def _goal(about: Asked) -> dict[str, Any] | None:
+    """Return the step that sends the goal of which an action-result speaks."""
+    number = about.given.get("goal", 1)
+    goals = [
+        one for one in given_steps(about.scenario, "action") if one.get("name") == about.given.get("action")
+    ]
+    is_there = about.check == "action-result" and isinstance(number, int) and 0 < number <= len(goals)
+    return goals[number - 1] if is_there else None
+
+
+def _limit_s(goal: dict[str, Any]) -> Any:  # noqa: ANN401 - whatever the rubric has
+    return goal.get("limit_s", Action.model_fields["limit_s"].default)
+
+
+def _too_many_rows(rows: float, about: Asked) -> Iterator[str]:
+    most_s = longest_s(about.scenario)
+    if most_s and rows > FASTEST_HZ * most_s:
+        yield f"{rows} rows in {most_s:g} s, which {about.name} lasts at most, are more than {FASTEST_HZ} a second"
+        return
+    fed = _fed(about.scenario)
+    if fed is None:
+        return
+    count, lasting_s = fed
+    if count and rows > ROWS_PER_MESSAGE * count + ROWS_HZ * (lasting_s + ROWS_LONGER_S):
+        sends = f"{about.name} sends the node {plural(count, 'message')}, and is over {lasting_s + ROWS_LONGER_S:.2g} s"
+        yield f"{sends} after its start: so many rows never come"
+
+
+def _fed(scenario: dict[str, Any]) -> tuple[int, float] | None:
+    """Return how many messages the grader sends to a script that runs alone, and how long such a run lasts where the
+    script answers each at once; None where something else may send it more, or set the run's length."""
+    until, starts = as_map(scenario.get("until")), as_maps(scenario.get("start"))
+    steps, alone = _read_steps(scenario), len(starts) == 1 and "script" in starts[0][1]
+    lasting = [until.get(key, 0) for key in ("window_s", "alive_s", "quiet_s")]
+    ends = "steps" in scenario or any(until.get(key) for key in (*SEEN, "window_s", "alive_s", "quiet_s"))
+    if not alone or not ends or steps is None or steps_s({"steps": scenario.get("steps")}) is None:
+        return None
+    if "calls" in scenario or until.get("ended") or not all(map(is_number, lasting)):
+        return None
+    sent = [step.published for step in steps if step.published is not None]
+    count, probed_s = _probed(scenario)
+    count += sum(one.total or 0 for one in sent)
+    return count, probed_s + sum(step.lasts_s for step in steps) + max(lasting)
+
+
+def within_faults(about: Asked) -> Iterator[Fault]:
+    """Yield times in which something has to come, and that are longer than the run waits for it."""
+    within_s, goal, most_s = about.given.get("within_s"), _goal(about), longest_s(about.scenario)
+    at = (*about.path, "within_s")
+    if not is_number(within_s):
+        return
+    if goal is not None and is_number(limit_s := _limit_s(goal)) and within_s > limit_s:
+        yield (
+            at,
+            f"the step waits {limit_s:g} s for the result (limit_s), and gives it up before {within_s:g} s",
+        )
+    if about.check in {"reacts", "ends-at"} and most_s is not None and within_s >= most_s:
+        yield at, f"{about.name} lasts {most_s:g} s at most: what comes later is not seen"
