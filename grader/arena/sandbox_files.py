@@ -133,9 +133,7 @@ def copy_standins(folder: Path, ros: RosInstallation) -> None:
         _copy(STANDIN_SOURCES / name, folder / SHARE / name)
         _write_modules(folder / SHARE / name)
         for program in TWO_NAMES.get(name, ()):
-            shutil.copyfile(folder / SHARE / name / program, folder / SHARE / name / f"{program}.py")
-    for path in (folder, *folder.rglob("*")):
-        path.chmod(0o755 if path.is_dir() or _is_program(path) else 0o644)
+            _copy(STANDIN_SOURCES / name / program, folder / SHARE / name / f"{program}.py")
 
 
 def with_standins(env: Mapping[str, str], copied: Path, inside: str) -> dict[str, str]:
@@ -169,8 +167,16 @@ def _prepend(path: str, entries: list[str]) -> str:
 
 
 def _copy(source: Path, target: Path) -> None:
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(source, target, ignore=ignored, copy_function=shutil.copyfile)
+    """Copy a file, or a folder with all that is in it."""
+    if source.is_dir():
+        target.mkdir()
+        for name in os.listdir(source):  # noqa: PTH208 - as in `evidence/reader.py`
+            if name != "__pycache__":
+                _copy(source / name, target / name)
+        return
+    data = source.read_bytes()
+    target.write_bytes(data)
+    target.chmod(0o755 if data.startswith(SHEBANG) else 0o644)
 
 
 def _write_modules(package: Path) -> None:
@@ -187,11 +193,6 @@ def _write_modules(package: Path) -> None:
 def _append(path: str, entries: list[str]) -> str:
     before = [entry for entry in path.split(os.pathsep) if entry and entry not in entries]
     return os.pathsep.join([*before, *entries])
-
-
-def _is_program(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(len(SHEBANG)) == SHEBANG
 
 
 def _installed_standins(ros: RosInstallation) -> Iterator[str]:
