@@ -223,7 +223,7 @@ def _no_rotation(seen: Sequence[Seen], params: TransformParams) -> Verdict | Non
     if not wrong:
         return None
     message = (
-        f"the rotation of {params.name} is no rotation in {len(wrong)} of {plural(len(seen), 'message')}"
+        f"the rotation of {params.name} is not a rotation in {len(wrong)} of {plural(len(seen), 'message')}"
     )
     hint = (
         "a quaternion without rotation has w = 1.0; quaternion_from_euler(roll, pitch, yaw) gives any other"
@@ -350,7 +350,7 @@ def _wrong_pose(
     pose = next((p for t, p in reversed(poses) if t <= first.time_ns), poses[0][1])
     hint = f"send the pose of each message on {params.pose_of} at once, in its callback"
     if value is None:
-        return failed(f"{params.name} is no transform {count}", hint=hint)
+        return failed(f"{params.name} is not a transform {count}", hint=hint)
     old = [t for t, p in poses if _fits(value, p, params) and t <= first.time_ns]
     what, says = (
         f"{params.name} is wrong {count}",
