@@ -185,10 +185,19 @@ class Later:
             if PurePosixPath(slip.file).name in twice and not slip.name:
                 yield f"write anonymous=True on {_line(slip)}, since two of it run at once"
 
+    def _topics_of_others(self) -> set[str]:
+        """Topics of the same run that other criteria ask for."""
+        of_run = (c for c in self._rubric.criteria if c.scenario == self._criterion.scenario)
+        return {str(c.parameters["topic"]) for c in of_run if "topic" in c.parameters} - {self._topic}
+
     def _published(self) -> Iterator[str]:
         published, kind = self._of("publisher"), str(self._wanted.get("type", ""))
         lines = [one.line for one in published if f"/{one.message.lstrip('/')}" == self._topic]
         if len(published) == 1 and not lines and not self._ran:
+            other = published[0]
+            if f"/{other.message.lstrip('/')}" in self._topics_of_others():
+                yield f"add a publisher of {kind} on {self._topic}: {other.file} has only the one of {other.message}"
+                return
             yield f"publish on {self._topic} on {_line(published[0])}, not on {published[0].message}"
         if len(published) > 1 and not lines:
             names = join_words(f"{one.message} (line {one.line})" for one in published[:NAMES_SHOWN])

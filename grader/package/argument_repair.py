@@ -1,4 +1,4 @@
-"""Finds arguments that ROS's calls do not take as they are written, and variables that a function keeps for itself.
+"""Finds values that ROS's calls do not take as they are written, and names that belong to an object or to the file.
 
 A tree comes in. Out go mistakes: the expressions of each with what belongs in their place, and why; for variables, the
 lines above which a `global` is missing. What is said of them, and how a text is changed, is `source_repair.py`'s part;
@@ -8,6 +8,8 @@ as that, it runs in a child process with the standard library only, and executes
 from __future__ import annotations
 
 import ast
+import builtins
+import re
 from collections.abc import Iterator
 from typing import NamedTuple, TypeGuard
 
@@ -28,12 +30,19 @@ class Unbound(NamedTuple):
     first: ast.stmt
 
 
+NUMBERS = re.compile(r"U?Int\d+|Float\d+|Byte|Char")
+LOGS = re.compile(r"log(debug|info|warn|err|fatal)")
+
+
 def wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
     """Yield what calls of rospy's are given in another form than they take it."""
     types, of_rospy = _imported(tree, "msg"), _imported(tree, "rospy")
     functions = {one.name for one in tree.body if isinstance(one, ast.FunctionDef)}
     values = [(t, n.value) for n in ast.walk(tree) if isinstance(n, ast.Assign) for t in n.targets]
     rates = {ast.unparse(target) for target, value in values if _called(value) == "Rate"}
+    of_numbers = {
+        ast.unparse(target) for target, value in values if NUMBERS.fullmatch(_published_type(value))
+    }
     for call in (n for n in ast.walk(tree) if isinstance(n, ast.Call)):
         name = _called(call)
         if name == "sleep" and isinstance(call.func, ast.Attribute) and ast.unparse(call.func.value) in rates:
@@ -41,7 +50,11 @@ def wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
                 yield Argument(
                     [(call, f"{ast.unparse(call.func)}()")], "a Rate already knows how long to sleep"
                 )
+        elif name == "publish" and isinstance(call.func, ast.Attribute):
+            if ast.unparse(call.func.value) in of_numbers:
+                yield from _text_of_a_number(call)
         elif _is_rospys(call.func, of_rospy):
+            yield from _logged(call) if LOGS.fullmatch(name) else ()
             yield from _of_topic(call, types) if name in {"Publisher", "Subscriber"} else ()
             yield from _numbers(call, name)
             yield from _callback(call, name, functions)
@@ -62,6 +75,83 @@ def _of_topic(call: ast.Call, types: set[str]) -> Iterator[Argument]:
         yield Argument([(given, given.value)], "the type is given as a string")
     elif given is not None and _is_type(name, types):
         yield Argument([(given, name)], f"`{name}()` is a message, not a type")
+
+
+def _published_type(value: ast.expr) -> str:
+    """Return the last name of the type of a `Publisher(…)`; "" of all else."""
+    given = value.args[1:2] if isinstance(value, ast.Call) and _called(value) == "Publisher" else []
+    return ast.unparse(given[0]).rpartition(".")[2] if given else ""
+
+
+def _text_of_a_number(call: ast.Call) -> Iterator[Argument]:
+    """Of `publish(str(n))` on a topic of numbers."""
+    for given in call.args:
+        if isinstance(given, ast.Call) and _called(given) == "str" and len(given.args) == 1:
+            edit = (given, ast.unparse(given.args[0]))
+            yield Argument([edit], "the message takes a number, and `str(…)` makes a string of it")
+
+
+def _logged(call: ast.Call) -> Iterator[Argument]:
+    """Of `loginfo('a', b)`, whose text has no place for the value."""
+    text, *values = [*call.args, None]
+    values = [one for one in values if one is not None]
+    if _is_text(text) and values and "%" not in text.value:
+        places = " ".join(["%s"] * len(values))
+        blank = "" if not text.value or text.value[-1].isspace() else " "
+        edit = (text, repr(f"{text.value}{blank}{places}"))
+        yield Argument([edit], "the string has fewer `%` than there are values after it")
+
+
+def names_of_objects(tree: ast.Module) -> Iterator[Argument]:
+    """Yield names in methods that are there only with `self.` before them, and classes that stand in place of an object
+    whose attributes are used."""
+    shared = {name for one in tree.body for name in _bound_in(one)} | set(dir(builtins))
+    classes = [n for n in tree.body if isinstance(n, ast.ClassDef)]
+    for one in classes:
+        methods = [n for n in one.body if isinstance(n, ast.FunctionDef) and not n.decorator_list]
+        stored = (n for n in ast.walk(one) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store))
+        attributes = {n.attr for n in stored if _is_self(n.value)} | {n.name for n in methods}
+        attributes |= {name for part in one.body if isinstance(part, ast.Assign) for name in _bound_in(part)}
+        for method in (n for n in methods if n.args.args and n.args.args[0].arg == "self"):
+            known = shared | {name for part in method.body for name in _bound_in(part)}
+            known |= {n.arg for n in ast.walk(method) if isinstance(n, ast.arg)}
+            for name in (
+                n for n in ast.walk(method) if isinstance(n, ast.Name) and n.id in attributes - known
+            ):
+                yield Argument([(name, f"self.{name.id}")], f"`{name.id}` belongs to the class {one.name}")
+    used = {ast.unparse(n.value) for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
+    made = {one.name for one in classes if not one.bases}
+    for node in (n for n in ast.walk(tree) if isinstance(n, ast.Assign) and len(n.targets) == 1):
+        if (
+            isinstance(node.value, ast.Name)
+            and node.value.id in made
+            and ast.unparse(node.targets[0]) in used
+        ):
+            edit = (node.value, f"{node.value.id}()")
+            yield Argument(
+                [edit], f"`{ast.unparse(node.targets[0])}` is the class itself, not an object of it"
+            )
+
+
+def _is_self(node: ast.expr) -> bool:
+    return isinstance(node, ast.Name) and node.id == "self"
+
+
+def _bound_in(part: ast.AST) -> set[str]:
+    """Return the names that a part of a script gives a meaning to; of a function or class its own name alone."""
+    if isinstance(part, ast.FunctionDef | ast.ClassDef):
+        return {part.name}
+    found = set()
+    for node in ast.walk(part):
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+            found.add(node.id)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            found |= {(a.asname or a.name).partition(".")[0] for a in node.names}
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef | ast.ExceptHandler) and node.name:
+            found.add(node.name)
+        elif isinstance(node, ast.Global | ast.Nonlocal):
+            found |= set(node.names)
+    return found
 
 
 def _numbers(call: ast.Call, name: str) -> Iterator[Argument]:

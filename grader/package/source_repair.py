@@ -18,7 +18,7 @@ from difflib import get_close_matches
 from itertools import chain
 from typing import Any
 
-from grader.package.argument_repair import unbound_variables, wrong_arguments
+from grader.package.argument_repair import names_of_objects, unbound_variables, wrong_arguments
 from grader.package.syntax_repair import (
     Step,
     as_python3,
@@ -486,9 +486,12 @@ def _with_values_called(text: str) -> Iterator[Step]:
 def _with_calls(text: str) -> Iterator[Step]:
     tree, lines = ast.parse(text), text.split("\n")
     own = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+    own -= {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and n.decorator_list}
     named = [
         n for n in chain.from_iterable(map(_uncalled_expressions, ast.walk(tree))) if _is_callable(n, own)
     ]
+    alone = (n.value for n in ast.walk(tree) if isinstance(n, ast.Expr))
+    named += [n for n in alone if isinstance(n, ast.Attribute) and n.attr in own - CALLED]
     spans = [span for n in named if (span := _span(lines, n))]
     if spans:
         after = _edit(text, [(line, end, end, "()") for line, _, end in spans])
@@ -544,7 +547,8 @@ def _with_callbacks(text: str) -> Iterator[Step]:
 
 def _with_arguments(text: str) -> Iterator[Step]:
     lines = text.split("\n")
-    for mistake in wrong_arguments(ast.parse(text)):
+    tree = ast.parse(text)
+    for mistake in chain(wrong_arguments(tree), names_of_objects(tree)):
         spans = [(span, new) for node, new in mistake.edits if (span := _span(lines, node))]
         if len(spans) == len(mistake.edits):
             after = _edit(text, [(*span, new) for span, new in spans])

@@ -53,6 +53,7 @@ def listen():
 if __name__ == '__main__':
     listen()
 """
+TWICE = "class A:\n    n = 1\n    def g(self, x): return x\n"
 DEEPER = "        if late:\n            wait()\n"
 OWN = {"msg/Level.msg": "float64 level\n", "src/level.py": "from lab.msg import Level\n"}
 OWN_CMAKE = CMAKE.replace("rospy)\n", "message_generation rospy)\nadd_message_files(FILES Level.msg)\n")
@@ -166,6 +167,12 @@ CASES = {
             "without-quotes": ([("'talker'", "main")], 1, "the name of the node has no quotes", "node('main'"),
             "timer": ([("        rate.s", "        rospy.Timer(1 / 10, tick)\n        rate.s")], 1, "takes a Duration",
                       "rospy.Timer(rospy.Duration(1 / 10), tick)"),
+            "of-a-log": ([("        rate.s", "        rospy.loginfo('a:', 1)\n        rate.s")], 1, "fewer `%`",
+                         "rospy.loginfo('a: %s', 1)"),
+            "text-for-a-number": ([("publish(1)", "publish(str(1))")], 1, "makes a string of it", "publish(1)"),
+            "class": ([("\ndef main():", f"{TWICE}a = A\na.g(1)\ndef main():")], 1, "is the class itself", "a = A()"),
+            "of-self": ([("\ndef main():", f"{TWICE}    def f(self): g(n)\ndef main():")], 2, "belongs to the class A",
+                        "self.g(self.n)"),
             "callback": ([("\nmain()", "\nrospy.on_shutdown('main')\nmain()")], 1, "'main' is a string",
                          "down(main)"),
         }.items()

@@ -424,14 +424,25 @@ def known_elsewhere(node, tree):
 # ---- counters
 
 
+def in_brackets(counter, rest):
+    """Return how `counter + 1 % 128` is meant; "" where it is something else that a number behind a `%` is added to."""
+    if not isinstance(counter, (ast.Name, ast.Attribute)) or None in (whole(rest.left), whole(rest.right)):
+        return ""
+    return "write `(%s + %d) %% %d`" % (dotted(counter), whole(rest.left), whole(rest.right))
+
+
 def resets(tree):
     """Where a counter goes back: the number that it is set to in an `if` that asks for it, and the number in that `if`,
     or behind a `%`.
     """
+    added = {
+        id(n.right): n.left for n in walk(tree) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)
+    }
     for node in walk(tree):
-        value, done, asked = None, (), []
+        value, done, asked, fix = None, (), [], ""
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
             asked = [node.right]
+            fix = in_brackets(added.get(id(node)), node)
         elif isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Mod):
             asked = [node.value]
         elif isinstance(node, ast.If):
@@ -446,7 +457,7 @@ def resets(tree):
             asked = test if value is not None else []
         for part in asked:
             if whole(part) is not None:
-                yield slip(part.lineno, "reset-limit", "%d" % whole(part))
+                yield slip(part.lineno, "reset-limit", "%d" % whole(part), fix=fix)
         if value is not None:
             yield slip(value.lineno, "reset-value", "%d" % whole(value))
 

@@ -378,6 +378,12 @@ def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapPara
         message = f"the node dies at {significant(last + 1)}, where the counter should reset: {end.cause}"
         limits = slips_of(package, run, count.callerid, "reset-limit")
         high = next((one for one in limits if int(one.message) > params.maximum), None)
+        first = next((one for one in limits if one.fix), None)
+        if first is not None:
+            why = f"{message}; line {first.line} works the `%` out before the `+`, so it changes nothing"
+            return failed(
+                why, hint=f"on line {first.line}, {first.fix}", citations=(first.place, *end.citations)
+            )
         if high is not None and last == params.maximum:
             hint = _limit_hint(high, params)
             return failed(f"{message}; line {high.line} compares the counter with {high.message}", hint=hint)

@@ -181,9 +181,14 @@ def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     script = next((f for f in package.files if f.path == life.start.script), None)
     if script is not None and script.shebang_fault == "empty-file":
         return Ending("its file is empty", f"write the node in {script.path}", by_itself=True)
-    kinds = ("main-guard", "never-called", "loop-left", "commented-out", "no-init")
+    kinds = ("main-guard", "not-called", "never-called", "loop-left", "commented-out", "no-init")
     own = [s for s in package.slips if s.file == life.start.script and s.kind in kinds]
-    slips = [s for s in own if s.kind != "commented-out" or s.name == "spin"]
+    slips = [
+        s
+        for s in own
+        if (s.kind != "commented-out" or s.name == "spin")
+        and (s.kind != "not-called" or s.name.rpartition(".")[2] not in ("sleep", "is_shutdown"))
+    ]
     if not slips:
         return None
     slip = min(slips, key=lambda one: kinds.index(one.kind))
