@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120 - see above
 BOOTSTRAP = "import sys; sys.path.append(sys.argv[1]); from grader.limited_child import main; main()"
-COMMAND = [sys.executable, "-I", "-S", "-c", BOOTSTRAP, ROOT]
+COMMAND = [sys.executable, "-I", "-S", "-B", "-c", BOOTSTRAP, ROOT]
 STAND_BY = "stand-by"
 COLLECT_AFTER = 50_000
 """So many new objects until Python looks for cycles: what is parsed is many small objects without any."""

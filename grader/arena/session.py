@@ -52,7 +52,7 @@ BELOW = re.compile(r"Killed signal terminated program|process has died \[pid \d+
 def arena_command(ros: RosInstallation) -> tuple[list[str], dict[str, str]]:
     """Return the managed roscore's command, and its environment: ROS and nothing of the shell's."""
     env = {"LANG": "C.UTF-8", "ROS_IP": LOOPBACK, **ros.env, "PATH": search_path(ros, "")}
-    return [ros.python, "-s", str(ARENA)], env
+    return [ros.python, "-s", "-B", str(ARENA)], env
 
 
 class _Channel(NamedTuple):

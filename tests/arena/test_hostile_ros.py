@@ -166,7 +166,7 @@ def test_calls_that_are_made_to_break_the_master(tmp_path: Path) -> None:
     assert_unharmed(seen)
     refused = (
         "a document type",
-        "are no text",
+        "are not text",
         "an encoded call (gzip)",
         "a call of more than 8 MB",
         "its length",
@@ -220,7 +220,7 @@ def test_more_parameters_than_anybody_needs(tmp_path: Path) -> None:
     assert_told(
         told(seen, "limit"), ("8 MB of parameters", "nested more than 24 levels", "so often", "too large")
     )
-    assert_told(told(seen, "refused"), ("with a name that is none",))
+    assert_told(told(seen, "refused"), ("with something that is not a name",))
     latest = {e.name: e.value for _, e in seen.params}
     assert [latest[f"/again{number}"] for number in range(3)] == ["last"] * 3
     assert latest["/use_sim_time"] is False
@@ -256,7 +256,8 @@ def test_registrations_without_end(tmp_path: Path) -> None:
         told(seen, "refused"), ("the address http://192.0.2.1/", "file:///etc/passwd", "127.0.0.1:0/")
     )
     assert_told(
-        told(seen, "refused"), ("127.0.0.1:11311/", "nothing", "99999", "a name that is none", "not a string")
+        told(seen, "refused"),
+        ("127.0.0.1:11311/", "nothing", "99999", "something that is not a name", "not a string"),
     )
     assert_told(told(seen, "limit"), ("more topics and services than a process may",))
     assert "/talker" in seen.student_nodes("talker")
