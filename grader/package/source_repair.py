@@ -2,8 +2,8 @@
 
 `examine` is the entry; it runs in a child process with limits (`limited_child.py`). Pairs of a file's name and its text
 come in; for each, the steps go out (a mistake, and the text that has it repaired), and the names that the last text
-uses. Nothing is executed. What does not parse is for `syntax_repair.py`; `package/repairs/python.py` puts the answer in
-words.
+uses. Nothing is executed. What does not parse is for `syntax_repair.py`, calls are for `call_repair.py`;
+`package/repairs/python.py` puts the answer in words.
 """
 
 from __future__ import annotations
@@ -13,17 +13,27 @@ import builtins
 import re
 import sys
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from difflib import get_close_matches
-from itertools import chain
 from typing import Any
 
-from grader.package.argument_repair import names_of_objects, unbound_variables, wrong_arguments
+from grader.package.call_repair import (
+    with_arguments,
+    with_callbacks,
+    with_calls,
+    with_globals,
+    with_quoted_calls,
+    with_values_called,
+)
 from grader.package.syntax_repair import (
     Step,
     as_python3,
+    edited,
     is_docstring,
+    last_name,
     make_readable,
+    span_of,
+    step_to,
     syntax_error,
     with_line,
 )
@@ -66,12 +76,8 @@ NAMES_OF_ROSPY = (
     "wait_for_service"
 )
 ROSPY = frozenset(NAMES_OF_ROSPY.split())
-GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "logerr")
 LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
-CALLED = frozenset({"is_shutdown", "sleep", "spin"})
-QUOTED = re.compile(r"[\w.]+\.(sleep|spin)\([\w.]*\)")
 OF_TWO_FRAMES = {"lookup_transform", "can_transform", "lookupTransform", "canTransform", "waitForTransform"}
-TAKE_FUNCTIONS = {"Subscriber", "Timer", "Service", "on_shutdown", "signal"}
 ROLES = {
     "Publisher": "publisher",
     "Subscriber": "subscriber",
@@ -111,12 +117,12 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             _with_quotes,
             _with_names,
             _with_attributes,
-            _with_values_called,
-            _with_calls,
-            _with_quoted_calls,
-            _with_callbacks,
-            _with_arguments,
-            _with_globals,
+            with_values_called,
+            with_calls,
+            with_quoted_calls,
+            with_callbacks,
+            with_arguments,
+            with_globals,
             _with_main,
             _with_spin,
         ):
@@ -128,38 +134,15 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
 # ---- what parses, and is not meant
 
 
-def _span(lines: list[str], node: ast.expr) -> tuple[int, int, int] | None:
-    """Return line (from 0), start and end of an expression on one line, in characters."""
-    line = node.lineno - 1
-    if node.end_lineno != node.lineno or line >= len(lines) or node.end_col_offset is None:
-        return None
-    raw = lines[line].encode("utf-8", "surrogatepass")
-    start, end = (len(raw[:at].decode("utf-8", "replace")) for at in (node.col_offset, node.end_col_offset))
-    return line, start, end
-
-
-def _edit(text: str, edits: Iterable[tuple[int, int, int, str]]) -> str:
-    lines = text.split("\n")
-    for line, start, end, new in sorted(edits, reverse=True):
-        lines[line] = lines[line][:start] + new + lines[line][end:]
-    return "\n".join(lines)
-
-
-def _step(cause: str, line: int, before: str, after: str, word: str = "") -> Iterator[Step]:
-    """Yield the step if it changes anything, and what comes out parses."""
-    if after != before and syntax_error(after) is None:
-        yield {"cause": cause, "line": line, "word": word, "error": None, "text": after}
-
-
 def _without_old_names(text: str) -> Iterator[Step]:
     tree, lines = ast.parse(text), text.split("\n")
     bound = _bound(tree)
     uses = [n for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id in OLD_NAMES and n.id not in bound]
-    spans = [(span, OLD_NAMES[n.id]) for n in uses if (span := _span(lines, n))]
+    spans = [(span, OLD_NAMES[n.id]) for n in uses if (span := span_of(lines, n))]
     if spans:
         names = ", ".join(sorted({n.id for n in uses}))
-        after = _edit(text, [(*span, new) for span, new in spans])
-        yield from _step("old-name", min(n.lineno for n in uses), text, after, names)
+        after = edited(text, [(*span, new) for span, new in spans])
+        yield from step_to("old-name", min(n.lineno for n in uses), text, after, names)
 
 
 def _without_old_print(text: str) -> Iterator[Step]:
@@ -167,9 +150,13 @@ def _without_old_print(text: str) -> Iterator[Step]:
     for node in ast.walk(ast.parse(text)):
         value = node.value if isinstance(node, ast.Expr) else None
         first = value.elts[0] if isinstance(value, ast.Tuple) and value.elts else value
-        if isinstance(first, ast.BinOp) and isinstance(first.op, ast.RShift) and _last(first.left) == "print":
+        if (
+            isinstance(first, ast.BinOp)
+            and isinstance(first.op, ast.RShift)
+            and last_name(first.left) == "print"
+        ):
             for after in as_python3(text.split("\n"), first.lineno - 1):
-                for step in _step("old-name", first.lineno, text, after, "print >>"):
+                for step in step_to("old-name", first.lineno, text, after, "print >>"):
                     text = step["text"]
                     yield step
 
@@ -213,7 +200,7 @@ def _with_modules(text: str, types: list[str]) -> Iterator[Step]:
         lines, at = text.split("\n"), node.lineno - 1
         after = re.sub(rf"from\s+{re.escape(module)}\b", f"from {near}.msg", lines[at], count=1)
         if near and names <= known[near] and after != lines[at]:
-            for step in _step("module", at + 1, text, with_line(lines, at, after), module):
+            for step in step_to("module", at + 1, text, with_line(lines, at, after), module):
                 text = step["text"]
                 yield step
 
@@ -241,9 +228,9 @@ def _with_classes(text: str, types: list[str]) -> Iterator[Step]:
             meant = next(iter(right or near), same.get(alias.name.lower(), ""))
             if not meant or (not right and meant in unbound):
                 continue  # the import of what is used is missing
-            spans = [_span(lines, place) for place in (alias, *used)]  # type: ignore[arg-type] # it has a place too
+            spans = [span_of(lines, place) for place in (alias, *used)]  # type: ignore[arg-type] # it has a place too
             edits = [(*span, meant) for span in spans if span is not None]
-            yield from _step("name", alias.lineno, text, _edit(text, edits), alias.name)
+            yield from step_to("name", alias.lineno, text, edited(text, edits), alias.name)
             return
 
 
@@ -257,7 +244,7 @@ def _with_class_imported(text: str, node: ast.Import, known: dict[str, set[str]]
     used = any(isinstance(n, ast.Attribute) and ast.unparse(n) == whole for n in ast.walk(ast.parse(text)))
     right = f"import {package}.msg" if used else f"from {package}.msg import {name}"
     after = re.sub(rf"import\s+{re.escape(whole)}\b", right, lines[at], count=1)
-    yield from _step("module", at + 1, text, with_line(lines, at, after), whole)
+    yield from step_to("module", at + 1, text, with_line(lines, at, after), whole)
 
 
 def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
@@ -268,8 +255,10 @@ def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
     packages = {name: package for package, names in MESSAGES.items() for name in names.split()}
     packages |= {name: package for package, _, name in (kind.partition("/") for kind in types)}
     parts = [n for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)]
-    modules = {_last(n.value) for n in parts}
-    of_messages = {_last(n.value): f"{_last(n.value)}.{n.attr}" for n in parts if n.attr in ("msg", "srv")}
+    modules = {last_name(n.value) for n in parts}
+    of_messages = {
+        last_name(n.value): f"{last_name(n.value)}.{n.attr}" for n in parts if n.attr in ("msg", "srv")
+    }
     loaded = [n for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)]
     missing = {n.id: n.lineno for n in sorted(loaded, key=lambda n: -n.lineno) if n.id not in bound}
     for name in sorted(missing, key=lambda name: (missing[name], name)):
@@ -288,7 +277,7 @@ def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
             )
         else:
             continue
-        for step in _step("import", missing[name], text, after, name):
+        for step in step_to("import", missing[name], text, after, name):
             text = step["text"]
             yield step
 
@@ -308,10 +297,10 @@ def _with_class(text: str, name: str, meant: str) -> Iterator[Step]:
     """`Int8` in place of each `Int16`."""
     lines = text.split("\n")
     uses = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name) and n.id == name]
-    spans = [span for n in uses if (span := _span(lines, n))]
+    spans = [span for n in uses if (span := span_of(lines, n))]
     if spans:
-        after = _edit(text, [(*span, meant) for span in spans])
-        yield from _step("name", min(spans)[0] + 1, text, after, name)
+        after = edited(text, [(*span, meant) for span in spans])
+        yield from step_to("name", min(spans)[0] + 1, text, after, name)
 
 
 def _import_meant(text: str, name: str) -> str:
@@ -334,19 +323,15 @@ def _add_import(text: str, statement: str, module: str, name: str) -> str:
     for one in imports:
         if module and isinstance(one, ast.ImportFrom) and one.module == module and not one.level:
             other = next((a for a in one.names if a.name.lower() == name.lower() and not a.asname), None)
-            place = _span(lines, other) if other is not None else None  # type: ignore[arg-type] # as below
+            place = span_of(lines, other) if other is not None else None  # type: ignore[arg-type] # as below
             if place is not None:
-                return _edit(text, [(*place, name)])
-            span = _span(lines, one.names[-1])  # type: ignore[arg-type] # an alias has a place too
+                return edited(text, [(*place, name)])
+            span = span_of(lines, one.names[-1])  # type: ignore[arg-type] # an alias has a place too
             if span is not None:
-                return _edit(text, [(span[0], span[2], span[2], f", {name}")])
+                return edited(text, [(span[0], span[2], span[2], f", {name}")])
     first = next((s for s in body if not is_docstring(s)), None)
     at = (imports[-1].end_lineno or 0) if imports else (first.lineno - 1 if first else len(lines))
     return "\n".join([*lines[:at], statement, *lines[at:]])
-
-
-def _last(node: ast.AST | None) -> str:
-    return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
 
 
 def _with_names(text: str) -> Iterator[Step]:
@@ -362,10 +347,10 @@ def _with_names(text: str) -> Iterator[Step]:
         missing = [n for n in ast.walk(block) if isinstance(n, ast.Name) and n.id not in known]
         for name in dict.fromkeys(n.id for n in missing):
             meant = OBVIOUS_NAMES.get(name) or _meant_by(name, own)
-            spans = [span for n in missing if n.id == name and (span := _span(lines, n))]
+            spans = [span for n in missing if n.id == name and (span := span_of(lines, n))]
             if meant and spans:
-                after = _edit(text, [(*span, meant) for span in spans])
-                for step in _step("name", spans[0][0] + 1, text, after, name):
+                after = edited(text, [(*span, meant) for span in spans])
+                for step in step_to("name", spans[0][0] + 1, text, after, name):
                     text, lines = step["text"], step["text"].split("\n")
                     yield step
                     yield from _with_names(text)
@@ -385,26 +370,26 @@ def _with_quotes(text: str) -> Iterator[Step]:
     texts = [n for n in _texts_of_ros(tree) if isinstance(n, ast.Name)]
     missing = [n for n in texts if n.id not in known and not _meant_by(n.id, set(stored))]
     assigned = [n for n in ast.walk(tree) if isinstance(n, ast.Assign)]
-    own = {id(inner): _last(n.targets[0]) for n in assigned for inner in ast.walk(n.value)}
+    own = {id(inner): last_name(n.targets[0]) for n in assigned for inner in ast.walk(n.value)}
     keys = [
         n
         for n in _keys_of_parameters(tree)
         if n.id not in known or (stored.get(n.id) == [n.lineno] and own.get(id(n)) == n.id)
     ]
-    spans = [(span, n.id) for n in (*missing, *keys) if (span := _span(lines, n))]
+    spans = [(span, n.id) for n in (*missing, *keys) if (span := span_of(lines, n))]
     if spans:
-        after = _edit(text, [(*span, f"'{name}'") for span, name in spans])
+        after = edited(text, [(*span, f"'{name}'") for span, name in spans])
         words = ", ".join(dict.fromkeys(name for _, name in sorted(spans)))
-        yield from _step("quotes", min(spans)[0][0] + 1, text, after, words)
+        yield from step_to("quotes", min(spans)[0][0] + 1, text, after, words)
 
 
 def _texts_of_ros(tree: ast.Module) -> Iterator[ast.expr]:
     """Yield what stands where ROS is told the name of a node, a topic, a parameter or a frame."""
     yield from (node for _, node in _named_texts(tree))
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and _last(node.func) in OF_TWO_FRAMES:
+        if isinstance(node, ast.Call) and last_name(node.func) in OF_TWO_FRAMES:
             yield from node.args[:2]
-        elif isinstance(node, ast.Assign) and _last(node.targets[0]) in ("frame_id", "child_frame_id"):
+        elif isinstance(node, ast.Assign) and last_name(node.targets[0]) in ("frame_id", "child_frame_id"):
             yield node.value
 
 
@@ -413,13 +398,15 @@ def _keys_of_parameters(tree: ast.Module) -> Iterator[ast.Name]:
     read = {
         ast.unparse(n.targets[0])
         for n in ast.walk(tree)
-        if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call) and _last(n.value.func) == "get_param"
+        if isinstance(n, ast.Assign)
+        and isinstance(n.value, ast.Call)
+        and last_name(n.value.func) == "get_param"
     }
     for node in ast.walk(tree):
         root: ast.expr | None = node if isinstance(node, ast.Subscript) else None
         while isinstance(root, ast.Subscript):
             root = root.value
-        of_call = isinstance(root, ast.Call) and _last(root.func) == "get_param"
+        of_call = isinstance(root, ast.Call) and last_name(root.func) == "get_param"
         if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Name) and root is not None:
             yield from [node.slice] if of_call or ast.unparse(root) in read else []
 
@@ -446,134 +433,19 @@ def _with_attributes(text: str) -> Iterator[Step]:
     """`rospy.subscriber(…)`, for `rospy.Subscriber(…)`: what rospy lacks, and has nearly under that name."""
     lines = text.split("\n")
     for node in ast.walk(ast.parse(text)):
-        if not isinstance(node, ast.Attribute) or _last(node.value) != "rospy" or node.attr in ROSPY:
+        if not isinstance(node, ast.Attribute) or last_name(node.value) != "rospy" or node.attr in ROSPY:
             continue
         plain = {name.lower(): name for name in ROSPY}
         if isinstance(node.ctx, ast.Store):
             continue  # a value is given to it: `rospy.rate = 10`
         meant = plain.get(node.attr.lower()) or next(iter(get_close_matches(node.attr, ROSPY, 1, 0.85)), "")
-        span = _span(lines, node)
+        span = span_of(lines, node)
         if meant and span is not None and not node.attr.startswith("_"):
             line, _, end = span
-            after = _edit(text, [(line, end - len(node.attr), end, meant)])
-            for step in _step("attribute", line + 1, text, after, f"rospy.{node.attr}"):
+            after = edited(text, [(line, end - len(node.attr), end, meant)])
+            for step in step_to("attribute", line + 1, text, after, f"rospy.{node.attr}"):
                 text, lines = step["text"], step["text"].split("\n")
                 yield step
-
-
-def _with_values_called(text: str) -> Iterator[Step]:
-    """`rate = rospy.rate = 10`, for `rate = rospy.Rate(10)`: a value is given to what takes it as an argument."""
-    lines = text.split("\n")
-    for node in ast.walk(ast.parse(text)):
-        target = node.targets[-1] if isinstance(node, ast.Assign) else None
-        if (
-            not isinstance(target, ast.Attribute)
-            or _last(target.value) != "rospy"
-            or not isinstance(node, ast.Assign)
-        ):
-            continue
-        meant = {name.lower(): name for name in GIVEN_ONE}.get(target.attr.lower(), "")
-        begin, value = _span(lines, target), _span(lines, node.value)
-        if meant and begin is not None and value is not None and begin[0] == value[0]:
-            line, start, end = value
-            call = f"rospy.{meant}({lines[line][start:end]})"
-            yield from _step(
-                "value", line + 1, text, _edit(text, [(line, begin[1], end, call)]), f"rospy.{meant}"
-            )
-            return
-
-
-def _with_calls(text: str) -> Iterator[Step]:
-    tree, lines = ast.parse(text), text.split("\n")
-    own = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
-    own -= {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and n.decorator_list}
-    named = [
-        n for n in chain.from_iterable(map(_uncalled_expressions, ast.walk(tree))) if _is_callable(n, own)
-    ]
-    alone = (n.value for n in ast.walk(tree) if isinstance(n, ast.Expr))
-    named += [n for n in alone if isinstance(n, ast.Attribute) and n.attr in own - CALLED]
-    spans = [span for n in named if (span := _span(lines, n))]
-    if spans:
-        after = _edit(text, [(line, end, end, "()") for line, _, end in spans])
-        words = dict.fromkeys(ast.unparse(n) for n in sorted(named, key=lambda n: n.lineno))
-        yield from _step("call", min(spans)[0] + 1, text, after, ", ".join(words))
-
-
-def _with_quoted_calls(text: str) -> Iterator[Step]:
-    """`"rospy.spin()"`: a call that stands alone in quotes."""
-    lines = text.split("\n")
-    for node in ast.walk(ast.parse(text)):
-        value = node.value if isinstance(node, ast.Expr) else None
-        code = value.value if isinstance(value, ast.Constant) and isinstance(value.value, str) else ""
-        span = _span(lines, value) if value is not None and QUOTED.fullmatch(code) else None
-        if span is not None:
-            yield from _step("quoted", span[0] + 1, text, _edit(text, [(*span, code)]), code)
-            return
-
-
-def _uncalled_expressions(node: ast.AST) -> Iterator[ast.expr]:
-    """Yield what stands there by itself and says nothing: a statement, or a condition."""
-    if isinstance(node, ast.Expr):
-        yield node.value
-    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
-        yield node.operand
-    elif isinstance(node, ast.While | ast.If):
-        yield node.test
-
-
-def _is_callable(node: ast.expr, own: set[str]) -> bool:
-    return (isinstance(node, ast.Attribute) and node.attr in CALLED) or (
-        isinstance(node, ast.Name) and node.id in own
-    )
-
-
-def _with_callbacks(text: str) -> Iterator[Step]:
-    """`Subscriber('x', String, on_x())` calls the function instead of naming it: one that takes a message, or that
-    gives nothing back."""
-    tree, lines = ast.parse(text), text.split("\n")
-    own = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
-    called = []
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and _last(node.func) in TAKE_FUNCTIONS:
-            given = [*node.args[:3], *(k.value for k in node.keywords if k.arg in {"callback", "handler"})]
-            calls = (n for n in given if isinstance(n, ast.Call) and not n.args and not n.keywords)
-            called += [n for n in calls if (one := own.get(_last(n.func))) and _is_callback(one)]
-    spans = [(span, ast.unparse(n.func)) for n in called if (span := _span(lines, n))]
-    if spans:
-        after = _edit(text, [(*span, name) for span, name in spans])
-        words = ", ".join(dict.fromkeys(name for _, name in spans))
-        yield from _step("callback", min(span for span, _ in spans)[0] + 1, text, after, words)
-
-
-def _with_arguments(text: str) -> Iterator[Step]:
-    lines = text.split("\n")
-    tree = ast.parse(text)
-    for mistake in chain(wrong_arguments(tree), names_of_objects(tree)):
-        spans = [(span, new) for node, new in mistake.edits if (span := _span(lines, node))]
-        if len(spans) == len(mistake.edits):
-            after = _edit(text, [(*span, new) for span, new in spans])
-            for step in _step("argument", spans[0][0][0] + 1, text, after, mistake.why):
-                yield step
-                yield from _with_arguments(step["text"])
-                return
-
-
-def _with_globals(text: str) -> Iterator[Step]:
-    lines = text.split("\n")
-    for found in unbound_variables(ast.parse(text)):
-        at = found.first.lineno - 1
-        blanks = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
-        after = "\n".join([*lines[:at], f"{blanks}global {found.name}", *lines[at:]])
-        for step in _step("unbound", found.first.lineno, text, after, found.name):
-            yield step
-            yield from _with_globals(step["text"])
-            return
-
-
-def _is_callback(function: ast.FunctionDef) -> bool:
-    returns = (n.value for n in ast.walk(function) if isinstance(n, ast.Return | ast.Yield))
-    given = [a for a in function.args.args if a.arg != "self"]
-    return len(given) > len(function.args.defaults) or not any(returns)
 
 
 def _with_main(text: str) -> Iterator[Step]:
@@ -581,15 +453,15 @@ def _with_main(text: str) -> Iterator[Step]:
     tree, lines = ast.parse(text), text.split("\n")
     for node in ast.walk(tree):
         if isinstance(node, ast.Compare) and isinstance(node.left, ast.Name) and node.left.id == "__name__":
-            word, span = node.comparators[0], _span(lines, node.comparators[0])
+            word, span = node.comparators[0], span_of(lines, node.comparators[0])
             if (
                 isinstance(word, ast.Constant)
                 and str(word.value).strip("_ ").lower() == "main" != word.value
                 and span
             ):
                 if word.value != "__main__":
-                    after = _edit(text, [(*span, "'__main__'")])
-                    yield from _step("guard", node.lineno, text, after, str(word.value))
+                    after = edited(text, [(*span, "'__main__'")])
+                    yield from step_to("guard", node.lineno, text, after, str(word.value))
                 return
     runs = (
         s
@@ -603,24 +475,24 @@ def _with_main(text: str) -> Iterator[Step]:
         for f in tree.body
         if isinstance(f, ast.FunctionDef)
         and len(f.args.args) == len(f.args.defaults)
-        and any(isinstance(n, ast.Call) and _last(n.func) == "init_node" for n in ast.walk(f))
+        and any(isinstance(n, ast.Call) and last_name(n.func) == "init_node" for n in ast.walk(f))
     ]
     named = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
     if len(makers) == 1 and makers[0].name not in named:
         after = f"{text.rstrip()}\n\n\nif __name__ == '__main__':\n    {makers[0].name}()\n"
-        yield from _step("main", makers[0].lineno, text, after, makers[0].name)
+        yield from step_to("main", makers[0].lineno, text, after, makers[0].name)
 
 
 def _with_spin(text: str) -> Iterator[Step]:
     """A node that only waits for messages, and ends at once."""
     tree = ast.parse(text)
     calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call)]
-    waits = [c for c in calls if _last(c.func) in {"Subscriber", "Service", "Timer"}]
+    waits = [c for c in calls if last_name(c.func) in {"Subscriber", "Service", "Timer"}]
     rospy = next((a.asname or a.name for n in ast.walk(tree) if isinstance(n, ast.Import)
                   for a in n.names if a.name == "rospy"), "")  # fmt: skip
     loops = any(isinstance(n, ast.While) for n in ast.walk(tree))
-    makes_node = any(_last(c.func) == "init_node" for c in calls)
-    if not waits or loops or not rospy or not makes_node or LOOPED & {_last(c.func) for c in calls}:
+    makes_node = any(last_name(c.func) == "init_node" for c in calls)
+    if not waits or loops or not rospy or not makes_node or LOOPED & {last_name(c.func) for c in calls}:
         return
     lines = text.split("\n")
     block = _last_block(tree, waits)
@@ -630,7 +502,7 @@ def _with_spin(text: str) -> Iterator[Step]:
     indentation = first_line[: len(first_line) - len(first_line.lstrip())]
     at = last.lineno - 1 if before else last.end_lineno or last.lineno
     after = "\n".join([*lines[:at], f"{indentation}{rospy}.spin()", *lines[at:]])
-    yield from _step("spin", at + 1, text, after, f"{rospy}.spin()")
+    yield from step_to("spin", at + 1, text, after, f"{rospy}.spin()")
 
 
 def _last_block(tree: ast.Module, waits: list[ast.Call]) -> list[ast.stmt]:
@@ -658,7 +530,7 @@ def _names(text: str) -> list[dict[str, Any]]:
         given = constants.get(node.id) if isinstance(node, ast.Name) else node
         if not isinstance(given, ast.Constant) or not isinstance(given.value, str):
             continue
-        span = _span(lines, given)
+        span = span_of(lines, given)
         if span is not None and _is_literal(lines[span[0]][span[1] : span[2]], given.value):
             place = {"line": span[0] + 1, "start": span[1], "end": span[2]}
             found.append({"role": role, "value": given.value, **place, "keys": keys.get(id(node), [])})
@@ -684,7 +556,7 @@ def _named_texts(tree: ast.Module) -> Iterator[tuple[str, ast.expr]]:
             yield "key", call.slice
         if not isinstance(call, ast.Call):
             continue
-        role = ROLES.get(_last(call.func), "")
+        role = ROLES.get(last_name(call.func), "")
         keyword = "param_name" if role.endswith("param") else "name"
         given = [*call.args[:1], *(k.value for k in call.keywords if k.arg == keyword)]
         if role and given:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from grader.syntax_fixes import (
@@ -298,3 +298,31 @@ def _refactor(tool: Any, source: str) -> str | None:  # noqa: ANN401 - a library
 def is_docstring(statement: ast.stmt) -> bool:
     """Return whether the statement is a constant by itself, as a docstring is."""
     return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+
+
+def span_of(lines: list[str], node: ast.expr) -> tuple[int, int, int] | None:
+    """Return line (from 0), start and end of an expression on one line, in characters."""
+    line = node.lineno - 1
+    if node.end_lineno != node.lineno or line >= len(lines) or node.end_col_offset is None:
+        return None
+    raw = lines[line].encode("utf-8", "surrogatepass")
+    start, end = (len(raw[:at].decode("utf-8", "replace")) for at in (node.col_offset, node.end_col_offset))
+    return line, start, end
+
+
+def edited(text: str, edits: Iterable[tuple[int, int, int, str]]) -> str:
+    lines = text.split("\n")
+    for line, start, end, new in sorted(edits, reverse=True):
+        lines[line] = lines[line][:start] + new + lines[line][end:]
+    return "\n".join(lines)
+
+
+def step_to(cause: str, line: int, before: str, after: str, word: str = "") -> Iterator[Step]:
+    """Yield the step if it changes anything, and what comes out parses."""
+    if after != before and syntax_error(after) is None:
+        yield {"cause": cause, "line": line, "word": word, "error": None, "text": after}
+
+
+def last_name(node: ast.AST | None) -> str:
+    """Return `c` of the name `a.b.c`; "" of all else."""
+    return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""

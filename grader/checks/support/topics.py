@@ -208,7 +208,7 @@ _LOOKED_UP = re.compile(r"\"([^\"]{1,80})\" passed to lookupTransform argument \
 
 
 def _unknown_frame(run: Run) -> str:
-    """Return the frame that a node looks up in vain to the end, as what it prints says; "" for none."""
+    """Return the frame that a node still cannot look up when the run ends, as its output says; "" for none."""
     found = [m[1] for one in lives(run) for _, c in run.lines(one.name) if (m := _LOOKED_UP.search(c.line))]
     sent = {
         name

@@ -165,7 +165,7 @@ def _refusal(failure: GitFailed, source: Source, branch: str) -> NotSent:
         said = next((row for row in failure.stderr.splitlines() if "rejected" in row or "remote:" in row), "")
         return NotSent(
             f"{source.given} does not take a push to {branch}: {' '.join(said.split())[:200]}",
-            hint="whoever sends feedback needs write access to it",
+            hint="the account that sends feedback needs write access to that repository",
         )
     error = explained(failure, source)
     return NotSent(error.message, hint=error.hint)

@@ -1,8 +1,9 @@
-"""Finds values that ROS's calls do not take as they are written, and names that belong to an object or to the file.
+"""Repairs of calls: what is named and not called, values that ROS does not take as they are written, and names that
+belong to an object or to the whole file.
 
-A tree comes in. Out go mistakes: the expressions of each with what belongs in their place, and why; for variables, the
-lines above which a `global` is missing. What is said of them, and how a text is changed, is `source_repair.py`'s part;
-as that, it runs in a child process with the standard library only, and executes nothing.
+The text of a script that parses comes in, and the steps go out that repair it. What is said of them is the part of
+`package/repairs/python.py`. It runs in a child process as `source_repair.py` does: the standard library only, and
+nothing is executed.
 """
 
 from __future__ import annotations
@@ -11,9 +12,15 @@ import ast
 import builtins
 import re
 from collections.abc import Iterator
+from itertools import chain
 from typing import NamedTuple, TypeGuard
 
-from grader.package.syntax_repair import is_docstring
+from grader.package.syntax_repair import Step, edited, is_docstring, last_name, span_of, step_to
+
+GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "logerr")
+CALLED = frozenset({"is_shutdown", "sleep", "spin"})
+QUOTED = re.compile(r"[\w.]+\.(sleep|spin)\([\w.]*\)")
+TAKE_FUNCTIONS = {"Subscriber", "Timer", "Service", "on_shutdown", "signal"}
 
 
 class Argument(NamedTuple):
@@ -30,11 +37,126 @@ class Unbound(NamedTuple):
     first: ast.stmt
 
 
+def with_values_called(text: str) -> Iterator[Step]:
+    """`rate = rospy.rate = 10`, for `rate = rospy.Rate(10)`: a value is given to what takes it as an argument."""
+    lines = text.split("\n")
+    for node in ast.walk(ast.parse(text)):
+        target = node.targets[-1] if isinstance(node, ast.Assign) else None
+        if (
+            not isinstance(target, ast.Attribute)
+            or last_name(target.value) != "rospy"
+            or not isinstance(node, ast.Assign)
+        ):
+            continue
+        meant = {name.lower(): name for name in GIVEN_ONE}.get(target.attr.lower(), "")
+        begin, value = span_of(lines, target), span_of(lines, node.value)
+        if meant and begin is not None and value is not None and begin[0] == value[0]:
+            line, start, end = value
+            call = f"rospy.{meant}({lines[line][start:end]})"
+            yield from step_to(
+                "value", line + 1, text, edited(text, [(line, begin[1], end, call)]), f"rospy.{meant}"
+            )
+            return
+
+
+def with_calls(text: str) -> Iterator[Step]:
+    tree, lines = ast.parse(text), text.split("\n")
+    own = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+    own -= {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and n.decorator_list}
+    named = [
+        n for n in chain.from_iterable(map(_uncalled_expressions, ast.walk(tree))) if _is_callable(n, own)
+    ]
+    alone = (n.value for n in ast.walk(tree) if isinstance(n, ast.Expr))
+    named += [n for n in alone if isinstance(n, ast.Attribute) and n.attr in own - CALLED]
+    spans = [span for n in named if (span := span_of(lines, n))]
+    if spans:
+        after = edited(text, [(line, end, end, "()") for line, _, end in spans])
+        words = dict.fromkeys(ast.unparse(n) for n in sorted(named, key=lambda n: n.lineno))
+        yield from step_to("call", min(spans)[0] + 1, text, after, ", ".join(words))
+
+
+def with_quoted_calls(text: str) -> Iterator[Step]:
+    """`"rospy.spin()"`: a call that stands alone in quotes."""
+    lines = text.split("\n")
+    for node in ast.walk(ast.parse(text)):
+        value = node.value if isinstance(node, ast.Expr) else None
+        code = value.value if isinstance(value, ast.Constant) and isinstance(value.value, str) else ""
+        span = span_of(lines, value) if value is not None and QUOTED.fullmatch(code) else None
+        if span is not None:
+            yield from step_to("quoted", span[0] + 1, text, edited(text, [(*span, code)]), code)
+            return
+
+
+def _uncalled_expressions(node: ast.AST) -> Iterator[ast.expr]:
+    """Yield what stands there by itself and says nothing: a statement, or a condition."""
+    if isinstance(node, ast.Expr):
+        yield node.value
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        yield node.operand
+    elif isinstance(node, ast.While | ast.If):
+        yield node.test
+
+
+def _is_callable(node: ast.expr, own: set[str]) -> bool:
+    return (isinstance(node, ast.Attribute) and node.attr in CALLED) or (
+        isinstance(node, ast.Name) and node.id in own
+    )
+
+
+def with_callbacks(text: str) -> Iterator[Step]:
+    """`Subscriber('x', String, on_x())` calls the function instead of naming it: one that takes a message, or that
+    gives nothing back."""
+    tree, lines = ast.parse(text), text.split("\n")
+    own = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+    called = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and last_name(node.func) in TAKE_FUNCTIONS:
+            given = [*node.args[:3], *(k.value for k in node.keywords if k.arg in {"callback", "handler"})]
+            calls = (n for n in given if isinstance(n, ast.Call) and not n.args and not n.keywords)
+            called += [n for n in calls if (one := own.get(last_name(n.func))) and _is_callback(one)]
+    spans = [(span, ast.unparse(n.func)) for n in called if (span := span_of(lines, n))]
+    if spans:
+        after = edited(text, [(*span, name) for span, name in spans])
+        words = ", ".join(dict.fromkeys(name for _, name in spans))
+        yield from step_to("callback", min(span for span, _ in spans)[0] + 1, text, after, words)
+
+
+def _is_callback(function: ast.FunctionDef) -> bool:
+    returns = (n.value for n in ast.walk(function) if isinstance(n, ast.Return | ast.Yield))
+    given = [a for a in function.args.args if a.arg != "self"]
+    return len(given) > len(function.args.defaults) or not any(returns)
+
+
+def with_arguments(text: str) -> Iterator[Step]:
+    lines = text.split("\n")
+    tree = ast.parse(text)
+    for mistake in chain(_wrong_arguments(tree), _names_of_objects(tree)):
+        spans = [(span, new) for node, new in mistake.edits if (span := span_of(lines, node))]
+        if len(spans) == len(mistake.edits):
+            after = edited(text, [(*span, new) for span, new in spans])
+            for step in step_to("argument", spans[0][0][0] + 1, text, after, mistake.why):
+                yield step
+                yield from with_arguments(step["text"])
+                return
+
+
+def with_globals(text: str) -> Iterator[Step]:
+    lines = text.split("\n")
+    for found in _unbound_variables(ast.parse(text)):
+        at = found.first.lineno - 1
+        blanks = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
+        after = "\n".join([*lines[:at], f"{blanks}global {found.name}", *lines[at:]])
+        for step in step_to("unbound", found.first.lineno, text, after, found.name):
+            yield step
+            yield from with_globals(step["text"])
+            return
+
+
 NUMBERS = re.compile(r"U?Int\d+|Float\d+|Byte|Char")
 LOGS = re.compile(r"log(debug|info|warn|err|fatal)")
 
 
-def wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
+def _wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
     """Yield what calls of rospy's are given in another form than they take it."""
     types, of_rospy = _imported(tree, "msg"), _imported(tree, "rospy")
     functions = {one.name for one in tree.body if isinstance(one, ast.FunctionDef)}
@@ -102,7 +224,7 @@ def _logged(call: ast.Call) -> Iterator[Argument]:
         yield Argument([edit], "the string has fewer `%` than there are values after it")
 
 
-def names_of_objects(tree: ast.Module) -> Iterator[Argument]:
+def _names_of_objects(tree: ast.Module) -> Iterator[Argument]:
     """Yield names in methods that are there only with `self.` before them, and classes that stand in place of an object
     whose attributes are used."""
     shared = {name for one in tree.body for name in _bound_in(one)} | set(dir(builtins))
@@ -185,7 +307,7 @@ def _without_quotes(call: ast.Call, name: str, functions: set[str]) -> Iterator[
         yield Argument([(first, repr(first.id))], f"the name of the {what} has no quotes")
 
 
-def unbound_variables(tree: ast.Module) -> Iterator[Unbound]:
+def _unbound_variables(tree: ast.Module) -> Iterator[Unbound]:
     """Yield variables of the whole file that a function reads, and then gives a value to without a `global`."""
     shared = {
         target.id
@@ -231,10 +353,7 @@ def _imported(tree: ast.Module, ending: str) -> set[str]:
 
 def _called(node: ast.AST | None) -> str:
     """Return the last name of what is called; "" where nothing is."""
-    function = node.func if isinstance(node, ast.Call) else None
-    if isinstance(function, ast.Attribute):
-        return function.attr
-    return function.id if isinstance(function, ast.Name) else ""
+    return last_name(node.func) if isinstance(node, ast.Call) else ""
 
 
 def _is_rospys(function: ast.expr, of_rospy: set[str]) -> bool:
