@@ -444,7 +444,8 @@ def _in_order(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> 
                 else "no more comes"
             )
             message = f"{what} is never {value_text(value)}{before}: {came}"
-            hint = f"rostopic echo {params.topic} shows what your node publishes after each message"
+            make = f"set {params.field} to" if found[at:] else f"publish another message, with {params.field}"
+            hint = f"{make} {value_text(value)}{before}; rostopic echo {params.topic} shows what your node publishes"
             verdict = failed(message, hint=hint)
             later = any(params.is_at(one, v) for one in found[at:] for v in params.values[number + 1 :])
             if later or not found[at:]:  # one alone may have been lost on its way

@@ -252,7 +252,8 @@ def _other_frame(found: Sequence[Stamp], params: StampsParams) -> Verdict | None
     count = f"in {len(wrong)} of {plural(len(found), 'message')}"
     message = f"{params.field}.frame_id of {params.topic} is '{shown(seen)}', not {asked}, {count}"
     slash = "; tf2 does not accept frames that start with a slash" if seen == f"/{params.frame_id}" else ""
-    return failed(message, hint=f"set msg.{params.field}.frame_id = {asked}{slash}")
+    verdict = failed(message, hint=f"set msg.{params.field}.frame_id = {asked}{slash}")
+    return verdict.seeking("quoted", *filter(None, [seen]))
 
 
 def _ages(found: Iterable[Stamp]) -> str:

@@ -14,9 +14,12 @@ from grader.checks.support.scripts import (
     SourceLine,
     commented_call,
     commented_calls,
+    lines_that_answer,
+    lines_that_call,
     lines_that_publish,
     lines_that_say,
     lines_that_set,
+    lines_that_transform,
 )
 from grader.evidence.run import Run
 from grader.judging.facts import Facts, scripts_of, sources_of
@@ -35,16 +38,13 @@ SAYS = {
 """The checks of what a node says, and what a line of Python or C++ calls that says them."""
 
 
-def cite_words(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
-    """Return the verdict; one on other words or values than the lab's with the line of the script that makes, or that
-    publishes them, if it is plain which one does."""
+def cite_source(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
+    """Return the verdict; one on what a node says, sends or asks with the line of the script that does so, if it is
+    plain which one that is."""
     package = facts.package_of(criterion)
     placed = any(isinstance(one, FileCitation) for one in verdict.citations)
     lost = verdict.status in {Status.PARTIAL, Status.FAIL} and not verdict.unjudged
-    field = criterion.parameters.get("field")
-    if not (field or criterion.check in {*SAYS, "message"}) or placed or not lost or package is None:
-        return verdict
-    if package is not facts.package:
+    if placed or not lost or package is None or package is not facts.package:
         return verdict
     paths = scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
     lines = [
@@ -53,18 +53,43 @@ def cite_words(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run)
         for number, text in enumerate(build.file_lines(path)[:LINES_READ], 1)
         if len(text) <= LINE_CHARS and not text.lstrip().startswith(("#", "//"))
     ]
-    said = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
-    found = lines_that_set(lines, str(field)) if field else said
-    if field or criterion.check == "message":
-        published = lines_that_publish(lines, str(criterion.parameters.get("topic", "")))
-        # of several, the one that is published; of none, what is published has nothing of it
-        found = found if len(found) == 1 else [one for one in published if one in found] or published
-    elif not found and verdict.status is Status.PARTIAL:
-        found = [one for one in lines if re.search(SAYS[criterion.check], one.text)]
+    found = _lines_to_blame(verdict, criterion, lines)
     if len(found) != 1:
         return verdict
     place = FileCitation(file=found[0].file, line=found[0].number)
     return verdict.model_copy(update={"citations": (place, *verdict.citations)})
+
+
+def _lines_to_blame(verdict: Verdict, criterion: Criterion, lines: list[SourceLine]) -> list[SourceLine]:
+    """Return the lines that do what the criterion judges; none where a check is of something else."""
+    given = criterion.parameters
+    match criterion.check:
+        case "calls":
+            found = lines_that_call(lines, str(given["service"]))
+        case "service-answers":
+            found = lines_that_answer(lines, str(given["service"]))
+        case "transform":
+            found = lines_that_transform(lines)
+        case "hears" | "logs":
+            found = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
+            if not found and verdict.status is Status.PARTIAL:
+                found = [one for one in lines if re.search(SAYS[criterion.check], one.text)]
+        case "message":
+            found = lines_that_say(lines, f"{verdict.measured} {verdict.said}")
+            found = _published_of(found, lines, criterion)
+        case "stamps":
+            found = _published_of(lines_that_set(lines, "stamp"), lines, criterion)
+        case _ if "field" in given:
+            found = _published_of(lines_that_set(lines, str(given["field"])), lines, criterion)
+        case _:
+            found = []
+    return found
+
+
+def _published_of(found: list[SourceLine], lines: list[SourceLine], criterion: Criterion) -> list[SourceLine]:
+    """Return of several lines the one that is published; of none, what is published has nothing of it."""
+    published = lines_that_publish(lines, str(criterion.parameters.get("topic", "")))
+    return found if len(found) == 1 else [one for one in published if one in found] or published
 
 
 def cite_quoted(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:

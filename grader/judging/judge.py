@@ -31,7 +31,7 @@ from grader.judging.cited_lines import (
     cite_find,
     cite_name,
     cite_quoted,
-    cite_words,
+    cite_source,
     show_lines,
 )
 from grader.judging.facts import NOT_RUN, Facts, try_facts, views_of
@@ -111,8 +111,8 @@ def judge_all_runs(
     shown = dict(verdicts)
     if build is not None:
         for criterion in rubric.criteria:
-            placed = cite_words(verdicts[criterion.id], criterion, facts, build)
-            placed = cite_quoted(placed, criterion, facts, build)
+            placed = cite_quoted(verdicts[criterion.id], criterion, facts, build)
+            placed = cite_source(placed, criterion, facts, build)
             placed = cite_commented_call(placed, facts.package_of(criterion), build)
             placed = cite_find(placed, criterion, facts.package_of(criterion), build)
             shown[criterion.id] = show_lines(cite_name(placed, build), build)

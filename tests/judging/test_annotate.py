@@ -21,7 +21,7 @@ from grader.judging.cited_lines import (
     cite_commented_call,
     cite_find,
     cite_name,
-    cite_words,
+    cite_source,
     show_lines,
 )
 from grader.judging.facts import Facts, try_facts
@@ -130,13 +130,17 @@ def test_other_words_are_shown_where_the_script_makes_them(line: str, said: str,
     )
     facts_ = try_facts(lab, runs)
     verdict = partial(0.5, "each message is printed, but not as 'I heard <message>'").about(said=said)
-    found = cite_words(verdict, lab.criteria[0], facts_, runs["package"])
+    found = cite_source(verdict, lab.criteria[0], facts_, runs["package"])
     place = FileCitation(file=SCRIPT["path"], line=4)
     assert found.citations == ((place,) if cited else ())
-    assert cite_words(passed("right"), lab.criteria[0], facts_, runs["package"]) == passed("right")
+    assert cite_source(passed("right"), lab.criteria[0], facts_, runs["package"]) == passed("right")
 
 
 SENT = {"check": "message", "with": {"topic": "/chatter", "template": "hello world {seconds}"}}
+CALLS = {"check": "calls", "with": {"service": "/add"}}
+ANSWERS = {"check": "service-answers", "with": {"service": "/add", "expect": [{"sum": 3}]}}
+FRAMES = {"check": "transform", "with": {"parent": "base", "child": "laser"}}
+STAMPS = {"check": "stamps", "with": {"topic": "/reading"}}
 FIELD = {"check": "field-equals", "with": {"topic": "/cmd_vel", "field": "linear.x", "value": 1}}
 
 
@@ -160,6 +164,25 @@ FIELD = {"check": "field-equals", "with": {"topic": "/cmd_vel", "field": "linear
         (FIELD, "msg = Twist()\nmsg.linear.y = 1\npub.publish(msg)", 3),
         (FIELD, "if msg.linear.x == 2:\n    pub.publish(msg)", 2),
         (FIELD, "msg.linear.x = 2\nmsg.linear.x += 1\npub.publish(msg)", 3),
+        (CALLS, "add = rospy.ServiceProxy('add', Add)\nanswer = add(b=1, a=2)", 2),
+        (CALLS, "self.add = rospy.ServiceProxy('/add', Add)\nself.add.call(1, 2)", 2),
+        (CALLS, "c = actionlib.SimpleActionClient('add', Add)\nc.wait_for_server()\nc.send_goal(goal)", 3),
+        (CALLS, 'ros::ServiceClient c = n.serviceClient<Add>("add");\nif (c.call(srv))', 2),
+        (CALLS, "add = rospy.ServiceProxy('other', Add)\nadd(1, 2)", None),
+        (ANSWERS, "def add(r):\n    return AddResponse(r.a)\n\nrospy.Service('add', Add, add)", 2),
+        (
+            ANSWERS,
+            "def add(r):\n    if r.a:\n        return 1\n    return 2\nrospy.Service('add', Add, add)",
+            None,
+        ),
+        (
+            ANSWERS,
+            "def add(r):\n    return 1\ndef sub(r):\n    return 2\nrospy.Service('/add', Add, handler=sub)",
+            4,
+        ),
+        (FRAMES, "b = TransformBroadcaster()\nb.sendTransform(t)", 2),
+        (STAMPS, "msg.header.stamp = start\npub.publish(msg)", 1),
+        (STAMPS, "msg = Reading(data=1)\npub.publish(msg)", 2),
     ],
 )
 def test_what_is_wrong_in_a_message_is_shown_where_it_is_set_or_published(
@@ -169,7 +192,7 @@ def test_what_is_wrong_in_a_message_is_shown_where_it_is_set_or_published(
     package = {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: f"#!\n{source}\n"}}
     runs = build_runs({"runs": {"package": package}})
     verdict = failed("a message reads 'hello world', not 'hello world <seconds>'").about(said="hello world")
-    found = cite_words(verdict, lab.criteria[0], try_facts(lab, runs), runs["package"])
+    found = cite_source(verdict, lab.criteria[0], try_facts(lab, runs), runs["package"])
     assert found.citations == ((FileCitation(file=SCRIPT["path"], line=line + 1),) if line else ())
 
 

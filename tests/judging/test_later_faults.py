@@ -8,7 +8,7 @@ import pytest
 
 from grader.checks.support.text import could_say, texts_of_cpp
 from grader.judging import judge
-from grader.judging.cited_lines import cite_words
+from grader.judging.cited_lines import cite_source
 from grader.judging.facts import try_facts
 from grader.judging.judge import Judgement, judge_all_runs
 from grader.model.verdict import FileCitation, partial
@@ -293,7 +293,7 @@ def test_other_words_are_shown_where_the_program_in_cpp_makes_them() -> None:
     runs = cpp_runs({"processes": [STARTED]})
     lab = cpp_rubric(HEARS)
     said = partial(0.5, "each message is printed, but not as 'I heard <message>'").about(said="got [abc]")
-    found = cite_words(said, lab.criteria[0], try_facts(lab, runs), runs["package"])
+    found = cite_source(said, lab.criteria[0], try_facts(lab, runs), runs["package"])
     assert found.citations == (FileCitation(file="src/talker.cpp", line=5),)
 
 

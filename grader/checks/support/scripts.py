@@ -245,14 +245,63 @@ def lines_that_say(lines: Sequence[SourceLine], said: str) -> list[SourceLine]:
 def lines_that_publish(lines: Sequence[SourceLine], topic: str) -> list[SourceLine]:
     """Return the lines that publish on the topic, by the variable that its publisher is given to; all that publish
     where there is no such line."""
-    name = re.escape(topic.lstrip("/"))
-    made = re.compile(rf"""(\w+)\s*=[^=].*\b(?:Publisher|advertise)\b.*["']/?{name}["']""")
-    own = {found[1] for line in lines if (found := made.search(line.text))}
+    own = _names_given(lines, r"Publisher|advertise", topic)
     publishing = [(line, found[1]) for line in lines if (found := _PUBLISHES.search(line.text))]
     return [line for line, name in publishing if name in own] or [line for line, _ in publishing]
 
 
 _PUBLISHES = re.compile(r"(\w*)(?:\.|->)publish\s*\(")
+
+
+def lines_that_call(lines: Sequence[SourceLine], service: str) -> list[SourceLine]:
+    """Return the lines that call the service, or send the action a goal, by the variable that the client is given
+    to."""
+    own = _names_given(lines, r"ServiceProxy|serviceClient|SimpleActionClient", service)
+    if not own:
+        return []
+    calls = re.compile(rf"(?<!def )\b(?:{'|'.join(own)})(?:(?:\.|->)(?:call|send_?[gG]oal)\w*)?\s*\(")
+    return [line for line in lines if calls.search(line.text)]
+
+
+def _names_given(lines: Sequence[SourceLine], makers: str, name: str) -> set[str]:
+    """Return the variables that are given what one of the makers makes for this topic or service."""
+    quoted = re.escape(name.lstrip("/"))
+    made = re.compile(rf"""(\w+)\s*=[^=].*\b(?:{makers})\b.*["']/?{quoted}["']""")
+    return {found[1] for line in lines if (found := made.search(line.text))}
+
+
+def lines_that_answer(lines: Sequence[SourceLine], service: str) -> list[SourceLine]:
+    """Return the lines with which the callback of the service returns, where the callback is a function of Python in
+    the same file."""
+    quoted = re.escape(service.lstrip("/"))
+    offers = re.compile(
+        rf"""\bService\(\s*["']/?{quoted}["']\s*,\s*[\w.]+\s*,\s*(?:handler\s*=\s*)?(?:self\.)?(\w+)"""
+    )
+    names = {(line.file, found[1]) for line in lines if (found := offers.search(line.text))}
+    return [
+        line
+        for file, name in names
+        for line in _body_of(name, [one for one in lines if one.file == file])
+        if re.match(r"\s*return\b", line.text)
+    ]
+
+
+def _body_of(name: str, lines: Sequence[SourceLine]) -> Iterator[SourceLine]:
+    """Yield the lines of a function of Python below its first one."""
+    indent: int | None = None
+    for line in lines:
+        depth = len(line.text) - len(line.text.lstrip())
+        if indent is not None and line.text.strip() and depth <= indent:
+            return
+        if indent is not None:
+            yield line
+        elif re.match(rf"\s*def {name}\(", line.text):
+            indent = depth
+
+
+def lines_that_transform(lines: Sequence[SourceLine]) -> list[SourceLine]:
+    """Return the lines that send a transform."""
+    return [line for line in lines if re.search(r"(?:\.|->)sendTransform\s*\(", line.text)]
 
 
 def lines_that_set(lines: Sequence[SourceLine], field: str) -> list[SourceLine]:
