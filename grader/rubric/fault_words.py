@@ -11,7 +11,7 @@ from typing import Annotated, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from grader.checks.transform import FRAME_PATTERN
+from grader.checks.support.frames import FRAME_PATTERN
 from grader.rubric.scenario import NAME_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
 from grader.rubric.yaml_lines import Fault, KeyPath
 from grader.wording import did_you_mean, shorten
