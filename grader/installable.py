@@ -102,11 +102,18 @@ PYTHON_2 = {
     "urlparse": "urllib.parse",
 }  # fmt: skip
 """Modules of Python 2 by their names, and what they are called in Python 3."""
+WINDOWS = frozenset({
+    "_msi", "_winapi", "msilib", "msvcrt", "nt", "pythoncom", "pywintypes", "win32api", "win32com", "win32con",
+    "win32gui", "winreg", "winsound",
+})  # fmt: skip
+"""Modules of Python that only Windows has; editors that complete names add imports of them."""
 
 
 def exists_somewhere(name: str, own: Collection[str]) -> bool:
     """Return whether a module or package that is not here is the machine's to have: its name is not a slip of one of
     Python's, of ROS's or of the student's `own`, and stands in no handout for the student's package."""
+    if name in WINDOWS:
+        return False
     if name in known_packages() or name in sys.stdlib_module_names:
         return True
     return name not in {*ROS_2, *TUTORIALS, *PYTHON_2, *own} and not nearest_module(name, own)

@@ -55,7 +55,7 @@ BY_HAND: dict[RepairKind, str] = {
     "launch-syntax": "a launch file that is not well-formed XML: xmllint --noout FILE names the line",
     "package-name": "a misspelt package name: it is the same in package.xml, in project(…) and in each pkg=",
     "launch-type": "type= without .py: it is the file's whole name, as ls shows it",
-    "missing-import": "a name that is not imported: from std_msgs.msg import NAME",
+    "missing-import": "a name that is not imported: from std_msgs.msg import NAME; or an import of what is not there",
     "missing-call": "a name or call that is misspelt, missing, lacks its brackets or has an argument in the wrong form",
     "node-name": "a misspelt node name: rosnode list shows how it is called",
     "topic-name": "a misspelt topic: rostopic list shows how it is called",

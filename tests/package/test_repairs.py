@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.model.package import PythonSlip, SlipKind
 from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, advice_on
 from grader.model.submission import chmod_hint
 from grader.package.repairs import NotRepairable, Wanted, apply_repair, find_repairs
@@ -589,3 +590,31 @@ def test_what_is_added_at_the_end_is_below_the_last_line() -> None:
     assert changed_lines(before, after) == (2, "b()", "b()\n\nc()")
     assert changed_lines("a()\nb()", "a()\nb()\nc()") == (2, "b()", "b()\nc()")
     assert changed_lines("a()\n\nb()\n", "a()\n\nc()\nb()\n") == (2, "", "\nc()")
+
+
+@pytest.mark.parametrize(
+    ("line", "lacking", "more", "deleted"),
+    [
+        ("from msilib.schema import Error", True, (), True),
+        ("import winreg, winsound", True, (), True),
+        ("from rclpy.node import Node", True, (), True),
+        ("from std_msgs.msg import rate", False, (), True),
+        ("from std_msgs.msg import Int8, Int16", False, (), False),
+        ("import cv2", True, (), False),
+        ("import listener", True, (), False),
+        ("from msilib import (", True, (), False),
+        ("import rospi", True, ("undefined",), False),
+    ],
+)
+def test_an_import_of_what_is_not_there_is_deleted_where_nothing_uses_it(
+    line: str, lacking: bool, more: tuple[SlipKind, ...], deleted: bool, tmp_path: Path
+) -> None:
+    folder = package(tmp_path, swapped(TALKER, ("import rospy\n", f"import rospy\n{line}\n")))
+    kinds: list[SlipKind] = ["unused-import", *(["lacking-import"] if lacking else []), *more]
+    module = line.split()[1].partition(".")[0].strip(",")
+    slips = tuple(
+        PythonSlip(file=TALKER, line=3, kind=kind, message=module, name="x", fix="delete it")
+        for kind in kinds
+    )
+    found = find_repairs(folder, facts_of(folder).model_copy(update={"slips": slips}), WANTED)
+    assert [one.fix for one in found if one.kind == "missing-import"] == (["delete it"] if deleted else [])

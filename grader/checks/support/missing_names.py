@@ -15,7 +15,15 @@ from grader.checks.support.console_output import Traceback
 from grader.checks.support.exceptions import SLIPS
 from grader.checks.support.scripts import cmake_calls, is_product, path_in_package
 from grader.checks.support.text import near_names, shown
-from grader.installable import PYTHON_2, ROS_2, TUTORIALS, known_packages, nearest_module, noetic_messages
+from grader.installable import (
+    PYTHON_2,
+    ROS_2,
+    TUTORIALS,
+    WINDOWS,
+    known_packages,
+    nearest_module,
+    noetic_messages,
+)
 from grader.model.package import PackageFacts, PythonSlip
 from grader.syntax_fixes import parsed
 from grader.wording import join_words
@@ -178,13 +186,8 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
     if inner := _IN_MODULE.search(message):
         return f"{inner[2]} is a class in {inner[1]}", f"write `from {inner[1]} import {inner[2]}`"
     asked, wanted = NO_MODULE.search(message), _FROM_PACKAGE.search(message)
-    if asked and asked[1] in ROS_2:
-        return f"{asked[1]} is from ROS 2", "this lab is for ROS 1: write the node with rospy"
-    if asked and asked[1] in PYTHON_2:
-        return f"{asked[1]} is a Python 2 module", f"write {PYTHON_2[asked[1]]} instead of {asked[1]}"
-    if asked and asked[1] in TUTORIALS - {package.name}:
-        fix = f"write your package's name instead of {asked[1]}, or leave the line out"
-        return "tutorials use that name for the reader's own package", fix
+    if asked and (known := _module_of_others(asked[1], package)):
+        return known
     meant = unimported_module(found, package)
     near = near_names(asked[1], noetic_messages()) if asked and asked[1] not in known_packages() else ()
     near = () if meant else near
@@ -194,6 +197,20 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
         return f"messages come from {near[0]}.msg", f"write `from {near[0]}.msg import …`"
     meant = meant or (nearest_module(asked[1], own_modules(package)) if asked else "")
     return (f"did you mean {meant}?", f"write {meant} instead of {asked[1]}") if asked and meant else None
+
+
+def _module_of_others(name: str, package: PackageFacts) -> tuple[str, str] | None:
+    """Return the cause and the hint for a module of ROS 2, of Windows, of Python 2, or of a tutorial's package."""
+    if name in ROS_2:
+        return f"{name} is from ROS 2", "this lab is for ROS 1: write the node with rospy"
+    if name in WINDOWS:
+        return f"{name} is only on Windows", f"write the script without {name}"
+    if name in PYTHON_2:
+        return f"{name} is a Python 2 module", f"write {PYTHON_2[name]} instead of {name}"
+    if name in TUTORIALS - {package.name}:
+        fix = f"write your package's name instead of {name}, or leave the line out"
+        return "tutorials use that name for the reader's own package", fix
+    return None
 
 
 def _own_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:

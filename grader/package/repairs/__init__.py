@@ -70,7 +70,7 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     repair_files(files, scripts)
     rename_files(files, renames)
     paths = [renames.get(f.path, f.path) for f in scripts if f.python and f.link is None]
-    names = repair_python(files, paths, wanted.types)
+    names = repair_python(files, paths, package, wanted.types)
     name = repair_manifest(files, package, wanted)
     repair_cmake(files, package, name, wanted)
     rename_package(files, package, wanted)

@@ -6,13 +6,16 @@ The sources are read in a child process with limits (`package/source_repair.py`)
 from __future__ import annotations
 
 import json
+import re
 import time
 from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Literal
 
+from grader.installable import exists_somewhere, noetic_messages
 from grader.limited_child import ChildLimits, run_limited
+from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.repair import RepairKind, as_code
 from grader.package.python import reason_of
@@ -77,8 +80,11 @@ class _Entry(Record):
     names: tuple[Name, ...]
 
 
-def repair_python(files: Files, scripts: Sequence[str], types: Sequence[str]) -> dict[str, tuple[Name, ...]]:
+def repair_python(
+    files: Files, scripts: Sequence[str], package: PackageFacts, types: Sequence[str]
+) -> dict[str, tuple[Name, ...]]:
     """Find what keeps the sources from running, and return the names that they use once they do."""
+    _delete_imports(files, scripts, package)
     texts = {script: text for script in scripts if (text := files.text(script))}
     names: dict[str, tuple[Name, ...]] = {}
     for entry in _examine(texts, types):
@@ -86,6 +92,39 @@ def repair_python(files: Files, scripts: Sequence[str], types: Sequence[str]) ->
             _change(files, entry.file, cause, steps)
         names[entry.file] = entry.names
     return names
+
+
+def _delete_imports(files: Files, scripts: Sequence[str], package: PackageFacts) -> None:
+    """Delete imports that nothing in their script uses, of modules and messages that there are none of."""
+    own = {package.name, *(PurePosixPath(file.path).stem for file in package.files)}
+    misnamed = {s.file for s in package.slips if s.kind in {"undefined", "misspelt"}}
+    lacking = {(s.file, s.line) for s in package.slips if s.kind == "lacking-import"}
+    unused = [s for s in package.slips if s.kind == "unused-import" and s.file not in misnamed]
+    for slip in sorted(unused, key=lambda s: s.line, reverse=True):
+        lines = (files.text(slip.file) or "").split("\n")
+        text = lines[slip.line - 1] if slip.line <= len(lines) else ""
+        if slip.file not in scripts or slip.message in own or not IMPORT.fullmatch(text):
+            continue
+        what = _unknown_message(text)
+        if (slip.file, slip.line) in lacking and not exists_somewhere(slip.message, own):
+            what = f"module {slip.message}"
+        if not what:
+            continue
+        message = f"line {slip.line} of {slip.file}: there is no {what}"
+        after = "\n".join([*lines[: slip.line - 1], *lines[slip.line :]])
+        files.change("missing-import", slip.file, after, message, slip.fix)
+
+
+IMPORT = re.compile(r"(?:import|from)\s[^(\\;]*")
+"""A line that is one import, and nothing else."""
+
+
+def _unknown_message(line: str) -> str:
+    """Return what is imported from the messages of a known package and is not there; "" where there is no such name."""
+    found = re.fullmatch(r"from (\w+)\.msg import ([\w, ]+)", line.strip())
+    known = noetic_messages().get(found[1], ()) if found else ()
+    wrong = [name for name in re.split(r"[ ,]+", found[2]) if name not in known] if found and known else []
+    return f"{wrong[0]} in {found[1]}.msg" if found and wrong else ""
 
 
 def _examine(texts: dict[str, str], types: Sequence[str]) -> Iterator[_Entry]:
