@@ -56,9 +56,8 @@ class HearsParams(Record):
     topic: Annotated[GlobalName, Refers("sent")]
     """A topic on which a probe or a step of the scenario sends, with its slash."""
     template: Annotated[str, refuse_others(VALUE)] = VALUE
-    """What a line has to say about a message, where `{value}` is its text: `I heard {value}`. Capitals in
-    the template's own
-    words do not matter."""
+    """What a line has to say about a message, where `{value}` is its text: `I heard {value}`. Capitals in the
+    template's own words do not matter."""
 
 
 @check("hears", params=HearsParams)

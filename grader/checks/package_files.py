@@ -49,8 +49,8 @@ def layout(package: PackageFacts, params: LayoutParams) -> Verdict:
     """The package is laid out as the handout says.
 
     What it checks
-        That the folders and files of the handout are there under one package folder, under exactly these
-        names, and that each script is in the folder where the handout puts it, or below that.
+        That the folders and files of the handout exist under one package folder, with exactly these names,
+        and that each script is in the folder where the handout puts it, or below that.
 
     Why it matters on a robot
         People and programs expect things in their usual folders; someone who repairs the robot at night

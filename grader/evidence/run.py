@@ -166,7 +166,7 @@ class Channel:
 
     @property
     def data(self) -> tuple[Any, ...]:
-        """The field `data` of each message (std_msgs), None where it has none."""
+        """The field `data` of each message (std_msgs), None if it has none."""
         return tuple(v.get("data") if isinstance(v, dict) else None for v in self.values)
 
 

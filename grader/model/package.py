@@ -229,7 +229,7 @@ ShebangFault = Literal["", "empty-file", "byte-order-mark", "line-end", "other"]
 
 
 class SourceFile(Record):
-    """One file of the package. `executable` is None where the source carries no modes.
+    """One file of the package. `executable` is None if the source has no file modes.
 
     `link` is the target of a symbolic link as written. A link to a file of the same package has that file's
     facts; any other has `link_problem`, size 0 and the digest of its target's text. `python` marks files

@@ -204,9 +204,8 @@ class Publish(Record):
     latched: bool = False
     """Whether the last message is kept for nodes that subscribe later."""
     background: bool = False
-    """Whether the next steps begin at once, during this one. Without `count` and `duration_s` it lasts
-    until the run
-    ends."""
+    """Whether the next steps begin at once, during this one. Without `count` and `duration_s` it lasts until the
+    run ends."""
 
     @property
     def in_turn(self) -> tuple[Any, ...]:
