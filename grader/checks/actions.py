@@ -46,7 +46,7 @@ class ActionResultParams(Record):
     tolerance: Annotated[float, Field(ge=0)] = 1e-6
     """How far numbers of the result may be off."""
     feedback: Annotated[int, Field(ge=0)] = 0
-    """So many messages of feedback have to come at least."""
+    """The least number of feedback messages."""
     within_s: Annotated[float, Field(gt=0)] | None = None
     """How long after the goal, or after it was cancelled, the result may come; null: as long as the step waits."""
 
@@ -92,16 +92,16 @@ def action_result(package: PackageFacts, run: Run, params: ActionResultParams) -
     """The action server brings its goals to the right end.
 
     What it checks
-        That a goal of the grader's ends in the right state, with the right result, in time, with feedback on
-        the way; and that a goal that is cancelled is given up.
+        That a goal from the grader ends in the right state, with the right result, in time, with feedback
+        on the way; and that a cancelled goal is given up.
 
     Why it matters on a robot
-        A program that sends the robot somewhere has to be told whether it arrived, and be able to stop it. A server
-        that ignores being cancelled drives on.
+        A program that sends the robot somewhere has to know whether it arrived, and be able to stop it. A
+        server that ignores a cancel request drives on.
 
     How it is measured
-        The grader sends the goals one after the other once the server listens, and reads result and feedback as
-        actionlib's own client does. Of a result, only the fields that the rubric names matter.
+        The grader sends the goals one after the other once the server listens, and reads result and
+        feedback like actionlib's own client. Only the result fields that the rubric names matter.
 
     How to fix
         `actionlib.SimpleActionServer(name, CountAction, execute_cb=…, auto_start=False)`, then `start()`. The callback

@@ -79,19 +79,18 @@ def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
     """The package builds.
 
     What it checks
-        That `catkin_make` succeeds in a fresh workspace which holds this package, and the packages of the
-        same repository that it depends on. Where the lab asks for scripts, that each is there to run
-        afterwards.
+        That `catkin_make` succeeds in a fresh workspace with this package, and the packages of the same
+        repository that it depends on. If the lab asks for scripts, that each can be run afterwards.
 
     Why it matters on a robot
-        On the robot the workspace is built from what was pushed. What only builds beside files on your own
-        machine does not exist there.
+        On the robot the workspace is built from what was pushed. A package that needs other files from your
+        own machine does not build there.
 
     How it is measured
         By the exit code of `catkin_make`; the first error that it printed is quoted. A package with a file
-        `CATKIN_IGNORE` is not built at all. Nodes are run all the same, from their sources. A script is there where
-        `catkin_install_python` puts it into `devel/lib`, or where `rosrun` finds it in the package; whether it is
-        executable is judged elsewhere.
+        `CATKIN_IGNORE` is not built at all. Nodes are run anyway, from their sources. A script can be run
+        if `catkin_install_python` puts it into `devel/lib`, or if `rosrun` finds it in the package; another
+        criterion judges whether it is executable.
 
     How to fix
         Clone your repository into a new workspace, run `catkin_make`, and fix the first error: the later
@@ -230,7 +229,7 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     """The package builds, and its C++ programs run.
 
     What it checks
-        That `catkin_make` succeeds, and that each program which `add_executable` makes of your sources can
+        That `catkin_make` succeeds, and that each program that `add_executable` makes from your sources can
         be started. A package without such programs only has to build.
 
     Why it matters on a robot
@@ -238,9 +237,9 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
         robot that shows when it is too late.
 
     How it is measured
-        By the exit code of `catkin_make`. Then every program is started beside a roscore: one that a signal
-        ends (a segmentation fault), or that cannot be loaded, fails. That it comes to its end by itself is
-        fine, whatever its exit code, and so are two programs that use the same node name.
+        By the exit code of `catkin_make`. Then every program is started with a roscore: one that is ended
+        by a signal (a segmentation fault), or that cannot be loaded, fails. A program may end by itself,
+        with any exit code, and two programs may use the same node name.
 
     How to fix
         Fix the first error of `catkin_make`. For a program that does not start: `rosrun <package>

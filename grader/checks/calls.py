@@ -32,11 +32,11 @@ class CallsParams(Record):
     """The fields of the request, or of the goal, that matter, and their values; or a list of requests in their order.
     Calls between them, and fields that are left out, do not matter."""
     at_least: Annotated[int, Field(ge=1)] = 1
-    """So many calls have to come, each of them as `expect` has it where that is one request."""
+    """The least number of calls; if `expect` is one request, each of them has to match it."""
     at_most: Annotated[int, Field(ge=1)] | None = None
-    """So many calls may come, whatever their fields; null: any number."""
+    """The greatest number of calls, whatever their fields; null: any number."""
     apart_s: Annotated[float, Field(gt=0)] | None = None
-    """So far apart two calls have to come at least, by the run's clock; null: any time."""
+    """The least time between two calls, by the run's clock; null: any time."""
     tolerance: Annotated[float, Field(ge=0)] = 1e-6
     """How much numbers may differ."""
 
@@ -78,7 +78,7 @@ def calls(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
 
     What it checks
         That a node of the package calls the grader's service as often as it should, no more often and no
-        sooner again than the lab allows, and that the fields of its requests have the right values.
+        faster than the lab allows, and that the fields of its requests have the right values.
 
     Why it matters on a robot
         A server does what it is asked. A client that swaps two fields, or never calls, drives the robot to

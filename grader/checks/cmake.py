@@ -35,7 +35,7 @@ class CMakeParams(Record):
     """The package's name in CMake."""
 
     name: PackageName
-    """The handout's name for the package; it is right also where the manifest has another."""
+    """The handout's name for the package; it is right even if the manifest has another."""
 
 
 @check("cmake", params=CMakeParams, run_anyway=True)
@@ -47,13 +47,13 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         `catkin_package(…)`.
 
     Why it matters on a robot
-        These three lines are what makes a folder with code a package that catkin can build and ROS can
-        find. A name that differs from the manifest's stops the build of the whole workspace, other people's
-        packages included.
+        These three lines make a folder with code a package that catkin can build and ROS can find. A name
+        that differs from the manifest's stops the build of the whole workspace, other people's packages
+        included.
 
     How it is measured
-        By what CMake itself was told while the package was built: variables are expanded and comments
-        ignored. Where it was not built, the file is parsed.
+        By the calls that CMake made while the package was built: variables are expanded and comments
+        ignored. If it was not built, the file is parsed.
 
     How to fix
         Begin with `cmake_minimum_required(VERSION 3.0.2)`, `project(<name in package.xml>)`,
@@ -182,7 +182,8 @@ class CMakeInstallParams(Record):
     """The scripts that are installed."""
 
     scripts: Annotated[tuple[str, ...], Field(min_length=1)]
-    """Paths as the handout gives them: `src/talker.py`. A script that lies elsewhere is named by where it lies."""
+    """Paths as the handout gives them: `src/talker.py`. If a script is in another folder, its path there
+    counts."""
 
 
 class Lack(NamedTuple):
@@ -214,13 +215,13 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
         there, and `catkin_install_python` also makes the scripts name the right Python.
 
     How it is measured
-        By what CMake itself was told while the package was built: variables and `file(GLOB …)` are
-        expanded, comments and `if(FALSE)` ignored. Where it was not built, the file is parsed.
-        `install(PROGRAMS …)` is another command and does not count. Each script earns its share.
+        By the calls that CMake made while the package was built: variables and `file(GLOB …)` are expanded,
+        comments and `if(FALSE)` ignored. If it was not built, the file is parsed. `install(PROGRAMS …)` is
+        another command and does not count. Each script earns its share.
 
     How to fix
-        Take away the `#` before each line of the block that `catkin_create_pkg` wrote, and name your
-        scripts: `catkin_install_python(PROGRAMS scripts/talker.py scripts/listener.py DESTINATION
+        Remove the `#` before each line of the block that `catkin_create_pkg` wrote, and name your scripts:
+        `catkin_install_python(PROGRAMS scripts/talker.py scripts/listener.py DESTINATION
         ${CATKIN_PACKAGE_BIN_DESTINATION})`. Then run `catkin_make`.
     """
     names = join_words(params.scripts)

@@ -53,7 +53,7 @@ class PrintsParams(Record):
     text: Annotated[str, Field(min_length=1), refuse_others(PLACE)]
     """Part of a line; `{number}` in it stands for any number."""
     numbers: tuple[float, ...] = ()
-    """The numbers that have to stand in place of `{number}`, in this order."""
+    """The numbers that have to be in place of `{number}`, in this order."""
     tolerance: Annotated[float, Field(ge=0)] = 0.0
     """How much each number may differ, in the text's own unit."""
     exit_code: int | None = None
@@ -86,15 +86,15 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
     """The program prints the line.
 
     What it checks
-        That the process writes this text, with the right numbers where the lab names them, and that it ends
-        with the right exit code where the lab asks for one.
+        That the process writes this text, with the right numbers if the lab gives them, and that it ends
+        with the right exit code if the lab asks for one.
 
     Why it matters on a robot
-        Who starts a program reads what it says, and scripts go by its exit code.
+        People who start a program read what it prints, and scripts use its exit code.
 
     How it is measured
-        Every line on stdout and stderr, and every log message of the process's nodes, is compared. Capitals,
-        and how many blanks stand between words, do not matter; more may stand around the text. Numbers may
+        Every line on stdout and stderr, and every log message of the process's nodes, is compared. Capitals
+        and the number of spaces between words do not matter; there may be more text around it. Numbers may
         differ by the tolerance.
 
     How to fix
@@ -193,11 +193,11 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
 
     Why it matters on a robot
         A callback that fails does nothing with its message. The node looks healthy, and the robot drives on
-        with the command before.
+        with the previous command.
 
     How it is measured
-        By the tracebacks on stderr up to Ctrl-C in which a line of the package's own takes part. The one
-        that ends the whole process is not a callback's.
+        By the tracebacks on stderr up to Ctrl-C that contain a line of the package's own. A traceback that
+        ends the whole process is not a callback's.
 
     How to fix
         Read the last line of the traceback, and the line of your file above it. Look at what the message
@@ -256,14 +256,14 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
         That the node logs this text at this level.
 
     Why it matters on a robot
-        What is logged is kept with its time, its level and the node's name, and `rqt_console` shows it on
-        any machine. What is only printed is gone with its terminal.
+        A log message is kept with its time, its level and the node's name, and `rqt_console` shows it on
+        any machine. Text that is only printed is lost with its terminal.
 
     How it is measured
         By the messages on /rosout, where every `rospy.loginfo(…)`, `logwarn(…)` and `logerr(…)` goes. The
-        text has to stand in one of them letter by letter, capitals and punctuation included; more may stand
-        around it. Other words of the same kind (`Hello ROS!` for `Hello World!`) at the right level earn half of the
-        points.
+        text has to be in one of them letter by letter, including capitals and punctuation; there may be
+        more text around it. Other words of the same kind (`Hello ROS!` for `Hello World!`) at the right
+        level earn half of the points.
 
     How to fix
         `rospy.loginfo("…")` after `rospy.init_node(…)` for the level INFO. `print(…)` does not log.

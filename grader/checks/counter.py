@@ -46,7 +46,7 @@ class StartParams(Record):
     start: int = 0
     """The first value that the counter has to publish."""
     rate_hz: Annotated[float, Field(gt=0)] = 10.0
-    """The nominal rate, to know a flood of messages from a counter."""
+    """The nominal rate, to tell a flood of messages from a counter."""
 
 
 class StepParams(Record):
@@ -57,9 +57,9 @@ class StepParams(Record):
     maximum: int = 127
     """The last value before the wrap."""
     rate_hz: Annotated[float, Field(gt=0)] = 10.0
-    """The nominal rate, to know a flood of messages from a counter."""
+    """The nominal rate, to tell a flood of messages from a counter."""
     min_steps: Annotated[int, Field(ge=1)] = 10
-    """So many steps have to be seen before it can be judged."""
+    """How many steps have to be seen before it can be judged."""
 
 
 @check("counter-start", params=StartParams, messages_only=True, heeds_losses=True)
@@ -70,13 +70,14 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
         That the very first value published on the topic is the one that the handout asks for.
 
     Why it matters on a robot
-        A program that counts along, to find lost messages or to number pictures, begins with the first one. Off by
-        one at the start is off by one for ever.
+        A program that counts along, to find lost messages or to number pictures, begins with the first one.
+        If it is off by one at the start, it is off by one for ever.
 
     How it is measured
         The recorder is connected before the publisher's registration returns, so the first message is not
-        missed. A later value counts only if it is seen twice where there was time for those before it, and not at
-        all in a flood, whose first values the publisher itself may drop.
+        missed. If the first value seen is a later one and earlier ones could have been missed, this counts
+        only if a second run shows it too. In a flood of messages it does not count at all, because the
+        publisher itself may drop the first ones.
 
     How to fix
         Set the counter before the loop, publish it, and only then add one. `rostopic echo <topic>`, started
@@ -155,17 +156,17 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     """The counter goes up by one.
 
     What it checks
-        That every value is the one before plus one. Where the counter starts again is judged apart
+        That every value is the one before plus one. Another check judges where the counter starts again
         (`counter-wrap`).
 
     Why it matters on a robot
-        A counter in a message is how a receiver sees that something was lost. One that skips or repeats by
-        itself raises false alarms, or hides real losses.
+        A counter in a message shows the receiver that something was lost. A counter that skips or repeats
+        by itself raises false alarms, or hides real losses.
 
     How it is measured
-        Value by value. Values that are missing where there is also a gap in time were lost by the machine,
-        not by the program: nothing is taken for those. In a flood of messages
-        the publisher itself throws some away; those skips are left out.
+        Value by value. If values are missing and there is also a gap in time, the machine lost them, not
+        the program: this costs nothing. In a flood of messages the publisher itself throws some away; those
+        skips do not count.
 
     How to fix
         Add one to the counter in one place only, once each time around the loop. `rostopic echo <topic>`
@@ -198,14 +199,14 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     """The counter starts again at its maximum.
 
     What it checks
-        That the counter goes back to its first value when it has reached the maximum, several times over.
+        That the counter goes back to its first value when it has reached the maximum, several times.
 
     Why it matters on a robot
-        A number in a message has a fixed width. A program that counts past it dies, or goes on with a wrong
-        number, after the minutes or hours in which no one tested it.
+        A number in a message has a fixed width. A program that counts past it crashes, or goes on with a
+        wrong number, but only after minutes or hours, when no one is testing it.
 
     How it is measured
-        The clock is run faster, so that a node with `rospy.Rate` comes around twice in seconds; one with
+        The clock runs faster, so that a node with `rospy.Rate` wraps twice within seconds; a node with
         `time.sleep` is watched in real time. "Resetting back to zero at 127" can be read in two ways, and
         both are right: after 127 comes 0, or after 126 comes 0.
 

@@ -50,24 +50,24 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
 
     What it checks
         That the script is there, is executable (the system may run it as a program), and begins with a `#!`
-        line which names an interpreter that exists. A script of which `catkin_install_python` makes a program
-        need not be executable itself. A Python script must also be free of syntax errors.
+        line that names an existing interpreter. A script that `catkin_install_python` installs need not be
+        executable itself. A Python script must also be free of syntax errors.
 
     Why it matters on a robot
         `rosrun` and `roslaunch` only find files that may be executed, and the `#!` line is all that tells
         the robot that a file is Python. It works in your editor and fails on the robot.
 
     How it is measured
-        Whether it is executable is what git has of it in a repository, or the archive, or the disk. The
-        first line is read as the kernel reads it: a line that ends in CR LF, a byte order mark or a blank
-        line in front of it break it. A script in another folder counts, with a hint. ROS's own Python reads
-        the file without running it, and says which line it does not understand.
+        In a repository, git says whether it is executable; otherwise the archive or the disk does. The
+        first line is read as the kernel reads it: a line that ends in CR LF, or a byte order mark or a
+        blank line before it, breaks it. A script in another folder counts, with a hint. ROS's own Python
+        parses the file without running it, and says which line it does not understand.
 
     How to fix
-        `chmod +x <file>`, then with git `git add --chmod=+x <file>`, commit and push; an archive is packed
-        again with tar or zip. Write `#!/usr/bin/env python3` as the very first line; `dos2unix <file>` for a
-        file from Windows. `ls -lF` shows executable files with a `*`. `python3 -m py_compile <file>` shows
-        a syntax error: fix that line, or the one above it.
+        `chmod +x <file>`, then with git `git add --chmod=+x <file>`, commit and push; pack an archive again
+        with tar or zip. Write `#!/usr/bin/env python3` as the very first line; `dos2unix <file>` for a file
+        from Windows. `ls -lF` shows executable files with a `*`. `python3 -m py_compile <file>` shows a
+        syntax error: fix that line, or the one above it.
     """
     found = find_script(package, params.path)
     if found is None:

@@ -38,7 +38,7 @@ TABLE_BYTES_MAX = 4 << 20
 
 
 class TopicLeft(Record):
-    """What a recording has to hold of a topic."""
+    """What a recording has to contain on a topic."""
 
     type: Annotated[TypeName, Refers("message")] | None = None
     """As `rostopic info` gives it: `std_msgs/String`; null: any."""
@@ -47,7 +47,7 @@ class TopicLeft(Record):
 
 
 class ColumnBounds(Record):
-    """Between which values the numbers of a column lie."""
+    """Between which values the numbers of a column have to be."""
 
     min: float | None = None
     """The least value, in the column's own unit; null: no bound."""
@@ -65,8 +65,8 @@ class FileLeftParams(Record):
     """A file, and what has to be in it."""
 
     file: Annotated[str, Field(min_length=1), Refers("kept")]
-    """A name or pattern (`run.bag`, `results/*.csv`), from the process's working folder or from the package; one of
-    the scenario's `keeps` has to fit it."""
+    """A name or pattern (`run.bag`, `results/*.csv`), from the process's working folder or from the
+    package; one of the scenario's `keeps` has to match it."""
     process: ProcessName = ""
     """The process that leaves it, by the scenario's name; empty: any of the student's."""
     min_bytes: Annotated[int, Field(ge=1)] = 1
@@ -74,9 +74,9 @@ class FileLeftParams(Record):
     topics: dict[GlobalName, TopicLeft] = Field(default_factory=dict)
     """Topics that a recording (`.bag`, `.mcap`) has to hold."""
     columns: tuple[str, ...] = ()
-    """Names that have to stand in the first row of a table (CSV)."""
+    """Names that have to be in the first row of a table (CSV)."""
     rows_at_least: Annotated[int, Field(ge=0)] = 0
-    """The least number of rows of a table, without the first where it has `columns`."""
+    """The least number of rows of a table, not counting the first if it has `columns`."""
     bounds: dict[str, ColumnBounds] = Field(default_factory=dict)
     """Bounds for the numbers of columns, by their names."""
 
@@ -134,18 +134,18 @@ def file_left(package: PackageFacts, run: Run, params: FileLeftParams) -> Verdic
     """The run leaves a file, with what has to be in it.
 
     What it checks
-        That a bag, a table, a map or any other file is there once the program has ended, at the place that the
-        handout names, and holds what it should.
+        That a bag, a table, a map or any other file exists once the program has ended, in the place that
+        the handout names, and contains what it should.
 
     Why it matters on a robot
-        What a robot saw and did is known later only from what it wrote down. A recording that was not closed, or
+        Only what a robot wrote down shows later what it saw and did. That a recording was not closed, or
         lacks a topic, is noticed when the robot is back in its cupboard.
 
     How it is measured
-        All files that the program left are listed after Ctrl-C, and the file is read: the messages of each topic
-        of a bag, each row of a table, the size of a map. The file counts in the working folder (`~` for scripts,
-        `~/.ros` for nodes that roslaunch starts) and in the package. What was handed in and is unchanged was not
-        left by the run.
+        All files that the program left are listed after Ctrl-C, and the file is read: the messages of each
+        topic of a bag, each row of a table, the size of a map. The file may be in the working folder (`~`
+        for scripts, `~/.ros` for nodes that roslaunch starts) or in the package. A file that was handed in
+        and has not changed does not count.
 
     How to fix
         Write to the path that the handout names; in a launch file, `$(find <package>)/…` says where. End

@@ -78,20 +78,20 @@ def definition(package: PackageFacts, params: DefinitionParams) -> Verdict:
     """The package's own message, service or action is defined as the handout asks.
 
     What it checks
-        That the file has the handout's fields, by name and type, and its constants; in their order where that
-        is asked; nothing else where the handout gives the whole definition.
+        That the file has the handout's fields, by name and type, and its constants; in their order if the
+        lab asks for that; and nothing else if the handout gives the whole definition.
 
     Why it matters on a robot
-        Two programs understand each other only if their definitions are the same, letter by letter: a field of
-        another name or type makes another md5 sum, and ROS connects them not at all.
+        Two programs understand each other only if their definitions are the same, letter by letter: a field
+        with another name or type gives another md5 sum, and ROS does not connect them.
 
     How it is measured
         The file is read as ROS does. Comments and blanks do not matter; `Header` is `std_msgs/Header`, and a
         type without a package is the package's own.
 
     How to fix
-        One field a line, type before name: `float64 temperature`. Then list the file in `add_message_files`
-        (`add_service_files`, `add_action_files`) of CMakeLists.txt, and build again.
+        Write one field per line, with the type before the name: `float64 temperature`. Then list the file
+        in `add_message_files` (`add_service_files`, `add_action_files`) of CMakeLists.txt, and build again.
     """
     found = next((one for one in package.interfaces if one.path == params.file), None)
     wanted = params.wanted()

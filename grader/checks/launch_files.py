@@ -65,8 +65,8 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
     How it is measured
         The file is found by its name anywhere in the package and read without being run, with the files of
         the package that it includes, its `<arg>`s and groups. What `if` or `unless` switches off does not
-        count, nor does `<test>`. Whether the scripts are executable is judged elsewhere. In a file that roslaunch
-        reads, each node earns its share.
+        count, nor does `<test>`. Another criterion judges whether the scripts are executable. If roslaunch
+        can read the file, each node earns its share.
 
     How to fix
         One `<node pkg="<package>" type="<file>.py" name="<name>" output="screen"/>` for each script, all of
@@ -252,9 +252,9 @@ class OpensParams(Record):
     program: str = "firefox"
     """The program that is asked to open the page."""
     urls: tuple[str, ...]
-    """The addresses of which one has to be opened."""
+    """Addresses, one of which has to be opened."""
     script: str
-    """The script whose node has to run beside it."""
+    """The script whose node has to run at the same time."""
 
 
 class Page(NamedTuple):
@@ -270,17 +270,17 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
     """The launch file's shell script opens the page, and the node runs beside it.
 
     What it checks
-        That a `<node>` of the launch file is a shell script of the package, whatever its name, which is
-        executable and opens the page in the program; and that the node runs at the same time.
+        That a `<node>` of the launch file is an executable shell script of the package, with any name, that
+        opens the page in the program; and that the node runs at the same time.
 
     Why it matters on a robot
         Launch files start more than nodes: drivers, cameras and tools have their own start scripts, and they
         have to be executable and need a first line, as every node does.
 
     How it is measured
-        The program's place is taken by one that notes what it is asked to open. The script's mode and first
-        line are those of the file as handed in. A `/` at the end of the page's address does not matter. The page and
-        the node earn half each.
+        The program is replaced by one that records what it is asked to open. The script's mode and first
+        line are those of the file as handed in. A `/` at the end of the page's address does not matter. The
+        page and the node earn half each.
 
     How to fix
         Begin the script with `#!/bin/bash`, `chmod +x` it, and write `<node pkg="<package>" type="<script>.sh"

@@ -73,10 +73,10 @@ def launch_loads(package: PackageFacts, build: Run, run: Run, params: LaunchLoad
         ones, or dies.
 
     How it is measured
-        By every change of the parameter server up to the node's registration, and by what `roslaunch` says of
-        the node. `<rosparam>` may stand before or after the `<node>`: `roslaunch` sets parameters first. In a
-        namespace, the file counts as loaded where the node prints all of its values from there. Where some of the
-        names are loaded, each earns its share of one half, and the running node earns the other.
+        By every change of the parameter server up to the node's registration, and by what `roslaunch` says
+        about the node. `<rosparam>` may come before or after the `<node>`: `roslaunch` sets parameters
+        first. In a namespace, the file counts as loaded if the node prints all of its values from there.
+        Each name that is loaded earns its share of one half, and the running node earns the other half.
 
     How to fix
         `<rosparam file="$(find <package>)/config/<file>.yaml"/>` beside the `<node>`, not inside it and without

@@ -63,16 +63,17 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
 
     What it checks
         That the launch file is well-formed, and that `roslaunch` brings up a publisher and a subscriber
-        which are connected over the topic.
+        that are connected over the topic.
 
     Why it matters on a robot
-        A robot is started with launch files. One wrong attribute in one of them, and a part of the robot is
-        missing without anybody noticing.
+        A robot is started with launch files. With one wrong attribute in one of them, a part of the robot
+        is missing without anybody noticing.
 
     How it is measured
         `roslaunch` runs the file, which is found by its name anywhere in the package, and both nodes are
-        asked whom they are connected to; the kernel's table of connections has to bear it out. Any two
-        nodes of the package do, under any names. What comes up earns half, and the connection the other half.
+        asked whom they are connected to; the kernel's table of connections has to confirm it. Any two nodes
+        of the package will do, under any names. Nodes that come up earn half, and the connection the other
+        half.
 
     How to fix
         One `<node pkg="…" type="….py" name="…"/>` for each script, with the `.py`; the scripts have to be executable.
@@ -240,19 +241,19 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
 
     What it checks
         That `roslaunch` brings up every node that the lab asks for under the name in the launch file, that
-        two of them are connected over the topic where one is asked for, and that parameters are where the
+        two of them are connected over the topic if the lab asks for one, and that parameters are where the
         node reads them.
 
     Why it matters on a robot
-        The launch file's names are those that all other tools and files go by. A node that comes up under
-        another one, or in another namespace, is there and talks to no one.
+        All other tools and files use the names in the launch file. A node that comes up under another name,
+        or in another namespace, runs and talks to no one.
 
     How it is measured
         `roslaunch` runs the file; names come from the master, connections from both nodes and the kernel.
-        `<arg>`, `ns` and `<group>` are worked out, and `$(anon x)` may be followed by anything. Names given to
-        `init_node` do not matter. If the lab names only one node, it may be connected to any other of the package's.
-        Parameters are read as they were when the node started. Nodes, connection and parameters count alike, and of
-        several nodes or parameters each earns its share.
+        `<arg>`, `ns` and `<group>` are resolved, and `$(anon x)` may be followed by anything. Names given
+        to `init_node` do not matter. If the lab names only one node, it may be connected to any other of
+        the package's. Parameters are read as they were when the node started. Nodes, connection and
+        parameters count equally, and each of several nodes or parameters earns its share.
 
     How to fix
         `roslaunch <package> <file>` prints in red what it could not start; `rosnode list`, `rostopic info

@@ -56,8 +56,8 @@ class HearsParams(Record):
     topic: Annotated[GlobalName, Refers("sent")]
     """A topic on which a probe or a step of the scenario sends, with its slash."""
     template: Annotated[str, refuse_others(VALUE)] = VALUE
-    """What a line has to say of a message, `{value}` being its text: `I heard {value}`. Capitals in the template's own
-    words do not matter."""
+    """What a line has to say about a message, where `{value}` is its text: `I heard {value}`. Capitals in the
+    template's own words do not matter."""
 
 
 @check("hears", params=HearsParams)
@@ -73,11 +73,11 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
         the robot those are the readings that matter.
 
     How it is measured
-        The grader publishes messages that it makes up for this run, one text twice running. Each has to be
-        on stdout, on stderr or on /rosout, at its time or later. Other words on the line do not matter; a
-        number has to stand for itself (`12` is not in `127`). Where the lab gives the line's own words (`I
-        heard …`), they have to stand before the message, in capitals or not; a message that is printed with other words
-        earns half of its share.
+        The grader publishes messages that it makes up for this run, one text twice in a row. Each has to
+        appear on stdout, on stderr or on /rosout, when it is sent or later. Other words on the line do not
+        matter; a number has to stand alone (`12` is not in `127`). If the lab gives the line's own words
+        (`I heard …`), they have to come before the message, in capitals or not; a message that is printed
+        with other words earns half of its share.
 
     How to fix
         Subscribe with `rospy.Subscriber('<topic>', <Type>, callback)`, print `data.data` in the callback

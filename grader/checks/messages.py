@@ -57,7 +57,7 @@ class MessageParams(Record):
     topic: PublishedTopic
     """The topic, with its slash: `/chatter`."""
     template: Annotated[str, Field(min_length=1), refuse_others(SECONDS)]
-    """The whole text, `{seconds}` in it being a time that grows: `hello world {seconds}`."""
+    """The whole text, in which `{seconds}` stands for a time that grows: `hello world {seconds}`."""
 
 
 @check("message", params=MessageParams, messages_only=True, heeds_losses=True)
@@ -65,19 +65,19 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
     """Each message says what the handout asks, and contains the time.
 
     What it checks
-        That every message on the topic has the handout's words, and a time in seconds that grows from
+        That every message on the topic has the handout's words, and a time in seconds that increases from
         message to message.
 
     Why it matters on a robot
-        Programs that read the messages go by their form, and measurements without the right time cannot be put
-        in order or be told from old ones.
+        Programs that read the messages rely on their form, and measurements without the right time cannot
+        be put in order or told from old ones.
 
     How it is measured
-        Each text is compared with the template; capitals, and how many blanks stand between words, do not
+        Each text is compared with the template; capitals and the number of spaces between words do not
         matter. The number has to grow as the clock did between the arrivals, within 1.5 s and 5 %. Whole
         seconds and seconds since the node's start will do; nanoseconds, milliseconds and a number that
-        stays the same will not, and neither will one that counts the messages in a script that reads no
-        clock, though at 1 Hz it grows as the time does. A right time in other words than the handout's earns half.
+        stays the same will not. Nor will a count of the messages in a script that reads no clock, even
+        though at 1 Hz it grows like the time. A right time in other words than the handout's earns half.
 
     How to fix
         Build the text each time around the loop: `"hello world %s" % rospy.get_time()`. `rostopic echo
@@ -244,7 +244,7 @@ class FieldBoundsParams(Record):
     max: float | None = None
     """The greatest value, in the field's own unit; null: no bound."""
     share: Annotated[float, Field(gt=0, le=1)] = 1.0
-    """The share of the messages that has to lie within the bounds, above 0 and at most 1."""
+    """The share of the messages that has to be within the bounds, above 0 and at most 1."""
     of: Sender = "student"
     """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
     `anyone`'s."""
@@ -275,11 +275,11 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
 
     Why it matters on a robot
         A robot does what the number says. A speed ten times too high, or a value that is not a number at
-        all, ends at the wall.
+        all, ends in a wall.
 
     How it is measured
-        Every message of the run is decoded by the definition that its publisher sent. A bound itself is
-        within; NaN never is; of a list, every item counts, and an empty one is outside.
+        Every message of the run is decoded by the definition that its publisher sent. A value equal to a
+        bound is within it; NaN never is. In a list, every item counts, and an empty list is outside.
 
     How to fix
         Clip the value before it is published: `min(max(value, low), high)`. `rostopic echo <topic>/<field>`
@@ -394,8 +394,8 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
         values, one after the other.
 
     Why it matters on a robot
-        A constant that is wrong, or a last command that is not a stop, is done all the same: the robot has
-        nothing but the message.
+        The robot also obeys a wrong constant, or a last command that is not a stop: it has nothing but the
+        message.
 
     How it is measured
         The messages are decoded by the definition that their publisher sent. Numbers

@@ -49,9 +49,9 @@ class NodeLivesParams(Record):
     process: ProcessName
     """The scenario's name for the process."""
     min_s: Annotated[float, Refers("watched_s")] = 5.0
-    """So long it has to live after its first message."""
+    """How long it has to live after its first message."""
     names: tuple[NodeName, ...] = ()
-    """Names of which one has to be the node's, as `node-name` judges it; empty: any name will do."""
+    """The names that the node may have, as `node-name` judges them; empty: any name will do."""
     anonymous: Anonymous = "allowed"
     """Whether the node may, must or must not be anonymous."""
 
@@ -73,16 +73,16 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
 
     What it checks
         That the running script registers with the master as one node, lives as long as it is watched, and
-        ends without a traceback when Ctrl-C is pressed. Where the lab asks for a name, that it has this name.
+        ends without a traceback when Ctrl-C is pressed. If the lab asks for a name, that the node has it.
 
     Why it matters on a robot
-        A node that dies takes its part of the robot with it, and one that does not end on Ctrl-C keeps the
-        motors' topic in its hands while you try to stop it.
+        When a node dies, its part of the robot stops working, and a node that does not end on Ctrl-C keeps
+        driving the motors while you try to stop it.
 
     How it is measured
         By what the master lists, by the process's life until 5 s and more after its first message, and by
         its exit after SIGINT. Any exit code is fine. A traceback `publish() to a closed topic` at the end
-        is a race of rospy's own and costs nothing, nor does a lock-up of rospy's in a flood of messages.
+        is a race in rospy itself and costs nothing, nor does rospy hanging in a flood of messages.
 
     How to fix
         Call `rospy.init_node(…)` once. Loop with `while not rospy.is_shutdown():`, sleep with `rospy.Rate`,
@@ -117,8 +117,8 @@ def node_name(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
         That the node registers under the expected name, plain or anonymous as the lab asks.
 
     Why it matters on a robot
-        Other people's launch files, remappings and `rosnode info` all go by the node's name, and a second
-        node of the same name throws the first one out.
+        Other people's launch files, remappings and `rosnode info` all use the node's name, and a second
+        node with the same name shuts down the first.
 
     How it is measured
         By the names that the master lists. Anonymous means the base name with `_<digits>_<digits>` after

@@ -49,16 +49,16 @@ def layout(package: PackageFacts, params: LayoutParams) -> Verdict:
     """The package is laid out as the handout says.
 
     What it checks
-        That the folders and files of the handout are there under one package folder, under exactly these
-        names, and that each script lies in the folder where the handout puts it, or below that.
+        That the folders and files of the handout exist under one package folder, with exactly these names,
+        and that each script is in the folder where the handout puts it, or below that.
 
     Why it matters on a robot
-        People and programs find things in a package by the customs of its folders; anyone who repairs the
-        robot at night does not want to search.
+        People and programs expect things in their usual folders; someone who repairs the robot at night
+        does not want to search.
 
     How it is measured
-        By the files that were handed in. Git keeps no empty folders: one without a file in it is not there.
-        Further files and folders do not matter. A script that is nowhere at all counts elsewhere.
+        By the files that were handed in. Git keeps no empty folders, so put a file into each. Further files
+        and folders do not matter. Another criterion judges a script that is missing altogether.
 
     How to fix
         `mkdir <folder>` and `git mv <file> <folder>/`, then commit and push. Capital letters matter:
@@ -177,7 +177,7 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
 
     What it checks
         That `package.xml` can be read, gives the package the handout's name, has `catkin` as its build
-        tool, and declares the packages that the lab needs at run time, where the lab asks for that.
+        tool, and, if the lab asks for that, declares the packages that it needs at run time.
 
     Why it matters on a robot
         A robot's software is found by the names in its manifests. With a broken or misnamed one, `rosrun`
@@ -185,13 +185,13 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
 
     How it is measured
         The manifest is read with `catkin_pkg`, the library that catkin itself uses, and nothing is
-        executed. At run time count `<depend>`, `<exec_depend>` and `<run_depend>`; `<build_depend>` alone
-        does not. A `TODO` licence or maintainer costs nothing here.
+        executed. `<depend>`, `<exec_depend>` and `<run_depend>` count as dependencies at run time;
+        `<build_depend>` alone does not. A `TODO` licence or maintainer costs nothing here.
 
     How to fix
-        Open `package.xml` at the line that is named. `<name>` holds the package's name exactly as in the
-        handout, `<buildtool_depend>catkin</buildtool_depend>` names the build tool, and one `<exec_depend>`
-        line (`<run_depend>` in format 1) each package that a node imports.
+        Open `package.xml` at the line that the message names. `<name>` has to be the package's name exactly
+        as in the handout, `<buildtool_depend>catkin</buildtool_depend>` names the build tool, and one
+        `<exec_depend>` line (`<run_depend>` in format 1) each package that a node imports.
     """
     needs = f", {join_words(params.dependencies)} at run time" if params.dependencies else ""
     verdict = _judge_manifest(package, params)
@@ -257,11 +257,11 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
     """The manifest declares what the nodes need at run time.
 
     What it checks
-        That `package.xml` lists each package which the nodes import, as a dependency at run time.
+        That `package.xml` lists each package that the nodes import, as a dependency at run time.
 
     Why it matters on a robot
-        The manifest tells what else to install with the package on the robot. What is missing
-        there is missing on the robot, and the node stops at its first import.
+        The manifest says what else to install on the robot. A package that is missing in it is missing on
+        the robot, and the node stops at its first import.
 
     How it is measured
         The names under `<depend>`, `<exec_depend>` and `<run_depend>` are compared with the names that the
@@ -288,10 +288,11 @@ def maintainer(package: PackageFacts) -> Verdict:
         which ends in `@todo.todo`.
 
     Why it matters on a robot
-        When a package breaks on someone else's robot, the maintainer's address is whom they ask.
+        When a package breaks on someone else's robot, they write to the maintainer.
 
     How it is measured
-        By the `email` attribute of each `<maintainer>`. Any other address will do: it is not written to.
+        By the `email` attribute of each `<maintainer>`. Any other address will do: the grader sends no
+        mail.
 
     How to fix
         Open `package.xml` and write your own address: `<maintainer email="you@university.ac.uk">Your

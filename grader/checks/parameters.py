@@ -58,7 +58,7 @@ class ParamsLoadedParams(Record):
     file: str
     """The parameter file, as YAML."""
     names: tuple[str, ...]
-    """Names that have to be on the server afterwards, maps taken apart: `/robot/speed`."""
+    """Names that have to be on the server afterwards, with maps written as paths: `/robot/speed`."""
 
 
 @check("params-loaded", params=ParamsLoadedParams)
@@ -66,12 +66,12 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
     """The parameter file loads, and holds what the lab asks for.
 
     What it checks
-        That `rosparam load` takes the YAML file, and that all names of the lab are on the parameter server
-        afterwards, each with a value.
+        That `rosparam load` accepts the YAML file, and that all names of the lab are on the parameter
+        server afterwards, each with a value.
 
     Why it matters on a robot
-        What differs from robot to robot is kept in such files. A file that does not load stops the robot as it
-        starts, and a value under another name is one that no one reads.
+        Settings that differ from robot to robot are kept in such files. If a file does not load, the robot
+        does not start, and no node reads a value under a wrong name.
 
     How it is measured
         `rosparam load` loads the file as it was handed in; what it sets is compared by name. Values are free. Each
@@ -269,7 +269,7 @@ class ParamsReadParams(Record):
     names: tuple[Annotated[GlobalName, Refers("set")], ...]
     """Parameters that the scenario sets to made-up values, with their slash."""
     file: str = ""
-    """Where the student keeps their usual values, as YAML; empty: nowhere."""
+    """The student's file with the parameters' usual values, as YAML; empty: none."""
 
 
 @check("params-read", params=ParamsReadParams)
@@ -284,11 +284,11 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
         on with the old one, whatever the file says.
 
     How it is measured
-        The parameters have values that the grader makes up for this run. Each has to be on stdout, on stderr or
-        on /rosout; a number has to stand for itself (`12` is not in `127`). Each value earns its
-        share; two that are printed only on lines with each other's name (`First name: Lovelace`) earn none. Where the
-        student's file has another name in a parameter's place (`First` for `first`), which is judged
-        elsewhere, the value of that one will do.
+        The parameters have values that the grader makes up for this run. Each has to appear on stdout, on
+        stderr or on /rosout; a number has to stand alone (`12` is not in `127`). Each value earns its
+        share; two values that are only printed under each other's name (`First name: Lovelace`) earn none.
+        If the student's file has another name for a parameter (`First` for `first`), which another
+        criterion judges, its value will do.
 
     How to fix
         `rospy.get_param('/details/name/first')`, or `rospy.get_param('details')` for a map of them all, then
@@ -422,16 +422,17 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
         were, and that the new value is printed or logged.
 
     Why it matters on a robot
-        Parameters are shared by all nodes. One that writes a whole map back with names missing takes them away
-        from everybody else.
+        All nodes share the parameters. A node that writes back a whole map with names missing takes these
+        away from all others.
 
     How it is measured
-        By every change of the parameter server up to Ctrl-C or the node's own end. The value may be a number or
-        text. Once it is set, it, the others and the printed value earn equal shares.
+        By every change of the parameter server up to Ctrl-C or the node's own end. The value may be a
+        number or text. Once it is set, the parameter itself, the unchanged others and the printed value
+        earn equal shares.
 
     How to fix
-        `rospy.set_param('/details/contact/phone', 55555)`: the whole name of the one value, never a map. Read it
-        back with `rospy.get_param` and log it.
+        `rospy.set_param('/details/contact/phone', 55555)`: use the full name of the one value, never a map.
+        Read it back with `rospy.get_param` and log it.
     """
     until_ns = _until_ns(run)
     after = params_on_server(run, until_ns=until_ns)
@@ -549,14 +550,14 @@ def param_value(package: PackageFacts, build: Run, run: Run, params: ParamValueP
 
     What it checks
         That the parameter is on the parameter server under this name when the run ends, with this value and
-        of its kind: the text `'3'` is not the number 3.
+        this type: the text `'3'` is not the number 3.
 
     Why it matters on a robot
         Speeds, lengths and names of frames are parameters. A node that finds none under the name it asks
         for goes on with its default, and one that finds text where it expects a number dies.
 
     How it is measured
-        By every change that the parameter server was asked for, up to the Ctrl-C at the end of the run.
+        By every change on the parameter server, up to the Ctrl-C at the end of the run.
 
     How to fix
         `rospy.set_param('<name>', value)`, a `<param>` in the launch file, or a YAML file that `rosparam`

@@ -71,9 +71,9 @@ class RateParams(Record):
     gap_tolerance: Share = 0.5
     """The share of the nominal period by which a single gap may differ."""
     share_in_bounds: Share = 0.95
-    """The share of the gaps that has to lie within `gap_tolerance`."""
+    """The share of the gaps that has to be within `gap_tolerance`."""
     min_window_s: Annotated[Positive, Refers("watched_s")] = 5.0
-    """So long messages have to be seen before the rate is judged."""
+    """How long messages have to be seen before the rate is judged."""
     of: Sender = "student"
     """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
     `anyone`'s."""
@@ -119,19 +119,19 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
 
     Why it matters on a robot
         Controllers are tuned to a rate, and watchdogs stop the robot when messages come late. A loop
-        without its sleep fills the network and takes a whole core.
+        without a sleep fills the network and takes a whole core.
 
     How it is measured
         In real time, over at least 5 s after the first message. The mean has to lie within 5 % of the
         nominal rate, and 95 % of the gaps within half a period of the nominal one (a rubric may set other
         bounds). One single stall costs nothing. If the grading machine itself was late while a rate failed,
-        or had no time to spare and a few long gaps are all that is wrong, nothing is taken: the run is
-        repeated; not so where the run's own processes kept the machine busy. The mean is given with its
-        95 % confidence interval.
+        or had no time to spare and only a few long gaps are wrong, this costs nothing and the run is
+        repeated, unless the run's own processes kept the machine busy. The mean is given with its 95 %
+        confidence interval.
 
     How to fix
-        `rate = rospy.Rate(10)` once before the loop, `rate.sleep()` (with the brackets) once each
-        time around it, and nothing slow beside it. `rostopic hz <topic>` shows the rate.
+        `rate = rospy.Rate(10)` once before the loop, `rate.sleep()` (with the brackets) once each time
+        around it, and nothing slow in the loop. `rostopic hz <topic>` shows the rate.
     """
     expected = f"{params.low_hz:g} to {params.high_hz:g} Hz on {params.topic}, evenly"
     if run.clock != "real":

@@ -33,7 +33,8 @@ ORDER_S = 0.1
 
 
 class Condition(Record):
-    """A message that counts: any on the topic, or one whose `field` is `min` to `max`, or `value`."""
+    """The messages that count: any on the topic, or those whose `field` is from `min` to `max`, or
+    `value`."""
 
     topic: GlobalName
     """The topic, with its slash: `/chatter`."""
@@ -48,7 +49,7 @@ class Condition(Record):
     tolerance: Annotated[float, Field(ge=0)] = 0.0
     """How much a number may differ from `value`, in the field's own unit."""
     items: Literal["all", "any"] = "all"
-    """Of a list (`ranges[*]`), whether `all` items or `any` of them have to be so."""
+    """For a list (`ranges[*]`), whether `all` of its items have to match, or `any` of them."""
 
     @model_validator(mode="after")
     def _is_whole(self) -> Condition:
@@ -97,12 +98,11 @@ class ReactsParams(Record):
     """Cause and effect."""
 
     cause: Annotated[Condition, Refers("cause")]
-    """Each time that this begins to be true, an effect has to come; without a `field`, after each message one of its
-    own."""
+    """Each time that this becomes true, an effect has to come; without a `field`, one after each message."""
     effect: Condition
     """What has to come."""
     within_s: Annotated[float, Field(gt=0)]
-    """So soon after the cause the effect has to come."""
+    """How soon after the cause the effect has to come."""
     not_before: bool = True
     """Whether an effect before the first cause is wrong: one from `within_s` after a message for which the cause is
     not true. Publish such messages for about three times `within_s` first, so that there is something to see."""
@@ -127,13 +127,13 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         A robot that stops half a second late has hit the wall, and one that always stops never arrives.
 
     How it is measured
-        By when the messages reach the recorder. A cause with a field counts where it begins: several messages
-        in a row for which it is true are one. Where any message is a cause, each has to have an answer of its
-        own. In a run with a fast clock, time is the clock's.
+        By when the messages reach the recorder. A cause with a field counts when it begins: several
+        messages in a row for which it is true count once. If any message is a cause, each needs an answer
+        of its own. In a run with a fast clock, time is the clock's.
 
     How to fix
-        Publish the answer in the callback of the subscriber, or let the loop look at what the callback kept.
-        `rostopic echo` on both topics shows which message is answered late, or not at all.
+        Publish the answer in the callback of the subscriber, or let the loop check what the callback
+        stored. `rostopic echo` on both topics shows which message is answered late, or not at all.
     """
     causes = params.cause.read([c for c in run.channels if c.topic == params.cause.topic])
     own = run.student_channels(params.effect.topic)

@@ -260,9 +260,9 @@ class NoSuchScenario(KeyError):
 
 
 class Evidence(Mapping[str, Run]):
-    """The runs by scenario, and `package`, the run of the build. Iterating gives those that were recorded.
+    """The runs by scenario, and `package`, the run of the build. Iterating yields those that were recorded.
 
-    A scenario that was not recorded raises NotRecorded, one that the rubric does not have NoSuchScenario.
+    A scenario that was not recorded raises NotRecorded; one that the rubric does not have raises NoSuchScenario.
     """
 
     def __init__(
@@ -291,14 +291,14 @@ class Evidence(Mapping[str, Run]):
 
     @property
     def run(self) -> Run:
-        """The run of the criterion's own scenario. Raises NoSuchScenario where it names none."""
+        """The run of the criterion's own scenario. Raises NoSuchScenario if it names none."""
         if self._scenario is None:
             raise NoSuchScenario("the criterion names no scenario, so there is no run: add scenario: to it")
         return self[self._scenario]
 
     @property
     def package(self) -> PackageFacts:
-        """What the package's files say. Raises NotRecorded where no package was handed in."""
+        """What the package's files say. Raises NotRecorded if no package was handed in."""
         if isinstance(self._package, Verdict):
             raise NotRecorded(self._package)
         return self._package

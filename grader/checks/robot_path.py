@@ -45,14 +45,14 @@ DEGREES_FROM = 20.0
 
 
 class PathParams(Record):
-    """The way, and how the robot's velocities are read."""
+    """The path, and how the robot's velocities are read."""
 
     topic: GlobalName
     """The topic of velocities (`geometry_msgs/Twist`) or poses, with its slash."""
     points: Annotated[tuple[Spot, ...], Field(min_length=1)]
     """In metres, `[x, y]`, in the order in which they have to be passed."""
     tolerance_m: Annotated[float, Field(gt=0)]
-    """So far from the way and its points the robot may be."""
+    """How far from the path and its points the robot may be."""
     relative: bool = True
     """Whether the points are seen from the start, x being forward there and y to the left; the start itself is put
     before them."""
@@ -60,7 +60,7 @@ class PathParams(Record):
     """A velocity holds until the next one, but no longer than this; null: for ever."""
     of: Sender | None = None
     """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
-    `anyone`'s; null: the poses of a program, where one tells them, else the student's messages."""
+    `anyone`'s; null: the poses of a program if one publishes them, else the student's messages."""
 
     @model_validator(mode="after")
     def _is_a_way(self) -> PathParams:
@@ -84,17 +84,17 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     """The robot takes the right way.
 
     What it checks
-        That the path passes the points in their order, each within the tolerance, strays from the straight
-        line between two of them no farther than that, and ends at the last one.
+        That the path passes the points in their order, each within the tolerance, stays within the
+        tolerance of the straight lines between them, and ends at the last one.
 
     Why it matters on a robot
-        Time and speed make the way. A turn that lasts a tenth of a second too long leaves the robot beside
-        its door, and every later turn adds to it.
+        The path follows from time and speed. If a turn lasts a tenth of a second too long, the robot misses
+        its door, and every later turn adds to the error.
 
     How it is measured
-        Velocities (geometry_msgs/Twist) are added up over time, along exact arcs, each of them until the
-        next one came or its robot would have stopped by itself. Poses (turtlesim/Pose, Odometry) are taken
-        as they are. In a run with a fast clock, time is the clock's.
+        Velocities (geometry_msgs/Twist) are added up over time, along exact arcs, each until the next one
+        came or until the robot would have stopped by itself. Poses (turtlesim/Pose, Odometry) are taken as
+        they are. In a run with a fast clock, times are the clock's.
 
     How to fix
         Distance is speed times time, an angle is `angular.z` times time, in radians: a quarter turn is

@@ -74,16 +74,16 @@ class EndsAtParams(Place):
     goal: Spot
     """`[x, y]` in metres."""
     tolerance_m: Annotated[float, Field(gt=0)]
-    """So far from the goal it may end."""
+    """How far from the goal it may end."""
     heading_deg: Annotated[float, Field(ge=-360, le=360)] | None = None
     """Where it has to look: 0 along x, 90 along y; null: anywhere."""
     heading_tolerance_deg: Annotated[float, Field(gt=0, le=180)] = 15.0
     """How much the heading may differ."""
     within_s: Annotated[float, Field(gt=0)] | None = None
-    """So soon it has to be there, and stay: after the message that asked, or else after it set off."""
+    """How soon it has to be there, and stay: after the message that asked, or else after it set off."""
     asked_on: Annotated[GlobalName, Refers("sent")] | None = None
-    """The topic on which the grader sends goals: judged is where the robot is when the next one comes. Null: at the
-    end of the run."""
+    """The topic on which the grader sends goals: the robot's position is judged when the next goal comes.
+    Null: at the end of the run."""
     number: Annotated[int, Field(ge=1)] = 1
     """Which of the messages on `asked_on` asks for this goal."""
 
@@ -123,17 +123,18 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
     """The robot ends where it was sent.
 
     What it checks
-        That the robot's last position is within the tolerance of the goal, and where the rubric asks for it, that it
-        looks the right way and was there in time. Of several goals, each is judged when the next one is sent.
+        That the robot's last position is within the tolerance of the goal, and, if the rubric asks for it,
+        that the robot looks the right way and was there in time. If there are several goals, each is judged
+        when the next one is sent.
 
     Why it matters on a robot
         A robot that stops a hand's breadth beside its dock is not charged in the morning, and one that circles
         around its goal never says that it is there.
 
     How it is measured
-        By the positions that the simulator publishes, or else the package's own nodes. Velocities are added up over
-        time, along exact arcs. It is there from the first position after which none is outside the
-        tolerance. In a run with a fast clock, time is the clock's.
+        By the positions that the simulator publishes, or else those of the package's own nodes. Velocities
+        are added up over time, along exact arcs. The robot has arrived at the first position after which
+        none is outside the tolerance. In a run with a fast clock, times are the clock's.
 
     How to fix
         Steer by the error: its length is `math.hypot(dx, dy)`, its direction `math.atan2(dy, dx)` minus the
@@ -320,11 +321,11 @@ class StaysWithinParams(Place):
     max_m: Annotated[float, Field(gt=0)] | None = None
     """The greatest distance from the nearest of the walls; null: no bound."""
     share: Annotated[float, Field(gt=0, le=1)] = 1.0
-    """So much of the time it has to be inside."""
+    """The share of the time for which it has to be inside."""
     from_s: Annotated[float, Field(ge=0)] = 0.0
     """The time after it sets off that does not count."""
     least_m: Annotated[float, Field(ge=0)] = 0.0
-    """The path has to be so long."""
+    """The least length of the path."""
 
     @model_validator(mode="after")
     def _is_one_region(self) -> StaysWithinParams:
@@ -356,13 +357,13 @@ def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> 
         That the robot's path stays in a region: in a box or a polygon, or at a distance from walls or points.
 
     Why it matters on a robot
-        A robot that cuts a corner by a hand's breadth leaves its bumper there, and one that drifts away from the
+        A robot that cuts a corner too closely loses its bumper there, and one that drifts away from the
         wall that it follows has nothing to steer by.
 
     How it is measured
-        By the positions that the simulator publishes, or else the package's own nodes; velocities are added up over
-        time. What counts is the robot's centre. A share is one of the time after it sets off, in which each
-        position holds until the next one.
+        By the positions that the simulator publishes, or else those of the package's own nodes; velocities
+        are added up over time. The robot's centre counts. A share is of the time after the robot sets off;
+        each position holds until the next one.
 
     How to fix
         The report draws the path and where it leaves the region. Stop, or turn away, before the robot is there:

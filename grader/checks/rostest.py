@@ -77,13 +77,14 @@ def rostest(package: PackageFacts, run: Run, params: RostestParams) -> Verdict:
         What the tests of a `.test` file check while your nodes run, each testcase for its share of the points.
 
     Why it matters on a robot
-        A robot's software is tested as a whole: one node after the other may be right, and what they say to each
-        other wrong.
+        A robot's software is tested as a whole: each node alone may be right, but what they send each other
+        wrong.
 
     How it is measured
-        Each `<test>` of the file is a program that runs beside your nodes, and hears and asks them as any node
-        does. A testcase fails by an assertion, and all of a `<test>` by taking longer than its time limit. Testcases
-        that are skipped do not count. What is broken in the tests themselves costs no mark.
+        Each `<test>` of the file is a program that runs beside your nodes, subscribes to their topics and
+        calls their services. A testcase fails if an assertion does, and all of a `<test>` fails if it takes
+        longer than its time limit. Skipped testcases do not count. Faults in the tests themselves cost no
+        marks.
 
     How to fix
         Read what each testcase that failed says, and look at the same topic or service with `rostopic echo` or

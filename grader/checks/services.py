@@ -47,7 +47,7 @@ class ServiceAnswersParams(Record):
     service: GlobalName
     """The service, with its slash: `/add`."""
     expect: Annotated[tuple[dict[str, Any], ...], Field(min_length=1)]
-    """An entry for each call of the scenario, in order: the fields that matter, and their values."""
+    """One entry for each call of the scenario, in order: the fields that matter, and their values."""
     tolerance: Annotated[float, Field(ge=0)] = 1e-6
     """How much numbers may differ."""
 
@@ -60,8 +60,8 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
         That a node of the package offers the service under exactly this name, and that it is of this type.
 
     Why it matters on a robot
-        A node that calls a service waits for its name and asks by its type. One letter off, and the caller
-        waits for ever; another type, and every call is refused.
+        A node that calls a service waits for its name and uses its type. If one letter is wrong, the caller
+        waits for ever; if the type is another one, every call is refused.
 
     How it is measured
         By what the master lists, and by the type that the service itself gives when the grader connects to
@@ -69,7 +69,7 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
 
     How to fix
         `rospy.Service('<service>', <Type>, callback)` with the name and type of the handout, then
-        `rospy.spin()` or a loop. `rosservice list` and `rosservice type <service>` show what is there.
+        `rospy.spin()` or a loop. `rosservice list` and `rosservice type <service>` show what is offered.
     """
     found = offers(run)
     offer = found.get(params.service)
@@ -95,8 +95,8 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
         belong to the request.
 
     Why it matters on a robot
-        Another node stops and waits for the answer. One that never comes, or says success where nothing was
-        done, holds up or misleads everything that depends on it.
+        Another node stops and waits for the answer. An answer that never comes, or reports success when
+        nothing was done, blocks or misleads everything that depends on it.
 
     How it is measured
         The grader calls the service once it is offered and compares each field that the rubric names:

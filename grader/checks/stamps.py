@@ -43,7 +43,7 @@ class StampsParams(Record):
     a step of it and 0.02 s of the wall are added.
     """
     frame_id: str | None = None
-    """The header's `frame_id`, where the handout asks for one."""
+    """The header's `frame_id`, if the handout asks for one."""
 
 
 class Stamp(NamedTuple):
@@ -65,17 +65,18 @@ def stamps(package: PackageFacts, run: Run, params: StampsParams) -> Verdict:
     """Each message carries the time at which it was sent.
 
     What it checks
-        That the stamp of every message is the node's time when it was sent: not zero, not the same again and
-        again, not another clock's, growing; and the `frame_id`, where the handout asks for one.
+        That the stamp of every message is the node's time when it was sent: increasing, not zero, not
+        always the same, not from another clock; and that the `frame_id` is right, if the handout asks for
+        one.
 
     Why it matters on a robot
         tf looks up where the sensor was at the time of the stamp. With a stamp of zero or an old one, a
         measurement is thrown away, or put in the wrong place.
 
     How it is measured
-        Each stamp is compared with the time at which its message came, by the clock that the node has: `/clock`
-        where `/use_sim_time` is set. `seq` does not matter. Stamps of zero at the beginning do not count with
-        a fast clock: the node had not heard it yet.
+        Each stamp is compared with the time at which its message came, by the clock that the node has:
+        `/clock` where `/use_sim_time` is set. `seq` does not matter. With a fast clock, stamps of zero at
+        the beginning do not count: the node had not heard the clock yet.
 
     How to fix
         `msg.header.stamp = rospy.Time.now()` each time just before `publish(msg)`.

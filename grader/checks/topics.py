@@ -48,8 +48,8 @@ class TopicTypeParams(Record):
     type: Annotated[TypeName, Refers("message")]
     """As `rostopic info` gives it: `std_msgs/Int8`."""
     definition: Annotated[str | None, AfterValidator(_message_text)] = None
-    """The handout's text of a `.msg` that students write themselves: fields, their types and their order have to be the
-    same; null: the type's name alone is asked for."""
+    """The handout's text of a `.msg` that students write themselves: fields, their types and their order
+    have to be the same; null: only the type's name counts."""
 
 
 @check("topic-type", params=TopicTypeParams, messages_only=True, heeds_losses=True)
@@ -61,13 +61,13 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
         type.
 
     Why it matters on a robot
-        Publisher and subscriber find each other by the topic's name and agree by its type. One letter or
-        one type off, and nothing arrives, without any error on the publisher's side.
+        Publisher and subscriber find each other by the topic's name, and both need its type. If one letter
+        or the type is wrong, nothing arrives, without any error on the publisher's side.
 
     How it is measured
-        By the type that the publisher itself gives when the recorder connects to it (and by the definition that
-        it sends, where the rubric has the type's text), and by the messages that then come. A topic that is
-        advertised but stays silent fails with a message of its own.
+        By the type that the publisher itself gives when the recorder connects to it (and by the definition
+        that it sends, if the rubric has the type's text), and by the messages that then come. A topic that
+        is advertised but stays silent fails, and the report says so.
 
     How to fix
         `rospy.Publisher('<topic>', <Type>, queue_size=10)` with the topic and type of the handout, and
@@ -131,7 +131,8 @@ class OnlyTopicsParams(Record):
     """The topics of the lab."""
 
     topics: tuple[GlobalName, ...]
-    """Those that may be published: full names, or the beginning of names with `*` after it: `/square/*`."""
+    """The topics that may be published: full names, or the beginning of names followed by `*`:
+    `/square/*`."""
 
     def allows(self, topic: str) -> bool:
         return any(
@@ -144,18 +145,18 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
     """No topic is published beside those of the lab.
 
     What it checks
-        That the package's nodes publish on the topics of the handout and on no other one.
+        That the package's nodes publish on the topics of the handout and on no others.
 
     Why it matters on a robot
-        A topic that no one expects meets one of the same name sooner or later, and then two nodes drive the
-        same wheels.
+        Sooner or later, another node uses a topic of the same name, and then two nodes drive the same
+        wheels.
 
     How it is measured
         By every topic that a node of the package advertises or publishes on in the run. What ROS itself
         needs (`/rosout`, `/clock`) and what a node only subscribes to does not count.
 
     How to fix
-        Remove the `rospy.Publisher(…)` of the topic that is named, or give it the name that the handout
+        Remove the `rospy.Publisher(…)` of the topic in the message, or give it the name that the handout
         asks for. `rosnode info <node>` lists what a node publishes.
     """
     published = published_topics(run)
@@ -200,15 +201,15 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
     """The topic is latched.
 
     What it checks
-        That every publisher of the package on the topic latches: it keeps its last message and hands it to
-        each subscriber that comes later.
+        That every publisher of the package on the topic latches: it keeps its last message and sends it to
+        each later subscriber.
 
     Why it matters on a robot
-        A map, a goal or a status is published once. A node that is started a second later hears nothing of
-        it, unless the topic is latched.
+        A map, a goal or a status is published once. A node that is started a second later does not get it
+        unless the topic is latched.
 
     How it is measured
-        By what the publisher itself says when the recorder connects to it, once its first message came.
+        By what the publisher itself says when the recorder connects to it, once its first message has come.
 
     How to fix
         `rospy.Publisher('<topic>', <Type>, latch=True, queue_size=1)`, and a message on it.
@@ -260,16 +261,16 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
     """Two nodes are connected over a topic.
 
     What it checks
-        That messages go from one node to the other over the topic: not only that both name it.
+        That messages can go from one node to the other over the topic, not only that both name it.
 
     Why it matters on a robot
-        A publisher on one name and a subscriber on another run side by side in perfect silence, and nothing
-        ever says so.
+        A publisher on one name and a subscriber on another run side by side in perfect silence, without any
+        error message.
 
     How it is measured
-        Both nodes are asked whom they are connected to. It counts where both say so and the kernel knows of
-        a connection between their processes: what one node says of itself is not enough. A node that the
-        rubric does not name may have any name; the `_<digits>_<digits>` of an anonymous one does not matter.
+        Both nodes are asked whom they are connected to. A connection counts if both say so and the kernel
+        knows of it: what one node says about itself is not enough. A node that the rubric does not name may
+        have any name; the `_<digits>_<digits>` of an anonymous node does not matter.
 
     How to fix
         Both ends need the same topic name, with the namespace and after every `<remap>`, and the same

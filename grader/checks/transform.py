@@ -55,7 +55,7 @@ class TransformParams(Record):
     message with x, y and theta (`turtlesim/Pose`).
     """
     within_s: Annotated[float, Field(gt=0)] = 0.3
-    """How old the pose may be that the transform has."""
+    """How old the transform's pose may be."""
     tolerance_m: Annotated[float, Field(ge=0)] = 0.01
     """How far the translation may be off."""
     tolerance_deg: Annotated[float, Field(ge=0)] = 1.0
@@ -63,9 +63,9 @@ class TransformParams(Record):
     static: bool | None = None
     """Whether it has to be on `/tf_static`, or must not be; null: either."""
     min_hz: Annotated[float, Field(gt=0)] | None = None
-    """How often it has to be sent at least."""
+    """The least rate at which it has to be sent."""
     through: bool = False
-    """Whether it may lead through other frames, the grader's `transform` steps among them."""
+    """Whether it may lead through other frames, including those of the grader's `transform` steps."""
 
     @model_validator(mode="after")
     def _one_value(self) -> TransformParams:
@@ -96,17 +96,17 @@ def transform(package: PackageFacts, run: Run, params: TransformParams) -> Verdi
 
     What it checks
         That the package sends the transform from the parent frame to the child frame, with the right
-        translation and rotation, or following the poses on a topic; on `/tf_static` or often enough, where
-        the handout asks for that.
+        translation and rotation, or following the poses on a topic; and, if the handout asks for that, on
+        `/tf_static` or often enough.
 
     Why it matters on a robot
         Every measurement is placed by these transforms. With parent and child swapped, or degrees in place of
         radians, an obstacle in front of the robot is drawn behind it.
 
     How it is measured
-        Each transform on `/tf` and `/tf_static` is compared within the tolerances. One that follows poses has
-        to be a pose of the last `within_s` seconds, or the last one, when it is sent. A path through other
-        frames is put together as tf does.
+        Each transform on `/tf` and `/tf_static` is compared within the tolerances. When a transform that
+        follows poses is sent, it has to be a pose of the last `within_s` seconds, or the last pose. A path
+        through other frames is combined as tf does it.
 
     How to fix
         `header.frame_id` is the parent and `child_frame_id` the child; the translation is the child's place seen

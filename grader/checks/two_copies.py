@@ -45,9 +45,9 @@ class CopiesParams(Record):
     topic: GlobalName
     """The topic, with its slash: `/chatter`."""
     template: Annotated[str, refuse_others(VALUE)] = VALUE
-    """What the listener has to say of each message, `{value}` being its text."""
+    """What the listener has to print for each message; `{value}` stands for the message's text."""
     taken_over_score: Annotated[float, Field(ge=0, le=1)] = 0.3333
-    """The share that is earned where the second copy takes the name over and the first is shut down."""
+    """The share that is earned if the second copy takes the name over and the first is shut down."""
 
 
 class Trio(NamedTuple):
@@ -74,12 +74,12 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
 
     Why it matters on a robot
         A robot often has two of a kind, wheels or cameras, run by the same program. ROS allows each name
-        once: a second node of the same name has the first one shut down.
+        once: if a second node has the same name, the first one is shut down.
 
     How it is measured
         The grader starts the script twice, beside the listener. The names come from the master, and the
-        messages are told apart by their texts. Where the second copy takes the name over and the first is
-        shut down, part of the points is earned.
+        messages are told apart by their texts. If the second copy takes the name over and the first is shut
+        down, part of the points is earned.
 
     How to fix
         `rospy.init_node('<name>', anonymous=True)` adds a number of its own to each copy's name. `rosnode

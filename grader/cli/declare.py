@@ -269,8 +269,8 @@ CLASS_EXIT_CODES = """exit codes, that of the worst submission:
   130  interrupted: run the same command to continue
 """
 MERGE_EXIT_CODES = """exit codes:
-  0    all decisions stand there now
-  1    there are conflicts: all other decisions stand there now
+  0    all decisions are in DIR now
+  1    there are conflicts: all other decisions are in DIR now
   2    the command line, or one of the files, is wrong
   3    the file cannot be written
 """

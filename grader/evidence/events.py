@@ -47,7 +47,7 @@ class ProcessEvent(Record):
     script: str | None = None
     """The package's script that runs, from the package's root."""
     repairs: tuple[str, ...] = ()
-    """What was fixed on the copy that ran: `executable bit`, `CRLF`, `shebang`."""
+    """What was repaired in the copy that ran: `executable bit`, `CRLF`, `shebang`."""
     exit_code: int | None = None
     """Its exit code, at the end."""
     signal: int | None = None
@@ -132,30 +132,31 @@ class HostEvent(Record):
     load_1min: float
     """The load average of the last minute."""
     busy: float | None = None
-    """The share of the processors' time that was busy, 0 to 1; null where not known."""
+    """The share of the processors' time that was busy, 0 to 1; null if not known."""
     own_busy: float | None = None
-    """The part of `busy` that this run's student processes took, 0 to 1; null where not known."""
+    """The part of `busy` that this run's student processes took, 0 to 1; null if not known."""
 
 
 class ActorEvent(Record):
     """`/grader/actor`: what the grader, or a stand-in program of its own, did in the run.
 
-    `publish`: `value` is the field `data` as sent, or a map of the message's fields. `param`: `topic` is the
-    parameter's name, `value` what it was set to. `call`: `topic` is the service, `value` the request's fields;
-    `answer`: the response's fields, or None and the reason in `detail`. `open`: the stand-in for the program `actor`
-    was started with the arguments `value`. `refused`: `actor`, a process where it is known, else a node, was not
-    allowed what `detail` says; `limit`: it reached a limit. At most 50 of each in a run, equal ones once.
-    Of steps: `set_param` is `param` in the middle of the run. `wait` waited for the topic or node `topic`, or for a
-    time, and `detail` says whether it came. Of tests that call functions: `type` is the call, and `answer`, in
-    JSON, what came back in the process `detail`. `start`, `stop` (Ctrl-C) and `kill` have the process in `detail`
-    (`interrupt` is the run's end), and so has `type`, with the line that went to its standard input in `value`.
-    `goal`, `cancel` and `result` are an action's: `topic` is its name, `detail` the word for the result's status
-    (`SUCCEEDED`), or why there is none. `play`: the recording `topic` was played; its messages are on their topics.
-    `left`: the process `actor` left the file `detail`, of `value` bytes; what is kept of it is an attachment.
-    Of services and actions that the grader offers: `serve` is a call, or a goal, of the node `actor`, and `value` has
-    the fields of its `request` and of the `response` or result, None where the service fails; a goal's state is in
-    `detail`. `lookup`: the node `actor` asked the master for the service `topic`, the first time; `detail` says where
-    it was not there. `read`: the same of the parameter `topic`.
+    `publish`: `value` is the field `data` as sent, or a map of the message's fields. `param`: `topic` is
+    the parameter's name, `value` what it was set to. `call`: `topic` is the service, `value` the request's
+    fields; `answer`: the response's fields, or None and the reason in `detail`. `open`: the stand-in for
+    the program `actor` was started with the arguments `value`. `refused`: `actor` (a process if known, else
+    a node) was not allowed what `detail` says; `limit`: it reached a limit. There are at most 50 of each in
+    a run, equal ones once. For steps: `set_param` is `param` in the middle of the run. `wait` waited for
+    the topic or node `topic`, or for a time, and `detail` says whether it came. For tests that call
+    functions: `type` is the call, and `answer`, in JSON, is what came back in the process `detail`.
+    `start`, `stop` (Ctrl-C) and `kill` have the process in `detail` (`interrupt` is the run's end), and so
+    does `type`, with the line for its standard input in `value`. `goal`, `cancel` and `result` are an
+    action's: `topic` is its name, `detail` the word for the result's status (`SUCCEEDED`), or why there is
+    none. `play`: the recording `topic` was played; its messages are on their topics. `left`: the process
+    `actor` left the file `detail`, of `value` bytes; a file that is kept is an attachment. For services and
+    actions that the grader offers: `serve` is a call, or a goal, of the node `actor`, and `value` has the
+    fields of its `request` and of the `response` or result, None if the service fails; a goal's state is in
+    `detail`. `lookup`: the node `actor` asked the master for the service `topic` for the first time;
+    `detail` says if it did not exist. `read`: the same for the parameter `topic`.
     """
 
     action: Literal[
@@ -177,9 +178,9 @@ class ActorEvent(Record):
 
 
 class RecorderEvent(Record):
-    """`/grader/recorder`: the recorder's connections. `dropped` counts messages past the limits of a channel or of the
-    run; of a flood of millions it is worked out from the bytes, and `detail` says so. `behind`: the recorder could not
-    keep up, and from then on the publisher may have dropped messages."""
+    """`/grader/recorder`: the recorder's connections. `dropped` counts messages beyond the limits of a
+    channel or of the run; in a flood of millions it is calculated from the bytes, and `detail` says so.
+    `behind`: the recorder could not keep up, and from then on the publisher may have dropped messages."""
 
     event: Literal["connected", "refused", "closed", "limit", "behind", "invalid"]
     """What happened to the connection."""
@@ -190,7 +191,7 @@ class RecorderEvent(Record):
     messages: int = 0
     """How many messages were recorded."""
     dropped: int = 0
-    """How many were not, past the limits."""
+    """How many were not, because of the limits."""
     detail: str = ""
     """Further details."""
 
@@ -198,10 +199,10 @@ class RecorderEvent(Record):
 class ScenarioEvent(Record):
     """`/grader/scenario`: the run's own course. `outcome` is given once, at the end.
 
-    `complete`: everything waited for was seen. `ended`: the student's processes ended first. `silent`: what was
-    waited for did not come, or stopped coming, though the processes ran. `timeout`: the limit came while it was
-    still coming. `host`: the arena or the machine failed (`detail` says how): nothing may be held against a
-    student.
+    `complete`: everything that the run waited for was seen. `ended`: the student's processes ended first.
+    `silent`: messages did not come, or stopped coming, although the processes ran. `timeout`: the limit was
+    reached while they were still coming. `host`: the arena or the machine failed (`detail` says how), which
+    must not cost the student anything.
     """
 
     event: Literal["begin", "ready", "end"]

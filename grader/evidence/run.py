@@ -136,7 +136,7 @@ class Channel:
 
     @property
     def publisher(self) -> str:
-        """The name of its node, to be shown: another tool's recording may lack it."""
+        """The name of its node, for messages: another tool's recording may lack it."""
         return self.callerid or "an unnamed node"
 
     @cached_property
@@ -146,9 +146,8 @@ class Channel:
 
     @cached_property
     def values(self) -> tuple[Any, ...]:
-        """Return each message decoded to a dict of its fields; None where its definition does not fit.
-
-        Raises EvidenceError where that would take more memory than it may.
+        """Return each message decoded to a dict of its fields; None if its definition does not fit. Raises
+        EvidenceError if that would take more memory than allowed.
         """
         try:
             decoder = self.decoder(self.budget)
@@ -167,7 +166,7 @@ class Channel:
 
     @property
     def data(self) -> tuple[Any, ...]:
-        """The field `data` of each message (std_msgs), None where it has none."""
+        """The field `data` of each message (std_msgs), None if it has none."""
         return tuple(v.get("data") if isinstance(v, dict) else None for v in self.values)
 
 
@@ -183,7 +182,7 @@ def is_grader_node(name: str) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """What was recorded of one scenario."""
+    """The recording of one scenario."""
 
     evidence: str
     """The file's name, for citations."""
@@ -194,7 +193,7 @@ class Run:
     warp: float
     """How many seconds of ROS's time pass in one second; 1 in real time."""
     metadata: Mapping[str, str]
-    """What the recorder wrote into the file about the run; empty where another tool recorded it."""
+    """What the recorder wrote into the file about the run; empty if another tool recorded it."""
     start_ns: int
     """When the first record arrived, in ns. All times are the recorder's own, in real time."""
     end_ns: int
@@ -210,7 +209,7 @@ class Run:
     params: tuple[tuple[int, ParamEvent], ...] = ()
     """When (ns) which parameter was set or deleted."""
     host: tuple[tuple[int, HostEvent], ...] = ()
-    """How late and how busy the machine was, every now and then."""
+    """How late and how busy the machine was, at intervals."""
     actors: tuple[tuple[int, ActorEvent], ...] = ()
     """When (ns) the grader did what: messages, calls, goals and steps."""
     recorder: tuple[tuple[int, RecorderEvent], ...] = ()
@@ -275,7 +274,8 @@ class Run:
     def file_lines(self, path: str) -> list[str]:
         """Return the lines of a text file of the package that was kept with the run of the build; none for any other.
 
-        The carriage return of a script's first line is kept: the kernel takes it for part of the program's name.
+        The carriage return in a script's first line is kept: the kernel takes it as part of the program's
+        name.
         """
         text = self.attachments.get(path, b"")[:FILE_BYTES_MAX].decode("utf-8-sig", errors="replace")
         lines = _LINE_END.split(text)
@@ -285,7 +285,7 @@ class Run:
 
     @property
     def left_files(self) -> tuple[LeftFile, ...]:
-        """The files that the student's processes left, of a scenario that keeps files."""
+        """The files that the student's processes left, if the scenario keeps files."""
         left = [event for _, event in self.actors if event.action == "left"]
         return tuple(
             LeftFile(e.actor, e.detail, e.value, self.attachments.get(left_name(e.actor, e.detail)))

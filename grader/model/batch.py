@@ -52,7 +52,7 @@ class RosterFault(Record):
     where: str
     """The file and line: `roster.csv:7`."""
     id: str | None = None
-    """The student's id, where there is one."""
+    """The student's id, if there is one."""
     text: str
     """What is wrong."""
     name: str = ""
@@ -114,7 +114,7 @@ class CriterionInfo(Record):
 
 
 class BatchRun(Record):
-    """What a batch was asked to do, and how far it is."""
+    """What a batch was asked to do, and how far it has come."""
 
     schema_: Literal["grader.run/1"] = Field(default="grader.run/1", alias="schema")
     """Which format this is, and its version."""

@@ -27,10 +27,10 @@ MANIFEST, CMAKE = "package.xml", "CMakeLists.txt"
 class Fault(Record):
     """Why a file cannot be read as what it should be.
 
-    `kind` is the parser's own word (`XMLSyntaxError`, `TabError`). `cause` says the same in a student's words, empty
-    where the message says enough, and `fix` what to do, empty where that is not known. `unclosed` is the bracket that
-    is opened on that line and never closed, `?` where Python does not say which. `source` is the text of the line where
-    the column is known.
+    `kind` is the parser's own word (`XMLSyntaxError`, `TabError`). `cause` says the same in words for
+    students, and is empty if the message says enough; `fix` says what to do, and is empty if that is not
+    known. `unclosed` is the bracket that is opened on that line and never closed, `?` if Python does not
+    say which. `source` is the text of the line if the column is known.
     """
 
     file: str
@@ -45,18 +45,18 @@ class Fault(Record):
 
     @property
     def explanation(self) -> str:
-        """What is wrong, and what to do where that is known."""
+        """What is wrong, and what to do if that is known."""
         why = self.cause or self.message
         return f"{why}: {self.fix}" if self.fix else why
 
     @property
     def place(self) -> FileCitation:
-        """The line, with its column where it is known."""
+        """The line, with its column if known."""
         return FileCitation(file=self.file, line=self.line, column=self.column, source=self.source)
 
     @property
     def advice(self) -> str:
-        """What to do in which line; "" where that is not known."""
+        """What to do on which line; "" if that is not known."""
         named = self.line is None or self.fix.startswith("below line ")
         where = "" if named else f"line {self.line}: "
         return f"{where}{self.fix}" if self.fix else ""
@@ -79,7 +79,7 @@ class Person(Record):
 
 
 class Manifest(Record):
-    """`package.xml` (REP 127, 140, 149). `buildtool` is what `catkin_pkg` gives as the build type."""
+    """`package.xml` (REP 127, 140, 149). `build_type` is what `catkin_pkg` gives."""
 
     file: str
     format: int
@@ -140,7 +140,7 @@ class CMakeFacts(Record):
     """`source` says who read it: CMake itself (`trace`: variables expanded, branches taken) or a `parser`.
 
     `last_line` is where the last top-level command of the file begins. `stopped_line` is the last line that
-    CMake reached where it gave up before that one; the calls behind it are then the parser's.
+    CMake reached if it gave up before that one; later calls are then the parser's.
     """
 
     file: str
@@ -215,7 +215,7 @@ class Executable(Record):
 class Shebang(Record):
     """The first line of a script after `#!`, without its line ending.
 
-    `interpreter` is the program it comes down to: for `/usr/bin/env python3` that is `python3`. `found` tells
+    `interpreter` is the program that is meant: for `/usr/bin/env python3` that is `python3`. `found` says
     whether ROS's machine has that program.
     """
 
@@ -229,14 +229,14 @@ ShebangFault = Literal["", "empty-file", "byte-order-mark", "line-end", "other"]
 
 
 class SourceFile(Record):
-    """One file of the package. `executable` is None where the source carries no modes.
+    """One file of the package. `executable` is None if the source has no file modes.
 
-    `link` is the target of a symbolic link as it is written. A link to a file of the same package carries
-    that file's facts; any other has `link_problem`, size 0 and the digest of its target's text. `python`
-    marks files that are Python by name or shebang, `python_fault` those of them that ROS's Python does not
-    compile. `shebang_problem` says why the system cannot start a script by its first line ("" where it can,
-    and for files that are not scripts), and `shebang_fault` whether more than that line is wrong. `sha256` is
-    empty for a file that cannot be read.
+    `link` is the target of a symbolic link as written. A link to a file of the same package has that file's
+    facts; any other has `link_problem`, size 0 and the digest of its target's text. `python` marks files
+    that are Python by name or shebang; `python_fault` says why ROS's Python does not compile one.
+    `shebang_problem` says why the system cannot start a script by its first line ("" if it can, and for
+    files that are not scripts), and `shebang_fault` whether more than that line is wrong. `sha256` is empty
+    for a file that cannot be read.
     """
 
     path: str
@@ -270,43 +270,44 @@ SlipKind = Literal[
 
 
 class PythonSlip(Record):
-    """What is remarkable in a Python file, most of it slips that show only when the node runs. Of one that does not
-    compile only names, types and rates are known.
+    """What is remarkable in a Python file, most of it slips that show only when the node runs. For a file that does
+    not compile, only names, types and rates are known.
 
-    `message` says what is wrong on that line, `fix` what to do where that is always the same, and `name` is the
-    function or variable that both speak of. Of a kind that is not a slip, `message` is what is written there: a name, a
-    number or a text.
+    `message` says what is wrong on that line, `fix` what to do if that is always the same, and `name` is the
+    function or variable that both are about. For a kind that is not a slip, `message` is what the line says: a
+    name, a number or a text.
 
     `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and nodes
-    get none. `misspelt`: a name that the file does not define, beside one that it does. `no-clock`: it publishes and
-    counts, and nothing in what it sends tells the time, but at most the value that it counts on from: a slip only
-    where its messages are to tell it. `rate-parameter` and `rate-number`: no slip, but a loop or a timer whose rate
-    is a parameter or a number, in Hz. `reset-value` and `reset-limit`: where a counter goes back, to the number
-    `message`, or when it reaches it. `set-in-loop` and `reset-early`: a counter that is set in each turn of its loop,
-    or goes back before one is added. `never-called`: a function that makes a node, publishes or waits, which nothing
-    names; `main-guard`: `__name__` beside another word than `__main__`. `never-reached`: an endless loop before the
-    first `publish(…)`; `spin-in-loop`: a loop that publishes and waits in `spin()`; `loop-left`: one that ends in its
-    first turn, or after a number of them; `sleep-outside`: the `sleep()` that one lacks stands outside of it;
-    `sleep-twice`: one that waits twice in each turn. `callback-called`, `callback-values`, `callback-missing`: a
-    callback that is called where it is to be named, that takes another number of values than ROS has for it, or that
-    is not there. `callback-waits`: one of a topic that sleeps, or never ends. `queue-size`: one that is a text, with
-    which rospy sends nothing. `clock-value`: the values of the topic `message` are read from a clock, and nothing is
-    counted. `deaf`: why the node goes on after Ctrl-C. `outside-method`: a call in a class that stands in none of its
-    methods and uses a name that is not there. `object`: why an object of a class lacks an attribute where it is read,
-    or that the class stands in its place. `undefined`: why a name has no value where it is read. `commented-out`: a
-    call of ROS in a comment; `name` is `sleep`, or `pub = Publisher`. `no-effect` and `compared`: a statement such as
-    `++i`, or `i == 0`. `no-init`: a script with topics, or that does more than define names, never calls `init_node`.
-    `publishes` and `prints`: no slips, but a text that is published or printed, `{}` for a value in it and `{data}`
-    for that of a message. `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node,
-    or a topic; `name` is the variable that is given the publisher, or `anonymous`. `publisher-type` and
-    `subscriber-type`: the message type on that line. `argument-text`: no slip, but where an argument of the command
-    line is kept as a text; `fix` is the line with a number in its place. `defined-twice`: a callback that a second
-    function of its name hides, or a call of an imported name that a class hides. `subscribed-again`: a
-    `Subscriber(…)` that a loop makes in each of its turns. `unused-import` and `lacking-import`: no slips, but an
-    import of the module `message` whose names nothing in the script uses, or that Python did not find where the files
-    were read. `unregistered`: a `Publisher` or `Subscriber` that is taken off its topic. `not-started`: an action
-    server that waits for a `start()` that no line calls. `start-value` and `added-first`: no slips, but where a
-    counter, `name`, gets its first number, `message`, and where a loop adds one to it before it publishes.
+    get none. `misspelt`: a name that the file does not define, next to one that it does. `no-clock`: the file
+    publishes and counts, and nothing that it sends contains the time, except at most the value from which it counts
+    on; a slip only if its messages have to contain the time. `rate-parameter` and `rate-number`: no slips, but a
+    loop or a timer whose rate is a parameter or a number, in Hz. `reset-value` and `reset-limit`: where a counter
+    goes back, to the number `message`, or when it reaches it. `set-in-loop` and `reset-early`: a counter that is
+    set in each turn of its loop, or goes back before one is added. `never-called`: a function that makes a node,
+    publishes or waits, and that nothing calls; `main-guard`: `__name__` is compared with another word than
+    `__main__`. `never-reached`: an endless loop before the first `publish(…)`; `spin-in-loop`: a loop that
+    publishes and waits in `spin()`; `loop-left`: a loop that ends in its first turn, or after a number of them;
+    `sleep-outside`: a loop whose `sleep()` is outside it; `sleep-twice`: a loop that waits twice in each turn.
+    `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it should only be
+    named, that takes another number of values than ROS passes, or that does not exist. `callback-waits`: a topic's
+    callback that sleeps, or never ends. `queue-size`: a queue size that is a text, with which rospy sends nothing.
+    `clock-value`: the values of the topic `message` are read from a clock, and nothing is counted. `deaf`: why the
+    node goes on after Ctrl-C. `outside-method`: a call in a class, but outside its methods, that uses an unknown
+    name. `object`: why an object of a class lacks an attribute where it is read, or that the class is used in its
+    place. `undefined`: why a name has no value where it is read. `commented-out`: a ROS call in a comment; `name`
+    is `sleep`, or `pub = Publisher`. `no-effect` and `compared`: a statement such as `++i`, or `i == 0`. `no-init`:
+    a script with topics, or that does more than define names, never calls `init_node`. `publishes` and `prints`: no
+    slips, but a text that is published or printed, with `{}` for a value in it and `{data}` for that of a message.
+    `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a topic; `name` is
+    the variable that gets the publisher, or `anonymous`. `publisher-type` and `subscriber-type`: the message type
+    on that line. `argument-text`: no slip, but where an argument of the command line is kept as a text; `fix` is
+    the line with a number in its place. `defined-twice`: a callback that a second function of its name hides, or a
+    call of an imported name that a class hides. `subscribed-again`: a `Subscriber(…)` that a loop makes in each
+    turn. `unused-import` and `lacking-import`: no slips, but an import of the module `message` whose names nothing
+    in the script uses, or that Python did not find where the files were read. `unregistered`: a `Publisher` or
+    `Subscriber` that is taken off its topic. `not-started`: an action server that waits for a `start()` that no
+    line calls. `start-value` and `added-first`: no slips, but where a counter, `name`, gets its first number,
+    `message`, and where a loop adds one to it before it publishes.
     """
 
     file: str
@@ -343,11 +344,11 @@ class LaunchArg(Record):
 
 
 class LaunchNode(Record):
-    """One `<node>`, its attributes as written; an attribute that is not there is None.
+    """One `<node>`, with its attributes as written; a missing attribute is None.
 
     `remaps` are those in force: those that come before it in `<launch>` and its `<group>`s, then its own.
-    `file` is where it stands, `namespace` that of its groups, includes and its own `ns`, with both slashes.
-    `uncertain`: whether it counts is for roslaunch to work out (`if="$(eval …)"`).
+    `file` is the file that has it, `namespace` that of its groups, includes and its own `ns`, with both
+    slashes. `uncertain`: only roslaunch can tell whether it counts (`if="$(eval …)"`).
     """
 
     pkg: str | None
@@ -368,7 +369,7 @@ class LaunchNode(Record):
     unknown: tuple[str, ...] = ()
     """Attributes that roslaunch does not know."""
     renaming: tuple[LaunchLine, ...] = ()
-    """What is in force of `<remap>` and `ns`, each in the file's order."""
+    """The `<remap>`s and `ns` in force, in the file's order."""
 
     @property
     def full_name(self) -> str:
@@ -377,7 +378,7 @@ class LaunchNode(Record):
 
 
 class LaunchParam(Record):
-    """One `<param>`; `name` is the whole name on the server, `value` None where a file or command gives it."""
+    """One `<param>`; `name` is the full name on the server; `value` is None if a file or command gives it."""
 
     name: str
     value: str | None
@@ -397,15 +398,16 @@ class LaunchLoad(Record):
 
 
 class LaunchFile(Record):
-    """`fault` is set where the file is not well-formed or does not begin with `<launch>`.
+    """`fault` is set if the file is not well-formed or does not begin with `<launch>`.
 
-    Nodes and includes that a literal `if="false"` or `unless="true"` switches off are left out. `nodes` are the
-    file's own. What `roslaunch` makes of it all, with the package's own included files and with `$(arg …)`,
-    `$(dirname)` and namespaces resolved: `brings` (nodes), `tests` (`<test>`, which only rostest runs), `params`,
-    `loads`, `include_faults` (own files that cannot be included), `unset_args`. A path below the package reads
-    `$(find <package>)/…`. `unknown_tags` are tags, with their lines, that roslaunch skips, `commented` the `type`s of
-    nodes that stand in a comment, `switched_off` those of nodes that an `if` or `unless` leaves out, with its line and
-    what it says. `readable` are the nodes that can be read of a file that is not well-formed.
+    Nodes and includes that a literal `if="false"` or `unless="true"` switches off are left out. `nodes` are
+    the file's own. These fields say what `roslaunch` would do, with the package's own included files and
+    with `$(arg …)`, `$(dirname)` and namespaces resolved: `brings` (nodes), `tests` (`<test>`, which only
+    rostest runs), `params`, `loads`, `include_faults` (own files that cannot be included), `unset_args`. A
+    path inside the package is written as `$(find <package>)/…`. `unknown_tags` are tags that roslaunch
+    skips, with their lines; `commented` has the `type`s of nodes in comments; `switched_off` those of nodes
+    that an `if` or `unless` leaves out, with its line and text. `readable` are the nodes that can be read
+    from a file that is not well-formed.
     """
 
     path: str
@@ -477,29 +479,30 @@ class PackageFacts(Record):
     """What the package's files say; nothing of it was run."""
 
     name: str
-    """The package's name, from its manifest; its folder's where the manifest cannot be read."""
+    """The package's name, from its manifest; its folder's name if the manifest cannot be read."""
     path: str
-    """Where the package lay in what was handed in."""
+    """Where the package was in the submission."""
     manifest: Manifest | None
-    """`package.xml`; None where `manifest_fault` says why."""
+    """`package.xml`; if None, `manifest_fault` says why."""
     manifest_fault: Fault | None
     """Why the manifest cannot be read."""
     cmake: CMakeFacts | None
-    """`CMakeLists.txt`; None where there is none."""
+    """`CMakeLists.txt`; None if there is none."""
     files: tuple[SourceFile, ...]
     """All files, in the order of their paths."""
     launch_files: tuple[LaunchFile, ...]
     """All launch files."""
     hints: tuple[str, ...] = ()
-    """What was remarked when the submission was opened."""
+    """Remarks from when the submission was opened."""
     slips: tuple[PythonSlip, ...] = ()
     """Slips in Python files that compile."""
     interfaces: tuple[Interface, ...] = ()
     """The package's own `.msg`, `.srv` and `.action` files."""
     asked: str = Field(default="", exclude_if=lambda value: not value)
-    """The lab's name for it, where the lab asks for several packages and this is not the main one."""
+    """The lab's name for it, if the lab asks for several packages and this is not the main one."""
     also: tuple[PackageFacts, ...] = Field(default=(), exclude_if=lambda value: not value)
-    """What the lab asks for besides, as far as it was handed in. Their paths are relative to their own folders."""
+    """The other packages that the lab asks for, as far as they were handed in. Their paths are relative to
+    their own folders."""
 
     def way_to(self, other: PackageFacts) -> str:
         """Return the path of another package's folder from this one's, `.` for the same: `../lab_msgs`."""
@@ -514,7 +517,8 @@ class PackageFacts(Record):
         )
 
     def launches_of(self, programs: AbstractSet[str]) -> list[str]:
-        """Return the launch files that start all of these programs; of several, those of the package's own nodes."""
+        """Return the launch files that start all of these programs; if there are several, those of the
+        package's own nodes."""
         found = [one for one in self.launch_files if programs and one.starts(programs) == programs]
         own = [one for one in found if all(node.pkg == self.name for node in one.nodes)]
         return [one.path for one in own or found]
@@ -524,10 +528,11 @@ class PackageFacts(Record):
         return next((f for f in self.files if f.path == path), None)
 
     def hints_on(self, path: str) -> tuple[str, ...]:
-        """Return what intake remarked of one file: such hints begin with its path."""
+        """Return intake's remarks about one file: such hints begin with its path."""
         return tuple(hint for hint in self.hints if hint.startswith(f"{path} "))
 
     def general_hints(self) -> tuple[str, ...]:
-        """Return what intake remarked of the submission as a whole: where the package was found, and as what."""
+        """Return intake's remarks about the submission as a whole: where the package was found, and as
+        what."""
         of_files = {hint for file in self.files for hint in self.hints_on(file.path)}
         return tuple(hint for hint in self.hints if hint not in of_files)

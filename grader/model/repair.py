@@ -68,15 +68,16 @@ class Repair(Record):
     """One mistake, and how it is repaired. Logic is never repaired."""
 
     kind: RepairKind
-    """What kind of repair it is; the rubric's `repairs` go by it."""
+    """What kind of repair it is, as in the rubric's `repairs`."""
     file: str
     """A file of the submission, from the package's root."""
     line: int | None = None
     """The first line that changes, counted from 1; null for permission bits and renames."""
     before: str = ""
-    """The changed lines as they are after the repairs that come before this one; of a rename, the path."""
+    """The changed lines, after earlier repairs and before this one; for a rename, the path."""
     after: str = ""
-    """The same lines, repaired, or the new path. Where a line is only added, the line beside it is part of both."""
+    """The same lines, repaired, or the new path. If a line is only added, both include the line next to
+    it."""
     message: str
     """What is wrong."""
     fix: str

@@ -26,7 +26,7 @@ class HandedIn(Record):
     """When a submission was handed in, and the deadline. All times have a time zone."""
 
     at: AwareDatetime | None = None
-    """When it was submitted; null where neither roster nor commit says so."""
+    """When it was submitted; null if neither roster nor commit says so."""
     by: SaidBy = "nobody"
     """Which of them says so: the `roster` (`submitted_at`), the `commit` (its date), or `nobody`."""
     deadline: AwareDatetime | None = None
@@ -36,7 +36,7 @@ class HandedIn(Record):
     late_days: int = Field(default=0, exclude_if=lambda value: not value)
     """How many late days of the course the student could use. Only there if there are any."""
     before: AwareDatetime | None = None
-    """The time before which the commit to grade was looked for; null where the last one is graded."""
+    """The commit to grade is the last one before this time; null if the last of all is graded."""
     note: str = ""
     """How that commit was chosen."""
 
@@ -47,7 +47,7 @@ class Lateness(HandedIn):
     late_s: float = 0.0
     """Seconds after the deadline; 0 if it was in time."""
     late_days_used: int = Field(default=0, exclude_if=lambda value: not value)
-    """How many of them this submission took; the deadline is so much later. Only there if there are any."""
+    """How many of them this submission used; the deadline is that much later. Only there if there are any."""
     points_before: float
     """The points before the penalty."""
     points: float
@@ -74,8 +74,8 @@ class WrittenOverride(Record):
     """An override as `overrides.yaml` has it."""
 
     points: float | None = None
-    """The points that count: from 0 to the criterion's, below 0 for a penalty; null: as its `comments` say, and where
-    these say nothing of points, as the check says."""
+    """The points that count: from 0 to the criterion's, below 0 for a penalty; null: as its `comments` say,
+    or, if these have no points, as the check says."""
     comment: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
     """What the student reads, below the texts of its `comments`."""
     author: Annotated[str, Field(max_length=AUTHOR_CHARS)] = ""
@@ -85,11 +85,11 @@ class WrittenOverride(Record):
     comments: Annotated[tuple[CommentId, ...], Field(max_length=10)] = ()
     """The ids of comments in `comments.yaml`; whatever changes there changes here."""
     answer: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
-    """What the student is told who asked about the criterion."""
+    """The answer to the student who asked about the criterion."""
     answered: Annotated[tuple[Annotated[str, Field(max_length=40)], ...], Field(max_length=100)] = ()
-    """The questions that the answer is to, by their digests; empty: all that there are."""
+    """The questions that it answers, by their digests; empty: all of them."""
     together: Annotated[str, Field(max_length=40)] = ""
-    """The same word for all that were decided in one go, and can be taken back in one."""
+    """The same word for all overrides that were made in one go, and can be taken back together."""
 
 
 class Override(Record):
@@ -106,11 +106,11 @@ class Override(Record):
     comments: tuple[CommentId, ...] = Field(default=(), exclude_if=lambda value: not value)
     """The ids of its comments in `comments.yaml`."""
     answer: str = Field(default="", max_length=COMMENT_CHARS, exclude_if=lambda value: not value)
-    """What the student is told who asked about the criterion."""
+    """The answer to the student who asked about the criterion."""
     answered: tuple[str, ...] = Field(default=(), exclude_if=lambda value: not value)
-    """The questions that the answer is to, by their digests; empty: all that there are."""
+    """The questions that it answers, by their digests; empty: all of them."""
     together: str = Field(default="", exclude_if=lambda value: not value)
-    """The same word for all that were decided in one go."""
+    """The same word for all overrides that were made in one go."""
 
     @property
     def awards(self) -> bool:
@@ -161,22 +161,23 @@ class GitStatus(Record):
     points: tuple[Point, ...] = ()
     """Ways in which what will be marked differs from what was checked."""
     summary: str = ""
-    """What git has, on one line, where nothing differs."""
+    """What git has, on one line, if nothing differs."""
 
 
 class Repaired(Record):
-    """What a repaired copy of the package says of one criterion."""
+    """What a repaired copy of the package shows about one criterion."""
 
     repairs: tuple[Repair, ...]
     """The repairs that the criterion needs to be judged, in the order in which a student meets them."""
     share: float
     """The share of its points that it earns when it is judged on the copy, 0 to 1."""
     charged: bool = False
-    """Whether this criterion asks for what was repaired: it loses its points, so that the others keep theirs."""
+    """Whether this criterion is about the mistake that was repaired: it loses its points, so that the
+    others keep theirs."""
 
 
 class LeftOut(Record):
-    """What a criterion would have, if its group did not count only the best of them."""
+    """What a criterion would have if its group did not count only the best."""
 
     points: float
     """The points that it earned."""
@@ -224,7 +225,7 @@ class CriterionResult(Record):
     expected: str
     """What the lab asks for, with unit."""
     measured: str
-    """What was there, with unit."""
+    """What was found, with unit."""
     hint: str
     """What to do about it."""
     reproduce: str
@@ -234,11 +235,11 @@ class CriterionResult(Record):
     blocked_by: str = Field(default="", exclude_if=lambda value: not value)
     """The `id` of the criterion that keeps this one from being judged. Only there if it is `blocked`."""
     mistake: Mistake | None = Field(default=None, exclude_if=lambda value: value is None)
-    """What it is lost by. Only there for the mistakes that `Mistake` lists."""
+    """The mistake that lost it. Only there for the mistakes that `Mistake` lists."""
     repaired: Repaired | None = Field(default=None, exclude_if=lambda value: value is None)
-    """What a repaired copy of the package shows of it. Only there if one was run and changes something."""
+    """What a repaired copy of the package shows about it. Only there if one was run and changes something."""
     made_up: dict[str, bool | int | float | str] = Field(default={}, exclude_if=lambda value: not value)
-    """The values that it is judged by and that were made up for this submission, by their names in the rubric. Only
+    """The values by which it is judged that were made up for this submission, by their names in the rubric. Only
     there if there are any."""
 
     @property
@@ -281,11 +282,11 @@ class SubmissionInfo(Record):
     commit: str | None
     """The commit of a repository, else null."""
     digest: str
-    """sha256 of the package's files; empty where no package was found."""
+    """sha256 of the package's files; empty if no package was found."""
     package: str
-    """The package's name; empty where none was found or needed."""
+    """The package's name; empty if none was found or needed."""
     name: str = ""
-    """The student's name, only where the roster has one."""
+    """The student's name; only there if the roster has one."""
 
     @model_serializer(mode="wrap")
     def _without_no_name(self, dump: SerializerFunctionWrapHandler) -> dict[str, str | None]:
@@ -308,7 +309,7 @@ class EnvironmentInfo(Record):
     grader: str
     """The grader's version."""
     ros: str
-    """The ROS that ran it; empty where nothing was run."""
+    """The ROS that ran it; empty if nothing was run."""
     python: str
     """The Python that the grader ran under."""
     sandbox: str
@@ -374,8 +375,9 @@ class GradingResult(Record):
     rubric: RubricInfo
     """What it was judged by."""
     rubric_origin: RubricOrigin | None = Field(default=None, exclude_if=lambda value: value is None)
-    """Where that came from. `grader`: it comes with the grader. `pinned`: its digest was given, and fits. `submission`:
-    it lies in the student's repository, so the student can change it. `elsewhere`: another file of the machine."""
+    """Where the rubric came from. `grader`: it comes with the grader. `pinned`: its digest was given, and
+    matches. `submission`: it is in the student's repository, so the student can change it. `elsewhere`:
+    another file on the machine."""
     status: Literal["graded", "inconclusive", "error"]
     """`graded`: every criterion worth points is decided. `inconclusive`: some are open. `error`: it could not be
     graded, and `error` says why."""
@@ -402,7 +404,7 @@ class GradingResult(Record):
     late: Lateness | None = None
     """The late penalty. Only there if the rubric has a deadline."""
     standing: GitStatus | None = None
-    """What of the work is not committed or not pushed. Only in the output of `grader check`, and if there is
-    anything; it costs no points."""
+    """The part of the work that is not committed or not pushed. Only in the output of `grader check`, and if
+    there is anything; it costs no points."""
     error: ErrorInfo | None = None
     """Why it could not be graded. Only there for the status `error`."""

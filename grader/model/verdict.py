@@ -41,8 +41,8 @@ class Status(str, Enum):
 
 
 class FileCitation(Record):
-    """A line of the student's own files; `file` is relative to the package's root, `line` counts from 1. Of several
-    packages, it is the main one's root, and a file of another one is `../lab_msgs/…`."""
+    """A line of the student's own files; `file` is relative to the package's root, `line` counts from 1.
+    With several packages, it is the main one's root, and a file of another one is `../lab_msgs/…`."""
 
     file: str
     """A file of the submission, from the package's root."""
@@ -51,7 +51,7 @@ class FileCitation(Record):
     column: int | None = Field(default=None, exclude_if=lambda value: value is None)
     """The place in the line, counted from 1. Only there if it is known."""
     end_column: int | None = Field(default=None, exclude_if=lambda value: value is None)
-    """Where what is meant ends, counted from 1, itself not included. Only there if it is known."""
+    """The end of the place, counted from 1, itself not included. Only there if it is known."""
     source: str = Field(default="", exclude_if=lambda value: not value)
     """The line's text. Only there if something was lost and the line is short."""
 
@@ -87,11 +87,12 @@ MistakeKind = Literal["file-missing", "file-elsewhere", "not-executable", "canno
 
 
 class Mistake(Record):
-    """What a mark is lost by, for programs, which need not read the sentence. `name` is the file that it is about."""
+    """The mistake that lost a mark, for programs, which need not read the sentence. `name` is the file that
+    it is about."""
 
     kind: MistakeKind
-    """A file is not in the package, or only under another path; a script has no executable bit, or its first line keeps
-    the system from running it, or the build that was to make a program of it failed."""
+    """A file is not in the package, or only under another path; a script has no executable bit, or its
+    first line keeps the system from running it, or the build that was to install it failed."""
     name: str
     """The file that the lab asks for, or the script, from the package's root."""
 

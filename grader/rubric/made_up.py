@@ -57,20 +57,20 @@ class MadeUp(Record):
     """A value that is made up for each submission. Give `from` and `to`, `one_of`, `letters`, `sum`, `product`,
     `quotient` or `mean`.
 
-    It stands wherever a scenario, or a criterion's `with`, `hint` or `reproduce`, has `{made_up: NAME}`, in a text too:
-    `args: ["_rate:={made_up: rate}"]`.
+    It replaces `{made_up: NAME}` anywhere in a scenario, or in a criterion's `with`, `hint` or `reproduce`,
+    also within a text: `args: ["_rate:={made_up: rate}"]`.
     """
 
     from_: Annotated[int | float | None, Field(alias="from")] = None
-    """The least that it can be. It is a whole number where this and `step` are."""
+    """The least that it can be. It is a whole number if this and `step` are."""
     to: int | float | None = None
     """The most that it can be."""
     step: Annotated[int | float, Field(gt=0)] = 1
-    """The values lie so far apart, from `from` on."""
+    """The distance between possible values, counted from `from`."""
     one_of: tuple[Value, ...] = ()
     """It is one of these."""
     letters: Annotated[int | None, Field(ge=3, le=40)] = None
-    """It is a text of so many letters."""
+    """It is a text of this many letters."""
     sum: tuple[str | int | float, ...] = ()
     """It is the sum of these, numbers and names of values above it: `[a, b]`."""
     product: tuple[str | int | float, ...] = ()

@@ -38,14 +38,14 @@ class Criterion(Record):
     points: Annotated[float, Field(ge=0)] = 0.0
     """Of the rubric's 100; 0 is advice."""
     bonus: Annotated[float, Field(gt=0)] | None = None
-    """Added to them where the check passes; not to reach it costs nothing."""
+    """Added to them if the check passes; if not, this costs nothing."""
     penalty: Annotated[float, Field(gt=0)] | None = None
-    """Taken off where the check fails; the total is never less than 0."""
+    """Taken off if the check fails; the total is never less than 0."""
     check: str
-    """The check that judges it, or `manual` where a person gives the points."""
+    """The check that judges it, or `manual` if a person awards the points."""
     package: str | None = None
-    """Which of the lab's packages it judges, where students hand in several; null: that of the process that `with`
-    names, or of all the processes of its scenario, else the first."""
+    """Which of the lab's packages it judges, if students hand in several; null: that of the process that
+    `with` names, or of all the processes of its scenario, else the first."""
     parameters: Annotated[dict[str, Any], Field(alias="with", default_factory=dict)]
     """The check's own parameters."""
     scenario: Name | None = None
@@ -57,7 +57,7 @@ class Criterion(Record):
     hint: str = ""
     """What to do, in place of the check's own hint."""
     reproduce: str = ""
-    """A command with which students can see it themselves, or a sentence with its commands between backticks."""
+    """A command with which students can see it themselves, or a sentence with its commands in backticks."""
 
     @property
     def extra(self) -> float:
@@ -75,15 +75,15 @@ class ManualParams(Record):
 
 
 class Group(Record):
-    """Criteria whose points are given together."""
+    """Criteria whose points are awarded together."""
 
     criteria: Annotated[tuple[Name, ...], Field(min_length=1)]
     """The ids of the criteria."""
     points: Annotated[float, Field(gt=0)] | None = None
-    """The group is worth so much, and the points of its criteria are their weights in it; null: each has its own
-    points."""
+    """What the group is worth; the points of its criteria are then their weights in it. Null: each has its
+    own points."""
     best: Annotated[int, Field(ge=1)] | None = None
-    """Only so many of its criteria count, those with the most points; all have to be worth the same then."""
+    """How many of its criteria count, those with the most points; then all have to be worth the same."""
 
 
 class Gate(Record):
@@ -92,7 +92,7 @@ class Gate(Record):
     criterion: Name
     """The criterion that has to be reached: it neither fails nor is blocked."""
     at_most: Annotated[float, Field(ge=0)]
-    """Without it, the whole is worth at most so many points."""
+    """The most points that the whole is worth without it."""
 
 
 class Late(Record):
@@ -105,9 +105,9 @@ class Late(Record):
     per: Literal["day", "hour"] = "day"
     """For each day or each hour."""
     grace_minutes: Annotated[float, Field(ge=0, le=LATE_DAYS_MAX * 24 * 60)] = 0.0
-    """What comes at most so long after the deadline is in time."""
+    """A submission this long after the deadline is still in time."""
     cap: Annotated[float, Field(ge=0, le=100)] = 100.0
-    """At most so many percent are lost."""
+    """The most percent that are lost."""
     cut_off_days: Annotated[float, Field(ge=0, le=LATE_DAYS_MAX)] | None = None
     """Later than this after the deadline nothing counts; null: always something."""
 
@@ -157,16 +157,16 @@ class Rubric(Record):
     packages: tuple[Annotated[str, Field(pattern=PACKAGE_PATTERN)], ...] = ()
     """Folders beside the rubric, each a ROS package of the course: nodes, messages, launch files."""
     starter: Annotated[str, Field(pattern=FOLDER_PATTERN)] | None = None
-    """A folder beside the rubric with the files that the course hands out; what is still as it was there is said
-    where its criterion is lost."""
+    """A folder beside the rubric with the files that the course hands out; if a criterion is lost and its
+    file is still unchanged, the report says so."""
     needs: Annotated[Needs, Field(default_factory=Needs)]
-    """What the machine has to have besides."""
+    """What else the machine has to have."""
     groups: Annotated[dict[Name, Group], Field(default_factory=dict)]
-    """How criteria's points are given together, by the group's name."""
+    """Criteria whose points are awarded together, by the group's name."""
     gates: tuple[Gate, ...] = ()
     """Criteria without which the whole is worth less."""
     made_up: Annotated[dict[Name, MadeUp], Field(default_factory=dict)]
-    """Values that are made up for each submission, by the names by which scenarios and criteria use them."""
+    """Values that are made up for each submission, by the names that scenarios and criteria use."""
     scenarios: dict[Name, Scenario]
     """The runs, by name."""
     criteria: Annotated[tuple[Criterion, ...], Field(min_length=1)]

@@ -48,7 +48,7 @@ class Start(Record):
     """A process of a run. Give one of `script`, `launch`, `load`, `program`, `built` and `tests`."""
 
     name: Name
-    """What the rubric's criteria and steps call the process."""
+    """The name of the process in the rubric's criteria and steps."""
     script: str | None = None
     """The student's file, at the place where the handout wants it: `src/talker.py`. It is found under `scripts/`,
     `src/` and anywhere else in the package too. A C++ program by its name."""
@@ -58,19 +58,20 @@ class Start(Record):
     """A YAML file that `rosparam load` puts on the parameter server."""
     program: Annotated[str, Field(pattern=PROGRAM_PATTERN)] | None = None
     """A node of another package, as `rosrun` takes it (`turtlesim/turtlesim_node`), or a launch file of one
-    (`course_sim/world.launch`), or its tests for rostest (`course_sim/world.test`), until whose end the run goes on.
-    It is the grader's, and what it does never counts as the student's."""
+    (`course_sim/world.launch`), or its tests for rostest (`course_sim/world.test`), which the run waits
+    for. It is the grader's, and what it does never counts as the student's."""
     built: bool = False
     """Start every program that the build made (`add_executable`), as processes `<name>/<program>`."""
     tests: str | None = None
-    """A Python file beside the rubric with tests for pytest that call functions of the student's files. The process is
-    the one in which they are called, once the steps are over; `check: pytest` judges the same file."""
+    """A Python file beside the rubric with tests for pytest that call functions of the student's files.
+    They are called in this process, after the steps; `check: pytest` judges the same file."""
     args: tuple[str, ...] = ()
     """Arguments, as for `rosrun` or `roslaunch`: `["_rate:=5", "robot:=burger"]`."""
     after: Name | None = None
     """The name of an earlier start: this one waits until a node of that one is registered."""
     package: str | None = None
-    """Which of the lab's packages has the file or the programs, where students hand in several; null: the first."""
+    """Which of the lab's packages has the file or the programs, if students hand in several; null: the
+    first."""
 
     @property
     def is_rostest(self) -> bool:
@@ -91,13 +92,13 @@ class Param(Record):
     """A YAML file of the student's, read as `rosparam load` would; each of its values is replaced by one of the same
     type that the grader makes up for this run."""
     also: tuple[str, ...] = ()
-    """Names that get made-up values too where the file lacks them."""
+    """Names that also get made-up values if the file lacks them."""
 
 
 class Probe(Record):
     """Messages that the grader publishes once the student's node has subscribed.
 
-    What is made up is shuffled together with `among`; `values` come after it.
+    Made-up values and those of `among` are shuffled together; `values` come after them.
     """
 
     topic: str
@@ -105,13 +106,13 @@ class Probe(Record):
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
     """Any message type of ROS's own packages: `std_msgs/String`."""
     text: Annotated[int, Field(ge=0)] = 0
-    """So many random strings; of four and more, one comes twice running."""
+    """How many random strings; if there are four or more, one comes twice in a row."""
     integers: Annotated[int, Field(ge=0)] = 0
-    """So many random values of the type's range."""
+    """How many random values in the type's range."""
     among: tuple[int, ...] = ()
     """Values that have to be among the random ones."""
     values: tuple[Any, ...] = ()
-    """Sent as they stand and in their order: the field `data`, or a map of the message's fields."""
+    """Sent as written and in their order: the field `data`, or a map of the message's fields."""
     times: Annotated[int, Field(ge=1, le=10_000)] = 1
     """How often `values` are sent, one round after the other."""
     rate_hz: Annotated[float, Field(gt=0, le=100)] = 10.0
@@ -128,8 +129,8 @@ class Call(Record):
     request: Annotated[dict[str, Any], Field(default_factory=dict)]
     """The request's fields; those that it lacks are zero."""
     definition: Annotated[str | None, AfterValidator(_service_text)] = None
-    """The handout's text of a `.srv` that students write themselves: where theirs has other fields, types or another
-    order, the service is not called, and the reason is said."""
+    """The handout's text of a `.srv` that students write themselves: if theirs has other fields, types or
+    another order, the service is not called, and the report says why."""
     delay_s: Seconds = 0.0
     """How long after the service is offered."""
 
@@ -147,22 +148,22 @@ class Served(Record):
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
     """Of ROS's, of the student's package (`lab5/Add`), or of one of the course's."""
     feedback: tuple[dict[str, Any], ...] = ()
-    """What is sent of each goal on its way, one after the other."""
+    """The feedback that is sent for each goal, one after the other."""
     result: dict[str, Any] = Field(default_factory=dict)
     """The fields of each goal's result; those that it lacks are zero."""
     ends: Literal["succeeded", "aborted"] = "succeeded"
-    """The state in which goals end. One that the client cancels before is preempted."""
+    """The state in which goals end. A goal that the client cancels before is preempted."""
     answer: dict[str, Any] | None = None
     """The fields of each answer; those that it lacks are zero."""
     answers: tuple[dict[str, Any], ...] = ()
-    """The answers in turn; the last one is given again and again."""
+    """The answers in turn; the last one is repeated."""
     fails: bool = False
-    """Whether each call ends with an error, as it does where a server's callback raises one."""
+    """Whether each call ends with an error, as if a server's callback raised an exception."""
     definition: Annotated[str | None, AfterValidator(_service_text)] = None
-    """The handout's text of a `.srv` that students write themselves: where theirs differs, their calls are refused, as
-    a server of the handout's would."""
+    """The handout's text of a `.srv` that students write themselves: if theirs differs, their calls are
+    refused, as the handout's server would do."""
     delay_s: Annotated[float, Field(ge=0, le=STEP_S_MAX)] = 0.0
-    """How long each answer takes; of an action, each feedback and the result."""
+    """How long each answer takes; for an action, each feedback and the result."""
 
     @property
     def name(self) -> str:
@@ -178,17 +179,18 @@ class Served(Record):
 class Publish(Record):
     """Messages on one topic. Give `value`, the same each time, or `values`, which take turns.
 
-    A value is the field `data`, or a map of the message's fields; what it leaves out is zero. In it, `now`, `now-2`
-    and `now+0.5` (seconds) are stamps, `.inf` and `.nan` are floats, `{from: 0, to: 1}` is a number that goes evenly
-    from the first message to the last, `{each: […]}` takes its items in turn, one for each message, and `{repeat:
-    .inf, count: 360, except: {"150-210": 0.3}}` is an array. Without `count` and `duration_s` each value is sent
-    once. Sending begins once a node has subscribed, and with `latched` at once.
+    A value is the field `data`, or a map of the message's fields; fields left out are zero. In it, `now`,
+    `now-2` and `now+0.5` (seconds) are stamps, `.inf` and `.nan` are floats, `{from: 0, to: 1}` is a number
+    that changes evenly from the first message to the last, `{each: […]}` takes its items in turn, one for
+    each message, and `{repeat: .inf, count: 360, except: {"150-210": 0.3}}` is an array. Without `count`
+    and `duration_s` each value is sent once. Sending begins once a node has subscribed, and with `latched`
+    at once.
     """
 
     topic: str
     """The topic, with its slash: `/chatter`."""
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
-    """A message type of ROS's, of the student's package or of one that is installed."""
+    """A message type of ROS, of the student's package or of an installed one."""
     value: Any = None
     """What each message holds."""
     values: tuple[Any, ...] = ()
@@ -202,8 +204,8 @@ class Publish(Record):
     latched: bool = False
     """Whether the last message is kept for nodes that subscribe later."""
     background: bool = False
-    """Whether the next steps begin at once, beside this one. Without `count` and `duration_s` it lasts until the run
-    ends."""
+    """Whether the next steps begin at once, during this one. Without `count` and `duration_s` it lasts until the
+    run ends."""
 
     @property
     def in_turn(self) -> tuple[Any, ...]:
@@ -224,7 +226,8 @@ class Wait(Record):
     """A pause. Give one of `seconds`, `topic` and `node`."""
 
     seconds: StepSeconds | None = None
-    """So long by the run's clock, from when the processes that run are nodes, or cannot become any."""
+    """How long, by the run's clock, counted from when the running processes are nodes, or cannot become
+    any."""
     topic: str | None = None
     """Until this topic has had its messages."""
     messages: Annotated[int, Field(ge=1, le=MESSAGES_MAX)] = 1
@@ -234,7 +237,7 @@ class Wait(Record):
     node: str | None = None
     """Until a node of this name is registered."""
     limit_s: StepSeconds | None = None
-    """After so long the run goes on without it; null: the `first_message_s` of `until`."""
+    """The run goes on without it after this time; null: the `first_message_s` of `until`."""
 
 
 class Action(Record):
@@ -247,14 +250,14 @@ class Action(Record):
     goal: Annotated[dict[str, Any], Field(default_factory=dict)]
     """The goal's fields; those that it lacks are zero."""
     cancel_after_s: StepSeconds | None = None
-    """Cancels the goal so long after it was sent, where no result has come by then; null: never."""
+    """How long after it was sent the goal is cancelled, if no result has come by then; null: never."""
     limit_s: StepSeconds = 30.0
-    """Without a result within this, the run goes on. The last goal of an action, once cancelled, is waited for no
-    longer than twice the `within_s` of its criteria, or 5 s more than that."""
+    """Without a result within this time, the run goes on. After cancelling the last goal of an action, it
+    waits no longer than twice the `within_s` of its criteria, or 5 s more than that."""
 
 
 class Play(Record):
-    """A recording beside the rubric, with its messages as they are, stamps too.
+    """A recording beside the rubric, with its messages unchanged, including their stamps.
 
     Playing begins once a node has subscribed.
     """
@@ -266,7 +269,7 @@ class Play(Record):
     speed: Annotated[float, Field(gt=0, le=100)] = 1.0
     """2 is twice as fast."""
     background: bool = False
-    """Whether the next steps begin at once, beside this one."""
+    """Whether the next steps begin at once, during this one."""
 
 
 class SetParam(Record):
@@ -279,7 +282,8 @@ class SetParam(Record):
 
 
 class Transform(Record):
-    """Where one frame is in another, on `/tf`, or latched on `/tf_static`. Numbers may change as `publish` has them."""
+    """Where one frame is in another, on `/tf`, or latched on `/tf_static`. Numbers may change as in
+    `publish`."""
 
     parent: Annotated[str, Field(min_length=1)]
     """The frame in which it is."""
@@ -288,7 +292,7 @@ class Transform(Record):
     translation: Annotated[tuple[Any, ...], Field(min_length=3, max_length=3)] = (0, 0, 0)
     """x, y, z in metres; each may be a number that changes, `{from: 0, to: 1}`."""
     rotation_deg: Annotated[tuple[Any, ...], Field(min_length=3, max_length=3)] = (0, 0, 0)
-    """Roll, pitch and yaw in degrees, as tf's are; each may be a number that changes."""
+    """Roll, pitch and yaw in degrees, in tf's order; each may be a number that changes."""
     static: bool = False
     """Whether it is sent once, latched, on `/tf_static`."""
     rate_hz: Annotated[float, Field(gt=0, le=100)] = 20.0
@@ -298,7 +302,7 @@ class Transform(Record):
     duration_s: StepSeconds | None = None
     """How long to send."""
     background: bool = False
-    """Whether the next steps begin at once, beside this one."""
+    """Whether the next steps begin at once, during this one."""
 
     @property
     def published(self) -> Publish:
@@ -333,9 +337,9 @@ class Typed(Record):
 class Step(Record):
     """One thing that the grader does in a run, after the probes, the calls and the steps before it. Give one key.
 
-    `start`, `stop`, `kill` and `restart` name one of the scenario's `start`. What a step starts before anything else
-    names it is not started with the others. What a step did is in the evidence (`/grader/actor`). When no student's
-    process runs any more, and no later step starts one, the steps that are left are left out.
+    `start`, `stop`, `kill` and `restart` name one of the scenario's `start`. If a process first appears in
+    a `start` step, it is not started with the others. What a step did is in the evidence (`/grader/actor`).
+    When no student's process runs any more, and no later step starts one, the remaining steps are skipped.
     """
 
     publish: Publish | None = None
@@ -378,45 +382,47 @@ class Step(Record):
 
 
 class Until(Record):
-    """When a run has seen enough. All conditions that are given must hold; with none, it is watched for `limit_s`.
+    """When a run has seen enough. All given conditions must be true; without any, the run lasts `limit_s`.
 
-    What cannot come is given up sooner: once all processes are nodes that only wait, loop or compute, and nothing in
-    the graph has changed for 1.5 to 4 s. A topic on which a node only waits for callbacks stays silent then, and after
-    `silent_s` one of a node that loops and whose script publishes, unless `first_message_s` is more than 20.
-    `alive_s`, silence and `quiet_s` do not count while a process may still become a node: until it is one, or
-    `silent_s` after its start. Where others fill the machine, this, `first_message_s` and `limit_s` are longer by what
-    they take.
+    The run waits less long for what cannot come: once all processes are nodes that only wait, loop or
+    compute, and nothing in the graph has changed for 1.5 to 4 s. Then a topic counts as silent if its node
+    only waits for callbacks; if the node loops and its script publishes, only after `silent_s`, unless
+    `first_message_s` is more than 20. `alive_s`, silence and `quiet_s` do not count while a process may
+    still become a node: until it is one, or `silent_s` after its start. If other programs keep the machine
+    busy, this time, `first_message_s` and `limit_s` are longer by the time that those take.
     """
 
     window_s: Seconds | None = None
-    """That long after the first message on every topic of `topics`, or until the rates that are judged there are
-    clear. A topic that stays silent is waited for until `silent_s` after the first message on another, and twice as
-    long while messages come to a node of the student's: it may collect many before it publishes."""
+    """This long after the first message on every topic of `topics`, or until the rates that are judged
+    there are clear. The run waits for a silent topic until `silent_s` after the first message on another,
+    and twice as long while messages come to a node of the student's, which may collect many before it
+    publishes."""
     topics: tuple[str, ...] = ()
     """The topics of `window_s`, with their slash."""
     messages: Annotated[dict[str, int], Field(default_factory=dict)]
-    """So many messages on each topic: `{/chatter: 20}`."""
+    """How many messages on each topic: `{/chatter: 20}`."""
     connected: tuple[str, ...] = ()
-    """Topics over which a publisher and a subscriber of the student's are connected, for a second."""
+    """Topics over which a publisher and a subscriber of the student's have been connected for a second."""
     heard: bool = False
     """Whether every probe's value has to be printed."""
     nodes: Annotated[int, Field(ge=0)] = 0
-    """So many nodes of the student's have registered."""
+    """How many nodes of the student's have registered."""
     alive_s: Seconds | None = None
-    """That long after the student's first node registered, and half as long after the last process's did."""
+    """This long after the student's first node registered, and half as long after the last process's node
+    did."""
     opened: tuple[str, ...] = ()
     """Programs that were asked to open something: `firefox`."""
     ended: tuple[Name, ...] = ()
     """Processes that have ended."""
     quiet_s: Seconds | None = None
-    """For so long nothing was printed, published, registered or set, and something was before."""
+    """Nothing has been printed, published, registered or set for this long, after something was."""
     first_message_s: Seconds = 20.0
-    """The run gives up when no message has come within this."""
+    """The run gives up if no message has come within this time."""
     silent_s: Seconds = 6.0
-    """The run gives up when all that is waited for has been silent for so long; where a connection is waited for, when
-    nothing in the graph has changed for the longer of this and `first_message_s`."""
+    """The run gives up if everything that it waits for has been silent for this long; if it waits for a
+    connection, when nothing in the graph has changed for the longer of this and `first_message_s`."""
     limit_s: Seconds = 60.0
-    """The run ends after this at the latest."""
+    """The run ends after this time at the latest."""
 
 
 class Scenario(Record):
@@ -442,8 +448,8 @@ class Scenario(Record):
     serves: tuple[Served, ...] = ()
     """Services and actions that the grader offers to the student's nodes."""
     steps: tuple[Step, ...] = ()
-    """What the grader does, one after the other; `until` is looked at once they are over, and its times count from
-    then on."""
+    """What the grader does, one step after the other; `until` is checked after the last one, and its times
+    count from then on."""
     until: Annotated[Until, Field(default_factory=lambda: Until(messages={}))]
     """When the run has seen enough."""
     keeps: tuple[Annotated[str, Field(min_length=1)], ...] = ()

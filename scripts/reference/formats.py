@@ -45,7 +45,7 @@ The [exit codes](exit-codes.md) have a page of their own.
 
 OF_EVIDENCE = """\
 MCAP files ([mcap.dev](https://mcap.dev)), profile `ros1`, chunks compressed by zstd with checksums. `package.mcap`
-holds what the files say and the build, each `<scenario>.mcap` a run. Any reader of MCAP opens them.
+holds what the files say and the build, each `<scenario>.mcap` a run. Any MCAP reader opens them.
 
 - **What nodes published**: a channel for each topic and publisher, `message_encoding` `ros1`, its schema
   (`ros1msg`) as the publisher sent it, and the channel metadata `topic`, `callerid`, `md5sum`, `latching` (`1` or
@@ -61,21 +61,21 @@ METADATA = {
     "format": "The version of this format: `1`.",
     "scenario": "The scenario's name in the rubric; `package` for the files and the build.",
     "clock": "`real` or `warped`.",
-    "warp": "How many times faster than the wall a warped clock ran.",
+    "warp": "How many times faster than real time a warped clock ran.",
     "submission.id": "As in the result.",
     "submission.source": "As in the result.",
-    "submission.commit": "As in the result; empty where there is none.",
+    "submission.commit": "As in the result; empty if there is none.",
     "submission.digest": "As in the result.",
     "submission.package": "As in the result.",
-    "scenario.digest": "sha256 of the scenario's definition: by another one of the same name, it has to be run again.",
+    "scenario.digest": "sha256 of the scenario's definition: if that changes, the scenario has to be run again.",
     "grader": "The version of the grader that recorded it.",
     "ros": "The ROS that ran it.",
     "python": "The Python of that ROS.",
-    "sandbox": "What shut the student's code in.",
+    "sandbox": "What confined the student's code.",
     "limits": "The limits that it ran under, as JSON.",
-    "made_up": "The values that were made up for the submission, as JSON; only there where there are any.",
-    "not_run": "Why nothing was run; only there where nothing was.",
-    "recording.missing": "Which file was to be handed in and was not there.",
+    "made_up": "The values that were made up for the submission, as JSON; only there if there are any.",
+    "not_run": "Why nothing was run; only there if nothing was.",
+    "recording.missing": "Which file should have been handed in and was missing.",
     "recording.problem": "Why the recording that was handed in cannot be read.",
 }
 

@@ -217,7 +217,7 @@ class WrapParams(Record):
     wraps: Annotated[int, Field(ge=1)] = 2
     """How often the wrap has to be seen."""
     rate_hz: Annotated[float, Field(gt=0)] = 10.0
-    """The nominal rate, to know a flood of messages from a counter."""
+    """The nominal rate, to tell a flood of messages from a counter."""
 
     @model_validator(mode="after")
     def _goes_up(self) -> WrapParams:

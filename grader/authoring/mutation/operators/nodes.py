@@ -134,7 +134,7 @@ def ctrl_c_swallowed(script: Script, life: ast.While | ast.Expr) -> list[TextEdi
 
 @operator("traceback-on-exit", each=_lives)
 def traceback_on_exit(script: Script, life: ast.While | ast.Expr) -> list[TextEdit]:
-    """Uses a variable that is not there, once the node has been told to end.
+    """Uses an undefined variable once the node has been told to end.
 
     Fits every script with a loop until shutdown or a spin.
     """
@@ -275,7 +275,7 @@ def typographic_quote(script: Script) -> list[TextEdit]:
 
 @operator("no-break-space", each=each_script)
 def no_break_space(script: Script) -> list[TextEdit]:
-    """Copies a line from a PDF, with a space that is none for Python.
+    """Copies a line from a PDF, with a space that Python does not accept.
 
     Fits every Python script with an assignment that has spaces around its sign.
     """
@@ -301,7 +301,7 @@ def syntax_error(script: Script) -> list[TextEdit]:
 
 @operator("missing-module", each=each_script)
 def missing_module(script: Script) -> list[TextEdit]:
-    """Imports messages of a package that is not there.
+    """Imports messages of a package that does not exist.
 
     Fits every Python script that imports rospy.
     """
