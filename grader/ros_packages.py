@@ -31,8 +31,8 @@ COMMON = frozenset({
 })  # fmt: skip
 """What most students' packages depend on: known without a look at all that there is, which takes a while."""
 IGNORED = frozenset({"CATKIN_IGNORE", "AMENT_IGNORE"})
-TypeKind = Literal["msg", "srv"]
-WORDS: Mapping[TypeKind, str] = {"msg": "message", "srv": "service"}
+TypeKind = Literal["msg", "srv", "action"]
+WORDS: Mapping[TypeKind, str] = {"msg": "message", "srv": "service", "action": "action"}
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ IGNORED = frozenset({"build", "devel", "install", "__pycache__"})
 LAUNCH_ENDINGS = (".launch", ".launch.xml")
 SCRIPT = b"#!"
 _NAME = re.compile(rb"<name>\s*([\w-]+)\s*</name>")
+_TEST_NAME = re.compile(r"""<test\b[^>]*\btest-name\s*=\s*["']([^"']+)["']""")
 _COMMENT = re.compile("<!--.*?-->", re.DOTALL)
 _TARGET = re.compile(r"(?:add_executable\s*\(\s*|\bOUTPUT_NAME\s+)\"?([\w.-]+)")
 
@@ -94,10 +95,10 @@ def _programs(rubric: dict[str, Any], package: str, files: Mapping[str, bytes]) 
         if owner == package and name not in known and "${" not in cmake:
             yield path, f'{package} has no program or launch file "{name}"{did_you_mean(name, known)}'
         elif owner == package and name.endswith(ROSTEST_ENDING):
-            text = next(data for file, data in files.items() if file.endswith(f"/{name}")).decode(
-                errors="replace"
-            )
-            yield from ((path, fault) for fault in _started_by_test(rubric, name, _COMMENT.sub("", text)))
+            data = next(data for file, data in files.items() if file.endswith(f"/{name}"))
+            text = _COMMENT.sub("", data.decode(errors="replace"))
+            yield from ((path, fault) for fault in _started_by_test(rubric, name, text))
+            yield from _unknown_tests(rubric, path, name, text)
 
 
 def _started_by_test(rubric: dict[str, Any], name: str, text: str) -> Iterator[str]:
@@ -105,6 +106,20 @@ def _started_by_test(rubric: dict[str, Any], name: str, text: str) -> Iterator[s
     for own in packages_in(rubric):
         if re.search(rf"""pkg\s*=\s*["']{own}["']|\$\(find {own}\)""", text):
             yield f"{name} starts something of {own}: take it out, and start it in the scenario, before the tests"
+
+
+def _unknown_tests(rubric: dict[str, Any], start: KeyPath, name: str, text: str) -> Iterator[Fault]:
+    """Yield the tests that criteria ask for and that the `.test` file, started at that place, does not have."""
+    tests = set(_TEST_NAME.findall(text))
+    scenario = as_map(as_map(rubric.get("scenarios")).get(str(start[1])))
+    process = next((one.get("name") for n, one in as_maps(scenario.get("start")) if n == start[3]), None)
+    for index, criterion in as_maps(rubric.get("criteria")):
+        given = as_map(criterion.get("with"))
+        test = given.get("test")
+        is_asked = criterion.get("scenario") == start[1] and given.get("process") == process
+        if is_asked and isinstance(test, str) and test and "$(" not in text and test not in tests:
+            fault = f'{name} has no <test test-name="{test}">{did_you_mean(test, tests)}'
+            yield ("criteria", index, "with", "test"), fault
 
 
 def _started_programs(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:

@@ -29,7 +29,7 @@ from grader.wording import closest, did_you_mean, join_words
 LAUNCH_ENDINGS = (".launch", ".xml")
 OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended", "quiet_s")
 """Conditions of `until` that say nothing of how long a run lasts."""
-TYPES: Mapping[str, TypeKind] = {"message": "msg", "field": "msg", "service": "srv"}
+TYPES: Mapping[str, TypeKind] = {"message": "msg", "field": "msg", "service": "srv", "action": "action"}
 LIKELY, SURE = 0.6, 0.85
 """How alike two names have to be: to be suggested, and to be taken for one with a slip."""
 ASKED_OF_STUDENT = frozenset({
@@ -46,6 +46,7 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     for name, scenario in scenarios.items():
         yield from _outside_faults(("scenarios", name), scenario, rubric)
+        yield from _type_faults(("scenarios", name), scenario, rubric)
         found = (*parameter_faults(scenario), *argument_faults(scenario, rubric))
         yield from ((("scenarios", name, *at), fault) for at, fault in found)
     for index, criterion, others in _criteria(rubric):
@@ -57,6 +58,9 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
                 as_map(criterion.get("with")), judged or {}, others | set(_topics_in(judged))
             )
             yield from ((("criteria", index, "with", *at), fault) for at, fault in asked)
+    for index, package in as_texts(as_map(rubric.get("needs")).get("ros")):
+        if fault := ros_packages().misspelt(package):
+            yield ("needs", "ros", index), fault
     yield from field_faults(rubric)
     yield from frame_faults(rubric)
     yield from _unused_faults(rubric, scenarios, checks)
@@ -94,8 +98,19 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
         if package in packages_in(rubric):
             key = "launch" if file.endswith(LAUNCH_ENDINGS) else "script"
             yield at, f"is the student's: with program it would count as the grader's. Write {key}: {file}"
+
+
+def _type_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield types that no machine has, of what a scenario sends, calls and offers."""
     for at, _, one in services_in(scenario):
         yield from _of_machine((*path, *at, "type"), "service", one.get("type"), rubric)
+    for index, step in as_maps(scenario.get("steps")):
+        for key, to in (("publish", "message"), ("action", "action")):
+            kind = as_map(step.get(key)).get("type")
+            yield from _of_machine((*path, "steps", index, key, "type"), to, kind, rubric)
+    for index, served in as_maps(scenario.get("serves")):
+        if served.get("action") is not None:
+            yield from _of_machine((*path, "serves", index, "type"), "action", served.get("type"), rubric)
 
 
 def _file_fault(file: str, rubric: dict[str, Any]) -> str:

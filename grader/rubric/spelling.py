@@ -8,18 +8,26 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from grader.checks.support.topics import SYSTEM_TOPICS
+from grader.installable import noetic_messages
 from grader.rubric.message_fields import type_judged, types_of
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import is_one_edit
 
 ONE_NAME = re.compile(
-    r"/[A-Za-z][\w/]*|[\w./-]*\.(?:py|cpp|launch|ya?ml|csv|txt|bag|pgm|urdf|srv|msg|action)"
+    r"/[A-Za-z][\w/]*|[\w./-]*\.(?:py|cpp|launch|ya?ml|csv|txt|bag|pgm|urdf|srv|msg|action|xml)"
 )
 """A topic, a service, a node or a parameter, and a file of the student's."""
-PLAIN_NAMES = {"script", "parent", "child", "publisher", "subscriber"}
-"""Keys of names that have neither a slash nor an ending: programs in C++, nodes and frames."""
+PLAIN_NAMES = {
+    "script", "parent", "child", "publisher", "subscriber", "frame_id", "child_frame_id", "names", "opened", "columns",
+    "launch", "folders",
+}  # fmt: skip
+"""Keys of names that have neither a slash nor a known ending: programs, nodes, frames, columns and folders; or of lists
+of them."""
+WORDS = {"text", "template", "value", "values"}
+"""Keys of texts that students have to write as the handout has them; or of lists of them."""
 FIELDS = {"result", "expect", "request", "goal", "answer", "feedback"}
 """Keys of maps from fields to values."""
+_WORD = r"[^\W\d]\w+"
 CHARS_MIN = 3
 """Of names of so few letters, one that differs in a letter is another name."""
 PROSE = {"title", "handout", "hint", "reproduce"}
@@ -31,14 +39,45 @@ def doubtful_names(data: object, folder: Path) -> Iterator[Fault]:
     for path, text, near in _named_once(data, folder):
         if not near:
             yield path, f"nothing else in the rubric names {text}: is it spelt as in the handout?"
+    for path, word, near in _misspelt_words(data, code=False):
+        yield (
+            path,
+            f'nothing else in the rubric has the word {word}: did you mean "{near}", as in the handout?',
+        )
 
 
 def misspelt_names(data: object, folder: Path) -> Iterator[Fault]:
-    """Yield those of them that are one letter off from a name that other lines have."""
-    for path, text, near in _named_once(data, folder):
+    """Yield those of them that are one letter off from a name that other lines have, and words of texts that are one
+    letter off from one that the handout has in backticks."""
+    for path, text, near in (*_named_once(data, folder), *_misspelt_words(data, code=True), *_package(data)):
         if near:
             fault = f'nothing else in the rubric names {text} (did you mean "{near}"?): '
             yield path, fault + "if it is right, say it in the handout too"
+
+
+def _package(data: object) -> Iterator[tuple[KeyPath, str, str]]:
+    """Yield the package's name where it is one letter off from the lab's id, or from a word of the handout or title."""
+    rubric = as_map(data)
+    package, prose = rubric.get("package"), f"{rubric.get('handout')} {rubric.get('title')}"
+    known = dict.fromkeys([str(rubric.get("id")).replace("-", "_"), *re.findall(r"\w+", prose)])
+    if isinstance(package, str) and not re.search(rf"\b{re.escape(package)}\b", prose):
+        near = next((one for one in known if is_slip(package, one)), "")
+        yield from [(("package",), package, near)] if near and package not in known else []
+
+
+def _misspelt_words(data: object, *, code: bool) -> Iterator[tuple[KeyPath, str, str]]:
+    """Yield each word of a criterion's texts that no other line has, and the handout's word that is meant by it: one in
+    backticks, or with `code=False` any other."""
+    texts, handout = list(texts_in((), data)), str(as_map(data).get("handout"))
+    quoted = set(re.findall(_WORD, " ".join(re.findall(r"`([^`]+)`", handout))))
+    known = quoted if code else set(re.findall(_WORD, handout)) - quoted
+    for path, text in texts:
+        if path[0] != "criteria" or _key(path) not in WORDS or text == path[-1]:
+            continue
+        for word in re.findall(rf"(?<![{{\w]){_WORD}(?![\w}}])", text):
+            near = next((one for one in sorted(known) if is_slip(word, one)), "")
+            if near and _count(word, word, texts) == 1:
+                yield path, word, near
 
 
 def _named_once(data: object, folder: Path) -> Iterator[tuple[KeyPath, str, str]]:
@@ -62,7 +101,7 @@ def _named_once(data: object, folder: Path) -> Iterator[tuple[KeyPath, str, str]
             )
             quoted = [one for one in re.findall(r"`[/~]?(\w+)`", handout) if is_slip(last, one)]
             yield path, text, near or next(iter(quoted), "")
-        elif text.startswith("/") and _count(text, text, texts) == 1:
+        elif re.search(r"[/.]", text) and _count(text, text, texts) == 1:
             if (whole := _in_namespace(path, text, names)) and not re.search(
                 rf"(?<![\w~]){text}(?!\w)", handout
             ):
@@ -103,19 +142,24 @@ def is_slip(word: str, other: str) -> bool:
 def _is_slip_in_path(name: str, other: str, texts: list[tuple[KeyPath, str]]) -> bool:
     """Return whether one part of a name with slashes is one letter off. The last part has to be the same, or the other
     name to be there more than once."""
-    parts, others = name.split("/"), other.split("/")
+    parts, others = re.split("[/.]", name), re.split("[/.]", other)
     differing = [pair for pair in zip(parts, others, strict=False) if pair[0] != pair[1]]
     if len(parts) != len(others) or len(differing) != 1 or not is_slip(*differing[0]):
         return False
-    return parts[-1] == others[-1] or _count(other, other, texts) > 1
+    return name.rpartition("/")[2] == other.rpartition("/")[2] or _count(other, other, texts) > 1
 
 
 def _last_word(path: KeyPath, text: str, rubric: dict[str, Any]) -> str:
     """Return the part of a name by which others would know it; "" for a text that is not a name of the student's."""
-    if ONE_NAME.fullmatch(text) or (path[-1] in PLAIN_NAMES and text != path[-1]):
+    if ONE_NAME.fullmatch(text) or (_key(path) in PLAIN_NAMES and text != path[-1]):
         return PurePosixPath(text).stem
     is_field = FIELDS & {*path[:-1]} and text == path[-1] and not _is_known_field(path, rubric)
     return text.rpartition(".")[2].partition("[")[0] if is_field or _is_own_field(path, rubric) else ""
+
+
+def _key(path: KeyPath) -> object:
+    """Return the key that a text is the value of, or one of the values."""
+    return next((part for part in reversed(path) if not isinstance(part, int)), "")
 
 
 def _is_known_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
@@ -136,12 +180,19 @@ def _own_packages(rubric: dict[str, Any]) -> set[str]:
 
 
 def _is_own_field(path: KeyPath, rubric: dict[str, Any]) -> bool:
-    """Return whether a field of a message type is meant that the student or the course defines."""
+    """Return whether a field of a message type is meant that the student or the course defines, or one that no message
+    of ROS's has, on a topic whose type is not said."""
     if len(path) != 4 or path[-2:] != ("with", "field"):
         return False
     criterion = next((one for index, one in as_maps(rubric.get("criteria")) if index == path[1]), {})
-    topic = as_map(criterion.get("with")).get("topic")
-    return any(str(kind).partition("/")[0] in _own_packages(rubric) for kind in types_of(str(topic), rubric))
+    given = as_map(criterion.get("with"))
+    kinds = [*types_of(str(given.get("topic")), rubric)]
+    if not kinds:
+        of_ros = {
+            field for types in noetic_messages().values() for fields in types.values() for field in fields
+        }
+        return not of_ros.issuperset(re.findall(r"[^\W\d]\w*", str(given.get("field"))))
+    return any(str(kind).partition("/")[0] in _own_packages(rubric) for kind in kinds)
 
 
 def texts_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, str]]:

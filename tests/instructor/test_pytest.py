@@ -125,7 +125,7 @@ def test_some_are_selected(tmp_path):
         ("def test_a(nothing):\n    pass\n", "there is no fixture 'nothing'"),
         ("def test_a(evidence):\n    evidence['tolker']\n", "there is no scenario 'tolker'"),
         ("import pytest\n@pytest.mark.points('x')\ndef test_a():\n    pass\n", "points(…) takes one number"),
-        ("import pytest\n@pytest.mark.points(0)\ndef test_a():\n    pass\n", "have 0 points together"),
+        ("import pytest\n@pytest.mark.points(0)\ndef test_a():\n    pass\n", "have 0 points in total"),
         ("raise SystemExit('no')\n", "pytest ended with code 3"),
         ("def test_a():\n    raise OSError('gone\\nfor ever')\n", "test_a: test_lab.py:2: OSError: gone"),
         (

@@ -30,7 +30,7 @@ def _with_steps(folder: Path, *steps: str) -> Path:
         f"{{publish: {SCAN}}}",
         "{publish: {topic: /speed, type: std_msgs/Float64, value: {from: 0, to: .5}, rate_hz: 20, duration_s: 3}}",
         "{publish: {topic: /go, type: std_msgs/Bool, values: [true, false], background: true}}",
-        "{publish: {topic: /own, type: lab/Reading, value: {anything: now}}}",
+        "{publish: {topic: /own, type: lab1/Reading, value: {anything: now}}}",
         "{wait: {seconds: 2}}",
         "{wait: {topic: /cmd_vel, messages: 3, new: true, limit_s: 5}}",
         "{wait: {node: /talker}}",
@@ -39,7 +39,7 @@ def _with_steps(folder: Path, *steps: str) -> Path:
         "{start: talker}, {restart: talker}",
         "{type: {process: talker, line: '3.5'}}",
         "{set_param: {name: /gain, value: [1, 2.5]}}",
-        "{action: {name: /count, type: lab/Count, goal: {target: 5}, cancel_after_s: 2}}",
+        "{action: {name: /count, type: lab1/Count, goal: {target: 5}, cancel_after_s: 2}}",
         "{transform: {parent: map, child: base, translation: [1, {from: 0, to: 2}, 0], duration_s: 2}}",
         "{transform: {parent: base, child: laser, rotation_deg: [0, 0, 180], static: true}}",
     ],
@@ -94,7 +94,10 @@ def test_what_is_not_finite_stays_as_it_is_written(tmp_path: Path) -> None:
         ("{wait: {}}", ".wait: give one of seconds, topic and node: none is there"),
         ("{wait: {seconds: 1, new: true}}", ".wait.new: is for a topic"),
         ("{wait: {node: talker}}", '.wait.node: a node\'s name begins with a slash: "/talker"'),
-        ("{action: {name: count, type: lab/Count}}", '.action.name: an action begins with a slash: "/count"'),
+        (
+            "{action: {name: count, type: lab1/Count}}",
+            '.action.name: an action begins with a slash: "/count"',
+        ),
         ("{set_param: {name: gain, value: 1}}", '.set_param.name: a parameter begins with a slash: "/gain"'),
         (
             "{set_param: {name: /gain, value: .inf}}",
@@ -280,7 +283,7 @@ def test_sound_services(served: str, tmp_path: Path) -> None:
             ": give one of answer, answers and fails: answer and fails are",
         ),
         ("{type: lab1/Add, fails: true}", ": give one of service and action, not neither"),
-        ("{action: /a, type: a/B, fails: true}", ".fails: is not for an action"),
+        ("{action: /a, type: lab1/B, fails: true}", ".fails: is not for an action"),
         (f"{{{OWN}, fails: true, result: {{}}}}", ".result: is not for a service"),
         pytest.param(
             "{action: /a, type: actionlib/Test, result: {reslt: 1}}",
