@@ -282,6 +282,9 @@ def _explain_fault(text: str, end: int, file: str, message: str) -> Fault:
         return _fault(file, half.line, message, half.cause, fix=half.fix)
     if unparsed is not None and text[unparsed.span].startswith('"'):
         line, cause, fix = unparsed.line, 'a quote `"` is opened here and never closed', ""
+    elif head := missing_head(tokens, text):
+        cause = f"the line that begins the command is missing above `{_word(first)}`"
+        fix = f"above line {line}, write `{head}`"
     elif first.kind == "RPAREN":
         cause, fix = "there is one `)` too many", ""
     elif "unexpected end of file" in message and len(tokens) > 1 and tokens[1].kind == "LPAREN":
@@ -291,6 +294,28 @@ def _explain_fault(text: str, end: int, file: str, message: str) -> Fault:
     elif end == 0 and len(text) <= _LINK_CHARS_MAX and _LINK_TEXT.fullmatch(text):
         cause, fix = "the file holds only the path that a link should lead to, no CMake commands", ""
     return _fault(file, line, message, cause, fix=fix, unclosed=unclosed)
+
+
+def missing_head(tokens: list[Token], text: str) -> str:
+    """Return how the call begins whose words and `)` are there alone, from the first of the tokens on; "" where that
+    is not known."""
+    inside = [str(t.value) for t in takewhile(lambda t: t.kind not in {"LPAREN", "RPAREN"}, tokens)]
+    behind = tokens[len(inside) : len(inside) + 1]
+    if not behind or behind[0].kind != "RPAREN":
+        return ""
+    below_comment = text[: behind[0].span.start].rstrip().rpartition("\n")[2].lstrip().startswith("#")
+    called = set(re.findall(r"^\s*(\w+)\s*\(", text, re.MULTILINE))
+    catkin = re.search(r"^\s*find_package\s*\(\s*catkin\b", text, re.MULTILINE)
+    if "DESTINATION" in inside or any(word.endswith(".py") for word in inside):
+        return "catkin_install_python(PROGRAMS"
+    if any("INCLUDE_DIRS" in word for word in inside):
+        return "include_directories("
+    for ending, command in ((".msg", "add_message_files"), (".srv", "add_service_files")):
+        if inside and inside[-1].endswith(ending):
+            return f"{command}(FILES"
+    if inside and not catkin and all(re.fullmatch(r"[a-z]\w+", word) for word in inside):
+        return "find_package(catkin REQUIRED COMPONENTS"
+    return "catkin_package(" if not inside and "catkin_package" not in called and below_comment else ""
 
 
 class HalfComment(NamedTuple):

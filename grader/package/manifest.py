@@ -47,8 +47,8 @@ _CAUSES: tuple[tuple[str, ...], ...] = (
     (r"version must not be empty", "version", "`<version>` is empty", "write 0.0.0"),
     (r'version "(.*?)" does not follow version', "version", "`{0}` is not a version", "write 0.0.0"),
     (r"description must not be empty", "description", "`<description>` is empty", "write a sentence"),
-    (r"at least one maintainer", "", '`<maintainer email="...">` is missing'),
-    (r'at least one "license"', "", "`<license>` is missing"),
+    (r"at least one maintainer", "", '`<maintainer email="...">` is missing', "{maintainer}"),
+    (r'at least one "license"', "", "`<license>` is missing", "{license}"),
     (r"license tag must neither", "license", "`<license>` is empty"),
     (r"must not contain the following tags: (.*)", "{0}", "format {format} has no `<{0}>`"),
     (r"must not contain the following children: (.*)", "",
@@ -74,6 +74,17 @@ _KNOWN_TAGS = (
     *("exec_depend", "test_depend", "doc_depend"),
 )
 _ALIKE = 0.8
+
+
+def required_tags(name: str) -> dict[str, str]:
+    """Return the tags that every manifest has (REP 127, 140, 149), each as it is written for a package of this name."""
+    return {
+        "name": f"<name>{name}</name>",
+        "version": "<version>0.0.0</version>",
+        "description": f"<description>The {name} package</description>",
+        "maintainer": '<maintainer email="you@example.org">You</maintainer>',
+        "license": "<license>BSD</license>",
+    }
 
 
 def read_manifest(folder: Path) -> tuple[Manifest | None, Fault | None]:
@@ -219,11 +230,26 @@ def explain(message: str, root: etree._Element) -> tuple[int | None, Reason]:
         for pattern, tag, *words in _CAUSES:
             if found := re.search(pattern, text):
                 groups = found.groups()
-                reason = Reason(*(one.format(*groups, format=root.get("format", "1")) for one in words))
+                tags = {tag: f"add `{line}`" for tag, line in required_tags(_name_in(root)).items()}
+                reason = Reason(
+                    *(one.format(*groups, format=root.get("format", "1"), **tags) for one in words)
+                )
+                if "exactly one" in text:
+                    reason = _of_one(groups[0], root, tags) or reason
                 known.setdefault(reason, _line_of(root, tag.format(*groups)))
                 break
     line = next((number for number in known.values() if number is not None), line_of(root))
     return line, _together(list(known))
+
+
+def _name_in(root: etree._Element) -> str:
+    return next((_text(element) for tag, element in _elements(root) if tag == "name"), "your_package")
+
+
+def _of_one(wanted: str, root: etree._Element, tags: dict[str, str]) -> Reason | None:
+    """Return what is to be said where a tag of which there has to be one is missing; None where it is there."""
+    there = any(tag == wanted for tag, _ in _elements(root))
+    return None if there or wanted not in tags else Reason(f"`<{wanted}>` is missing", tags[wanted])
 
 
 def _together(reasons: Sequence[Reason]) -> Reason:

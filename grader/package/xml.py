@@ -152,7 +152,7 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
         line, text = opened, _line(data, opened)
         column = text.find("<") + 1
         known = column > 0
-    reason = _opened_again(message, data, text, root) or reason
+    reason = _opened_again(message, data, text, root) or _never_opened(message, data, root) or reason
     return Fault(
         file=file,
         line=line or None,
@@ -174,6 +174,29 @@ def _opened_again(message: str, data: bytes, text: str, root: str) -> Reason | N
     return Reason(
         f"`<{root}>` opens the file a second time here, where it should end", f"write `</{root}>` for it"
     )
+
+
+def _never_opened(message: str, data: bytes, root: str) -> Reason | None:
+    """Return what is to be said where other tags stand outside of the root's, which is never opened; None where it is,
+    or where one tag holds all the others."""
+    text = data.decode("utf-8", "replace")
+    first = _first_tag(text, root)
+    if "Extra content at the end" not in message or first is None:
+        return None
+    return Reason(f"`<{root}>` is missing", f"above line {first + 1}, write `{_opening(text, root)}`")
+
+
+def _opening(text: str, root: str) -> str:
+    """Return the root's tag; that of a manifest with the format that its other tags are of (REP 127, 140)."""
+    is_later = root == "package" and re.search(r"<(exec_)?depend>", text)
+    return f'<{root} format="2">' if is_later else f"<{root}>"
+
+
+def _first_tag(text: str, root: str) -> int | None:
+    """Return the line, from 0, of the first tag of a file that never opens its root's; None where it does."""
+    plain = _COMMENT.sub(lambda found: "\n" * found[0].count("\n"), text)
+    lines = (n for n, line in enumerate(plain.split("\n")) if re.match(r"\s*<\w", line))
+    return None if re.search(rf"<{re.escape(root)}[\s>/]", plain) else next(lines, None)
 
 
 def _line(data: bytes, number: int) -> str:
@@ -267,6 +290,9 @@ def _edits(text: str, fault: Fault, root: str) -> Iterator[str]:
         yield _COMMENT.sub(lambda found: f"<!--{re.sub(r'-(?=-)|-$', '- ', found[1])}-->", text)
     elif "EntityRef" in message:
         yield re.sub(r"&(?!#?\w+;)", "&amp;", text)
+    elif "Extra content at the end" in message and (first := _first_tag(text, root)) is not None:
+        end = [] if f"</{root}>" in text else [f"</{root}>", ""]
+        yield "\n".join([*lines[:first], _opening(text, root), *lines[first:], *end])
     elif "XML declaration allowed only" in message:
         yield text.lstrip()
     last = at + 1 == len(lines) or lines[at + 1].lstrip().startswith("<")

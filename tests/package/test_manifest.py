@@ -52,7 +52,7 @@ def test_what_catkin_warns_of_is_advice(old, new, advice, capfd):
 @pytest.mark.parametrize(
     ("old", "new", "line", "cause"),
     [
-        ("  <name>lab1</name>\n", "", 2, "exactly one `<name>`"),
+        ("  <name>lab1</name>\n", "", 2, "`<name>` is missing"),
         ("<name>lab1<", "<name>my lab<", 3, "`my lab` is not a package name"),
         ("<name>lab1<", "<name><", 3, "`<name>` is empty"),
         ("0.0.0", "1.0", 4, "`1.0` is not a version"),

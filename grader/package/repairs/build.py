@@ -13,8 +13,8 @@ from grader.installable import noetic_messages
 from grader.model.message_definitions import meant_type
 from grader.model.package import CMAKE, MANIFEST, PackageFacts, meant_command
 from grader.model.repair import RepairKind
-from grader.package.cmake_parse import commands_of, join_half_comment
-from grader.package.manifest import parse_manifest
+from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
+from grader.package.manifest import parse_manifest, required_tags
 from grader.package.repairs.editing import Files, naming_files, rename_word, repair_xml
 from grader.package.repairs.files import is_own
 from grader.package.repairs.names import CPP, Wanted, is_near
@@ -41,6 +41,7 @@ def repair_manifest(files: Files, package: PackageFacts, wanted: Wanted) -> str:
     if text is None:
         return package.name
     repair_xml(files, MANIFEST, "package", "manifest-line")
+    _add_required(files, package.name)
     _add_buildtool(files)
     for name in wanted.dependencies:
         _add_dependency(files, name)
@@ -78,6 +79,14 @@ def _is_meant(files: Files, package: PackageFacts, name: str, wanted: str) -> bo
 
 def _parses(text: str) -> bool:
     return parse_xml(text.encode(), MANIFEST, root="package")[0] is not None
+
+
+def _add_required(files: Files, name: str) -> None:
+    """Add the tags without which catkin refuses a manifest."""
+    for tag, line in required_tags(name).items():
+        text = files.text(MANIFEST) or ""
+        if _parses(text) and not re.search(rf"<{tag}\b", _without_comments(text)):
+            _insert(files, line, f"{MANIFEST} has no <{tag}>")
 
 
 def _add_buildtool(files: Files) -> None:
@@ -190,8 +199,8 @@ def _replace_token(text: str, token: Token, new: str) -> str:
 
 
 def _close_bracket(files: Files) -> None:
-    """Take a call wholly out of its comment, or close the bracket at the end of the last line that is not a comment, or
-    on a line of its own."""
+    """Take a call wholly out of its comment, begin one whose first line is missing, or close a bracket: where its call
+    ends, else at the end of the last line that is not a comment, or on a line of its own."""
     text = _cmake(files)
     if commands_of(text.encode()) is not None:
         return
@@ -201,13 +210,27 @@ def _close_bracket(files: Files) -> None:
         )
         return
     lines = text.rstrip().split("\n")
+    fault = parse_tree_of(text.encode(), CMAKE)[1]
+    if fault is not None and (place := _PLACE.fullmatch(fault.fix)):
+        number, begins = int(place["above"] or place["end"]), place["head"]
+        changed = [*lines[: number - 1], begins or f"{lines[number - 1]})", *lines[number - bool(begins) :]]
+        if commands_of("\n".join(changed).encode()) is not None:
+            message = f"line {fault.line} of {CMAKE}: {fault.cause}"
+            files.change("build-line", CMAKE, "\n".join([*changed, ""]), message, fault.fix)
+            return
     last = max((i for i, line in enumerate(lines) if line.split("#", maxsplit=1)[0].strip()), default=0)
     for added in ([lines[last] + ")"], [lines[last], ")"]):
-        changed = "\n".join([*lines[:last], *added, *lines[last + 1 :], ""])
-        if commands_of(changed.encode()) is not None:
+        changed = [*lines[:last], *added, *lines[last + 1 :], ""]
+        if commands_of("\n".join(changed).encode()) is not None:
             message = f"line {last + 1} of {CMAKE}: an opening bracket is never closed"
-            files.change("build-line", CMAKE, changed, message)
+            files.change("build-line", CMAKE, "\n".join(changed), message)
             return
+
+
+_PLACE = re.compile(
+    r"write `\)` at the end of line (?P<end>\d+)|above line (?P<above>\d+), write `(?P<head>.+)`"
+)
+"""Where a bracket is to be closed, or a call to be begun."""
 
 
 def _spell_commands(files: Files) -> None:
@@ -543,6 +566,14 @@ def _correct_destination(files: Files, scripts: Collection[str]) -> None:
         at = next((i for i, t in enumerate(words) if t.value == "DESTINATION"), len(words))
         given = words[at + 1] if at + 1 < len(words) else None
         names_one = any(_plain(t.value) in scripts for t in words)
+        if names_one and at == len(words) and "PROGRAMS" in [t.value for t in words]:
+            text, last = _cmake(files), words[-1].span.stop
+            message = f"line {call.line} of {CMAKE}: {call.identifier}(…) has no DESTINATION"
+            fix = f"write DESTINATION {BIN} as the last words of the call"
+            files.change(
+                "build-line", CMAKE, f"{text[:last]}\n  DESTINATION {BIN}{text[last:]}", message, fix
+            )
+            return
         if given and names_one and given.value != BIN and given.value.strip("${}").startswith("CATKIN_"):
             message = f"line {call.line} of {CMAKE}: {given.value} is not where rosrun looks"
             fix = f"write DESTINATION {BIN}"

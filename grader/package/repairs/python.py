@@ -21,7 +21,7 @@ from grader.model.repair import RepairKind, as_code
 from grader.package.python import reason_of
 from grader.package.repairs.editing import Files
 from grader.syntax_fixes import COMMENTED_OUT, DELETE_LINE, OUT_OF_BLOCK, Reason
-from grader.wording import join_words, plural
+from grader.wording import is_one_edit, join_words, plural
 
 EXAMINE = "grader.package.source_repair:examine"
 LIMITS = {"memory_bytes": 1 << 30, "cpu_s": 20, "file_bytes": 32 << 20, "answer_bytes": 16 << 20}
@@ -120,11 +120,16 @@ IMPORT = re.compile(r"(?:import|from)\s[^(\\;]*")
 
 
 def _unknown_message(line: str) -> str:
-    """Return what is imported from the messages of a known package and is not there; "" where there is no such name."""
+    """Return what is imported from the messages of a known package, is not there, and is no slip of what is; "" where
+    there is no such name."""
     found = re.fullmatch(r"from (\w+)\.msg import ([\w, ]+)", line.strip())
     known = noetic_messages().get(found[1], ()) if found else ()
-    wrong = [name for name in re.split(r"[ ,]+", found[2]) if name not in known] if found and known else []
-    return f"{wrong[0]} in {found[1]}.msg" if found and wrong else ""
+    if found is None or not known:
+        return ""
+    wrong = [name for name in re.split(r"[ ,]+", found[2]) if name not in known]
+    slips = [name for name in wrong if any(is_one_edit(name.lower(), one.lower()) for one in known)]
+    meant = slips or {name.lower() for name in wrong} & {one.lower() for one in known}
+    return f"{wrong[0]} in {found[1]}.msg" if wrong and not meant else ""
 
 
 def _examine(texts: dict[str, str], types: Sequence[str]) -> Iterator[_Entry]:
