@@ -151,14 +151,15 @@ def _without_braces(lines: list[str]) -> str:
 
 
 def _with_body_indented(lines: list[str], at: int) -> Iterator[str]:
-    """Yield the text with the line indented, where it alone can be the body of the block that begins above it."""
-
+    """Yield the text with the line indented, where it alone can be the body of the block that begins above it: a `pass`
+    also from further out."""
     head = next((line for line in reversed(lines[:at]) if without_texts(line).strip()), "")
     after = next((line for line in lines[at + 1 :] if without_texts(line).strip()), "")
-    own = _indentation(lines[at])
+    own, around = _indentation(lines[at]), _indentation(head)
     ends = len(_indentation(after)) < len(own) or not after or CONTINUES.match(after.strip())
-    if lines[at].strip() and own == _indentation(head) and ends:
-        yield with_line(lines, at, "    " + lines[at])
+    does_nothing = lines[at].partition("#")[0].strip() == "pass" and around.startswith(own)
+    if does_nothing or (lines[at].strip() and own == around and ends):
+        yield with_line(lines, at, f"{around}    {lines[at].lstrip()}")
 
 
 def _with_head_uncommented(lines: list[str], at: int) -> Iterator[str]:

@@ -108,6 +108,16 @@ CASES = {
         ["python-syntax"],
         "the line after a `:` must be indented",
     ),
+    "pass-further-out": Case(
+        swapped(TALKER, ("\nmain()", "\nif __name__ == '__main__':\n    try:\n        main()\n    except Exception:\npass")),
+        ["python-syntax"],
+        "indent line 17 by 8 more spaces",
+    ),
+    "many-tabs": Case(
+        swapped(TALKER, ("    rate = rospy.Rate", "".join(f"\ta{n} = {n}\n" for n in range(5)) + "    rate = rospy.Rate")),
+        ["python-syntax"],
+        "start lines 8 to 12 with 4 spaces",
+    ),
     "further-in": Case(swapped(TALKER, ("    rate = ", "       rate = ")), ["python-syntax"],
         "line 8 of src/talker.py: t"),
     "all-further-in": Case(
