@@ -351,6 +351,8 @@ def _why_unnamed(
 
 def _without_call(package: PackageFacts, all_named: Sequence[Installed], path: str) -> Lack:
     fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN})"
+    if beside := package.folder_beside:
+        path = path.removeprefix(f"{beside}/")
     if folder := _folder_above(all_named, path):
         other = "install(DIRECTORY …)"
         why = f"line {folder.call.line}: {other} names {{}}, where catkin_install_python(PROGRAMS …) should"

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from grader.errors import SubmissionError
-from grader.intake.find import BUILD_SPACES
+from grader.model.package import BUILD_SPACES
 from grader.intake.git import Git, GitFailed, GitMissing, Repository
 from grader.intake.gitdir import Repositories, Unfit, link_repository, repository_around
 from grader.intake.limits import NO_CODE, IntakeLimits, too_much

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.errors import GraderError, SubmissionError
-from grader.intake.find import BUILD_SPACES
+from grader.model.package import BUILD_SPACES
 from grader.intake.git import Git, GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.gitdir import Unfit, View, open_view, repository_around
 from grader.intake.names import brief, encodable, listing, printable
