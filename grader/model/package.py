@@ -539,7 +539,9 @@ class PackageFacts(Record):
         if not top or top in PACKAGE_FOLDERS or not PACKAGE_FOLDERS & {path.parts[1] for path in inside}:
             return ""
         calls = self.cmake.calls if self.cmake is not None else ()
-        named = {PurePosixPath(INTERFACE_FOLDERS.get(c.name, "."), arg) for c in calls for arg in c.args if arg}
+        named = {
+            PurePosixPath(INTERFACE_FOLDERS.get(c.name, "."), arg) for c in calls for arg in c.args if arg
+        }
         there = {PurePosixPath(f.path) for f in self.files}
         return top if any(PurePosixPath(top, path) in there and path not in there for path in named) else ""
 

@@ -483,6 +483,13 @@ CASES = {
         swapped(TALKER, ("rate.sleep()", "rate.sleep(0.5")), ["python-syntax", "missing-call"],
         after={TALKER: "rate.sleep()"},
     ),
+    "topics-that-are-all-near": Case(
+        swapped(TALKER, ("    publisher = ", "    rospy.Publisher('numeric_chatter2', Int8, queue_size=10)\n    publisher = "),
+                ("'numeric_chatter'", "'numeric_chatter1'")), []),
+    "topic-of-another-role": Case(
+        swapped(TALKER, ("    publisher = ", "    rospy.Subscriber('numeric_chater', Int8, print)\n    publisher = "),
+                ("'numeric_chatter'", "'numeric_chattr'")), ["topic-name"], "numeric_chattr should be /numeric_chatter",
+        wanted=asking(does=(("src/talker.py", "publisher", "/numeric_chatter"),))),
     "nothing": Case({}, []),
 }  # fmt: skip
 

@@ -77,7 +77,9 @@ def _beside_the_folder(text: str, package: PackageFacts) -> Explained | None:
     there = {f.path.removeprefix(f"{folder}/") for f in package.files if folder}
     there |= {f"{posixpath.dirname(path)}/" for path in there} - {"/"}
     words = (word.strip("/.") for word in re.findall(r"[\w./+-]+", text))
-    absent = next((path for word in words for path in there if f"/{word}/".endswith(f"/{path.rstrip('/')}/")), "")
+    absent = next(
+        (path for word in words for path in there if f"/{word}/".endswith(f"/{path.rstrip('/')}/")), ""
+    )
     if not absent:
         return None
     why = f"{absent} is in {folder}/, and {CMAKE} and {MANIFEST} lie beside that folder"

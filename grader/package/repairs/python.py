@@ -176,7 +176,9 @@ def _rewritten(before: str, after: str) -> str:
 def _further_in(before: str, after: str, line: int) -> str:
     """Return by how many characters more the line begins."""
     one, other = (text.split("\n")[line - 1 : line] or [""] for text in (before, after))
-    more = sum(len(text) - len(text.lstrip()) for text in other) - sum(len(text) - len(text.lstrip()) for text in one)
+    more = sum(len(text) - len(text.lstrip()) for text in other) - sum(
+        len(text) - len(text.lstrip()) for text in one
+    )
     return "four" if more == INDENTATION else str(more)
 
 
