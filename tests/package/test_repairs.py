@@ -73,6 +73,9 @@ TEMPLATE = """\
 LEVELS = "a:\n  b:\n    x: 1\n  y: 2\n  c:\n    z: 3\n"
 
 
+OTHER = "rospy.Publisher('numeric_chatter2', Int8, queue_size=10)"
+
+
 def asking(**more: object) -> Wanted:
     """Return what is wanted of the correct package, and more."""
     return WANTED.model_copy(update=more)
@@ -109,12 +112,12 @@ CASES = {
         "the line after a `:` must be indented",
     ),
     "pass-further-out": Case(
-        swapped(TALKER, ("\nmain()", "\nif __name__ == '__main__':\n    try:\n        main()\n    except Exception:\npass")),
+        swapped(TALKER, ("\nmain()", "\nif 1:\n    try:\n        main()\n    except Exception:\npass")),
         ["python-syntax"],
         "indent line 17 by 8 more spaces",
     ),
     "many-tabs": Case(
-        swapped(TALKER, ("    rate = rospy.Rate", "".join(f"\ta{n} = {n}\n" for n in range(5)) + "    rate = rospy.Rate")),
+        swapped(TALKER, ("    rate = ", "".join(f"\ta{n} = {n}\n" for n in range(5)) + "    rate = ")),
         ["python-syntax"],
         "start lines 8 to 12 with 4 spaces",
     ),
@@ -484,7 +487,7 @@ CASES = {
         after={TALKER: "rate.sleep()"},
     ),
     "topics-that-are-all-near": Case(
-        swapped(TALKER, ("    publisher = ", "    rospy.Publisher('numeric_chatter2', Int8, queue_size=10)\n    publisher = "),
+        swapped(TALKER, ("    publisher = ", f"    {OTHER}\n    publisher = "),
                 ("'numeric_chatter'", "'numeric_chatter1'")), []),
     "topic-of-another-role": Case(
         swapped(TALKER, ("    publisher = ", "    rospy.Subscriber('numeric_chater', Int8, print)\n    publisher = "),
