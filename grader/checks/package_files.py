@@ -385,6 +385,8 @@ def _unreadable(package: PackageFacts) -> Verdict:
     if fault is None or fault.kind == "Missing":
         meant = next(filter(None, (meant_manifest(file.path) for file in package.files)), "")
         hint = "write package.xml beside CMakeLists.txt, as catkin_create_pkg makes it, and push it"
+        if package.cmake is None:
+            hint = "write package.xml and CMakeLists.txt, as catkin_create_pkg makes them, and push both"
         return failed("there is no package.xml", measured="no file", hint=meant or hint)
     line = f", line {fault.line}" if fault.line else ""
     return failed(
