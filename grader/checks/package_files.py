@@ -335,7 +335,9 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
     places += [
         f'pkg="{name}" in {file}, line{"s" * (len(own) > 1)} {join_words(own)}' for file, own in lines.items()
     ]
-    search = f"`grep -rnw {found.name} .` shows whether it stands anywhere else, as in $(find {found.name})"
+    such = f"$(find {found.name})"
+    such += f" or `from {found.name}.msg import …`" if package.interfaces else ""
+    search = f"`grep -rnw {found.name} .` shows whether it stands anywhere else, as in {such}"
     return f"write {join_words(places[:PLACES_SHOWN])}; {search}"
 
 

@@ -255,7 +255,9 @@ class Later:
         said = list({one.message: one for one in self._of("publishes")}.values())
         code = in_language(code_of(template), "python")
         if len(said) != 1:
-            if not said and self._lacks_words(template.partition(SECONDS)[0]):
+            types = {one.message for one in self._of("publisher-type")}
+            no_text = bool(types) and "String" not in types
+            if not said and (no_text or self._lacks_words(template.partition(SECONDS)[0])):
                 yield f"publish `{code}`"
             return
         text = said[0].message
