@@ -88,7 +88,7 @@ def _asked_first_line(found: SourceFile | None) -> str:
 
 def _moved(package: PackageFacts, path: str, wanted: str) -> str:
     """Return that the script goes elsewhere, and what names its place; "" where it is there."""
-    if path == wanted:
+    if path in (wanted, f"{package.folder_beside}/{wanted}"):
         return ""
     calls = {one.call.line: one.call.file for one in installed(package) if names_script(one, path)}
     written = "".join(f", and write {wanted} in {file}, line {line}" for line, file in calls.items())

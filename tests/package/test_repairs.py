@@ -116,6 +116,11 @@ CASES = {
         ["python-syntax"],
         "indent line 17 by 8 more spaces",
     ),
+    "pass-at-no-level": Case(
+        swapped(TALKER, ("\nmain()", "\nif 1:\n    try:\n        main()\n    except Exception:\n  pass  # no")),
+        ["python-syntax"],
+        "indent line 17 by 6 more spaces",
+    ),
     "many-tabs": Case(
         swapped(TALKER, ("    rate = ", "".join(f"\ta{n} = {n}\n" for n in range(5)) + "    rate = ")),
         ["python-syntax"],
