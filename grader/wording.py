@@ -87,6 +87,21 @@ def is_one_edit(one: str, other: str) -> bool:
     return swapped or one[1:] == other[1:] or one[1:] == other or one == other[1:]
 
 
+def numbers_text(numbers: Iterable[int]) -> str:
+    """Return `3, 5 to 8 and 10`, of numbers in their order; two that follow each other are no range."""
+    runs: list[list[int]] = []
+    for each in numbers:
+        if runs and each == runs[-1][-1] + 1:
+            runs[-1].append(each)
+        else:
+            runs.append([each])
+    texts = [[f"{run[0]} to {run[-1]}"] if len(run) > PAIR else map(str, run) for run in runs]
+    return join_words(text for run in texts for text in run)
+
+
+PAIR = 2
+
+
 def lines_text(first: int, last: int) -> str:
     """Return `line 3`, or `lines 3 to 5`, of lines from 0."""
     return f"line {first + 1}" if last == first else f"lines {first + 1} to {last + 1}"

@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import PackageName, check
-from grader.checks.support.build_errors import misspelt_cmake_lists, repair_of_file
+from grader.checks.support.build_errors import misspelt_cmake_lists, move_into, repair_of_file
 from grader.checks.support.scripts import (
     PYTHON,
     Installed,
@@ -20,7 +20,7 @@ from grader.checks.support.scripts import (
     names_script,
 )
 from grader.checks.support.text import near_names, shown
-from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts, meant_command
+from grader.model.package import CMAKE, CMakeCall, CMakeFacts, Fault, PackageFacts, meant_command
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words
@@ -335,11 +335,7 @@ def _why_unnamed(
     wanted = PurePosixPath(path).name
     near = [wanted] if wanted in names else list(near_names(wanted, names))
     if near:
-        one = names[near[0]]
-        why = f"line {one.call.line}: {shown(one.path)} is named, but does not exist; the script is {path}"
-        if one.path.rstrip(",;") == path:
-            why = f"line {one.call.line}: in {shown(one.path)}, the {one.path[-1]} counts as part of the name"
-        return Lack(why, f"write {path} in place of {shown(one.path)}", _line(one))
+        return _named_elsewhere(package, names[near[0]], path)
     why = "catkin_install_python(…) does not name {}"
     if any(one.kind == "PROGRAMS" and is_bin(one.destination or "", package) for one in of_python):
         absent = next((shown(one.path) for one in names.values() if one.known), "")
@@ -350,8 +346,22 @@ def _why_unnamed(
     return Lack(why, fix, None, path)
 
 
+def _named_elsewhere(package: PackageFacts, one: Installed, path: str) -> Lack:
+    """The call names a file that is not there, and the script lies at `path`."""
+    where = f"line {one.call.line}"
+    if path == f"{package.folder_beside}/{one.path}":
+        why = f"{where}: {shown(one.path)} is in {package.folder_beside}/, beside which {CMAKE} lies"
+        return Lack(why, move_into(package.folder_beside), _line(one))
+    why = f"{where}: {shown(one.path)} is named, but does not exist; the script is {path}"
+    if one.path.rstrip(",;") == path:
+        why = f"{where}: in {shown(one.path)}, the {one.path[-1]} counts as part of the name"
+    return Lack(why, f"write {path} in place of {shown(one.path)}", _line(one))
+
+
 def _without_call(package: PackageFacts, all_named: Sequence[Installed], path: str) -> Lack:
     fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN})"
+    if beside := package.folder_beside:
+        path = path.removeprefix(f"{beside}/")
     if folder := _folder_above(all_named, path):
         other = "install(DIRECTORY …)"
         why = f"line {folder.call.line}: {other} names {{}}, where catkin_install_python(PROGRAMS …) should"

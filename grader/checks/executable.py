@@ -86,12 +86,20 @@ def _asked_first_line(found: SourceFile | None) -> str:
     return f"#!{found.shebang.text}" if found and found.shebang and own else RIGHT_SHEBANG
 
 
+def _moved(package: PackageFacts, path: str, wanted: str) -> str:
+    """Return that the script goes elsewhere, and what names its place; "" where it is there."""
+    if path in (wanted, f"{package.folder_beside}/{wanted}"):
+        return ""
+    calls = {one.call.line: one.call.file for one in installed(package) if names_script(one, path)}
+    written = "".join(f", and write {wanted} in {file}, line {line}" for line, file in calls.items())
+    return f"the handout puts it at {wanted}; move it there{written}"
+
+
 def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: ExecutableParams) -> Verdict:
     remarks = package.hints_on(found.path)
     of_first_line = list(shebang_obstacles(found))
     obstacles = [*of_first_line, *_mode_obstacles(found, remarks)]
-    moved = f"the handout puts it at {params.path}; move it there" if found.path != params.path else ""
-    hint = moved or "; ".join(remarks)
+    hint = _moved(package, found.path, params.path) or "; ".join(remarks)
     fault = syntax_fault(found)
     if fault is not None:
         verdict = _syntax_verdict(found, fault, [] if has_wrapper(package, build, found.path) else obstacles)

@@ -336,7 +336,9 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
     places += [
         f'pkg="{name}" in {file}, line{"s" * (len(own) > 1)} {join_words(own)}' for file, own in lines.items()
     ]
-    search = f"`grep -rnw {found.name} .` shows whether it stands anywhere else, as in $(find {found.name})"
+    such = f"$(find {found.name})"
+    such += f" or `from {found.name}.msg import …`" if package.interfaces else ""
+    search = f"`grep -rnw {found.name} .` shows whether it stands anywhere else, as in {such}"
     return f"write {join_words(places[:PLACES_SHOWN])}; {search}"
 
 
@@ -386,6 +388,8 @@ def _unreadable(package: PackageFacts) -> Verdict:
     if fault is None or fault.kind == "Missing":
         meant = next(filter(None, (meant_manifest(file.path) for file in package.files)), "")
         hint = "write package.xml beside CMakeLists.txt, as catkin_create_pkg makes it, and push it"
+        if package.cmake is None:
+            hint = "write package.xml and CMakeLists.txt, as catkin_create_pkg makes them, and push both"
         return failed("there is no package.xml", measured="no file", hint=meant or hint)
     line = f", line {fault.line}" if fault.line else ""
     return failed(

@@ -15,7 +15,6 @@ from grader.errors import UsageError
 from grader.intake import find_packages
 from grader.intake.choose import is_slip
 from grader.intake.find import (
-    BUILD_SPACES,
     WORKSPACE_MARKS,
     Candidate,
     enclosing_package,
@@ -26,7 +25,7 @@ from grader.intake.gitdir import repository_around
 from grader.intake.names import is_archive_name, listing, printable
 from grader.intake.open import is_recording
 from grader.intake.tree import is_file, is_there
-from grader.model.package import CMAKE, MANIFEST
+from grader.model.package import BUILD_SPACES, CMAKE, MANIFEST
 from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
 from grader.rubric.load import LoadedRubric, find_rubric_for_package, load_rubric, packages_of_labs

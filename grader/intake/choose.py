@@ -12,10 +12,10 @@ from pathlib import Path
 
 from grader.errors import PackageNotFound
 from grader.files import read_untrusted
-from grader.intake.find import BUILD_SPACES, WORKSPACE_MARKS, Candidate, manifest_name, named_at
+from grader.intake.find import WORKSPACE_MARKS, Candidate, manifest_name, named_at
 from grader.intake.names import brief, encodable, is_archive_name, listing, printable
 from grader.intake.tree import NO_CONTENT, is_there, walk
-from grader.model.package import MANIFEST, meant_manifest
+from grader.model.package import BUILD_SPACES, MANIFEST, meant_manifest
 from grader.wording import is_one_edit
 
 COPIES_LOOKED_AT, FOLDERS_OF_A_COPY = 50, 300

@@ -13,10 +13,8 @@ from lxml import etree
 from grader.errors import SubmissionError
 from grader.intake.names import LONGEST_PACKAGE_NAME, encodable, printable
 from grader.intake.tree import NO_CONTENT, Folder, is_file, is_there, read_file, walk
-from grader.model.package import CMAKE, MANIFEST
+from grader.model.package import BUILD_SPACES, CMAKE, MANIFEST
 
-# Where catkin puts what it makes: a copy of a package in there is none.
-BUILD_SPACES = frozenset({"build", "devel", "install"})
 FOLDERS_LOOKED_AT, ENTRIES_LOOKED_AT, SECONDS_LOOKED = 3000, 300_000, 3.0
 IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "AMENT_IGNORE", "COLCON_IGNORE"})
 WORKSPACE_MARKS = (".catkin_workspace", ".catkin_tools", "src/CMakeLists.txt")

@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from grader.errors import SubmissionError
-from grader.intake.find import BUILD_SPACES
 from grader.intake.git import Git, GitFailed, GitMissing, Repository
 from grader.intake.gitdir import Repositories, Unfit, link_repository, repository_around
 from grader.intake.limits import NO_CODE, IntakeLimits, too_much
 from grader.intake.names import brief, encodable, listing, printable
 from grader.intake.source import GivenModes
 from grader.intake.tree import Entry, list_entries, read_file
+from grader.model.package import BUILD_SPACES
 from grader.model.submission import ModeSource, chmod_hint
 from grader.portable import MODES_ON_DISK, system
 

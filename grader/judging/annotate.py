@@ -7,9 +7,9 @@ wants of it, and with advice on what no criterion asks for, but stops a student 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from grader.checks.messages import code_of
 from grader.checks.support.exit_causes import syntax_hint
@@ -25,6 +25,7 @@ from grader.wording import significant
 
 POINTS_MAX = 3
 USUAL_RATE_HZ = 10
+Told = TypeVar("Told", Verdict, CriterionResult)
 OF_FILES = ("build", "cmake", "manifest")
 """Checks whose criterion takes the advice: it is of the package as a whole."""
 
@@ -116,6 +117,27 @@ def choose_hint_language(verdict: Verdict, criterion: Criterion, facts: Facts) -
         return verdict
     hint = in_language(verdict.hint, language_of(verdict, criterion, facts))
     return verdict.model_copy(update={"hint": hint})
+
+
+def lab_names(rubric: Rubric, lost: Collection[str], package: PackageFacts | None) -> dict[str, str]:
+    """Return the `pkg="…"` that hints have of the package's present name, and the one to write: where the manifest is
+    told to take the lab's name, launch files are told that one too. `lost` are criteria's ids."""
+    asked = (
+        str(c.parameters.get("name", ""))
+        for c in rubric.criteria
+        if c.check == "manifest" and c.id in lost and c.visibility == "visible"
+        if rubric.package_of(c) == rubric.package
+    )
+    name = next(asked, "")
+    return {f'pkg="{package.name}"': f'pkg="{name}"'} if package is not None and name else {}
+
+
+def with_lab_names(told: Told, names: Mapping[str, str]) -> Told:
+    """Return it with its hint in the names of `lab_names`."""
+    hint = told.hint
+    for old, new in names.items():
+        hint = hint.replace(old, new)
+    return told if hint == told.hint else told.model_copy(update={"hint": hint})
 
 
 def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:

@@ -7,6 +7,7 @@ A verdict and the files that were recorded come in; the verdict goes out with th
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 from grader.checks.cmake import NOT_CALLED, below_catkin_package
 from grader.checks.support.launch import find_launch
@@ -129,16 +130,29 @@ def cite_commented_call(verdict: Verdict, package: PackageFacts | None, build: R
     if not found:
         return verdict
     told = "; ".join(f"{name}(…) is commented out on {lines_text(*place)}" for name, place in found.items())
-    places = join_words(lines_text(*place) for place in found.values())
     update = {
         "message": f"{verdict.message}; {told}",
-        "hint": f"remove the # from {places} of {CMAKE}: {verdict.hint}",
+        "hint": _without_comment_signs(verdict.hint, found),
         "citations": (
             *(FileCitation(file=CMAKE, line=first + 1) for first, _ in found.values()),
             *verdict.citations,
         ),
     }
     return verdict.model_copy(update=update)
+
+
+def _without_comment_signs(hint: str, found: Mapping[str, tuple[int, int]]) -> str:
+    """Return the hint, with the lines of these calls; of the template's catkin_package(…), which has examples in it, no
+    line is left."""
+    rest = dict(found)
+    if CATKIN_PACKAGE_ADDED.search(hint) and len(set(rest.get("catkin_package", ()))) > 1:
+        where = lines_text(*rest.pop("catkin_package"))
+        hint = CATKIN_PACKAGE_ADDED.sub(f"write catkin_package() in place of {where} of {CMAKE}", hint)
+    places = join_words(lines_text(*place) for place in rest.values())
+    return f"remove the # from {places} of {CMAKE}: {hint}" if places else hint
+
+
+CATKIN_PACKAGE_ADDED = re.compile(r"add catkin_package\(\)( below the [^;]*)?")
 
 
 def _cite_install(verdict: Verdict, package: PackageFacts, build: Run, called: str) -> Verdict:

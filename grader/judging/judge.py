@@ -25,7 +25,7 @@ from grader.checks.support.topics import SYSTEM_TOPICS, account_for_losses, expl
 from grader.errors import EvidenceError
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
-from grader.judging.annotate import add_advice, choose_hint_language, fill_slots
+from grader.judging.annotate import add_advice, choose_hint_language, fill_slots, lab_names, with_lab_names
 from grader.judging.cited_lines import (
     cite_commented_call,
     cite_find,
@@ -116,8 +116,9 @@ def judge_all_runs(
             placed = cite_commented_call(placed, facts.package_of(criterion), build)
             placed = cite_find(placed, criterion, facts.package_of(criterion), build)
             shown[criterion.id] = show_lines(cite_name(placed, build), build)
+    names = lab_names(rubric, {i for i, v in shown.items() if v.status.is_lost}, facts.package)
     results = tuple(
-        result_of(c, shown[c.id], rubric.digits, uses.get(c.id), values_of(rubric, c))
+        result_of(c, with_lab_names(shown[c.id], names), rubric.digits, uses.get(c.id), values_of(rubric, c))
         for c in rubric.criteria
     )
     package = facts.package
@@ -451,10 +452,12 @@ def judge_files(
     judging = _Judging(rubric, package, checks)
     for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
         judging.judge(name)
-    found = (judging.results[c.id] for c in rubric.criteria if c.id in judging.results)
+    found = [judging.results[c.id] for c in rubric.criteria if c.id in judging.results]
+    names = lab_names(rubric, {v.criterion.id for v in found if v.criterion.status.is_lost}, package)
+    told = [with_lab_names(v.criterion, names) for v in found]
     return tuple(
-        one.model_copy(update={"criterion": name_unchanged_files(one.criterion, rubric, package, handed_out)})
-        for one in found
+        one.model_copy(update={"criterion": name_unchanged_files(criterion, rubric, package, handed_out)})
+        for one, criterion in zip(found, told, strict=True)
     )
 
 

@@ -163,6 +163,9 @@ class Later:
 
     def _rate(self) -> Iterator[str]:
         hz, numbers = float(str(self._wanted["rate_hz"])), self._of("rate-number")
+        pauses = [one for one in numbers if one.name]
+        if len(pauses) == 1 and self._lacks_words(".sleep()"):  # no Rate is ever slept by
+            numbers = pauses
         if len(numbers) == 1 and abs(float(numbers[0].message) - hz) > RATE_SHARE * hz:
             yield f"make it {significant(hz)} Hz on {_line(numbers[0])}, which asks for {numbers[0].message} Hz"
         for slip in self._of("not-called"):
@@ -252,7 +255,9 @@ class Later:
         said = list({one.message: one for one in self._of("publishes")}.values())
         code = in_language(code_of(template), "python")
         if len(said) != 1:
-            if not said and self._lacks_words(template.partition(SECONDS)[0]):
+            types = {one.message for one in self._of("publisher-type")}
+            no_text = bool(types) and "String" not in types
+            if not said and (no_text or self._lacks_words(template.partition(SECONDS)[0])):
                 yield f"publish `{code}`"
             return
         text = said[0].message

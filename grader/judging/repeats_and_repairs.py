@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from graphlib import TopologicalSorter
 from pathlib import PurePosixPath
 
@@ -132,7 +132,8 @@ def apply_repaired_copy(
         verdict, copy = first[criterion.id], on_copy[criterion.id]
         share = min(rubric.share_of(one.kind) for one in needed) if criterion.points else 1.0
         told = _as_handed_in(charged or needed, repairs)
-        verdicts[criterion.id] = _charge(verdict, copy, told) if charged else _share(copy, told, share)
+        shared = _share(_with_old_names(copy, repairs), told, share)
+        verdicts[criterion.id] = _charge(verdict, copy, told) if charged else shared
         uses[criterion.id] = Repaired(repairs=told, share=share, charged=bool(charged))
     return verdicts, uses
 
@@ -140,8 +141,24 @@ def apply_repaired_copy(
 def _as_handed_in(needed: Sequence[Repair], repairs: Sequence[Repair]) -> tuple[Repair, ...]:
     """Return the repairs with the names that their files have in the package as it is: on the copy, a file may have
     got its right name first."""
-    names = {one.after: one.before for one in repairs if one.kind == "file-name"}
+    names = _old_names(repairs)
     return tuple(one.model_copy(update={"file": names.get(one.file, one.file)}) for one in needed)
+
+
+def _old_names(repairs: Iterable[Repair]) -> dict[str, str]:
+    return {one.after: one.before for one in repairs if one.kind == "file-name"}
+
+
+def _with_old_names(copy: Verdict, repairs: Iterable[Repair]) -> Verdict:
+    """Return a verdict on the copy that cites files by the names that they have in the package as it is."""
+    names = _old_names(repairs)
+    cited = tuple(
+        one.model_copy(update={"file": names.get(one.file, one.file)})
+        if isinstance(one, FileCitation)
+        else one
+        for one in copy.citations
+    )
+    return copy.model_copy(update={"citations": cited})
 
 
 def concerns(
@@ -219,7 +236,8 @@ def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], crit
     """Return whether the copy shows no more of a lost criterion than the package as it is."""
     one, copy = first[criterion.id], on_copy[criterion.id]
     if copy.status.is_lost and copy.score <= one.score:
-        return not one.unjudged or (copy.unjudged and copy.cause == one.cause)
+        same = copy.cause == one.cause and copy.blocked_by == one.blocked_by
+        return not one.unjudged or (copy.unjudged and same)
     # what was judged before, and could not be on the copy, shows nothing of the repair
     return copy.status is Status.ERROR or (copy.status.is_open and not one.unjudged)
 

@@ -11,6 +11,7 @@ import shlex
 from collections.abc import Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from difflib import get_close_matches
+from pathlib import PurePosixPath
 from typing import Literal
 
 from pydantic import Field
@@ -475,6 +476,14 @@ class Interface(Record):
         return tuple(f"{name}{part}" for part in CLASSES_OF.get(suffix, ("",)))
 
 
+BUILD_SPACES = frozenset({"build", "devel", "install"})
+"""Where catkin puts what it makes: a copy of a package in there is none."""
+OF_PACKAGES = frozenset({".py", ".cpp", ".msg", ".srv", ".action", ".launch"})
+PACKAGE_FOLDERS = frozenset({"scripts", "src", "nodes", "bin", "msg", "srv", "action", "launch"})
+INTERFACE_FOLDERS = {"add_message_files": "msg", "add_service_files": "srv", "add_action_files": "action"}
+"""Calls that name definitions, and the folders of these."""
+
+
 class PackageFacts(Record):
     """What the package's files say; nothing of it was run."""
 
@@ -522,6 +531,23 @@ class PackageFacts(Record):
         found = [one for one in self.launch_files if programs and one.starts(programs) == programs]
         own = [one for one in found if all(node.pkg == self.name for node in one.nodes)]
         return [one.path for one in own or found]
+
+    @property
+    def folder_beside(self) -> str:
+        """Return the folder that has all of the package's own folders, where `package.xml` and `CMakeLists.txt` lie
+        beside it and name files as if they lay in it; "" of other packages."""
+        code = [PurePosixPath(f.path) for f in self.files if PurePosixPath(f.path).suffix in OF_PACKAGES]
+        inside = [path for path in code if len(path.parts) > 1 and path.parts[0] not in BUILD_SPACES]
+        tops = {path.parts[0] for path in inside}
+        top = next(iter(tops)) if len(tops) == 1 else ""
+        if not top or top in PACKAGE_FOLDERS or not PACKAGE_FOLDERS & {path.parts[1] for path in inside}:
+            return ""
+        calls = self.cmake.calls if self.cmake is not None else ()
+        named = {
+            PurePosixPath(INTERFACE_FOLDERS.get(c.name, "."), arg) for c in calls for arg in c.args if arg
+        }
+        there = {PurePosixPath(f.path) for f in self.files}
+        return top if any(PurePosixPath(top, path) in there and path not in there for path in named) else ""
 
     def file(self, path: str) -> SourceFile | None:
         """Return the file at this path, or None."""

@@ -119,11 +119,11 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
         return
     if "global declaration" in error["message"]:
         yield from _with_global_first(text, error["line"])
+    if error["message"].startswith(("expected an indented block", "unindent does not match")):
+        yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
     if error["message"].startswith(("unexpected indent", "unindent does not match")):
         yield from (("commented", candidate) for candidate in _with_head_uncommented(lines, at))
         yield from (("level", candidate) for candidate in _with_block_moved(lines, at))
-    if error["message"].startswith("expected an indented block"):
-        yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
     yield from (("python2", candidate) for candidate in as_python3(lines, at))
     if any(map(without_brace, lines[: at + 1])):
         yield "braces", _without_braces(lines)
@@ -151,14 +151,16 @@ def _without_braces(lines: list[str]) -> str:
 
 
 def _with_body_indented(lines: list[str], at: int) -> Iterator[str]:
-    """Yield the text with the line indented, where it alone can be the body of the block that begins above it."""
-
+    """Yield the text with the line indented, where it alone can be the body of the block that begins above it: a `pass`
+    also from further out."""
     head = next((line for line in reversed(lines[:at]) if without_texts(line).strip()), "")
     after = next((line for line in lines[at + 1 :] if without_texts(line).strip()), "")
-    own = _indentation(lines[at])
+    own, around = _indentation(lines[at]), _indentation(head)
     ends = len(_indentation(after)) < len(own) or not after or CONTINUES.match(after.strip())
-    if lines[at].strip() and own == _indentation(head) and ends:
-        yield with_line(lines, at, "    " + lines[at])
+    is_head = without_texts(head).rstrip().endswith(":")
+    does_nothing = lines[at].partition("#")[0].strip() == "pass" and around.startswith(own) and is_head
+    if does_nothing or (lines[at].strip() and own == around and ends):
+        yield with_line(lines, at, f"{around}    {lines[at].lstrip()}")
 
 
 def _with_head_uncommented(lines: list[str], at: int) -> Iterator[str]:

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.errors import GraderError, SubmissionError
-from grader.intake.find import BUILD_SPACES
 from grader.intake.git import Git, GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.gitdir import Unfit, View, open_view, repository_around
 from grader.intake.names import brief, encodable, listing, printable
 from grader.intake.package_files import is_script
 from grader.intake.tree import list_entries
+from grader.model.package import BUILD_SPACES
 from grader.model.result import GitStatus, Point
 from grader.portable import MODES_ON_DISK
 

@@ -299,6 +299,17 @@ def test_calls_that_make_messages_and_are_commented_out_are_named(
     assert cite_commented_call(passed("right"), package, build) == passed("right")
 
 
+def test_the_templates_catkin_package_is_written_in_place_of_its_examples() -> None:
+    text = "project(lab1)\n##     catkin_package(CATKIN_DEPENDS ...)\n#catkin_package(\n#  INCLUDE_DIRS include\n#)\n"
+    build, package = commented(text)
+    lost = failed(
+        "catkin_package(…) is missing", hint="add catkin_package() below the find_package(…) on line 1"
+    )
+    found = cite_commented_call(lost.seeking("uncalled", "catkin_package"), package, build)
+    assert found.message.endswith("catkin_package(…) is commented out on lines 3 to 5")
+    assert found.hint == "write catkin_package() in place of lines 3 to 5 of CMakeLists.txt"
+
+
 @pytest.mark.parametrize(
     ("call", "cited"),
     [("catkin_package()", True), ("find_package(catkin REQUIRED)", True), ("find_package(Boost)", False)],

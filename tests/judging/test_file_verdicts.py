@@ -205,6 +205,32 @@ def test_a_lab_without_criteria_of_files_hears_at_once_which_cannot_be_read(name
     assert found[0].criterion.citations[0].file == next(iter(files))
 
 
+def test_launch_files_are_told_the_name_that_the_manifest_is_told(tmp_path) -> None:
+    launch = '<launch><node pkg="lab_1" type="numeric_talker.py" name="a"/></launch>'
+    facts = facts_of(tmp_path, **{"launch/lab.launch": launch})
+    parameters = {"launch": "lab.launch", "scripts": ["src/numeric_talker.py"]}
+    launched = {"id": "launch", "check": "launch-xml", "with": parameters}
+    right, other = (
+        judge_files(rubric({**MANIFEST_CHECK, "with": {"name": name}}, launched), facts)[1].criterion.hint
+        for name in ("lab1", "basics")
+    )
+    assert 'pkg="lab1"' in right
+    assert 'pkg="basics"' in other
+
+
+def test_a_script_that_has_to_move_is_told_the_line_that_names_it(tmp_path) -> None:
+    where = "DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION}"
+    installed = f"\ncatkin_install_python(PROGRAMS src/numeric_talker.py {where})\n"
+    facts = facts_of(tmp_path, **{"CMakeLists.txt": CMAKE + installed})
+    elsewhere = {**EXECUTABLE, "with": {"path": "scripts/numeric_talker.py"}}
+    told = judge_files(rubric(elsewhere), facts)[0].criterion
+    line = (CMAKE + installed).split("\n").index(installed.strip()) + 1
+    assert told.status is Status.PASS
+    assert told.hint.endswith(
+        f"move it there, and write scripts/numeric_talker.py in CMakeLists.txt, line {line}"
+    )
+
+
 @pytest.mark.parametrize(
     ("files", "other"),
     [

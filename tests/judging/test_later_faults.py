@@ -177,10 +177,10 @@ def test_a_type_that_the_lab_does_not_want_is_not_imported_first() -> None:
     run = {**DIES, "console": console}
     assert hint_of("node", run, TALKER).startswith("from sensor_msgs.msg import JointState")
     told = hint_of("node", run, TALKER, slip("publisher", "chatter"), slip("publisher-type", "JointState"))
-    assert (
-        told
-        == f"from std_msgs.msg import String; then publish std_msgs/String on line 5 of {FILE}, not JointState"
+    retyped = (
+        f"from std_msgs.msg import String; then publish std_msgs/String on line 5 of {FILE}, not JointState"
     )
+    assert told.startswith(retyped)
 
 
 @pytest.mark.parametrize("case", NOTHING)

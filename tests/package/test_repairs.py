@@ -74,6 +74,9 @@ TEMPLATE = """\
 LEVELS = "a:\n  b:\n    x: 1\n  y: 2\n  c:\n    z: 3\n"
 
 
+OTHER = "rospy.Publisher('numeric_chatter2', Int8, queue_size=10)"
+
+
 def asking(**more: object) -> Wanted:
     """Return what is wanted of the correct package, and more."""
     return WANTED.model_copy(update=more)
@@ -108,6 +111,21 @@ CASES = {
         swapped(TALKER, ("\nmain()", "\nif __name__ == '__main__':\nmain()")),
         ["python-syntax"],
         "the line after a `:` must be indented",
+    ),
+    "pass-further-out": Case(
+        swapped(TALKER, ("\nmain()", "\nif 1:\n    try:\n        main()\n    except Exception:\npass")),
+        ["python-syntax"],
+        "indent line 17 by 8 more spaces",
+    ),
+    "pass-at-no-level": Case(
+        swapped(TALKER, ("\nmain()", "\nif 1:\n    try:\n        main()\n    except Exception:\n  pass  # no")),
+        ["python-syntax"],
+        "indent line 17 by 6 more spaces",
+    ),
+    "many-tabs": Case(
+        swapped(TALKER, ("    rate = ", "".join(f"\ta{n} = {n}\n" for n in range(5)) + "    rate = ")),
+        ["python-syntax"],
+        "start lines 8 to 12 with 4 spaces",
     ),
     "further-in": Case(swapped(TALKER, ("    rate = ", "       rate = ")), ["python-syntax"],
         "line 8 of src/talker.py: t"),
@@ -474,6 +492,13 @@ CASES = {
         swapped(TALKER, ("rate.sleep()", "rate.sleep(0.5")), ["python-syntax", "missing-call"],
         after={TALKER: "rate.sleep()"},
     ),
+    "topics-that-are-all-near": Case(
+        swapped(TALKER, ("    publisher = ", f"    {OTHER}\n    publisher = "),
+                ("'numeric_chatter'", "'numeric_chatter1'")), []),
+    "topic-of-another-role": Case(
+        swapped(TALKER, ("    publisher = ", "    rospy.Subscriber('numeric_chater', Int8, print)\n    publisher = "),
+                ("'numeric_chatter'", "'numeric_chattr'")), ["topic-name"], "numeric_chattr should be /numeric_chatter",
+        wanted=asking(does=(("src/talker.py", "publisher", "/numeric_chatter"),))),
     "nothing": Case({}, []),
 }  # fmt: skip
 

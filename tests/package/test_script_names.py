@@ -69,7 +69,7 @@ SAID = {
     "log": ("rospy.loginfo('got %s', msg.data)", ("prints", "got {data}")),
     "log-of-caller": (
         "rospy.loginfo(rospy.get_caller_id() + 'got %s', msg.data)",
-        ("prints", "{}got {data}"),
+        ("prints", "{node}got {data}"),
     ),
     "print": ("print('a', n, msg.data)", ("prints", "a {} {data}")),
     "argument": ("heard = lambda m: print(m)", ("prints", "{data}")),

@@ -574,7 +574,7 @@ def names_in(node):
 # ---- texts that are published and printed
 
 PRINTED = ("loginfo", "logwarn", "logerr", "logdebug", "logfatal", "print", "write")
-VALUE, DATA = "{}", "{data}"
+VALUE, DATA, NODE = "{}", "{data}", "{node}"
 PLACE = re.compile(r"%(?:\(\w*\))?[-+ #0-9.]*[a-zA-Z]|%%")
 FIELD = re.compile(r"\{[^{}]*\}")
 DEPTH = 6
@@ -582,7 +582,7 @@ DEPTH = 6
 
 def said_texts(tree):
     """The texts that a script publishes and prints, as far as its source has them: `{}` is a value, `{data}` that of a
-    message."""
+    message, `{node}` the node's name in what is printed."""
     given, kinds = {}, set()
     for node in walk(tree):
         if isinstance(node, (ast.Assign, ast.AugAssign)):
@@ -595,7 +595,7 @@ def said_texts(tree):
     for node in walk(tree):
         if is_call(node, "publish") and len(node.args) == 1:
             place, text = read.message(node.args[0])
-            yield from said("publishes", place, text)
+            yield from said("publishes", place, text.replace(NODE, VALUE))
         elif called_name(node) in PRINTED and node.args:
             yield from said("prints", node, read.printed(node))
 
@@ -639,6 +639,8 @@ class Texts:
         of_message = isinstance(node, ast.Attribute) and node.attr == "data"
         if of_message or (isinstance(node, ast.Name) and node.id in self.arguments):
             return DATA
+        if called_name(node) in ("get_caller_id", "get_name"):
+            return NODE
         inner = self.inside(node) if depth else None
         if inner is not None:
             return self.of(inner, depth - 1)

@@ -22,7 +22,7 @@ from grader.installable import (
     noetic_messages,
 )
 from grader.model.message_definitions import meant_type
-from grader.model.package import Fault, PackageFacts, meant_command
+from grader.model.package import CMAKE, MANIFEST, Fault, PackageFacts, meant_command
 from grader.model.verdict import FileCitation
 from grader.wording import join_words
 
@@ -63,10 +63,32 @@ class Explained(NamedTuple):
 def explain_error_of_build(error: BuildError, package: PackageFacts, lines: Sequence[str]) -> Explained:
     """Return the error in a student's words, else as it was printed."""
     text = error.text.translate(_QUOTES)
+    if error.kind == "cmake" and (explained := _beside_the_folder(text, package)):
+        return explained
     for pattern, explain in _EXPLAINED:
         if found := re.search(pattern, text):
             return explain(found, package, lines)
     return Explained(error.text, FIRST_ERROR_HINT)
+
+
+def _beside_the_folder(text: str, package: PackageFacts) -> Explained | None:
+    """Explain what CMake does not find where it looks, and what lies in the folder beside the build files."""
+    folder = package.folder_beside
+    there = {f.path.removeprefix(f"{folder}/") for f in package.files if folder}
+    there |= {f"{posixpath.dirname(path)}/" for path in there} - {"/"}
+    words = (word.strip("/.") for word in re.findall(r"[\w./+-]+", text))
+    absent = next(
+        (path for word in words for path in there if f"/{word}/".endswith(f"/{path.rstrip('/')}/")), ""
+    )
+    if not absent:
+        return None
+    why = f"{absent} is in {folder}/, and {CMAKE} and {MANIFEST} lie beside that folder"
+    return Explained(why, move_into(folder))
+
+
+def move_into(folder: str) -> str:
+    """Return how the build files come into the folder that they are for."""
+    return f"git mv {CMAKE} {MANIFEST} {folder}/"
 
 
 def unreadable_file(package: PackageFacts) -> Explained | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
@@ -138,10 +138,16 @@ def _unreadable(
         seen = f"; there is {join_words(dict.fromkeys([*near, *others]))}" if near or others else ""
         seen += f", and {full[0]} starts {join_words(sorted(wanted))}" if len(others) > 1 and full else ""
         seen += f", which starts {join_words(sorted(wanted))}" if full and full == others else ""
+        parts = {} if full else _parts_started(started)
+        seen += (
+            f", and {join_words(f'{path} starts {name}' for path, name in parts.items())}" if parts else ""
+        )
         message = f"{launch} is not in the package{seen}"
         movable = [p for p in near if can_be_moved(p, launch) and (not wanted or started.get(p, wanted))]
         movable += full[:1] if len(full) == 1 else []
         hint = f"git mv {movable[0]} launch/{launch}" if movable else add_hint(package, f"launch/{launch}")
+        if parts and set(parts.values()) == wanted and not movable:
+            hint = f"{hint}, with the <node>s of {join_words(parts)} in it"
         place = movable[0] if movable else f"launch/{launch}"
         verdict = failed(message, hint=hint, citations=(FileCitation(file=place),))
         return verdict.lost_by("file-elsewhere" if movable else "file-missing", f"launch/{launch}")
@@ -151,6 +157,13 @@ def _unreadable(
     message = f"{file.path}{line} is not well-formed: {file.fault.explanation}"
     hint = file.fault.advice or "close every element, and begin with <launch> and end with </launch>"
     return failed(message, hint=hint, citations=(file.fault.place,))
+
+
+def _parts_started(started: Mapping[str, set[str]]) -> dict[str, str]:
+    """Return the launch files that start one of the programs each, no two of them the same one, and that program."""
+    alone = [(path, next(iter(names))) for path, names in started.items() if len(names) == 1]
+    names = [name for _, name in alone]
+    return {path: name for path, name in alone if names.count(name) == 1}
 
 
 def not_run(run: Run) -> Verdict | None:

@@ -326,8 +326,9 @@ def commented_calls(
 
 
 def commented_call(lines: Sequence[str], name: str) -> tuple[int, int] | None:
-    """Return the first and the last line (from 0) of a call that is commented out."""
-    pattern = re.compile(rf"\s*#[#\s]*{name}\s*\(" + (r"\s*catkin\b" if name == "find_package" else ""))
+    """Return the first and the last line (from 0) of a call that is commented out; `name(…)` in a sentence is none."""
+    arguments = r"\s*catkin\b" if name == "find_package" else r"(?!.*\.\.\.\s*\))"
+    pattern = re.compile(rf"\s*#[#\s]*{name}\s*\({arguments}")
     first = next((i for i, text in enumerate(lines) if pattern.match(text[:LINE_CHARS_MAX])), None)
     if first is None:
         return None

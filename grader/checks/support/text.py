@@ -276,7 +276,7 @@ def says(said: str, template: str) -> bool:
 
 def in_source(said: str) -> str:
     """Return the text of a source as a student reads it: `hello <value>`."""
-    text = said.replace(SAID_DATA, "<message>").replace(SAID_VALUE, "<value>")
+    text = said.replace(SAID_DATA, "<message>").replace(SAID_VALUE, "<value>").replace("{node}", "<node>")
     return text.replace("\n", r"\n").replace("\t", r"\t")
 
 

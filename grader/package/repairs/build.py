@@ -11,7 +11,7 @@ from cmake_parser.ast import Command, Token
 
 from grader.installable import noetic_messages
 from grader.model.message_definitions import meant_type
-from grader.model.package import CMAKE, MANIFEST, PackageFacts, meant_command
+from grader.model.package import CMAKE, INTERFACE_FOLDERS, MANIFEST, PackageFacts, meant_command
 from grader.model.repair import RepairKind
 from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
 from grader.package.manifest import parse_manifest, required_tags
@@ -24,8 +24,6 @@ from grader.wording import join_words, lines_text
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 INSTALL = "catkin_install_python"
 CALL_LINES_MAX = 30
-INTERFACES = {"add_message_files": "msg", "add_service_files": "srv", "add_action_files": "action"}
-"""Calls that name definitions, and the folders of these."""
 GENERATE, GENERATION = "generate_messages", "message_generation"
 FORMAT_1 = r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>"
 RUN_NEEDS = re.compile(r"<(?:depend|run_depend|exec_depend|build_export_depend)>\s*([\w-]+)\s*<")
@@ -150,8 +148,9 @@ def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted)
         below = (GENERATE, "find_package", "project")
         _add_call(files, "catkin_package()", "catkin_package()", below)
     _make_interfaces(files, package, name)
-    _install(files, package, wanted)
-    _correct_paths(files, package)
+    if not package.folder_beside:  # what it names is right once it lies there itself
+        _install(files, package, wanted)
+        _correct_paths(files, package)
     _link_programs(files)
     _correct_include(files)
     _declare_exported(files)
@@ -300,7 +299,7 @@ def _declare_exported(files: Files) -> None:
 def _make_interfaces(files: Files, package: PackageFacts, name: str) -> None:
     """Find what CMakeLists.txt lacks to make the package's own messages, services and actions, where code uses them."""
     used = _used_kinds(files, package, name)
-    made = {c: _definitions(package, folder) for c, folder in INTERFACES.items() if folder in used}
+    made = {c: _definitions(package, folder) for c, folder in INTERFACE_FOLDERS.items() if folder in used}
     if not any(made.values()):
         return
     _correct_types(files, package)
@@ -350,7 +349,7 @@ def _used_kinds(files: Files, package: PackageFacts, name: str) -> set[str]:
     folders = {path.stem: path.parent.name for path in paths}
     fields = {field.type.partition("[")[0] for one in package.interfaces for field in one.fields}
     inner = {folders.get(kind.removeprefix(f"{name}/"), "") for kind in fields} if found else set[str]()
-    used = set(INTERFACES.values()) if None in found else found | inner
+    used = set(INTERFACE_FOLDERS.values()) if None in found else found | inner
     return used | ({"action"} if "msg" in used else set())
 
 
@@ -387,7 +386,7 @@ def _generate(files: Files, package: PackageFacts) -> None:
     needed |= {name.partition("/")[0] for name in types if "/" in name} - {package.name}
     if not calls:
         line = f"{GENERATE}({' '.join(['DEPENDENCIES', *sorted(needed)] if needed else [])})"
-        _add_call(files, f"{GENERATE}(…)", line, (*INTERFACES, "find_package"), sorted(needed))
+        _add_call(files, f"{GENERATE}(…)", line, (*INTERFACE_FOLDERS, "find_package"), sorted(needed))
         return
     if of_catkin and calls[0].line > of_catkin[0].line:
         text, call, at = _cmake(files), calls[0].span, of_catkin[0].span.start

@@ -177,6 +177,7 @@ KINDS: dict[str, RepairKind] = {
     "set-param": "parameter-name",
     "key": "parameter-name",
 }
+TOPIC_ROLES = frozenset({"publisher", "subscriber"})
 ROLES = ("node", "publisher", "subscriber", "param", "set-param")
 NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test")
 WORDS = {"topic-name": "topic", "node-name": "node", "parameter-name": "parameter"}
@@ -196,14 +197,29 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
         asked = asked_of.get(role, branches)
         given = [name for name in names if name.role == role]
         used = {_resolve(name, node) for name in given}
-        absent = [w for w in asked if _bare(w, role) not in used]
+        absent = [
+            w for w in asked if _bare(w, role) not in used and not _is_of_other_role(file, role, w, wanted)
+        ]
         for name in dict.fromkeys(given):
             near = (w for w in absent if _is_slip(name, w, node) and _has_keys(w, name.keys, branches))
             right = next(near, "")
+            alike = {_resolve(one, node) for one in given if right and _is_slip(one, right, node)}
+            if role in TOPIC_ROLES and len(alike) > 1:
+                continue  # any of them may be meant, or none
             if right and _resolve(name, node) not in {_bare(w, role) for w in asked}:
                 literal = _literal(name, right, node)
                 _replace_literal(files, file, name, literal, literal if literal.startswith("~") else right)
                 node = literal if role == "node" else node
+
+
+def _is_of_other_role(file: str, role: str, topic: str, wanted: Wanted) -> bool:
+    """Return whether the script has to subscribe to the topic and this is a publisher, or the other way round."""
+    kinds = {
+        kind
+        for path, kind, used in wanted.does
+        if used == topic and PurePosixPath(path).name == PurePosixPath(file).name
+    }
+    return role in TOPIC_ROLES and bool(kinds & TOPIC_ROLES) and role not in kinds
 
 
 def _repair_dots(files: Files, file: str, names: Sequence[Name], branches: Sequence[str]) -> list[Name]:

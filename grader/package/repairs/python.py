@@ -21,7 +21,7 @@ from grader.model.repair import RepairKind, as_code
 from grader.package.python import reason_of
 from grader.package.repairs.editing import Files
 from grader.syntax_fixes import COMMENTED_OUT, DELETE_LINE, OUT_OF_BLOCK, Reason
-from grader.wording import is_one_edit, join_words, plural
+from grader.wording import is_one_edit, join_words, numbers_text, plural
 
 EXAMINE = "grader.package.source_repair:examine"
 LIMITS = {"memory_bytes": 1 << 30, "cpu_s": 20, "file_bytes": 32 << 20, "answer_bytes": 16 << 20}
@@ -199,7 +199,7 @@ def _required_indentation(before: str, after: str, first: str) -> str:
             "`grader check --fix` does it"
         )
     begun = [
-        f"{'line' if len(some) == 1 else 'lines'} {join_words(map(str, some))} with {plural(spaces, 'space')}"
+        f"{'line' if len(some) == 1 else 'lines'} {numbers_text(some)} with {plural(spaces, 'space')}"
         for spaces, some in lines.items()
     ]
     return f"{first}start {join_words(begun)}"
@@ -217,6 +217,18 @@ def _rewritten(before: str, after: str) -> str:
     return "; ".join([f"write {found[0][1]}", *written]) + more
 
 
+def _further_in(before: str, after: str, line: int) -> str:
+    """Return by how many characters more the line begins."""
+    one, other = (text.split("\n")[line - 1 : line] or [""] for text in (before, after))
+    more = sum(len(text) - len(text.lstrip()) for text in other) - sum(
+        len(text) - len(text.lstrip()) for text in one
+    )
+    return "four" if more == INDENTATION else str(more)
+
+
+INDENTATION = 4
+
+
 def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[str, str]:
     """Return what is wrong, and how it is repaired; "" where the changed line says it."""
     first, after = steps[0], steps[-1].text
@@ -231,7 +243,16 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     meant = {"commented": COMMENTED_OUT, "level": OUT_OF_BLOCK if error and first.line < error.line else ""}
     told = reason_of(meant.get(cause) or (error.message if error else "")).text
     said, fix = (
-        words.format(file=file, place=place, line=first.line, word=word, names=names, calls=calls, told=told)
+        words.format(
+            file=file,
+            place=place,
+            line=first.line,
+            word=word,
+            names=names,
+            calls=calls,
+            told=told,
+            further=_further_in(before, after, first.line),
+        )
         for words in WORDS[cause]
     )
     if cause == "quotes":
@@ -245,7 +266,7 @@ BELOW = "{place}: `global {word}` comes after a line that uses {word}"
 WORDS: dict[Cause, tuple[str, str]] = {
     "tabs": ("{place}: tabs and spaces are mixed in the indentation", "replace the tabs: "),
     "level": ("{place}: {told}", "change the indentation: "),
-    "indent": ("{place}: the line after a `:` must be indented", "indent line {line} by four more spaces"),
+    "indent": ("{place}: the line after a `:` must be indented", "indent line {line} by {further} more spaces"),
     "commented": ("{place}: {told}", ""),
     "braces": ("{place}: Python has no `{{` and `}}` around a block",
      "end the first line of each block with `:` in place of `{{`, and delete each `}}` that ends a block"),
