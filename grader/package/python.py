@@ -45,6 +45,7 @@ _VAGUE = (
 )
 """Messages that say less than the line itself."""
 _EMPTY_BLOCK = re.compile(r"expected an indented block after .* on line (\d+)")
+_EXCEPT = re.compile(r"\s*(except|finally)\b")
 _NEXT_BLOCK = re.compile(r"\s*(?:@|(?:def|async def|class|if __name__)\b)")
 _UNCLOSED = re.compile(r"'([(\[{])' was never closed")
 _OUT_OF_BLOCK = "this line is further out than the lines around it, which belong to one block"
@@ -271,13 +272,8 @@ def reason_of(
     odd = "invalid decimal" in message and _strange(text)  # Python 3.10 on `1` and an invisible character
     if odd or "invalid character" in message or "non-printable" in message:
         return _character(message, text)
-    if "unindent does not match" in message and mixed:
-        return Reason(
-            "tabs and spaces are mixed in the indentation of this file", "use four spaces everywhere"
-        )
-    if (empty := _EMPTY_BLOCK.match(message)) and _NEXT_BLOCK.match(text) and "class" not in message:
-        why = f"there are only comments in the block on line {empty[1]}"
-        return Reason(why, f"below line {empty[1]}, write what it should do")
+    if of_block := _reason_of_block(message, text, mixed=mixed):
+        return of_block
     reason = reason_of_line(text) if vague else Reason()
     if vague and opened is not None and not reason.why:
         reason = _never_closed(opened)
@@ -289,6 +285,26 @@ def reason_of(
         if found := re.search(pattern, message):
             return Reason(*(text.format(*found.groups()) if "{0}" in text else text for text in words))
     return Reason()
+
+
+def _reason_of_block(message: str, text: str, *, mixed: bool) -> Reason | None:
+    """Return what is wrong with the lines of a block; None where it is something else."""
+    if "unindent does not match" in message and mixed:
+        why = "tabs and spaces are mixed in the indentation of this file"
+        return Reason(why, "use four spaces everywhere")
+    if "unindent does not match" in message and (lone := _EXCEPT.match(text)):
+        return Reason(
+            f"there is no `try:` for this `{lone[1]}`", "write `try:` above the lines that it is for"
+        )
+    empty = _EMPTY_BLOCK.match(message)
+    if empty and _EXCEPT.match(text):
+        return Reason(
+            f"there is nothing in the block on line {empty[1]}", f"below line {empty[1]}, write `pass`"
+        )
+    if empty and _NEXT_BLOCK.match(text) and "class" not in message:
+        why = f"there are only comments in the block on line {empty[1]}"
+        return Reason(why, f"below line {empty[1]}, write what it should do")
+    return None
 
 
 def _never_closed(line: int) -> Reason:

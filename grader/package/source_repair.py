@@ -15,6 +15,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from difflib import get_close_matches
+from itertools import pairwise
 from typing import Any
 
 from grader.package.call_repair import (
@@ -123,6 +124,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             with_callbacks,
             with_arguments,
             with_globals,
+            _with_start,
             _with_main,
             _with_spin,
         ):
@@ -446,6 +448,35 @@ def _with_attributes(text: str) -> Iterator[Step]:
             for step in step_to("attribute", line + 1, text, after, f"rospy.{node.attr}"):
                 text, lines = step["text"], step["text"].split("\n")
                 yield step
+
+
+def _with_start(text: str) -> Iterator[Step]:
+    """A function that goes on after two blank lines, and calls itself or makes the node there: the line that begins
+    the script's own part is missing."""
+    tree, lines = ast.parse(text), text.split("\n")
+    functions = [n for n in tree.body if isinstance(n, ast.FunctionDef)]
+    others = [
+        n
+        for n in tree.body
+        if not isinstance(n, ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom)
+    ]
+    if any(isinstance(n, ast.Call) for one in others for n in ast.walk(one)):
+        return
+    for function in functions:
+        for before, after in pairwise(function.body):
+            rest = ast.Module(function.body[function.body.index(after) :], [])
+            calls = {last_name(n.func) for n in ast.walk(rest) if isinstance(n, ast.Call)}
+            apart = after.lineno - (before.end_lineno or after.lineno)
+            if apart > BLANK_LINES and calls & {function.name, "init_node", *(f.name for f in functions)}:
+                line = "if __name__ == '__main__':"
+                changed = "\n".join([*lines[: after.lineno - 1], line, *lines[after.lineno - 1 :]])
+                if syntax_error(changed) is None:
+                    yield from step_to("start", after.lineno, text, changed, function.name)
+                    return
+
+
+BLANK_LINES = 2
+"""So many stand between a function and what comes after it (PEP 8)."""
 
 
 def _with_main(text: str) -> Iterator[Step]:

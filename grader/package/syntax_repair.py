@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable, Iterator
+from itertools import takewhile
 from typing import Any
 
 from grader.syntax_fixes import (
@@ -28,6 +29,7 @@ ODD_LINES_MAX = 3
 FIXERS = ("print", "except", "exec", "raise", "repr", "ne", "numliterals", "long", "unicode")
 OLD_PRINT = re.compile(r"\bprint\b(?!\s*\()")
 OUTERMOST = re.compile(r"(import|from)\s|if\s+__name__\b")
+EMPTY_EXCEPT = re.compile(r"expected an indented block after 'except' statement on line (\d+)")
 CONTINUES = re.compile(r"(elif|else|except|finally)\b")
 
 Step = dict[str, Any]
@@ -73,11 +75,12 @@ def _one_step(text: str, error: Error) -> Step | None:
             word = re.match(r"name '(\w+)'", error["message"])
             line = (
                 _first_changed(text, candidate)
-                if cause in ("braces", "commented", "level")
+                if cause in ("braces", "commented", "level", "line")
                 else error["line"]
             )
             found = {"cause": cause, "line": line, "error": error, "text": candidate}
-            return {**found, "word": word[1] if word else ""}
+            added = candidate.split("\n")[line - 1].strip() if cause == "line" else ""
+            return {**found, "word": word[1] if word else added}
     return None
 
 
@@ -121,6 +124,7 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
         yield from _with_global_first(text, error["line"])
     if error["message"].startswith(("expected an indented block", "unindent does not match")):
         yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
+    yield from (("line", candidate) for candidate in _with_line_back(lines, at, error["message"]))
     if error["message"].startswith(("unexpected indent", "unindent does not match")):
         yield from (("commented", candidate) for candidate in _with_head_uncommented(lines, at))
         yield from (("level", candidate) for candidate in _with_block_moved(lines, at))
@@ -171,6 +175,57 @@ def _with_head_uncommented(lines: list[str], at: int) -> Iterator[str]:
             yield with_line(lines, number, _indentation(before) + head.lstrip())
         if without_texts(lines[number]).strip():
             return
+
+
+def _with_line_back(lines: list[str], at: int, message: str) -> Iterator[str]:
+    """Yield the text with a line that its block cannot do without: `try:`, `except …:`, `pass` or `def …:`."""
+    if empty := EMPTY_EXCEPT.match(message):
+        head = int(empty[1])
+        yield "\n".join([*lines[:head], f"{_indentation(lines[head - 1])}    pass", *lines[head:]])
+    elif message.startswith("expected 'except' or 'finally'"):
+        first = max((n for n, line in enumerate(lines[: at + 1]) if line.strip() == "try:"), default=at)
+        own = _indentation(lines[first])
+        inside = takewhile(
+            lambda line: not line.strip() or len(_indentation(line)) > len(own), lines[first + 1 :]
+        )
+        end = first + 1 + len("\n".join(inside).rstrip().split("\n"))
+        added = [f"{own}except rospy.ROSInterruptException:", f"{own}    pass"]
+        yield "\n".join([*lines[:end], *added, *lines[end:]])
+    elif message.startswith(("unexpected indent", "unindent does not match")):
+        yield from _with_try(lines, at)
+        yield from _with_def(lines, at)
+
+
+def _with_try(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with `try:` above the lines that an `except` without one stands below."""
+    numbers = range(at, len(lines))
+    found = next((n for n in numbers if re.match(r"\s*(except|finally)\b", lines[n])), None)
+    if found is None or any(re.match(r"\s*(def|class)\b", line) for line in lines[at:found]):
+        return
+    level, first = _width(lines[found]), found
+    while first > 0 and (not lines[first - 1].strip() or _width(lines[first - 1]) > level):
+        first -= 1
+    first = next((n for n in range(first, found) if lines[n].strip()), found)
+    if first < found and not any(line.strip() == "try:" for line in lines[first:found]):
+        yield "\n".join([*lines[:first], f"{_indentation(lines[found])}try:", *lines[first:]])
+
+
+def _with_def(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with the first line of a function above lines that stand further in for no reason: of the one that
+    the file names as a callback, or calls, and does not have."""
+    text = "\n".join(lines)
+    before = next((line for line in reversed(lines[:at]) if without_texts(line).strip()), "")
+    named = dict.fromkeys(re.findall(r"\b(?:Subscriber|Service|Timer)\s*\(.*,\s*(\w+)\s*[,)]", text), "msg")
+    named |= dict.fromkeys(re.findall(r"^\s*(\w+)\(\)\s*$", text, re.MULTILINE), "")
+    given = set(re.findall(r"\b(?:def|class|import)\s+(\w+)|^\s*(\w+)\s*=", text, re.MULTILINE))
+    known = {name for pair in given for name in pair}
+    lost = [name for name in named if name not in known]
+    if len(lost) != 1 or _indentation(before) or not _indentation(lines[at]):
+        return
+    body = "\n".join(takewhile(lambda line: not line.strip() or _indentation(line), lines[at:]))
+    value = re.search(r"\b(\w+)\.data\b", body)
+    given_to = value[1] if named[lost[0]] and value else named[lost[0]]
+    yield "\n".join([*lines[:at], f"def {lost[0]}({given_to}):", *lines[at:]])
 
 
 def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import stat
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -419,6 +420,56 @@ CASES = {
                            "rate.sleep() is in quotes", after={TALKER: "        rate.sleep()"}),
     "type-that-is-imported": Case(swapped(TALKER, ("'numeric_chatter', Int8", "'numeric_chatter', Int16")),
                                   ["missing-call"], "Int16 is not defined", after={TALKER: "'numeric_chatter', Int8"}),
+    "try-missing": Case(
+        {TALKER: SCRIPT.replace("\nmain()", "\nif 1:\n        main()\n    except rospy.ROSException:\n        pass")},
+        ["python-syntax"],
+        "below line 13 add `try:`, with 4 spaces before it",
+    ),
+    "except-without-pass": Case(
+        {TALKER: SCRIPT.replace("\nmain()", "\ntry:\n    main()\nexcept rospy.ROSException:")},
+        ["python-syntax"],
+        "add `pass`, with 4 spaces before it",
+    ),
+    "except-missing": Case(
+        {TALKER: SCRIPT.replace("\nmain()", "\ntry:\n    main()\n    pass")},
+        ["python-syntax"],
+        "the line `except rospy.ROSInterruptException:` is missing",
+    ),
+    "function-without-first-line": Case(
+        swapped(TALKER, ("def main():\n", "")), ["python-syntax"], "the line `def main():` is missing"
+    ),
+    "callback-without-first-line": Case(
+        {TALKER: SPINS.replace("\ndef listen", "\n    print(m.data)\n\ndef listen").replace("print)", "heard)")},
+        ["python-syntax", "missing-call"],
+        "the line `def heard(m):` is missing",
+    ),
+    "own-part-without-first-line": Case(
+        {TALKER: SPINS.replace("\nif __name__ == '__main__':\n    listen()", "\n\n    listen()")},
+        ["missing-call", "missing-call"],
+        "add `if __name__ == '__main__':`",
+    ),
+    "call-without-first-line": Case(
+        swapped(CMAKELISTS, ("find_package(catkin REQUIRED COMPONENTS rospy)", "  rospy\n)")),
+        ["build-line"],
+        "add `find_package(catkin REQUIRED COMPONENTS`",
+    ),
+    "bracket-in-the-middle": Case(
+        swapped(CMAKELISTS, ("catkin_package()", "catkin_package(\n\ninclude_directories(${catkin_INCLUDE_DIRS})")),
+        ["build-line"],
+        "write `catkin_package()`",
+    ),
+    "no-destination": Case(
+        swapped(CMAKELISTS, ("catkin_package()", "catkin_package()\ncatkin_install_python(PROGRAMS src/talker.py)")),
+        ["build-line"],
+        "catkin_install_python(…) has no DESTINATION",
+        wanted=asking(installed=(TALKER,)),
+    ),
+    "no-version": Case(
+        {XML: re.sub(r"<version>.*</version>\n?", "", MANIFEST)}, ["manifest-line"], "add `<version>0.0.0</version>`"
+    ),
+    "launch-not-opened": Case(
+        {LAUNCHED: LAUNCH.replace("<launch>\n", "")}, ["launch-syntax"], "`<launch>` is missing"
+    ),
     "spin": Case({TALKER: SPINS}, ["missing-call"], after={TALKER: "Int8, print)\n    rospy.spin()\n"}),
     "launch-file-by-what-it-starts": Case(
         {LAUNCHED: None, "src/trial.launch": LAUNCH}, ["file-name"], wanted=STARTED,

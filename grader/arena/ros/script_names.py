@@ -372,9 +372,13 @@ GIVEN_BY_NAME = {"queue_size": "10", "anonymous": "True", "latch": "True"}
 """Arguments of rospy's functions that are written with their name, and a value that most labs give them."""
 
 
+MADE = {"publish": "rospy.Publisher('…', …, queue_size=10)", "sleep": "rospy.Rate(…)"}
+"""What a variable has to be given by the method that is called of it."""
+
+
 def undefined(node, tree):
     """Return why a name is not there that the file gives no value anywhere, and what to do."""
-    name, line = node.id, node.lineno
+    name = node.id
     why = "nothing in the file gives `%s` a value" % name
     uses = [n for n in walk(tree) if node in (getattr(n, "value", None), getattr(n, "func", None))]
     used = uses[0] if uses else None
@@ -385,18 +389,29 @@ def undefined(node, tree):
     module = "%s.%s" % (name, inner) if inner in ("msg", "srv") else ALIASES.get(name, name)
     if module != name or (name in MODULES and inner):
         return "`%s` is not imported" % name, "write `import %s` at the top" % module
-    if name[:1].isupper():
-        how = "above line %d, define %s or import it (a message: `from <package>.msg import %s`)"
-        return why, how % (line, name, name)
-    if isinstance(used, ast.Call):
-        return why, "above line %d, define it with `def %s(…):`, or import it" % (line, name)
+    return why, "above line %d, %s" % what_to_write(node, used, tree)
+
+
+def what_to_write(node, used, tree):
+    """Return the line above which a name has to get its value, and how that is written. `used` is what the value is
+    used in."""
+    name, line = node.id, node.lineno
+    inner = used.attr if isinstance(used, ast.Attribute) else ""
+    takers = [n for n in walk(tree) if isinstance(n, ast.Call) and node in n.args[1:]]
     types = {published_type(n) for n in walk(tree) if called_name(n) == "Publisher"} - {""}
-    if any(node in n.args for n in calls_in(tree, "publish")) or (
-        isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)
-    ):
-        kind = types.pop() if len(types) == 1 else "<Type>"
-        return why, "above line %d, create the message: `%s = %s()`" % (line, name, kind)
-    return why, "above line %d, write `%s = …`, with the value that it should have" % (line, name)
+    if name[:1].isupper():
+        return line, "define %s or import it (a message: `from <package>.msg import %s`)" % (name, name)
+    if isinstance(used, ast.Call):
+        return line, "define it with `def %s(…):`, or import it" % name
+    if any(called_name(n) in ("Subscriber", "Service", "Timer") for n in takers):
+        return line, "define it with `def %s(…):`" % name
+    if inner in MADE:
+        loops = [n.lineno for n in walk(tree) if isinstance(n, (ast.While, ast.For)) and node in ast.walk(n)]
+        return min([line, *loops]), "write `%s = %s`" % (name, MADE[inner])
+    is_set = isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)
+    if is_set or any(node in n.args for n in calls_in(tree, "publish")):
+        return line, "create the message: `%s = %s()`" % (name, types.pop() if len(types) == 1 else "<Type>")
+    return line, "write `%s = …`, with the value that it should have" % name
 
 
 def known_elsewhere(node, tree):

@@ -215,7 +215,7 @@ def _close_bracket(files: Files) -> None:
         changed = [*lines[: number - 1], begins or f"{lines[number - 1]})", *lines[number - bool(begins) :]]
         if commands_of("\n".join(changed).encode()) is not None:
             message = f"line {fault.line} of {CMAKE}: {fault.cause}"
-            files.change("build-line", CMAKE, "\n".join([*changed, ""]), message, fault.fix)
+            files.change("build-line", CMAKE, "\n".join([*changed, ""]), message)
             return
     last = max((i for i, line in enumerate(lines) if line.split("#", maxsplit=1)[0].strip()), default=0)
     for added in ([lines[last] + ")"], [lines[last], ")"]):
@@ -568,10 +568,7 @@ def _correct_destination(files: Files, scripts: Collection[str]) -> None:
         if names_one and at == len(words) and "PROGRAMS" in [t.value for t in words]:
             text, last = _cmake(files), words[-1].span.stop
             message = f"line {call.line} of {CMAKE}: {call.identifier}(…) has no DESTINATION"
-            fix = f"write DESTINATION {BIN} as the last words of the call"
-            files.change(
-                "build-line", CMAKE, f"{text[:last]}\n  DESTINATION {BIN}{text[last:]}", message, fix
-            )
+            files.change("build-line", CMAKE, f"{text[:last]}\n  DESTINATION {BIN}{text[last:]}", message)
             return
         if given and names_one and given.value != BIN and given.value.strip("${}").startswith("CATKIN_"):
             message = f"line {call.line} of {CMAKE}: {given.value} is not where rosrun looks"

@@ -34,11 +34,11 @@ ATTEMPTS = 3
 Cause = Literal[
     "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
     "old-name", "module", "import", "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument",
-    "unbound", "guard", "main", "spin",
+    "unbound", "guard", "start", "main", "spin", "line",
 ]  # fmt: skip
 CALLS = (
-    "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "guard", "main",
-    "spin",
+    "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "guard",
+    "start", "main", "spin",
 )  # fmt: skip
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "import"), "missing-import"),
@@ -287,6 +287,8 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "unbound": ("{place}: the function assigns to {word}, so it is a variable of its own and has no value yet",
      "write `global {word}` as the first line of the function"),
     "guard": ("{place}: `__name__` is never {word!r}", ""),
+    "line": ("{place}: the line `{word}` is missing", ""),
+    "start": ("{place}: the lines from here on belong to {calls}, so nothing runs them", ""),
     "main": ("{place}: nothing calls {calls}", "add `if __name__ == '__main__':`, and {calls} below it"),
     "spin": ("{file} ends as soon as it has subscribed, because nothing keeps it running",
      "write {word} as the last line of the code that makes the node"),
