@@ -98,7 +98,9 @@ def _interrupted(_number: int, _frame: object) -> None:
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGTERM, _interrupted)  # what runs beside is ended either way
+    # what runs beside is ended either way; what a shell starts in the background, and its nodes, would ignore Ctrl-C
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupted)
     try:
         sys.exit(main())
     except KeyboardInterrupt:
