@@ -194,7 +194,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         if copied := copied_topic(package, run, "subscriber"):
             other = f"{other}, on {copied}"
             hint = f"write {topic} on the one of {copied} whose callback is for it"
-        elif len(subscribed) == 1 and not near:
+        elif len(subscribed) == 1 and not near and not probes_on(run, subscribed[0]):
             hint = f"{hint}, or rename {subscribed[0]} if that is meant to be it"
         meant = near or (subscribed if len(subscribed) == 1 else [])
         cited = named_at(package, run, "subscriber", meant[0]) if meant else ()

@@ -215,6 +215,8 @@ class Later:
         probes = scenario.probes if scenario is not None else ()
         sent = [probe.type for probe in probes if probe.topic == self._topic]
         heard, types = self._of("subscriber"), self._of("subscriber-type")
+        if len(heard) == 1 and f"/{heard[0].message.lstrip('/')}" in self._topics_of_others():
+            heard, types = [], []
         own = sent[0].rpartition("/")[2] if sent else ""
         elsewhere = len(heard) == 1 and f"/{heard[0].message.lstrip('/')}" != self._topic
         if elsewhere and not self._ran:

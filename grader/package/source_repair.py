@@ -32,6 +32,7 @@ from grader.package.syntax_repair import (
     edited,
     is_docstring,
     last_name,
+    lost_head,
     make_readable,
     span_of,
     step_to,
@@ -451,28 +452,27 @@ def _with_attributes(text: str) -> Iterator[Step]:
 
 
 def _with_start(text: str) -> Iterator[Step]:
-    """A function that goes on after two blank lines, and calls itself or makes the node there: the line that begins
-    the script's own part is missing."""
+    """A function that goes on after two blank lines: the first line of the next one is missing; or, where it makes the
+    node or calls a function there, the line that begins the script's own part."""
     tree, lines = ast.parse(text), text.split("\n")
     functions = [n for n in tree.body if isinstance(n, ast.FunctionDef)]
-    others = [
-        n
-        for n in tree.body
-        if not isinstance(n, ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom)
-    ]
-    if any(isinstance(n, ast.Call) for one in others for n in ast.walk(one)):
-        return
+    plain = (ast.FunctionDef, ast.ClassDef, ast.Import, ast.ImportFrom)
+    started = any(
+        isinstance(n, ast.Call) for one in tree.body if not isinstance(one, plain) for n in ast.walk(one)
+    )
     for function in functions:
         for before, after in pairwise(function.body):
+            if after.lineno - (before.end_lineno or after.lineno) <= BLANK_LINES:
+                continue
             rest = ast.Module(function.body[function.body.index(after) :], [])
             calls = {last_name(n.func) for n in ast.walk(rest) if isinstance(n, ast.Call)}
-            apart = after.lineno - (before.end_lineno or after.lineno)
-            if apart > BLANK_LINES and calls & {function.name, "init_node", *(f.name for f in functions)}:
-                line = "if __name__ == '__main__':"
-                changed = "\n".join([*lines[: after.lineno - 1], line, *lines[after.lineno - 1 :]])
-                if syntax_error(changed) is None:
-                    yield from step_to("start", after.lineno, text, changed, function.name)
-                    return
+            head = lost_head(text, ast.unparse(rest))
+            begins = not started and calls & {"init_node", *(one.name for one in functions)}
+            line = head or ("if __name__ == '__main__':" if begins else "")
+            changed = "\n".join([*lines[: after.lineno - 1], line, *lines[after.lineno - 1 :]])
+            if line and syntax_error(changed) is None:
+                yield from step_to("start", after.lineno, text, changed, function.name)
+                return
 
 
 BLANK_LINES = 2

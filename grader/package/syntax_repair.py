@@ -8,6 +8,7 @@ and nothing is executed.
 from __future__ import annotations
 
 import ast
+import builtins
 import re
 from collections.abc import Iterable, Iterator
 from itertools import takewhile
@@ -211,21 +212,26 @@ def _with_try(lines: list[str], at: int) -> Iterator[str]:
 
 
 def _with_def(lines: list[str], at: int) -> Iterator[str]:
-    """Yield the text with the first line of a function above lines that stand further in for no reason: of the one that
-    the file names as a callback, or calls, and does not have."""
-    text = "\n".join(lines)
+    """Yield the text with the first line of a function above lines that stand further in for no reason."""
     before = next((line for line in reversed(lines[:at]) if without_texts(line).strip()), "")
+    if _indentation(before) or not _indentation(lines[at]):
+        return
+    body = "\n".join(takewhile(lambda line: not line.strip() or _indentation(line), lines[at:]))
+    if head := lost_head("\n".join(lines), body):
+        yield "\n".join([*lines[:at], head, *lines[at:]])
+
+
+def lost_head(text: str, body: str) -> str:
+    """Return the first line of the one function that the file names as a callback, or calls, and does not have; ""
+    where there is not just one. `body` are the lines that belong below it."""
     named = dict.fromkeys(re.findall(r"\b(?:Subscriber|Service|Timer)\s*\(.*,\s*(\w+)\s*[,)]", text), "msg")
     named |= dict.fromkeys(re.findall(r"^\s*(\w+)\(\)\s*$", text, re.MULTILINE), "")
     given = set(re.findall(r"\b(?:def|class|import)\s+(\w+)|^\s*(\w+)\s*=", text, re.MULTILINE))
-    known = {name for pair in given for name in pair}
-    lost = [name for name in named if name not in known]
-    if len(lost) != 1 or _indentation(before) or not _indentation(lines[at]):
-        return
-    body = "\n".join(takewhile(lambda line: not line.strip() or _indentation(line), lines[at:]))
-    value = re.search(r"\b(\w+)\.data\b", body)
-    given_to = value[1] if named[lost[0]] and value else named[lost[0]]
-    yield "\n".join([*lines[:at], f"def {lost[0]}({given_to}):", *lines[at:]])
+    lost = [name for name in named if name not in {one for pair in given for one in pair}]
+    if len(lost) != 1 or lost[0] in dir(builtins):
+        return ""
+    value = re.search(r"\b(\w+)\.data\b", body) if named[lost[0]] else None
+    return f"def {lost[0]}({value[1] if value else named[lost[0]]}):"
 
 
 def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:

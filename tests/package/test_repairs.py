@@ -443,6 +443,11 @@ CASES = {
         ["python-syntax", "missing-call"],
         "the line `def heard(m):` is missing",
     ),
+    "second-function-without-first-line": Case(
+        {TALKER: SPINS.replace("def listen():", "def heard(m):\n    print(m)\n\n").replace("print)", "heard)")},
+        ["missing-call", "missing-call"],
+        "add `def listen():`",
+    ),
     "own-part-without-first-line": Case(
         {TALKER: SPINS.replace("\nif __name__ == '__main__':\n    listen()", "\n\n    listen()")},
         ["missing-call", "missing-call"],
