@@ -58,7 +58,7 @@ def misspelt_names(data: object, folder: Path) -> Iterator[Fault]:
 def _package(data: object) -> Iterator[tuple[KeyPath, str, str]]:
     """Yield the package's name where it is one letter off from the lab's id, or from a word of the handout or title."""
     rubric = as_map(data)
-    package, prose = rubric.get("package"), f"{rubric.get('handout')} {rubric.get('title')}"
+    package, prose = rubric.get("package"), f"{rubric.get('handout') or ''} {rubric.get('title')}"
     known = dict.fromkeys([str(rubric.get("id")).replace("-", "_"), *re.findall(r"\w+", prose)])
     if isinstance(package, str) and not re.search(rf"\b{re.escape(package)}\b", prose):
         near = next((one for one in known if is_slip(package, one)), "")
@@ -68,7 +68,7 @@ def _package(data: object) -> Iterator[tuple[KeyPath, str, str]]:
 def _misspelt_words(data: object, *, code: bool) -> Iterator[tuple[KeyPath, str, str]]:
     """Yield each word of a criterion's texts that no other line has, and the handout's word that is meant by it: one in
     backticks, or with `code=False` any other."""
-    texts, handout = list(texts_in((), data)), str(as_map(data).get("handout"))
+    texts, handout = list(texts_in((), data)), str(as_map(data).get("handout") or "")
     quoted = set(re.findall(_WORD, " ".join(re.findall(r"`([^`]+)`", handout))))
     known = quoted if code else set(re.findall(_WORD, handout)) - quoted
     for path, text in texts:
