@@ -533,6 +533,12 @@ class PackageFacts(Record):
         return [one.path for one in own or found]
 
     @property
+    def own_modules(self) -> set[str]:
+        """What a script of the package may import of the student's own."""
+        files = {f.path.rpartition("/")[2].removesuffix(".py") for f in self.files}
+        return {self.name, *(one.name for one in self.also), *files}
+
+    @property
     def folder_beside(self) -> str:
         """Return the folder that has all of the package's own folders, where `package.xml` and `CMakeLists.txt` lie
         beside it and name files as if they lay in it; "" of other packages."""

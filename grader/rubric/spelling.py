@@ -62,7 +62,8 @@ def _package(data: object) -> Iterator[tuple[KeyPath, str, str]]:
     known = dict.fromkeys([str(rubric.get("id")).replace("-", "_"), *re.findall(r"\w+", prose)])
     if isinstance(package, str) and not re.search(rf"\b{re.escape(package)}\b", prose):
         near = next((one for one in known if is_slip(package, one)), "")
-        yield from [(("package",), package, near)] if near and package not in known else []
+        if near and package not in known:
+            yield ("package",), package, near
 
 
 def _misspelt_words(data: object, *, code: bool) -> Iterator[tuple[KeyPath, str, str]]:

@@ -29,7 +29,6 @@ from grader.checks.support.missing_names import (
     name_slip,
     other_name,
     own_message,
-    own_modules,
     unimported_module,
     unmade,
 )
@@ -521,7 +520,7 @@ def _lacking(found: Traceback, package: PackageFacts) -> str:
     match = NO_MODULE.search(found.message) if found.kind == "ModuleNotFoundError" else None
     # roslib.load_manifest, which rosbuild needed, asks for the ROS package itself
     name = found.message if found.kind == "ResourceNotFound" else match[1] if match else ""
-    own = own_modules(package)
+    own = package.own_modules
     sure = found.kind == "ResourceNotFound" or (bool(found.frames) and found.frames[-1].in_library)
     known = name in known_packages() or not _is_module(name, package)
     lacks = exists_somewhere(name, own) and (known or not sure)

@@ -195,7 +195,7 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
         near = (wanted[2],)
     if near:
         return f"messages come from {near[0]}.msg", f"write `from {near[0]}.msg import …`"
-    meant = meant or (nearest_module(asked[1], own_modules(package)) if asked else "")
+    meant = meant or (nearest_module(asked[1], package.own_modules) if asked else "")
     return (f"did you mean {meant}?", f"write {meant} instead of {asked[1]}") if asked and meant else None
 
 
@@ -252,12 +252,6 @@ def _own_python_package(name: str, package: PackageFacts) -> tuple[str, str] | N
         f"src/{name}/ is there, and CMakeLists.txt does not call {call}",
         f"call {call} above catkin_package(…)",
     )
-
-
-def own_modules(package: PackageFacts) -> set[str]:
-    """Return what a script of the package may import of the student's own."""
-    files = {f.path.rpartition("/")[2].removesuffix(".py") for f in package.files}
-    return {package.name, *(one.name for one in package.also), *files}
 
 
 def _other_types(name: str, package: str) -> tuple[str, str] | None:

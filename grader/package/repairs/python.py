@@ -10,7 +10,7 @@ import re
 import time
 from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Literal
 
 from grader.installable import exists_somewhere, noetic_messages
@@ -96,7 +96,7 @@ def repair_python(
 
 def _delete_imports(files: Files, scripts: Sequence[str], package: PackageFacts) -> None:
     """Delete imports that nothing in their script uses, of modules and messages that there are none of."""
-    own = {package.name, *(PurePosixPath(file.path).stem for file in package.files)}
+    own = package.own_modules
     misnamed = {s.file for s in package.slips if s.kind in {"undefined", "misspelt"}}
     lacking = {(s.file, s.line) for s in package.slips if s.kind == "lacking-import"}
     unused = [s for s in package.slips if s.kind == "unused-import" and s.file not in misnamed]
