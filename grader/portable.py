@@ -10,8 +10,9 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from typing import IO
 
 from grader.errors import HostError
 
@@ -55,13 +56,55 @@ def close(descriptor: int) -> None:
         os.close(descriptor)
 
 
-def kill_group(process: subprocess.Popen[bytes]) -> None:
-    """Kill a process in a session of its own with everything it started, if it still runs, and wait for it."""
-    if process.poll() is None:
-        end_group(process)
+@contextmanager
+def own_group(
+    command: Sequence[str],
+    *,
+    cwd: os.PathLike[str],
+    env: Mapping[str, str],
+    stdout: IO[bytes] | int,
+    stderr: IO[bytes] | int,
+    pass_fds: Sequence[int] = (),
+) -> Iterator[subprocess.Popen[bytes]]:
+    """Run a program without input in a session of its own. It ends with the block, and all that it started too, even if
+    Ctrl-C comes while it is started. Raises OSError."""
+    process = None
+    try:
+        with _interrupt_held():
+            process = subprocess.Popen(
+                command,
+                cwd=cwd,
+                env=env,
+                stdin=subprocess.DEVNULL,
+                stdout=stdout,
+                stderr=stderr,
+                start_new_session=True,
+                pass_fds=pass_fds,
+            )
+        yield process
+    finally:
+        if process is not None:
+            _end_group(process)
 
 
-def end_group(process: subprocess.Popen[bytes]) -> None:
+@contextmanager
+def _interrupt_held() -> Iterator[None]:
+    """Let a Ctrl-C that comes inside take effect at the end. Only the main thread is interrupted by one."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    came: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        for number in came[:1]:
+            signal.raise_signal(number)
+
+
+def _end_group(process: subprocess.Popen[bytes]) -> None:
     """Kill everything in the session of a process, and itself, and wait for it."""
     with suppress(ProcessLookupError):
         if sys.platform == "win32":

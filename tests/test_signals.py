@@ -6,6 +6,7 @@ Sources of what is expected: man 2 execve (what is ignored and held back is hand
 from __future__ import annotations
 
 import asyncio
+import os
 import signal
 import subprocess
 import sys
@@ -20,9 +21,10 @@ from grader import grade
 from grader.arena import arena_process
 from grader.arena.sandbox import why_no_sandbox
 from grader.errors import HostError
-from grader.portable import wait_for_children
+from grader.portable import own_group, wait_for_children
 from tests.arena.support import printed, run_script
 from tests.faulty import ROOT, RUBRIC, VICTIM, result_in
+from tests.support.processes import lives
 
 needs_sandbox = pytest.mark.skipif(bool(why_no_sandbox()), reason=f"no sandbox here: {why_no_sandbox()}")
 DEAF = """
@@ -137,3 +139,26 @@ def test_a_handler_of_the_program_stays() -> None:
         assert heard
     finally:
         signal.signal(signal.SIGCHLD, before)
+
+
+def test_ctrl_c_while_a_program_is_started_ends_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Python raises it between the start of the program and the line that would end it."""
+    started: list[int] = []
+
+    class Interrupted(subprocess.Popen):
+        def __init__(self, *args, **options) -> None:
+            super().__init__(*args, **options)
+            started.append(self.pid)
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(subprocess, "Popen", Interrupted)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with (
+            pytest.raises(KeyboardInterrupt),
+            own_group(["sleep", "3600"], cwd=tmp_path, env=dict(os.environ), stdout=1, stderr=2),
+        ):
+            pytest.fail("the interrupt was lost")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert not lives(started[0])

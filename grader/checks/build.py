@@ -99,12 +99,15 @@ def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
     scripts = f", and {join_words(params.scripts)} there to run" if params.scripts else ""
     verdict = judge_build(package, build)
     if verdict.status is Status.PASS:
-        verdict = _hidden(package) or _lost_scripts(package, params.scripts) or verdict
+        verdict = _unseen(package) or _lost_scripts(package, params.scripts) or verdict
     return verdict.about(expected=f"{verdict.expected or EXPECTED}{scripts}")
 
 
-def _hidden(package: PackageFacts) -> Verdict | None:
-    """Return the loss of a package that tells catkin to pass it over."""
+def _unseen(package: PackageFacts) -> Verdict | None:
+    """Return the loss of a package that catkin does not find, or is told to pass over: it builds nothing of it."""
+    if package.has_no_manifest:
+        why = "catkin_make builds nothing of the package: catkin does not see one without package.xml"
+        return unjudged(why, measured="not built", hint="write package.xml, then run catkin_make")
     if package.file(IGNORE) is None:
         return None
     message = f"catkin_make builds nothing of the package: {IGNORE} hides it from catkin"

@@ -145,7 +145,8 @@ def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
     if project is None and (slip := _misspelt(facts, "project")):
         yield _respell(slip, "project")
     elif project is None:
-        yield Wrong("project(…) is missing", f"add project({wanted})", uncalled="project")
+        least = _first(facts, "cmake_minimum_required")
+        yield Wrong("project(…) is missing", f"add project({wanted})", below=least, uncalled="project")
     elif not project.args or project.args[0] not in names:
         name = project.args[0] if project.args else ""
         message = f"line {project.line}: project({name}) differs from the package's name {wanted}"

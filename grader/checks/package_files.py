@@ -224,7 +224,7 @@ def _of_ros_2(found: Manifest, params: ManifestParams) -> Verdict:
     return failed(
         f"{found.file} is for a ROS 2 package (its build type is {found.build_type})",
         measured=f"name {found.name}, build type {found.build_type}",
-        hint=f"make a package for ROS 1: catkin_create_pkg {made}",
+        hint=f"make a package for ROS 1: `catkin_create_pkg {made}`",
         citations=(FileCitation(file=found.file, line=found.name_line),),
     )
 
@@ -385,7 +385,7 @@ def _last_line(found: Manifest) -> int:
 
 def _unreadable(package: PackageFacts) -> Verdict:
     fault = package.manifest_fault
-    if fault is None or fault.kind == "Missing":
+    if fault is None or package.has_no_manifest:
         meant = next(filter(None, (meant_manifest(file.path) for file in package.files)), "")
         hint = "write package.xml beside CMakeLists.txt, as catkin_create_pkg makes it, and push it"
         if package.cmake is None:

@@ -206,7 +206,7 @@ def _rename(root: Path, packages: list[Candidate], wanted: WantedPackage) -> str
     if not seen:
         told = f"It is the folder whose {MANIFEST} says <name>{name}</name>"
         loose = _loose_files(root, wanted.files)
-        made = f"catkin_create_pkg {name} std_msgs rospy makes it, to hold {loose}"
+        made = f"`catkin_create_pkg {name} std_msgs rospy` makes it, to hold {loose}"
         return f"{told}: {made}." if loose else f"{told}: was it handed in (and pushed)?"
     counts = {c: _count_files(c.folder, wanted.files) for c in seen.values()}
     only = max(counts, key=lambda c: counts[c])

@@ -20,7 +20,7 @@ from typing import IO
 
 from grader.host_programs import find_user_program, loading_environment, with_absolute_paths
 from grader.intake.credentials import Access, is_refusal, scrubbed
-from grader.portable import kill_group
+from grader.portable import own_group
 
 _QUIET = {
     "core.hooksPath": os.devnull,
@@ -119,6 +119,8 @@ class Git:
     def _run(
         self, args: tuple[str, ...], cwd: Path, repository: Repository | None, *, remote: bool, access: Access
     ) -> bytes:
+        if time.monotonic() >= self._deadline:
+            raise GitTimeout(f"no answer within {self.timeout_s:g} s")
         with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
             whole = (*access.options, *_place(repository), *args)
             environment = self._environment(cwd, access) if remote else self._local_environment()
@@ -195,22 +197,9 @@ class Git:
         git = find_user_program("git")
         if git is None:
             raise GitMissing("git is not installed")
-        try:
-            process = subprocess.Popen(
-                [*_limits(), git, *options, *args],
-                cwd=cwd,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=stdout,
-                stderr=stderr,
-                start_new_session=True,
-            )
-        except FileNotFoundError:
-            raise GitMissing("git is not installed") from None
-        try:
+        command = [*_limits(), git, *options, *args]
+        with own_group(command, cwd=cwd, env=environment, stdout=stdout, stderr=stderr) as process:
             yield process
-        finally:
-            kill_group(process)
 
     def _local_environment(self) -> dict[str, str]:
         """For repositories on this machine: no settings but ours, so no filter, no helper and no network."""

@@ -533,6 +533,13 @@ class PackageFacts(Record):
         return [one.path for one in own or found]
 
     @property
+    def has_no_manifest(self) -> bool:
+        """There is no `package.xml`; one that cannot be read is another fault."""
+        return self.manifest is None and (
+            self.manifest_fault is None or self.manifest_fault.kind == "Missing"
+        )
+
+    @property
     def own_modules(self) -> set[str]:
         """What a script of the package may import of the student's own."""
         files = {f.path.rpartition("/")[2].removesuffix(".py") for f in self.files}

@@ -232,7 +232,7 @@ class _Writer:
 
     def _advice(self, criteria: tuple[CriterionResult, ...]) -> Iterator[str]:
         for criterion in self._first(criteria):
-            hint = f" {self._text(criterion.hint)}" if criterion.hint else ""
+            hint = f"; {self._text(criterion.hint)}" if criterion.hint else ""
             yield f"- {self._code(criterion.id)}: {self._text(criterion.message)}{hint}"
         yield from self._more(criteria)
         yield from [""] if criteria else []

@@ -168,7 +168,6 @@ _COMMAND = rf"""
     | (?:git\ )?mv\ [\w./-]*\w\ [\w./-]*\w
     | git\ (?:add|commit|push|rm|update-index)\b(?:\ -[\w=+-]+)*(?:\ {_FILE})*
     | (?:mkdir|cd)\ [\w./~-]*\w
-    | catkin_create_pkg(?:\ \w+)+
     | ros(?:run|launch)\ \w+\ {_FILE}
     | ros(?:topic|node|param|service|msg)\ (?:list|info|echo|hz|pub|type|get|set|load|call|show)\b(?:\ {_FILE})*
     | (?:sudo\ )?apt-get\ install(?:\ [\w.+-]*\w)+)

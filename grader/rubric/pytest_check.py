@@ -22,7 +22,7 @@ from grader.checks import partial as partial_
 from grader.checks.registry import parts
 from grader.files import temporary_folder
 from grader.model.verdict import Status
-from grader.portable import end_group
+from grader.portable import own_group
 
 HINTS = 4
 SHOWN_TESTS = 20
@@ -161,23 +161,21 @@ def _environment() -> dict[str, str]:
 
 def _run(command: list[str], folder: Path, timeout_s: float, handed: tuple[int, ...] = ()) -> int:
     """Return the exit code. What the tests started ends with them. Raises TestsBroken after `timeout_s`."""
-    with (folder / "output").open("wb") as output:
-        process = subprocess.Popen(
+    with (
+        (folder / "output").open("wb") as output,
+        own_group(
             command,
             cwd=folder,
             env=_environment(),
-            stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=subprocess.STDOUT,
-            start_new_session=True,
             pass_fds=handed,
-        )
+        ) as process,
+    ):
         try:
             return process.wait(timeout_s)
         except subprocess.TimeoutExpired as error:
             raise TestsBroken(f"the tests took longer than {timeout_s:g} s") from error
-        finally:
-            end_group(process)
 
 
 def _last_words(folder: Path, code: int) -> str:

@@ -95,4 +95,4 @@ def test_flood_is_recorded_up_to_the_limit_and_the_rest_counted(tmp_path: Path) 
     run = run_script(tmp_path, code, window_s=2, topics=["/count"])
     (channel,) = run.student_channels("/count")
     assert len(channel.messages) <= 20_000
-    assert len(channel.messages) > 2_000
+    assert len(channel.messages) > 200  # at 10 Hz it would be 20; how many more depends on the machine

@@ -325,6 +325,12 @@ CASES = {
     "no-catkin-package": Case(swapped(CMAKELISTS, ("catkin_package()\n", "")), ["build-line"], "catkin_package()"),
     "command": Case(swapped(CMAKELISTS, ("catkin_package", "catkin_pakage")), ["build-line"], "no command catkin_p"),
     "project": Case(swapped(CMAKELISTS, ("project(lab)", "project(xyz)")), ["build-line"], "project(xyz)"),
+    "no-project": Case(swapped(CMAKELISTS, ("project(lab)\n", "")), ["build-line"], "does not call project(…)"),
+    "late-project": Case(
+        {CMAKELISTS: CMAKE.replace("project(lab)\n", "") + "project(lab)\n"},
+        ["build-line"],
+        "project(…) is called after catkin_package(…)",
+    ),
     "open-bracket": Case(swapped(CMAKELISTS, ("catkin_package()", "catkin_package(")), ["build-line"], "is never"),
     "cmake-name": Case({CMAKELISTS: None, "CMakelists.txt": CMAKE}, ["file-name"], "should be called CMakeLists.txt"),
     "script-name": Case({TALKER: None, "src/talkr.py": SCRIPT}, ["file-name"], "should be called talker.py"),

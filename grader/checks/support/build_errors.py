@@ -270,8 +270,8 @@ def _late_project(found: re.Match[str], package: PackageFacts, _lines: Sequence[
     """CMake gives a name of its own to what comes before `project(…)`."""
     call = next(iter(cmake_calls(package, "project")), None)
     why = f"project(…) comes after {found[1]}(…)" if call else f"there is no project(…) before {found[1]}(…)"
-    fix = f"move project(…) from line {call.line}" if call else f"write project({package.name})"
-    return Explained(why, f"{fix} to right below cmake_minimum_required(…), with find_package(…) next")
+    fix = f"move project(…) from line {call.line} to" if call else f"write project({package.name})"
+    return Explained(why, f"{fix} just below cmake_minimum_required(…), with find_package(…) next")
 
 
 def _missing_message(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:

@@ -140,6 +140,9 @@ def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted)
         return
     _spell_commands(files)
     needs = " ".join(wanted.dependencies or ("rospy", "std_msgs"))
+    if not _has(files, package, "project"):
+        _add_call(files, "project(…)", f"project({name or wanted.package})", ("cmake_minimum_required",))
+    _move_project(files)
     _spell_catkin(files)
     if not _calls_catkin(files, package):
         line = f"find_package(catkin REQUIRED COMPONENTS {needs})"
@@ -406,6 +409,20 @@ def _generate(files: Files, package: PackageFacts) -> None:
         files.change("build-line", CMAKE, text[:at] + added + text[at:], message, fix)
 
 
+def _move_project(files: Files) -> None:
+    """Call project(…) above catkin_package(…), which asks for the project's name."""
+    project, of_catkin = _commands(files, "project"), _commands(files, "catkin_package")
+    if not project or not of_catkin or project[0].line < of_catkin[0].line:
+        return
+    call = project[0]
+    first = next((c for c in _commands(files, "find_package", "catkin_package")), call).span.start
+    text, span = _cmake(files), call.span
+    changed = f"{text[:first]}{text[span]}\n{text[first : span.start].rstrip()}\n{text[span.stop :].lstrip()}"
+    message = f"line {call.line} of {CMAKE}: project(…) is called after catkin_package(…)"
+    above = text.count("\n", 0, first) + 1
+    files.change("build-line", CMAKE, changed, message, f"move it above line {above}")
+
+
 def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -> None:
     """Name the project. A manifest in whose name the lab's is meant gets that name later."""
     right = wanted if _is_meant(files, package, name, wanted) else name
@@ -420,7 +437,7 @@ def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -
 
 def _add_call(files: Files, what: str, line: str, below: Sequence[str], names: Sequence[str] = ()) -> None:
     """Take the call out of its comment, write it in place of a comment that has not the `names`, or write it below the
-    first of these commands that is there."""
+    first of these commands that is there; without one, at the end of the file, and project(…) at its beginning."""
     text = _cmake(files)
     lines = text.split("\n")
     name, _, first = line.partition("(")
@@ -435,7 +452,8 @@ def _add_call(files: Files, what: str, line: str, below: Sequence[str], names: S
         changed = "\n".join([*lines[:at], *new, *lines[at + len(call) :]])
     else:
         above = next((found[0] for name in below if (found := _commands(files, name))), None)
-        at = text.count("\n", 0, above.span.stop) + 1 if above is not None else len(lines)
+        end = 0 if name == "project" else len(lines)
+        at = text.count("\n", 0, above.span.stop) + 1 if above is not None else end
         changed = "\n".join([*lines[:at], line, *lines[at:]])
     files.change("build-line", CMAKE, changed, f"{CMAKE} does not call {what}", fix)
 
