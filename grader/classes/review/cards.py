@@ -92,33 +92,15 @@ class Card:
         return mark(self.override)
 
     @property
-    def points(self) -> str:
-        """For the form's field."""
+    def form(self) -> Draft:
+        """What the form's fields hold: what was typed, else what is decided."""
         if self.draft and self.draft.typed:
-            return self.draft.points
-        points = self.decided.written.points if self.decided else None
-        return "" if points is None else form_number(points)
-
-    @property
-    def comment(self) -> str:
-        """For the form's field."""
-        if self.draft and self.draft.typed:
-            return self.draft.comment
-        return self.decided.written.comment if self.decided else ""
-
-    @property
-    def answer(self) -> str:
-        """For the form's field."""
-        if self.draft and self.draft.typed:
-            return self.draft.answer
-        return self.decided.written.answer if self.decided else ""
-
-    @property
-    def comments(self) -> Sequence[str]:
-        """The ids of the bank's comments that are chosen."""
-        if self.draft and self.draft.typed:
-            return self.draft.comments
-        return self.decided.written.comments if self.decided else ()
+            return self.draft
+        if self.decided is None:
+            return Draft()
+        written = self.decided.written
+        points = "" if written.points is None else form_number(written.points)
+        return Draft(points=points, comment=written.comment, comments=written.comments, answer=written.answer)
 
     @property
     def said(self) -> str:
