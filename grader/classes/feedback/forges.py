@@ -12,6 +12,7 @@ import os
 import re
 from abc import abstractmethod
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -97,17 +98,13 @@ class Comments(Sender):
     def send(self, feedback: Feedback, *, look: bool = False) -> str:
         """Make the comment or the issue; return its address."""
         path = self.path(feedback.entry)
-        try:
+        with self._asking(self.place(feedback)):
             if not self.settings.public and self.is_public(path):
                 raise NotSent(
                     "everybody can read this repository, and so everybody could read the feedback",
                     hint="--public returns it all the same",
                 )
             return self._once(feedback, path, look=look)
-        except Refused as error:
-            raise self._error(error, self.place(feedback)) from error
-        except NoAnswer as error:
-            raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
 
     def _once(self, feedback: Feedback, path: str, *, look: bool) -> str:
         """Make it, and look whether it is there where that is not known."""
@@ -149,7 +146,7 @@ class Comments(Sender):
         """Yield what a student asks: each open issue (with that label), each answer to feedback, in an issue or on the
         commit. Raises NotSent."""
         path = self.path(entry)
-        try:
+        with self._asking(f"{self.server}/{path}"):
             for post in self.issues(path):
                 if MARK in post.text:
                     yield from (reply for reply in self.replies(path, post.number) if MARK not in reply.text)
@@ -157,8 +154,14 @@ class Comments(Sender):
                     yield post
             if commit:
                 yield from (post for post in self.comments(path, commit) if MARK not in post.text)
+
+    @contextmanager
+    def _asking(self, where: str) -> Iterator[None]:
+        """Turn a refusal, or no answer, into an error of ours about that place."""
+        try:
+            yield
         except Refused as error:
-            raise self._error(error, f"{self.server}/{path}") from error
+            raise self._error(error, where) from error
         except NoAnswer as error:
             raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
 

@@ -148,7 +148,8 @@ def cards(row: GradebookRow, rubric: Rubric, known: Known, drafts: Mapping[str, 
     mine = [c for c in found if c.awarded]
     waiting = [c for c in found if not c.awarded and _waits(c, whole=whole)]
     others = [c for c in found if c not in mine and c not in waiting]
-    return Cards(waiting=waiting, decided=mine, rest=sorted(others, key=_nothing_lost))
+    rest = sorted(others, key=lambda c: c.criterion.points >= c.criterion.max_points)
+    return Cards(waiting=waiting, decided=mine, rest=rest)
 
 
 def card(
@@ -173,10 +174,6 @@ def _waits(card: Card, *, whole: bool) -> bool:
     """Of what could not be graded at all, only what people decide anyway waits for one."""
     status = card.criterion.status
     return card.criterion.counts and ((status.is_open and whole) or (card.manual and status.is_open))
-
-
-def _nothing_lost(card: Card) -> bool:
-    return card.criterion.points >= card.criterion.max_points
 
 
 def verdict(status: Status, points: float, most: float) -> str:
