@@ -14,7 +14,15 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.files import result_text
 from grader.report.sentences import points_line
-from grader.report.terminal import NOT_DECIDED, TO_FIX, Terminal, emit, open_console, print_report
+from grader.report.terminal import (
+    NOT_DECIDED,
+    TO_FIX,
+    Terminal,
+    emit,
+    fit_encoding,
+    open_console,
+    print_report,
+)
 from grader.report.text import line
 from grader.report.view import arrange, points_of
 from grader.rubric.model import Rubric
@@ -132,10 +140,7 @@ class TerminalScreen(Screen):
         self._console.file.flush()
 
     def _show(self, text: str, limit: int = TEXT_CHARS) -> str:
-        text, encoding = line(text, limit), self._console.encoding
-        if text.encode(encoding, "ignore").decode(encoding) != text:
-            text = text.replace(DASH, "-").replace("…", "...")
-        return text.encode(encoding, "backslashreplace").decode(encoding)
+        return fit_encoding(line(text, limit), self._console.encoding)
 
 
 class JsonLines(Screen):
