@@ -125,9 +125,10 @@ def keep_base(place: ProcessEnvironment, exit_code: int | None) -> None:
         _hand_answers(place)
 
 
-def catkin_make(place: ProcessEnvironment) -> list[str]:
+def catkin_make(place: ProcessEnvironment, folder: str = "") -> list[str]:
+    """Return the command that builds the workspace in `folder`, by default the submission's."""
     return [
-        "catkin_make", "-C", place.inside_workspace, "-j2", "--no-color", "--cmake-args",
+        "catkin_make", "-C", folder or place.inside_workspace, "-j2", "--no-color", "--cmake-args",
         f"-DPYTHON_EXECUTABLE={place.ros.python}",
     ]  # fmt: skip
 
@@ -335,18 +336,9 @@ async def _build(place: ProcessEnvironment) -> bytes:
 def _spec(place: ProcessEnvironment) -> dict[str, Any]:
     boxed = place.sandbox.bubblewrap
     sources = place.course / "src"
-    binds: list[Word] = [
-        "--ro-bind",
-        copy_of(sources),
-        SOURCES,
-        "--bind",
-        scratch(4 * BUILT_BYTES_MAX, BUILT_FILES),
-        COURSE,
-    ]
-    make = [
-        "catkin_make", "-C", COURSE if boxed else str(place.course), "-j2", "--no-color", "--cmake-args",
-        f"-DPYTHON_EXECUTABLE={place.ros.python}",
-    ]  # fmt: skip
+    memory = scratch(4 * BUILT_BYTES_MAX, BUILT_FILES)
+    binds: list[Word] = ["--ro-bind", copy_of(sources), SOURCES, "--bind", memory, COURSE]
+    make = catkin_make(place, COURSE if boxed else str(place.course))
     argv = ["/bin/bash", "-c", BUILD, "bash", *make] if boxed else make
     bare = replace(place, env={}, sees_course=False)
     return bare.spec(

@@ -327,10 +327,6 @@ def _lingers(user: int) -> bool:
     return False
 
 
-def _environment() -> dict[str, str]:
-    return {**HOST_ENV, "XDG_RUNTIME_DIR": str(RUNTIME / str(os.geteuid()))}
-
-
 def _move_to_scope() -> bool:
     """Ask for the move and wait until it is done: the answer only says that it will be."""
     busctl, pid = find_host_program("busctl"), os.getpid()
@@ -338,27 +334,16 @@ def _move_to_scope() -> bool:
         return False
     scope = f"grader-{pid}-{secrets.token_hex(4)}.scope"
     manager = "--system" if os.geteuid() == 0 else "--user"
+    call = [busctl, manager, f"--timeout={ANSWER_S}", "call", *METHOD]
     properties = ["PIDs", "au", "1", str(pid), *DELEGATED]
-    command = [
-        busctl,
-        manager,
-        f"--timeout={ANSWER_S}",
-        "call",
-        *METHOD,
-        scope,
-        "fail",
-        "3",
-        *properties,
-        "0",
-    ]
     try:
         subprocess.run(
-            command,
+            [*call, scope, "fail", "3", *properties, "0"],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             check=True,
             timeout=ANSWER_S + 1,
-            env=_environment(),
+            env={**HOST_ENV, "XDG_RUNTIME_DIR": str(RUNTIME / str(os.geteuid()))},
             cwd="/",
         )
     except (OSError, subprocess.SubprocessError):

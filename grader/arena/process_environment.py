@@ -310,28 +310,17 @@ class ProcessEnvironment:
         return self.limits.model_copy(update={"home_bytes": room})
 
     def _binds(self, *, copy: bool, as_handed_in: bool, output: bool) -> list[Word]:
-        course: list[Word] = (
-            ["--ro-bind", copy_of(self.course), COURSE] if self.sees_course and self.course.is_dir() else []
-        )
-        if not copy:
-            return course
-        workspace = self.workspace
-        sources = workspace.built / "src" if as_handed_in else workspace.repaired
-        binds: list[Word] = [
-            *course,
-            "--ro-bind",
-            copy_of(workspace.large),
-            LARGE,
-            "--ro-bind",
-            copy_of(sources),
-            SOURCES,
-        ]
-        if output:
-            base: list[Word] = (
-                ["--ro-bind", copy_of(self.base), BASE_WORKSPACE] if self.base.is_file() else []
-            )
-            return [*binds, *base, "--bind", scratch(self.limits.tmp_bytes, OUTPUT_FILES), OUTPUT]
-        return [*binds, "--ro-bind", copy_of(self.archive), BUILT] if self.archive.is_file() else binds
+        shown = {COURSE: self.course} if self.sees_course and self.course.is_dir() else {}
+        if copy:
+            workspace = self.workspace
+            shown[LARGE] = workspace.large
+            shown[SOURCES] = workspace.built / "src" if as_handed_in else workspace.repaired
+            inside, kept = (BASE_WORKSPACE, self.base) if output else (BUILT, self.archive)
+            shown |= {inside: kept} if kept.is_file() else {}
+        binds = [word for inside, path in shown.items() for word in ("--ro-bind", copy_of(path), inside)]
+        if not (copy and output):
+            return binds
+        return [*binds, "--bind", scratch(self.limits.tmp_bytes, OUTPUT_FILES), OUTPUT]
 
     def stage(self) -> dict[str, Any] | None:
         """Return where the arena makes its stage, and the user who writes there; None without a sandbox."""

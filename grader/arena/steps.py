@@ -183,8 +183,7 @@ class StepRunner:
         try:
             found = MessageType(type_, find_text or self._message_text)
         except ValueError as error:
-            begin = MISFIT if self._arena.place.is_own(type_) else f"the grader cannot publish {type_}: "
-            self._note("note", topic, f"{begin}{error}")
+            self._note_misfit(topic, type_, error)
             return
         if self._md5sums.setdefault(topic, found.md5sum) != found.md5sum:
             self._note(
@@ -250,14 +249,14 @@ class StepRunner:
         try:
             self._send(publish.topic, value, index, total)
         except ValueError as error:
-            begin = (
-                MISFIT
-                if self._arena.place.is_own(publish.type)
-                else f"the grader cannot publish {publish.type}: "
-            )
-            self._note("note", publish.topic, f"{begin}{error}")
+            self._note_misfit(publish.topic, publish.type, error)
             return False
         return True
+
+    def _note_misfit(self, topic: str, type_: str, error: ValueError) -> None:
+        """Note why nothing of that type can be published: by the student's own definition, or by the rubric's."""
+        begin = MISFIT if self._arena.place.is_own(type_) else f"the grader cannot publish {type_}: "
+        self._note("note", topic, f"{begin}{error}")
 
     async def _stream(self, publish: Publish) -> None:
         topic, total, values = publish.topic, publish.total, publish.in_turn

@@ -30,7 +30,7 @@ from grader.intake import safe_name
 from grader.intake.gitdir import write_staged
 from grader.model.progress import Progress, Silence
 from grader.model.result import GitStatus, GradingResult, Point
-from grader.report.terminal import open_console
+from grader.report.terminal import fit_encoding, open_console
 from grader.report.text import line
 from grader.report.view import arrange, hidden_ids, without_hidden
 from grader.rubric.find import named_labs
@@ -279,4 +279,4 @@ def _point(point: Point, encoding: str) -> Iterator[RenderableType]:
 
 
 def _fit_encoding(text: str, encoding: str) -> str:
-    return line(text, LINE_CHARS).encode(encoding, "backslashreplace").decode(encoding)
+    return fit_encoding(line(text, LINE_CHARS), encoding)

@@ -10,10 +10,11 @@ import sys
 from pathlib import Path
 
 from grader import pipeline
+from grader.cli.checking import say_choice
 from grader.cli.display import open_progress
 from grader.cli.host_support import warn_without_sandbox
 from grader.cli.outcome import exit_code, judged_criteria
-from grader.cli.output import report, say, say_beside
+from grader.cli.output import report, say
 from grader.cli.select_rubric import Chosen, choose_all, only, package_prefix
 from grader.errors import ExitCode, GraderError, RubricError, UsageError
 from grader.faults import fault_of
@@ -77,8 +78,7 @@ def _grade(settings: JobSettings) -> JobResult:
     settings.check_attempt()
     chosen = _choose(settings)
     source, rubric = chosen.source, with_pass_mark(chosen.rubric, settings.mark)
-    if chosen.words:
-        say_beside(chosen.words)
+    say_choice(chosen)
     if not settings.static:
         warn_without_sandbox(settings.sandbox, rubric)
     clear(settings.out)

@@ -24,6 +24,7 @@ from grader.classes.batch.regrade import CHANGES, CriterionState, Regraded
 from grader.classes.batch.run import GRADEBOOK, INDEX, RESULTS, Watcher
 from grader.classes.gradebook import GradebookRow
 from grader.classes.overrides import FILE as OVERRIDES
+from grader.cli.display import live_console
 from grader.cli.output import say, say_json
 from grader.model.batch import ROSTER
 from grader.model.verdict import Status
@@ -231,8 +232,8 @@ def _span(seconds: float) -> str:
 @contextmanager
 def open_class_display() -> Iterator[Watcher]:
     """Show a batch's progress on stderr until the block ends."""
-    console = Console(file=sys.stderr, markup=False, emoji=False, highlight=False)
-    if not console.is_terminal or console.is_dumb_terminal or console.encoding != "utf-8":
+    console = live_console()
+    if console is None:
         yield PlainClass(sys.stderr)
         return
     progress = LiveClass(console)

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,10 +34,10 @@ from grader.classes.feedback.send import Recipients as WantedFeedback
 from grader.classes.gradebook import write_gradebook
 from grader.classes.gradebook.table import Book, GradebookFormat, GradebookRow
 from grader.classes.roster import Local, Roster, read_roster
-from grader.classes.roster.entries import parse_time
 from grader.classes.roster.platforms import is_download, unpack_download
 from grader.cli import publishing
 from grader.cli.class_display import open_class_display, print_batch
+from grader.cli.declare import STDOUT
 from grader.cli.host_support import require_room, warn_without_sandbox
 from grader.cli.output import say, say_beside, say_json
 from grader.errors import ExitCode, GraderError, UsageError
@@ -48,7 +47,6 @@ from grader.model.batch import BatchRun
 from grader.portable import cores
 from grader.rubric.course import CourseFile, load_course, split_name
 from grader.rubric.load import PIN, LoadedRubric, load_rubric, needs_ros, split_pin
-from grader.untrusted_text import line
 from grader.wording import plural
 
 if TYPE_CHECKING:
@@ -120,18 +118,6 @@ def default_jobs(rubric: LoadedRubric, *, static: bool) -> int:
     return cores() if static or not rubric.rubric.scenarios else cores() * JOBS_PER_CORE
 
 
-def parse_before(text: str | None) -> datetime | None:
-    """Parse the value of `--before`. Raises UsageError."""
-    if text is None:
-        return None
-    found = parse_time(text)
-    if found is None:
-        raise UsageError(
-            f"--before {line(text, 80)} is not a time", hint="write it like 2026-11-20T23:59:00+01:00"
-        )
-    return found
-
-
 def allowed_folders(folders: Sequence[Path], *, remote_only: bool) -> Local:
     """Return which paths of this machine a roster may name. Raises UsageError."""
     if folders and remote_only:
@@ -171,7 +157,6 @@ def executor(options: BatchOptions, exchange: str | None) -> Executor:
     )
 
 
-STDOUT = "-"
 ENDINGS: dict[GradebookFormat, str] = {"csv": ".csv", "jsonl": ".jsonl", "xlsx": ".xlsx"}
 COLUMNS = ("lab", "due", "graded", "open", "not graded", "published", "sent")
 

@@ -257,6 +257,7 @@ AuthorOption = Annotated[
 DraftsFlag = Annotated[
     bool, Flag("--drafts", "take results as they are now, also where others are published")
 ]
+STDOUT = "-"
 STATIC = Flag("--static", "check the files only and run nothing")
 BATCH_FOLDER = "the --out of `grader batch`"
 

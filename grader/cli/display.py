@@ -154,14 +154,21 @@ class LiveSteps(Steps):
         return table
 
 
+def live_console() -> Console | None:
+    """Return a console on stderr on which lines can be drawn again; None where stderr is none."""
+    console = Console(file=sys.stderr, markup=False, emoji=False, highlight=False)
+    live = console.is_terminal and not console.is_dumb_terminal and console.encoding == "utf-8"
+    return console if live else None
+
+
 @contextmanager
 def open_progress(*, early: bool = False) -> Iterator[Progress]:
     """Show progress on stderr until the block ends; then a live display is cleared.
 
     With `early`, what the files alone decide is printed to stdout as soon as it is known, and stays there.
     """
-    console = Console(file=sys.stderr, markup=False, emoji=False, highlight=False)
-    if not console.is_terminal or console.is_dumb_terminal or console.encoding != "utf-8":
+    console = live_console()
+    if console is None:
         yield PlainSteps(sys.stderr, tell=print_early if early else None)
         return
     above = console.print if sys.stdout.isatty() else None

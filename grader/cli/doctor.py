@@ -19,7 +19,7 @@ from rich.text import Text
 
 from grader.arena.sandbox import is_shown
 from grader.arena.sandbox_files import missing_packages
-from grader.cli.host_support import DoctorRow, platform_rows, sandbox_rows
+from grader.cli.host_support import DoctorRow, platform_rows, program_row, sandbox_rows
 from grader.errors import RosMissing
 from grader.host_programs import LISTS, LOCALHOST, LOCALHOST_HINT, resolves
 from grader.installable import install_command
@@ -142,17 +142,11 @@ def _python() -> DoctorRow:
 
 def _programs() -> Iterator[DoctorRow]:
     for name, package in PROGRAMS.items():
-        path = shutil.which(name)
-        if path:
-            yield DoctorRow(name=name, state="ok", detail=path)
-        else:
-            yield DoctorRow(name=name, state="missing", detail="not found", fix=f"apt-get install {package}")
+        yield program_row(name, shutil.which(name), "missing", f"apt-get install {package}")
 
 
 def _git() -> DoctorRow:
-    path = shutil.which("git")
-    fix = "" if path else "https://git-scm.com/downloads"
-    return DoctorRow(name="git", state="ok" if path else "limited", detail=path or "not found", fix=fix)
+    return program_row("git", shutil.which("git"), "limited", "https://git-scm.com/downloads")
 
 
 def _ros() -> Iterator[DoctorRow]:
@@ -166,9 +160,7 @@ def _ros() -> Iterator[DoctorRow]:
         return
     yield DoctorRow(name="ROS 1", state="ok", detail=ros.label)
     for program in ROS_PROGRAMS:
-        path = ros.program(program)
-        fix = "" if path else INSTALL_HINT
-        yield DoctorRow(name=program, state="ok" if path else "missing", detail=path or "not found", fix=fix)
+        yield program_row(program, ros.program(program), "missing", INSTALL_HINT)
     yield from _modules(ros)
     yield _standins(ros)
 

@@ -80,9 +80,13 @@ def sandbox_rows() -> Iterator[DoctorRow]:
 
 
 def _program(name: str) -> DoctorRow:
-    path, package = find_host_program(name), PROGRAMS[name]
+    return program_row(name, find_host_program(name), "limited", f"apt-get install {PROGRAMS[name]}")
+
+
+def program_row(name: str, path: str | None, without: Literal["limited", "missing"], fix: str) -> DoctorRow:
+    """Return the row of a program: where it is, or what its lack means and how to fix that."""
     if path is None:
-        return DoctorRow(name=name, state="limited", detail="not found", fix=f"apt-get install {package}")
+        return DoctorRow(name=name, state=without, detail="not found", fix=fix)
     return DoctorRow(name=name, state="ok", detail=path)
 
 

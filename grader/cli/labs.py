@@ -276,10 +276,7 @@ def _correct(lab: str) -> tuple[LoadedRubric, Solution]:
 
 
 def _mistakes(loaded: LoadedRubric, correct: Solution) -> list[Planned]:
-    file = mutants_file(loaded)
-    if file is None:
-        return plan_all(correct)
-    return plan_declared(load_mutants(file, loaded.rubric), correct)[0]
+    return _plan_mutants(loaded, correct, own=True, everything=False)[0]
 
 
 def _find_mistake(planned: list[Planned], name: str) -> Planned:

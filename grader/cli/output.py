@@ -12,8 +12,11 @@ import textwrap
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 
+from grader.cli.declare import STDOUT
 from grader.errors import ExitCode, GraderError, RubricError
+from grader.files import atomic_write
 from grader.untrusted_text import json_text, line, visible
 
 LINE_CHARS = 4000
@@ -39,6 +42,14 @@ def say_document(made: Callable[[bool], str]) -> None:
     encoding lacks needs an escape of the document's own format."""
     encoding = (sys.stdout.encoding or "ascii").lower().replace("-", "")
     sys.stdout.write(made(encoding != "utf8"))
+
+
+def write_document(out: str, made: Callable[[bool], str], *, public: bool = False) -> None:
+    """Write a document as `say_document` takes it to the file `out`, or print it for `-`. Raises OutputError."""
+    if out == STDOUT:
+        say_document(made)
+    else:
+        atomic_write(Path(out), made(False).encode(), public=public)
 
 
 ERROR_CHARS, NARROWEST = 2000, 40

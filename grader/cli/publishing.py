@@ -121,12 +121,12 @@ def check_options(form: FeedbackForm, given: Mapping[str, bool]) -> None:
             raise UsageError(f"--form {form.name} does not take {name}", hint=f"it takes {takes}")
 
 
-def parse_since(text: str | None) -> datetime | None:
-    """Parse the value of `--changed-since`. Raises UsageError."""
+def parse_option_time(option: str, text: str | None) -> datetime | None:
+    """Parse the time that an option was given; None for none. Raises UsageError."""
     found = parse_time(text) if text is not None else None
     if text is not None and found is None:
         hint = "write it like 2026-11-20T23:59:00+01:00"
-        raise UsageError(f"--changed-since {line(text, 80)} is not a time", hint=hint)
+        raise UsageError(f"{option} {line(text, 80)} is not a time", hint=hint)
     return found
 
 

@@ -6,7 +6,7 @@ They judge and verify, write reports, print what a file holds, and export bags. 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
@@ -16,7 +16,6 @@ from rich.text import Text
 
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch
 from grader.classes.batch.renew_results import (
-    JudgedFolder,
     WrittenReports,
     figures_in,
     has_result,
@@ -26,8 +25,9 @@ from grader.classes.batch.renew_results import (
     write_one,
 )
 from grader.classes.batch.run import INDEX
-from grader.cli.outcome import exit_code
-from grader.cli.output import report, say, say_beside, say_document
+from grader.cli.declare import STDOUT
+from grader.cli.outcome import exit_code, worst
+from grader.cli.output import report, say, say_beside, write_document
 from grader.cli.select_rubric import package_prefix
 from grader.errors import EvidenceError, ExitCode, UsageError
 from grader.evidence.bag import export_bag
@@ -37,7 +37,7 @@ from grader.evidence.run import Run
 from grader.files import atomic_write
 from grader.judging import judge
 from grader.judging.summary import criteria_text, judged_text
-from grader.model.result import CriterionResult, GradingResult
+from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
 from grader.portable import cores
 from grader.report.class_page.page import write_class_page
@@ -49,11 +49,9 @@ from grader.report.text import line
 from grader.report.view import without_hidden
 from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, load_rubric
-from grader.rubric.model import Rubric
 from grader.verification import PartFinding, compare, read_whole, result_folders, verify
 from grader.wording import first_few, number
 
-WORST_FIRST = (ExitCode.NOT_GRADED, ExitCode.BELOW_PASS_MARK, ExitCode.INCONCLUSIVE)
 CHANNELS_MAX = 500
 FINDING_CHARS = 500
 
@@ -61,7 +59,7 @@ FINDING_CHARS = 500
 def judge_evidence(evidence: Sequence[Path], loaded: LoadedRubric, out: str) -> ExitCode:
     """Judge one submission and write its criteria as JSON to the file `out`, or to stdout for `-`."""
     criteria = judge(loaded.rubric, load_evidence(evidence), loaded.checks, loaded.handed_out)
-    _write(out, lambda ascii_only: criteria_text(criteria, ascii_only=ascii_only))
+    write_document(out, lambda ascii_only: criteria_text(criteria, ascii_only=ascii_only))
     return exit_code(criteria, loaded.rubric)
 
 
@@ -70,28 +68,15 @@ def judge_submissions(folders: Sequence[Path], loaded: LoadedRubric, out: str, j
     others. Return the exit code of the worst."""
     order = {folder: index for index, folder in enumerate(folders)}
     judged = sorted(judge_all(folders, loaded, jobs), key=lambda one: order[one.folder])
-    _write(
-        out, lambda ascii_only: judged_text(loaded.rubric, map(_named_outcome, judged), ascii_only=ascii_only)
-    )
+    found = [(one.folder.name, one.error if one.criteria is None else one.criteria) for one in judged]
+    write_document(out, lambda ascii_only: judged_text(loaded.rubric, found, ascii_only=ascii_only))
     for one in judged:
         if one.criteria is None:
             report(EvidenceError(one.error, hint=one.hint))
-    codes = {
+    return worst(
         ExitCode.NOT_GRADED if c is None else exit_code(c, loaded.rubric)
         for c in (j.criteria for j in judged)
-    }
-    return next((code for code in WORST_FIRST if code in codes), ExitCode.PASSED)
-
-
-def _named_outcome(one: JudgedFolder) -> tuple[str, tuple[CriterionResult, ...] | str]:
-    return one.folder.name, one.error if one.criteria is None else one.criteria
-
-
-def _write(out: str, text: Callable[[bool], str]) -> None:
-    if out == "-":
-        say_document(text)
-    else:
-        atomic_write(Path(out), text(False).encode())
+    )
 
 
 def print_inspection(inspection: Inspection, stream: IO[str]) -> None:
@@ -188,7 +173,7 @@ def verify_results(results: Sequence[Path], rubric: str | None, allowed: Path | 
     """Verify each result, print what was found, and return the exit code of the worst."""
     folders = result_folders(list(results))
     rubrics: dict[str, LoadedRubric] = {}
-    codes = set()
+    codes = list[ExitCode]()
     for folder in folders:
         try:
             name = rubric or read_whole(folder).rubric.id
@@ -196,11 +181,11 @@ def verify_results(results: Sequence[Path], rubric: str | None, allowed: Path | 
                 rubrics[name] = _rubric_named(name, given=rubric is not None)
             of_class = (folder.resolve().parent / RUN).is_file()
             found = verify(folder, rubrics[name], allowed, of_class=of_class)
-            codes.add(_print_findings(folder, found))
+            codes.append(_print_findings(folder, found))
         except EvidenceError as error:  # noqa: PERF203 - each result has its own
             report(error)
-            codes.add(ExitCode.NOT_GRADED)
-    return next((code for code in WORST_FIRST if code in codes), ExitCode.PASSED)
+            codes.append(ExitCode.NOT_GRADED)
+    return worst(codes)
 
 
 def _rubric_named(name: str, *, given: bool) -> LoadedRubric:
@@ -231,7 +216,6 @@ def _export(run: Run, path: Path, *, everything: bool) -> None:
     say(f"{path}: {count} messages")
 
 
-STDOUT = "-"
 NAMES_SHOWN = 5
 
 
@@ -318,7 +302,7 @@ def write_form(
         rubric=rubric.rubric,
         hidden=missing_hidden(shown, rubric.rubric),
         prefix=where,
-        passed=_has_passed(shown, rubric.rubric),
+        passed=shown.status != "error" and exit_code(shown.criteria, rubric.rubric) is ExitCode.PASSED,
         docs=rubric.docs,
         load_figures=lambda: figures_in(folder, shown, rubric.rubric),
     )
@@ -339,7 +323,3 @@ def _prefix(result: GradingResult, given: str | None) -> str:
             f"no package {package} with these files is here, so paths begin in it; give its folder with --prefix"
         )
     return found or ""
-
-
-def _has_passed(result: GradingResult, rubric: Rubric) -> bool:
-    return result.status != "error" and exit_code(result.criteria, rubric) is ExitCode.PASSED

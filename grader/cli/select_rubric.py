@@ -389,7 +389,8 @@ def package_prefix(result: GradingResult, here: Path) -> str | None:
 
     Results do not say it: it is the package of that name that has all files that the result cites. None if none has.
     """
-    root = _root(here.resolve())
+    here = here.resolve()
+    root = next((folder for folder in (here, *here.parents) if (folder / ".git").exists()), here)
     cited = {
         c.file for criterion in result.criteria for c in criterion.citations if isinstance(c, FileCitation)
     }
@@ -397,10 +398,6 @@ def package_prefix(result: GradingResult, here: Path) -> str | None:
         if name == result.submission.package and all((folder / file).exists() for file in cited):
             return folder.relative_to(root).as_posix()
     return None
-
-
-def _root(here: Path) -> Path:
-    return next((folder for folder in (here, *here.parents) if (folder / ".git").exists()), here)
 
 
 def _packages(root: Path) -> Iterator[tuple[str, Path]]:

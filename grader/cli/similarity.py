@@ -104,7 +104,8 @@ def _tail(similarity: Similarity) -> Iterator[str]:
         yield f"{len(similarity.pairs) - PAIRS_SHOWN} more pairs are in the files below."
     for group in similarity.clusters:
         if len(group) > 2:
-            yield f"{len(group)} belong together: {_ids(group)}"
+            names = first_few([line(name, NAME_CHARS) for name in group], IDS_SHOWN)
+            yield f"{len(group)} belong together: {names}"
     if similarity.same_group:
         count = similarity.same_group
         yield (
@@ -128,7 +129,3 @@ def _tail(similarity: Similarity) -> Iterator[str]:
 def _not_compared(one: NotCompared) -> str:
     place = line(f"{one.id}: {one.file}" if one.file else one.id, TEXT_CHARS)
     return f"{place}: {line(one.reason, TEXT_CHARS)}"
-
-
-def _ids(group: tuple[str, ...]) -> str:
-    return first_few([line(name, NAME_CHARS) for name in group], IDS_SHOWN)

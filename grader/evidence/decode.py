@@ -308,10 +308,11 @@ def _text_of(name: str, find_text: FindText) -> str:
 
 def _needed_types(text: str, package: str) -> list[str]:
     types = (match[1] for line in text.splitlines() if (match := _TYPE.match(line.partition("#")[0])))
-    return [_full(name, package) for name in types if name not in _BUILT_IN]
+    return [full_name(name, package) for name in types if name not in _BUILT_IN]
 
 
-def _full(name: str, package: str) -> str:
+def full_name(name: str, package: str) -> str:
+    """Return the whole name of a type that a definition of `package` names."""
     if "/" in name:
         return name
     return "std_msgs/Header" if name == "Header" else f"{package}/{name}"

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, TypeGuard
 
-from grader.evidence.decode import Decoder, Encoder, FindText, definition, full_definition
+from grader.evidence.decode import Decoder, Encoder, FindText, definition, full_definition, full_name
 from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, parse, sections_of
 from grader.installable import noetic_messages
 from grader.model.message_definitions import DIVIDER
@@ -317,11 +317,4 @@ def _md5_line(
     kind, brackets, name = match[1], match[2] or "", match[3]
     if kind in PRIMITIVES or kind in CLOCKS or kind in {"byte", "char"}:
         return f"{kind}{brackets} {name}"
-    full = (
-        "std_msgs/Header"
-        if kind == "Header"
-        else kind
-        if "/" in kind
-        else f"{owner.partition('/')[0]}/{kind}"
-    )
-    return f"{_md5(full, parts, known)} {name}"
+    return f"{_md5(full_name(kind, owner.partition('/')[0]), parts, known)} {name}"

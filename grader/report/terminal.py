@@ -70,7 +70,7 @@ PLAIN_MARKS = {
 """In place of `SIGNS` where an encoding has no ✓."""
 
 
-PLAIN_LETTERS = str.maketrans({"…": "...", "→": "->", "±": "+/-", MINUS: "-"})
+PLAIN_LETTERS = str.maketrans({"…": "...", "→": "->", "±": "+/-", MINUS: "-", "\N{EN DASH}": "-"})
 """What stands for the grader's own signs where an encoding lacks them."""
 
 
@@ -331,11 +331,7 @@ class Terminal:
         return self._fit_encoding(line(text, limit))
 
     def _fit_encoding(self, text: str) -> str:
-        """Return the text in characters that the terminal's encoding has."""
-        encoding = self.console.encoding
-        if not _can_encode(text, encoding):
-            text = text.translate(PLAIN_LETTERS)
-        return text.encode(encoding, "backslashreplace").decode(encoding)
+        return fit_encoding(text, self.console.encoding)
 
 
 def wrap(text: str, width: int) -> list[str]:
@@ -348,6 +344,13 @@ def wrap(text: str, width: int) -> list[str]:
         else:
             rows[-1] = row
     return rows
+
+
+def fit_encoding(text: str, encoding: str) -> str:
+    """Return the text in characters that the encoding has."""
+    if not _can_encode(text, encoding):
+        text = text.translate(PLAIN_LETTERS)
+    return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def mark(status: Status, encoding: str) -> str:

@@ -4,7 +4,7 @@
 |---|---|
 | terminal, XML, a log | `line` (one line of bounded length), `visible` (`lines=True` keeps line ends) |
 | Markdown | `markdown`, `markdown_code`, `markdown_block` |
-| HTML | `html` for text and quoted attributes, `html_address` for `href` |
+| HTML | `html` for text and quoted attributes |
 | CSV | `csv_text` for whole tables |
 | JSON | `json_text` |
 | a file's name | `grader.intake.safe_name` |
@@ -27,7 +27,6 @@ __all__ = [
     "csv_cell",
     "csv_text",
     "html",
-    "html_address",
     "json_text",
     "line",
     "markdown",
@@ -39,20 +38,12 @@ __all__ = [
 ]
 
 
-_ADDRESS = re.compile(r"https?://[!-~]+", re.IGNORECASE)
-
-
-def html(text: str, *, lines: bool = False) -> str:
-    """`text` for an element's content or for an attribute in quotes; `lines` is for `<pre>`.
+def html(text: str) -> str:
+    """`text` for an element's content or for an attribute in quotes.
 
     Not for `<script>` and `<style>`, whose content HTML reads otherwise.
     """
-    return escape(visible(text, lines=lines), quote=True).replace("`", "&#96;")
-
-
-def html_address(address: str) -> str:
-    """`address` for `href` and `src`; empty for all but http and https, `javascript:` among them."""
-    return html(address) if _ADDRESS.fullmatch(address) else ""
+    return escape(visible(text), quote=True).replace("`", "&#96;")
 
 
 # A backslash keeps markup from being read. It does not keep a forge from finding names, numbers of issues, addresses or

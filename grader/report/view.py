@@ -187,11 +187,10 @@ def write_files_hint(files: Sequence[MissingFile]) -> str:
     return f"write these files{then.replace(' it', ' them')}"
 
 
-def _open_alike(loss: Loss) -> Hashable:
-    return loss.criterion.status, loss.criterion.hint
-
-
-def _fold(losses: list[Loss], key: Callable[[Loss], Hashable] = _open_alike) -> tuple[Loss, ...]:
+def _fold(
+    losses: list[Loss],
+    key: Callable[[Loss], Hashable] = lambda loss: (loss.criterion.status, loss.criterion.hint),
+) -> tuple[Loss, ...]:
     """One entry for all that have the same key."""
     groups: dict[Hashable, list[Loss]] = {}
     for loss in losses:

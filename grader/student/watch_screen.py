@@ -14,7 +14,15 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.files import result_text
 from grader.report.sentences import points_line
-from grader.report.terminal import NOT_DECIDED, TO_FIX, Terminal, emit, open_console, print_report
+from grader.report.terminal import (
+    NOT_DECIDED,
+    TO_FIX,
+    Terminal,
+    emit,
+    fit_encoding,
+    open_console,
+    print_report,
+)
 from grader.report.text import line
 from grader.report.view import arrange, points_of
 from grader.rubric.model import Rubric
@@ -59,22 +67,18 @@ class TerminalScreen(Screen):
         self._ended = False
 
     def begin(self, saved: tuple[str, ...]) -> None:
-        """See `Screen`."""
         self._at = self._clock()
         doing = "looking at the files" if self._static else "running everything"
         self._say(f"{self._saved_text(saved)}: {doing} … {ENDS}" if saved else f"{doing} … {ENDS}")
 
     def restart(self) -> None:
-        """See `Screen`."""
         self._say("saved again: starting over")
 
     def unchanged(self, saved: tuple[str, ...]) -> None:
-        """See `Screen`."""
         self._at = self._clock()
         self._say(f"{self._saved_text(saved)}: nothing has changed … {ENDS}")
 
     def end(self, outcome: WatchedResult, saved: tuple[str, ...]) -> None:
-        """See `Screen`."""
         result = outcome.result
         if self._console.is_terminal and self._ended:
             self._console.clear()
@@ -132,10 +136,7 @@ class TerminalScreen(Screen):
         self._console.file.flush()
 
     def _show(self, text: str, limit: int = TEXT_CHARS) -> str:
-        text, encoding = line(text, limit), self._console.encoding
-        if text.encode(encoding, "ignore").decode(encoding) != text:
-            text = text.replace(DASH, "-").replace("…", "...")
-        return text.encode(encoding, "backslashreplace").decode(encoding)
+        return fit_encoding(line(text, limit), self._console.encoding)
 
 
 class JsonLines(Screen):
@@ -145,7 +146,6 @@ class JsonLines(Screen):
         self._stream = stream
 
     def end(self, outcome: WatchedResult, _saved: tuple[str, ...]) -> None:
-        """See `Screen`."""
         ascii_only = (self._stream.encoding or "ascii").lower().replace("-", "") != "utf8"
         rows = result_text(outcome.result, ascii_only=ascii_only).split("\n")
         self._stream.write(f"{' '.join(row.strip() for row in rows).strip()}\n")

@@ -278,14 +278,12 @@ def grade_all(
         _grade_folder,
         jobs,
         min(most, len(jobs)),
-        ended=_grading_ended,
+        ended=lambda job, error: GradedSubmission(
+            name=job.name, result=None, error=f"the process that graded it {error.reason}"
+        ),
         begun=lambda job: begun(job.name),
         warm_up=WARM_UP,
     )
-
-
-def _grading_ended(job: FolderJob, error: WorkerEnded) -> GradedSubmission:
-    return GradedSubmission(name=job.name, result=None, error=f"the process that graded it {error.reason}")
 
 
 def _grade_folder(job: FolderJob) -> GradedSubmission:

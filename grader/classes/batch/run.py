@@ -23,7 +23,7 @@ from grader.classes.overrides import COMMENTS_FILE as BANK
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
 from grader.errors import Busy, GraderError, UsageError
-from grader.files import check_writable, keep_private, lock, make_folder
+from grader.files import check_writable, keep_private, make_folder, try_lock
 from grader.intake import safe_name, without_password
 from grader.judging.summary import passed
 from grader.model import SandboxMode
@@ -308,14 +308,8 @@ def hold_folder(out: Path, who: str = "another batch works") -> Iterator[None]:
     """Hold a batch's folder. Raises Busy, which says `who` does, if another program holds it."""
     descriptor = os.open(out, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
-        held = True
-        with suppress(OSError):  # a file system without locks: nothing can be known there
-            held = lock(descriptor)
-        if not held:
-            raise Busy(
-                f"{who} in {out} just now",
-                hint="wait until it has ended, or choose another --out",
-            )
+        if not try_lock(descriptor):
+            raise Busy(f"{who} in {out} just now", hint="wait until it has ended, or choose another --out")
         yield
     finally:
         os.close(descriptor)

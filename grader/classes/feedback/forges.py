@@ -12,6 +12,7 @@ import os
 import re
 from abc import abstractmethod
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -87,27 +88,19 @@ class Comments(Sender):
         return path
 
     def show(self, feedback: Feedback) -> str:
-        """Return the comment."""
-        return self.body(feedback)
-
-    def body(self, feedback: Feedback) -> str:
         """Return the comment, with the mark that says what it is."""
         return f"{feedback.text.rstrip()}\n\n{mark(feedback)}\n"
 
     def send(self, feedback: Feedback, *, look: bool = False) -> str:
         """Make the comment or the issue; return its address."""
         path = self.path(feedback.entry)
-        try:
+        with self._asking(self.place(feedback)):
             if not self.settings.public and self.is_public(path):
                 raise NotSent(
                     "everybody can read this repository, and so everybody could read the feedback",
                     hint="--public returns it all the same",
                 )
             return self._once(feedback, path, look=look)
-        except Refused as error:
-            raise self._error(error, self.place(feedback)) from error
-        except NoAnswer as error:
-            raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
 
     def _once(self, feedback: Feedback, path: str, *, look: bool) -> str:
         """Make it, and look whether it is there where that is not known."""
@@ -125,7 +118,7 @@ class Comments(Sender):
         raise AssertionError
 
     def _make(self, feedback: Feedback, path: str) -> str:
-        body = self.body(feedback)
+        body = self.show(feedback)
         if not self.settings.issues:
             return self.comment(path, feedback.commit, body)
         issue = _ISSUE.search(feedback.last_place)
@@ -149,7 +142,7 @@ class Comments(Sender):
         """Yield what a student asks: each open issue (with that label), each answer to feedback, in an issue or on the
         commit. Raises NotSent."""
         path = self.path(entry)
-        try:
+        with self._asking(f"{self.server}/{path}"):
             for post in self.issues(path):
                 if MARK in post.text:
                     yield from (reply for reply in self.replies(path, post.number) if MARK not in reply.text)
@@ -157,8 +150,14 @@ class Comments(Sender):
                     yield post
             if commit:
                 yield from (post for post in self.comments(path, commit) if MARK not in post.text)
+
+    @contextmanager
+    def _asking(self, where: str) -> Iterator[None]:
+        """Turn a refusal, or no answer, into an error of ours about that place."""
+        try:
+            yield
         except Refused as error:
-            raise self._error(error, f"{self.server}/{path}") from error
+            raise self._error(error, where) from error
         except NoAnswer as error:
             raise NotSent(f"{self.server}: {error}", hint="the same command tries it again") from error
 
@@ -234,19 +233,15 @@ class GitHubComments(Comments):
         return self.api.get(_repo_path(path)).get("private") is not True
 
     def comment(self, path: str, commit: str, body: str) -> str:
-        """Comment on a commit; return the comment's address."""
         return str(self.api.post(f"{_repo_path(path)}/commits/{commit}/comments", {"body": body})["html_url"])
 
     def comments(self, path: str, commit: str) -> Iterator[Post]:
-        """Yield the comments on a commit."""
         return _github_posts(self.api.pages(f"{_repo_path(path)}/commits/{commit}/comments"))
 
     def open_issue(self, path: str, title: str, body: str) -> str:
-        """Open an issue."""
         return str(self.api.post(f"{_repo_path(path)}/issues", {"title": title, "body": body})["html_url"])
 
     def reply(self, path: str, issue: int, body: str) -> str:
-        """Comment on an issue."""
         return str(self.api.post(f"{_repo_path(path)}/issues/{issue}/comments", {"body": body})["html_url"])
 
     def issues(self, path: str) -> Iterator[Post]:
@@ -255,7 +250,6 @@ class GitHubComments(Comments):
         return _github_posts(one for one in found if "pull_request" not in one)
 
     def replies(self, path: str, issue: int) -> Iterator[Post]:
-        """Yield the comments on an issue."""
         return _github_posts(self.api.pages(f"{_repo_path(path)}/issues/{issue}/comments"))
 
 
@@ -293,7 +287,6 @@ class GitLabComments(Comments):
         self.api = Api(base, {"Authorization": f"Bearer {token}"}, settings.told)
 
     def is_public(self, path: str) -> bool:
-        """Return whether everybody can read the project, or everybody with an account."""
         return str(self.api.get(_project_path(path)).get("visibility")) != "private"
 
     def comment(self, path: str, commit: str, body: str) -> str:
@@ -302,7 +295,6 @@ class GitLabComments(Comments):
         return self._commit(path, commit)
 
     def comments(self, path: str, commit: str) -> Iterator[Post]:
-        """Yield the comments on a commit."""
         for one in self.api.pages(f"{_project_path(path)}/repository/commits/{commit}/comments"):
             yield _gitlab_post(one, self._commit(path, commit), "note")
 
@@ -312,12 +304,10 @@ class GitLabComments(Comments):
         return str(self.api.post(f"{_project_path(path)}/issues", data)["web_url"])
 
     def reply(self, path: str, issue: int, body: str) -> str:
-        """Comment on an issue."""
         made = self.api.post(f"{_project_path(path)}/issues/{issue}/notes", {"body": body})
         return self._note(path, issue, made)
 
     def issues(self, path: str) -> Iterator[Post]:
-        """Yield the issues."""
         for one in self.api.pages(f"{_project_path(path)}/issues?scope=all"):
             yield _gitlab_post(one, str(one.get("web_url", "")), "description")
 

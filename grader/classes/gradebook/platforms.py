@@ -378,7 +378,7 @@ def _mark(row: GradebookRow, worth: Sequence[str] | None) -> Mark:
     return Mark(
         entry=row.entry,
         points=_points(result, worth),
-        open=_open(result),
+        open="" if result.status == "graded" else f"{result.status}: {error_text(result)}".rstrip(": "),
         comment="; ".join(text for text in (late_text(result), comment(result)) if text),
         late_cost=cost,
         gated=result.gate is not None,
@@ -392,7 +392,3 @@ def _points(result: GradingResult, worth: Sequence[str] | None) -> tuple[float |
         return (None,) * len(worth)
     found = criterion_points(result)
     return tuple(found.get(criterion) for criterion in worth)
-
-
-def _open(result: GradingResult) -> str:
-    return "" if result.status == "graded" else f"{result.status}: {error_text(result)}".rstrip(": ")

@@ -156,9 +156,7 @@ class _Views:
     def decide(self, key: str, criterion: str) -> AnyResponse:
         """Put a decision into `overrides.yaml`, change it, or take it out."""
         item = self._item(key)
-        asked = next((c for c in self._session.rubric.rubric.criteria if c.id == criterion), None)
-        if asked is None:
-            raise NotFound("The rubric has no such criterion.")
+        asked = self._criterion(criterion)
         form = request.form
         chosen = form.getlist("bank")
         typed = Draft(points=form.get("points", ""), comment=form.get("comment", ""), comments=chosen)
@@ -167,13 +165,13 @@ class _Views:
             override = self._override_from_form(item, asked)
             waits = self._saved_as(item, criterion, override)
         except Conflict:
-            return self._not_saved(item, criterion, _draft(typed, conflict=True), 409)
+            return self._not_saved(item, criterion, replace(typed, conflict=True), 409)
         except Wrong as wrong:
-            return self._not_saved(item, criterion, _draft(typed, error=str(wrong)), 400)
+            return self._not_saved(item, criterion, replace(typed, error=str(wrong)), 400)
         except GraderError as error:
             hint = f" Hint: {error.hint}." if error.hint else ""
             return self._not_saved(
-                item, criterion, _draft(typed, error=f"Not saved: {error.message}.{hint}"), 422
+                item, criterion, replace(typed, error=f"Not saved: {error.message}.{hint}"), 422
             )
         return self._saved_response(item, criterion, waits)
 
@@ -193,9 +191,7 @@ class _Views:
 
     def comment(self, criterion: str) -> AnyResponse:
         """Change a comment for all that have it, or add one."""
-        asked = next((c for c in self._session.rubric.rubric.criteria if c.id == criterion), None)
-        if asked is None:
-            raise NotFound("The rubric has no such criterion.")
+        asked = self._criterion(criterion)
         form, (least, most) = request.form, bounds(asked)
         known = self._session.decisions().bank.get(criterion, {})
         if form.get("id") and form["id"] not in known:
@@ -281,6 +277,12 @@ class _Views:
             raise NotFound("The class has no such submission.")
         return item
 
+    def _criterion(self, name: str) -> Criterion:
+        for criterion in self._session.rubric.rubric.criteria:
+            if criterion.id == name:
+                return criterion
+        raise NotFound("The rubric has no such criterion.")
+
     def _override_from_form(self, item: ListedSubmission, asked: Criterion) -> WrittenOverride | None:
         form, (least, most) = request.form, bounds(asked)
         if form.get("do") in {"remove", "undo"}:
@@ -327,14 +329,15 @@ class _Views:
         )
 
     def _code(self, item: ListedSubmission, criterion: str) -> list[CodeFile]:
-        asked = next(c for c in self._session.rubric.rubric.criteria if c.id == criterion)
         row = self._session.submissions.row(item.key)
         result = next((c for c in row.result.criteria if c.id == criterion), None) if row else None
         if result is None:
             return []
         mask = self._session.mask(item, self._commit(item))
         hide = mask.text if mask else str
-        return code_of(self._session.path / item.key, asked, result, self._session.starter, hide)
+        return code_of(
+            self._session.path / item.key, self._criterion(criterion), result, self._session.starter, hide
+        )
 
     def _row(
         self, item: ListedSubmission, drafts: Mapping[str, Draft]
@@ -433,10 +436,6 @@ def as_written(applied: AppliedOverride) -> Decided:
 
 def _author(default: str) -> str:
     return str(session.get("author", default))
-
-
-def _draft(typed: Draft, *, error: str = "", conflict: bool = False) -> Draft:
-    return replace(typed, error=error, conflict=conflict)
 
 
 def _now() -> str:

@@ -92,33 +92,15 @@ class Card:
         return mark(self.override)
 
     @property
-    def points(self) -> str:
-        """For the form's field."""
+    def form(self) -> Draft:
+        """What the form's fields hold: what was typed, else what is decided."""
         if self.draft and self.draft.typed:
-            return self.draft.points
-        points = self.decided.written.points if self.decided else None
-        return "" if points is None else form_number(points)
-
-    @property
-    def comment(self) -> str:
-        """For the form's field."""
-        if self.draft and self.draft.typed:
-            return self.draft.comment
-        return self.decided.written.comment if self.decided else ""
-
-    @property
-    def answer(self) -> str:
-        """For the form's field."""
-        if self.draft and self.draft.typed:
-            return self.draft.answer
-        return self.decided.written.answer if self.decided else ""
-
-    @property
-    def comments(self) -> Sequence[str]:
-        """The ids of the bank's comments that are chosen."""
-        if self.draft and self.draft.typed:
-            return self.draft.comments
-        return self.decided.written.comments if self.decided else ()
+            return self.draft
+        if self.decided is None:
+            return Draft()
+        written = self.decided.written
+        points = "" if written.points is None else form_number(written.points)
+        return Draft(points=points, comment=written.comment, comments=written.comments, answer=written.answer)
 
     @property
     def said(self) -> str:
@@ -166,7 +148,8 @@ def cards(row: GradebookRow, rubric: Rubric, known: Known, drafts: Mapping[str, 
     mine = [c for c in found if c.awarded]
     waiting = [c for c in found if not c.awarded and _waits(c, whole=whole)]
     others = [c for c in found if c not in mine and c not in waiting]
-    return Cards(waiting=waiting, decided=mine, rest=sorted(others, key=_nothing_lost))
+    rest = sorted(others, key=lambda c: c.criterion.points >= c.criterion.max_points)
+    return Cards(waiting=waiting, decided=mine, rest=rest)
 
 
 def card(
@@ -191,10 +174,6 @@ def _waits(card: Card, *, whole: bool) -> bool:
     """Of what could not be graded at all, only what people decide anyway waits for one."""
     status = card.criterion.status
     return card.criterion.counts and ((status.is_open and whole) or (card.manual and status.is_open))
-
-
-def _nothing_lost(card: Card) -> bool:
-    return card.criterion.points >= card.criterion.max_points
 
 
 def verdict(status: Status, points: float, most: float) -> str:

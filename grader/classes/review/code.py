@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from fnmatch import fnmatch
 from functools import lru_cache
+from keyword import kwlist
 from pathlib import Path, PurePosixPath
 
 from markupsafe import Markup, escape
@@ -150,10 +151,6 @@ def _handed_out(path: str, starter: Mapping[str, bytes]) -> list[str] | None:
     return None if found is None else found.decode("utf-8", "replace").splitlines()
 
 
-PYTHON_WORDS = (
-    "and as assert async await break class continue def del elif else except finally for from global if import in is "
-    "lambda nonlocal not or pass raise return try while with yield None True False"
-)
 CPP_WORDS = (
     "auto bool break case catch char class const constexpr continue default delete do double else enum explicit false "
     "float for friend if inline int long namespace new nullptr operator private protected public return short signed "
@@ -165,14 +162,16 @@ _LONG = r'''(?P<long>"""(?:(?!""").)*(?:""")?|\'\'\'(?:(?!\'\'\').)*(?:\'\'\')?)
 _NUMBER = r"(?P<number>\b\d[\w.]*)"
 
 
-def _words(words: str) -> str:
-    return rf"(?P<word>\b(?:{'|'.join(words.split())})\b)"
+def _words(words: Iterable[str]) -> str:
+    return rf"(?P<word>\b(?:{'|'.join(words)})\b)"
 
 
 _HASH = r"(?P<comment>#[^\n]*)"
-_PYTHON = re.compile("|".join([_HASH, _LONG, _STRING, _words(PYTHON_WORDS), _NUMBER]), re.DOTALL)
+_PYTHON = re.compile("|".join([_HASH, _LONG, _STRING, _words(kwlist), _NUMBER]), re.DOTALL)
 _CPP = re.compile(
-    "|".join([r"(?P<comment>//[^\n]*|/\*(?:(?!\*/).)*(?:\*/)?)", _STRING, _words(CPP_WORDS), _NUMBER]),
+    "|".join(
+        [r"(?P<comment>//[^\n]*|/\*(?:(?!\*/).)*(?:\*/)?)", _STRING, _words(CPP_WORDS.split()), _NUMBER]
+    ),
     re.DOTALL,
 )
 _XML = re.compile(r"(?P<comment><!--(?:(?!-->).)*(?:-->)?)|(?P<word></?[\w:-]+|/?>)|" + _STRING, re.DOTALL)

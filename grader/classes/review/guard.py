@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import secrets
-import stat
+from contextlib import suppress
 from hmac import compare_digest
 from pathlib import Path
 from typing import BinaryIO
@@ -14,6 +14,7 @@ from flask import Flask, Response, redirect, request, session
 from werkzeug.exceptions import Forbidden
 from werkzeug.wrappers import Response as AnyResponse
 
+from grader.files import open_untrusted
 from grader.results import EVIDENCE, RESULT
 
 TOKEN_BYTES = 24
@@ -103,19 +104,17 @@ REPORTS = {
     RESULT: "text/plain",
 }
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,150}")
-FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
-FILE = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 LISTED_MAX = 200
 
 
 def open_report(folder: Path, name: str) -> BinaryIO | None:
     """One of `REPORTS`; None where there is none, or it is not a file."""
-    return _open(folder, (), name) if name in REPORTS else None
+    return _open(folder, name) if name in REPORTS else None
 
 
 def open_evidence(folder: Path, name: str) -> BinaryIO | None:
     """Return a file of the evidence; None where there is none, or it is not a file."""
-    return _open(folder, (EVIDENCE,), name) if NAME.fullmatch(name) else None
+    return _open(folder, EVIDENCE, name) if NAME.fullmatch(name) else None
 
 
 def reports_of(folder: Path) -> list[str]:
@@ -139,19 +138,7 @@ def _exists(file: BinaryIO | None) -> bool:
     return file is not None
 
 
-def _open(folder: Path, below: tuple[str, ...], name: str) -> BinaryIO | None:
-    descriptors: list[int] = []
-    try:
-        descriptors.append(os.open(folder, FOLDER))
-        for part in below:
-            descriptors.append(os.open(part, FOLDER, dir_fd=descriptors[-1]))
-        file = os.open(name, FILE, dir_fd=descriptors[-1])
-    except OSError:
-        return None
-    finally:
-        for descriptor in descriptors:
-            os.close(descriptor)
-    if not stat.S_ISREG(os.fstat(file).st_mode):
-        os.close(file)
-        return None
-    return os.fdopen(file, "rb")
+def _open(folder: Path, *below: str) -> BinaryIO | None:
+    with suppress(OSError):
+        return open_untrusted(folder, *below)
+    return None

@@ -5,7 +5,6 @@ Two people may decide about the same criterion: each decision names the one it w
 
 from __future__ import annotations
 
-import fcntl
 import os
 import secrets
 import threading
@@ -38,6 +37,7 @@ from grader.classes.review.student_requests import Requests, read_requests, requ
 from grader.classes.review.submissions import (
     ListedSubmission,
     Mask,
+    Remembered,
     Submissions,
     aliases,
     alike,
@@ -45,7 +45,7 @@ from grader.classes.review.submissions import (
     stamp_of,
 )
 from grader.errors import Busy, GraderError, OutputError, RubricError, UsageError
-from grader.files import unwritable
+from grader.files import open_lock, unwritable, wait_for_lock
 from grader.model.batch import Entry, State
 from grader.model.result import BankComment, GradingResult, Override, WrittenOverride
 from grader.portable import cores
@@ -96,8 +96,7 @@ class ReviewSession:
         self.submissions = Submissions(path)
         self.background = BackgroundWriter(self._follow, pace)
         self._saving, self._writing, self._guard = threading.Lock(), threading.Lock(), threading.Lock()
-        self._decisions: tuple[object, Decisions] | None = None
-        self._requests: tuple[object, Requests] | None = None
+        self._decisions, self._requests = Remembered[Decisions](), Remembered[Requests]()
         self.share: Callable[[Entry], bool] = lambda _: True
         """Which submissions the pages list."""
         self.blind = False
@@ -137,17 +136,13 @@ class ReviewSession:
     def decisions(self) -> Decisions:
         """Return what both files say now. Raises RubricError where they have faults."""
         rubric, ids = self.rubric.rubric, tuple(ids_of(self.submissions.batch().run))
-        stamp = (stamp_of(self.path / FILE), stamp_of(self.path / BANK), ids)
-        with self._guard:
-            found = self._decisions
-        if found is None or found[0] != stamp:
+
+        def read() -> Decisions:
             bank = read_bank(self.path / BANK, rubric)
             written = read_written(self.path / FILE, rubric, ids, bank)
-            come_to = resolve_all(written, rubric, bank)
-            found = (stamp, Decisions(written=written, come_to=come_to, bank=bank))
-            with self._guard:
-                self._decisions = found
-        return found[1]
+            return Decisions(written=written, come_to=resolve_all(written, rubric, bank), bank=bank)
+
+        return self._decisions.get((stamp_of(self.path / FILE), stamp_of(self.path / BANK), ids), read)
 
     def items(self) -> tuple[ListedSubmission, ...]:
         """Return every submission of the share, with what was decided since its result was written."""
@@ -166,13 +161,7 @@ class ReviewSession:
         """Return what students ask, as the files of requests say now."""
         entries, paths = self.submissions.batch().run.entries, request_files(self.path)
         stamp = (tuple((path, stamp_of(path)) for path in paths), entries)
-        with self._guard:
-            found = self._requests
-        if found is None or found[0] != stamp:
-            found = (stamp, read_requests(paths, entries, self.rubric.rubric.criteria))
-            with self._guard:
-                self._requests = found
-        return found[1]
+        return self._requests.get(stamp, lambda: read_requests(paths, entries, self.rubric.rubric.criteria))
 
     def answered(self, item: ListedSubmission, criterion: str, answer: str) -> tuple[str, ...]:
         """Return the digests of the questions that an answer is to: those of now, and as before if it is as before."""
@@ -490,12 +479,12 @@ def same(one: Override | None, other: Override | None) -> bool:
 def hold_review(path: Path) -> Iterator[None]:
     """Hold what all reviews of a class hold while they compare and write: another process may review it, too."""
     try:
-        descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+        descriptor = open_lock(path / LOCK, public=True)
     except OSError as error:
         raise unwritable(path / LOCK, error) from error
     try:
         with suppress(OSError):  # a file system without locks: its users must not write at the same time
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            wait_for_lock(descriptor)
         yield
     finally:
         os.close(descriptor)

@@ -8,13 +8,12 @@ from __future__ import annotations
 import json
 import os
 import re
-import threading
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from pydantic import ValidationError
 
@@ -61,7 +60,8 @@ _ADDRESS = re.compile(
     r"[\w.+-]{1,100}@[\w-]{1,100}(?:\.[\w-]{1,60}){0,6}(?::\S{1,200})?|\b(?:https?|ssh|git)://\S{1,300}"
 )
 Stamp = tuple[int, int, int] | None
-T = TypeVar("T", bound=Record)
+T = TypeVar("T")
+AnyRecord = TypeVar("AnyRecord", bound=Record)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,14 +169,27 @@ class ListedSubmission:
         return shown and words.casefold() in f"{self.title} {self.name} {self.group}".casefold()
 
 
+class Remembered(Generic[T]):
+    """What was made of something last, for as long as that is the same. Safe to use from several threads."""
+
+    def __init__(self) -> None:
+        self._found: tuple[object, T] | None = None
+
+    def get(self, made_of: object, make: Callable[[], T]) -> T:
+        """Return what `make` made of this, calling it where that was something else."""
+        found = self._found
+        if found is None or found[0] != made_of:
+            found = self._found = (made_of, make())
+        return found[1]
+
+
 class Submissions:
     """All of a class in the roster's order. Safe to use from several threads."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._lock = threading.Lock()
-        self._run: tuple[Stamp, BatchFolder, Mapping[str, BatchFolder]] | None = None
-        self._items: dict[str, tuple[object, ListedSubmission]] = {}
+        self._run = Remembered[tuple[BatchFolder, Mapping[str, BatchFolder]]]()
+        self._items = defaultdict[str, Remembered[ListedSubmission]](Remembered)
 
     def batch(self) -> BatchFolder:
         """Return the batch's folder as `run.json` says now. Raises UsageError where that cannot be read."""
@@ -198,23 +211,17 @@ class Submissions:
 
     def _read(self) -> tuple[BatchFolder, Mapping[str, BatchFolder]]:
         """Return the batch, and by its key each submission as if there were no other."""
-        stamp = stamp_of(self.path / RUN)
-        with self._lock:
-            if self._run is None or self._run[0] != stamp:
-                batch = open_batch(self.path)
-                self._run = (stamp, batch, dict(_each(batch)))
-            return self._run[1:]
+
+        def read() -> tuple[BatchFolder, Mapping[str, BatchFolder]]:
+            batch = open_batch(self.path)
+            return batch, dict(_each(batch))
+
+        return self._run.get(stamp_of(self.path / RUN), read)
 
     def _item(self, key: str, one: BatchFolder) -> ListedSubmission:
         run = one.run
         made_of = (stamp_of(f"{self.path}/{key}/{RESULT}"), run.entries, run.faults, run.rubric)
-        with self._lock:
-            found = self._items.get(key)
-        if found is None or found[0] != made_of:
-            found = (made_of, item_of(next(one.rows())))
-            with self._lock:
-                self._items[key] = found
-        return found[1]
+        return self._items[key].get(made_of, lambda: item_of(next(one.rows())))
 
 
 def _each(batch: BatchFolder) -> Iterator[tuple[str, BatchFolder]]:
@@ -461,7 +468,7 @@ class Mask:
         found = _ADDRESS.sub(LEFT_OUT, text)
         return WORDS.sub(lambda word: LEFT_OUT if word[0].casefold() in self.words else word[0], found)
 
-    def record(self, record: T) -> T | None:
+    def record(self, record: AnyRecord) -> AnyRecord | None:
         """Return the record with all its texts so; None where nothing sound is left of it."""
         data = self._data(record.model_dump(mode="json", by_alias=True))
         try:

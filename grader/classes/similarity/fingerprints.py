@@ -187,7 +187,7 @@ def _without_comments(code: str, language: Language) -> str:
     Classes get names of one letter: `filter_code` counts their length wrongly."""
     code = code.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     if language == "python":
-        code = _IMPORT.sub(_line_ends, code)
+        code = _IMPORT.sub(lambda found: "\n" * found.group().count("\n"), code)
     parts = []
     for kind, text in _lexer(language).get_tokens(code):
         if any(_is(kind, laid) for laid in _LAID_ASIDE):
@@ -199,10 +199,6 @@ def _without_comments(code: str, language: Language) -> str:
 
 def _is(kind: tuple[str, ...], wanted: tuple[str, ...]) -> bool:
     return kind[: len(wanted)] == wanted
-
-
-def _line_ends(found: re.Match[str]) -> str:
-    return "\n" * found.group().count("\n")
 
 
 @cache

@@ -13,6 +13,7 @@ from grader.cli.declare import (
     REPORT_EXIT_CODES,
     RUBRIC,
     STATIC,
+    STDOUT,
     Argument,
     BookColumn,
     BookForm,
@@ -36,63 +37,52 @@ from grader.errors import ExitCode, UsageError
 from grader.report.forms import FORMS
 
 DEFAULT_OUT = Path("grader-results")
-STDOUT = "-"
 CLASS = Argument("DIR", BATCH_FOLDER)
+ROSTER = Argument(
+    "ROSTER|FOLDER",
+    "a CSV file (id,source,...), a folder of submissions, the zip that Moodle or Canvas offers for download,"
+    " or an export of GitHub Classroom or GitLab",
+)
+BATCH_OUT = Option(
+    "--out",
+    "DIR",
+    "write results to DIR/<id>/, with gradebook.csv and results.jsonl (default: ./grader-results)",
+)
+BEFORE = Option("--before", "TIME", "grade the last commit before TIME (default: the rubric's deadline)")
+REMOTE_ONLY = Flag("--remote-only", "do not let the roster name any path of this machine")
+CLUSTER = Option("--cluster", "ADDRESS", "grade on a Dask cluster: tls://HOST:8786, or local")
+CLUSTER_INSECURE = Flag(
+    "--cluster-insecure",
+    "accept a cluster without certificates (tcp://): anyone who reaches it can run programs there",
+)
+EXCHANGE = Option(
+    "--exchange", "URL", "where a cluster's workers leave results (default: the folder of --out)"
+)
 
 
 @command("batch", group=INSTRUCTORS, exit_codes=CLASS_EXIT_CODES, runs_code=True)
 def batch(
     *,
-    roster: Annotated[
-        Path,
-        Argument(
-            "ROSTER|FOLDER",
-            "a CSV file (id,source,...), a folder of submissions, the zip that Moodle or Canvas offers for download,"
-            " or an export of GitHub Classroom or GitLab",
-        ),
-    ],
+    roster: Annotated[Path, ROSTER],
     rubric: Annotated[str, RUBRIC],
-    out: Annotated[
-        Path | None,
-        Option(
-            "--out",
-            "DIR",
-            "write results to DIR/<id>/, with gradebook.csv and results.jsonl (default: ./grader-results)",
-        ),
-    ] = None,
+    out: Annotated[Path | None, BATCH_OUT] = None,
     package: PackageOption = None,
     jobs: JobsOption = None,
     only: OnlyOption = (),
-    before: Annotated[
-        str | None,
-        Option("--before", "TIME", "grade the last commit before TIME (default: the rubric's deadline)"),
-    ] = None,
+    before: Annotated[str | None, BEFORE] = None,
     allow_local: LocalOption = (),
-    remote_only: Annotated[
-        bool, Flag("--remote-only", "do not let the roster name any path of this machine")
-    ] = False,
+    remote_only: Annotated[bool, REMOTE_ONLY] = False,
     static: Annotated[bool, STATIC] = False,
-    cluster: Annotated[
-        str | None, Option("--cluster", "ADDRESS", "grade on a Dask cluster: tls://HOST:8786, or local")
-    ] = None,
-    cluster_insecure: Annotated[
-        bool,
-        Flag(
-            "--cluster-insecure",
-            "accept a cluster without certificates (tcp://): anyone who reaches it can run programs there",
-        ),
-    ] = False,
-    exchange: Annotated[
-        str | None,
-        Option("--exchange", "URL", "where a cluster's workers leave results (default: the folder of --out)"),
-    ] = None,
+    cluster: Annotated[str | None, CLUSTER] = None,
+    cluster_insecure: Annotated[bool, CLUSTER_INSECURE] = False,
+    exchange: Annotated[str | None, EXCHANGE] = None,
     sandbox: SandboxOption = "auto",
     as_json: JsonFlag = False,
 ) -> ExitCode:
     """Grade a class, or continue a batch that was stopped."""
     with loading():
         from grader.classes.batch.run import BatchOptions
-        from grader.cli import classes
+        from grader.cli import classes, publishing
         from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric)
     out = out or DEFAULT_OUT
@@ -103,7 +93,7 @@ def batch(
         jobs=jobs or classes.default_jobs(loaded, static=static),
         sandbox=sandbox,
         static_only=static,
-        before=classes.parse_before(before),
+        before=publishing.parse_option_time("--before", before),
         only=only,
         cluster=cluster or "",
         cluster_insecure=cluster_insecure,

@@ -33,6 +33,17 @@ VARIABLES = f"""variables:
 {TOKENS}"""
 
 
+FORM = Option("--form", "", "how it gets to the students", choices=tuple(FORMS))
+SHOW_ONE = Flag("--dry-run", "show one of them, and who could get nothing; send nothing")
+CHANGED_SINCE = Option("--changed-since", "TIME", "send only what was published after TIME")
+PLACE = Option("--out", "PATH", "the folder, zip or folder of mails to write (default: in DIR)")
+SMTP = Option(
+    "--smtp", "URL", "email: send through smtp://HOST:587 (STARTTLS) or smtps://HOST (default: files)"
+)
+ISSUES = Flag("--issues", "github, gitlab: an issue for each student in place of a comment on the commit")
+PUBLIC = Flag("--public", "github, gitlab: also in repositories that everybody can read")
+
+
 @command("publish", group=INSTRUCTORS, exit_codes=PUBLISH_EXIT_CODES)
 def publish(
     *,
@@ -62,34 +73,18 @@ def publish(
 def feedback(
     *,
     folder: Annotated[Path, CLASS],
-    form: Annotated[str, Option("--form", "", "how it gets to the students", choices=tuple(FORMS))],
-    dry_run: Annotated[
-        bool, Flag("--dry-run", "show one of them, and who could get nothing; send nothing")
-    ] = False,
+    form: Annotated[str, FORM],
+    dry_run: Annotated[bool, SHOW_ONE] = False,
     only: Annotated[Sequence[str], Option("--only", "ID", "send to these only")] = (),
-    changed_since: Annotated[
-        str | None, Option("--changed-since", "TIME", "send only what was published after TIME")
-    ] = None,
+    changed_since: Annotated[str | None, CHANGED_SINCE] = None,
     again: Annotated[bool, Flag("--again", "send what was sent before, too")] = False,
     drafts: Annotated[bool, Flag("--drafts", "send results as they are now, published or not")] = False,
-    out: Annotated[
-        Path | None, Option("--out", "PATH", "the folder, zip or folder of mails to write (default: in DIR)")
-    ] = None,
-    smtp: Annotated[
-        str,
-        Option(
-            "--smtp", "URL", "email: send through smtp://HOST:587 (STARTTLS) or smtps://HOST (default: files)"
-        ),
-    ] = "",
+    out: Annotated[Path | None, PLACE] = None,
+    smtp: Annotated[str, SMTP] = "",
     sender: Annotated[str, Option("--from", "ADDRESS", "email: the address to send from")] = "",
     branch: Annotated[str, Option("--branch", "NAME", "git: the branch (default: feedback)")] = "",
-    issues: Annotated[
-        bool,
-        Flag("--issues", "github, gitlab: an issue for each student in place of a comment on the commit"),
-    ] = False,
-    public: Annotated[
-        bool, Flag("--public", "github, gitlab: also in repositories that everybody can read")
-    ] = False,
+    issues: Annotated[bool, ISSUES] = False,
+    public: Annotated[bool, PUBLIC] = False,
 ) -> ExitCode:
     """Return what is published to the students, each result once.
 
@@ -119,7 +114,8 @@ def feedback(
         public=public,
         told=say_beside,
     )
-    wanted = Recipients(only=only, changed_since=publishing.parse_since(changed_since), again=again)
+    since = publishing.parse_option_time("--changed-since", changed_since)
+    wanted = Recipients(only=only, changed_since=since, again=again)
     return publishing.send(folder, FORMS[form], settings, wanted, drafts=drafts, dry_run=dry_run)
 
 

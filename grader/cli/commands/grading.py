@@ -56,13 +56,7 @@ def grade(
     loaded = load_rubric(rubric)
     folder = out or DEFAULT_OUT
     check_writable(folder)
-    options = pipeline.GradeOptions(
-        sandbox=sandbox,
-        submission_id=submission_id,
-        package=package or "",
-        static_only=False,
-        keep_hidden=True,
-    )
+    options = pipeline.GradeOptions(sandbox=sandbox, submission_id=submission_id, package=package or "")
     if not is_recording(Path(source)):
         warn_without_sandbox(sandbox, loaded)
     with open_progress(early=sys.stdout.isatty() and not as_json) as progress:
@@ -103,9 +97,7 @@ def record(
     else:
         loaded = rubric_to_record(package or only_package(source), script, launch, seconds)
     check_writable(out)
-    options = pipeline.GradeOptions(
-        sandbox=sandbox, package=package or "", static_only=False, keep_hidden=True
-    )
+    options = pipeline.GradeOptions(sandbox=sandbox, package=package or "")
     warn_without_sandbox(sandbox)
     with open_progress() as progress:
         files = pipeline.record(source, loaded, out, options, progress)

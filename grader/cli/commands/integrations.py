@@ -2,11 +2,12 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from grader.cli.declare import (
     EXPORT_EXIT_CODES,
     INSTRUCTORS,
+    STDOUT,
     Argument,
     Flag,
     Option,
@@ -17,11 +18,14 @@ from grader.cli.declare import (
     minutes,
 )
 from grader.errors import ExitCode
+from grader.model import SandboxMode
 from grader.model.version import ALL
+
+if TYPE_CHECKING:
+    from grader.integrations.bundle import BundleSettings
 
 Shell = Literal["bash", "zsh", "fish"]
 FORMATS = tuple(one.short for one in ALL)
-STDOUT = "-"
 LAB = Argument("LAB|FILE", "a lab's id or a rubric's file; see grader labs")
 ASSUME_EXECUTABLE = Flag(
     "--assume-executable",
@@ -66,12 +70,10 @@ def export_gradescope(
     with loading():
         from grader.cli.output import say
         from grader.files import atomic_write
-        from grader.integrations.bundle import BundleSettings
         from grader.integrations.platforms import gradescope_autograder
         from grader.rubric.load import load_rubric
     rubric = load_rubric(lab)
-    modes: Literal["lost", "granted"] = "granted" if assume_executable else "lost"
-    settings = BundleSettings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes, package=package or "")
+    settings = _settings(minutes, package, sandbox, assume_executable=assume_executable)
     data = gradescope_autograder(rubric, settings)
     if str(out) == STDOUT:
         sys.stdout.buffer.write(data)
@@ -104,16 +106,23 @@ def export_prairielearn(
     """Write a question with an external grader for PrairieLearn."""
     with loading():
         from grader.cli.output import say
-        from grader.integrations.bundle import BundleSettings
         from grader.integrations.platforms import prairielearn_question, write_question
         from grader.rubric.load import load_rubric
     rubric = load_rubric(lab)
-    modes: Literal["lost", "granted"] = "granted" if assume_executable else "lost"
-    settings = BundleSettings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes, package=package or "")
+    settings = _settings(minutes, package, sandbox, assume_executable=assume_executable)
     target = out or Path(f"{rubric.rubric.id}-prairielearn")
     write_question(prairielearn_question(rubric, settings, image), target)
     say(f"{target}: add question/ to your course's questions, and build {image} from image/")
     return ExitCode.PASSED
+
+
+def _settings(
+    minutes: int, package: str | None, sandbox: SandboxMode, *, assume_executable: bool
+) -> "BundleSettings":
+    with loading():
+        from grader.integrations.bundle import BundleSettings
+    modes: Literal["lost", "granted"] = "granted" if assume_executable else "lost"
+    return BundleSettings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes, package=package or "")
 
 
 @command("export bag", group=INSTRUCTORS)

@@ -10,6 +10,7 @@ from grader.cli.declare import (
     INSTRUCTORS,
     MUTANTS_EXIT_CODES,
     RUBRIC,
+    STDOUT,
     Argument,
     Flag,
     JsonFlag,
@@ -21,7 +22,6 @@ from grader.cli.declare import (
 )
 from grader.errors import ExitCode, RubricError, UsageError
 
-STDOUT = "-"
 OUT = Option("--out", "FILE", "where to write it (default: -, stdout)")
 FORCE = Flag("--force", "overwrite an existing file")
 LAB = Argument("LAB", "see grader labs")
@@ -240,12 +240,8 @@ def _refuse_existing(out: str, *, force: bool) -> None:
 
 
 def _write(out: str, text: str, *next_steps: str) -> None:
-    from grader.cli.output import say, say_document
-    from grader.files import atomic_write
+    from grader.cli.output import say, write_document
 
-    if out == STDOUT:
-        say_document(lambda _: text)
-        return
-    atomic_write(Path(out), text.encode("utf-8"), public=True)
-    for step in next_steps:
+    write_document(out, lambda _: text, public=True)
+    for step in next_steps if out != STDOUT else ():
         say(step)

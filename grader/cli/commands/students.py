@@ -20,38 +20,32 @@ from grader.cli.declare import (
 )
 from grader.errors import ExitCode, UsageError
 
+PATH = Argument("PATH", "your package's folder (default: this folder)")
+STAGED = Flag(
+    "--staged", "with --static, for a pre-commit hook: check what git has staged, exit 1 if it fails"
+)
+WATCH = Flag("--watch", "stay, and check again whenever you save a file, until Ctrl-C")
+FIX = Flag(
+    "--fix", "first show how to repair modes, line ends, tabs and misspelt names, and do it if you agree"
+)
+DRY_RUN = Flag("--dry-run", "with --fix: only show it, and exit 1 if a file would change")
+YES = Flag("--yes", "with --fix: do not ask")
+OUT = Option("--out", "DIR", "keep the results in DIR/<submission id>/ (default: only show them)")
+
 
 @command("check", group=STUDENTS, runs_code=True)
 def check(
     *,
-    path: Annotated[str, Argument("PATH", "your package's folder (default: this folder)")] = ".",
+    path: Annotated[str, PATH] = ".",
     rubric: Annotated[str | None, RUBRIC] = None,
     package: PackageOption = None,
     static: Annotated[bool, STATIC] = False,
-    staged: Annotated[
-        bool,
-        Flag(
-            "--staged", "with --static, for a pre-commit hook: check what git has staged, exit 1 if it fails"
-        ),
-    ] = False,
-    watch: Annotated[
-        bool, Flag("--watch", "stay, and check again whenever you save a file, until Ctrl-C")
-    ] = False,
-    fix: Annotated[
-        bool,
-        Flag(
-            "--fix",
-            "first show how to repair modes, line ends, tabs and misspelt names, and do it if you agree",
-        ),
-    ] = False,
-    dry_run: Annotated[
-        bool, Flag("--dry-run", "with --fix: only show it, and exit 1 if a file would change")
-    ] = False,
-    yes: Annotated[bool, Flag("--yes", "with --fix: do not ask")] = False,
-    out: Annotated[
-        Path | None,
-        Option("--out", "DIR", "keep the results in DIR/<submission id>/ (default: only show them)"),
-    ] = None,
+    staged: Annotated[bool, STAGED] = False,
+    watch: Annotated[bool, WATCH] = False,
+    fix: Annotated[bool, FIX] = False,
+    dry_run: Annotated[bool, DRY_RUN] = False,
+    yes: Annotated[bool, YES] = False,
+    out: Annotated[Path | None, OUT] = None,
     sandbox: SandboxOption = "auto",
     full: AllFlag = False,
     as_json: JsonFlag = False,

@@ -82,11 +82,6 @@ class SubmissionRow:
         """Whether its points say anything."""
         return self.state in {"graded", "inconclusive", "manual"}
 
-    def points_of(self, place: int, most: float) -> float:
-        """What it has for the criterion at that place, which is worth `most`."""
-        full = most if self.letters[place] == "p" else 0.0
-        return self.earned.get(place, full)
-
 
 def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInfo]) -> SubmissionRow:
     """One submission and its result, as the page shows it."""

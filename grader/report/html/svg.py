@@ -177,12 +177,12 @@ def log_ticks(low: float, high: float) -> list[float]:
     return [value for value in (*(-size for size in reversed(sizes)), 0.0, *sizes) if low <= value <= high]
 
 
-def ticks(low: float, high: float, count: int = TICKS) -> list[float]:
-    """About `count` round values from `low` to `high`: 0, 0.5, 1 …"""
+def ticks(low: float, high: float) -> list[float]:
+    """About `TICKS` round values from `low` to `high`: 0, 0.5, 1 …"""
     span = high - low
     if span < TINY or not math.isfinite(span):
         return []
-    rough = span / count
+    rough = span / TICKS
     size = 10.0 ** math.floor(math.log10(rough))
     step = next(factor * size for factor in (1, 2, 5, 10) if factor * size >= rough)
     first = math.ceil(low / step - 1e-9)
