@@ -57,7 +57,7 @@ def close(descriptor: int) -> None:
 
 
 @contextmanager
-def own_group(
+def own_session(
     command: Sequence[str],
     *,
     cwd: os.PathLike[str],
@@ -107,10 +107,10 @@ def _interrupt_held() -> Iterator[None]:
 def _end_group(process: subprocess.Popen[bytes]) -> None:
     """Kill everything in the session of a process, and itself, and wait for it."""
     with suppress(ProcessLookupError):
-        if sys.platform == "win32":
-            process.kill()
-        else:
+        if sys.platform != "win32":
             os.killpg(process.pid, signal.SIGKILL)
+        elif process.poll() is None:
+            process.kill()
     process.wait()
 
 

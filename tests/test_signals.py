@@ -21,7 +21,7 @@ from grader import grade
 from grader.arena import arena_process
 from grader.arena.sandbox import why_no_sandbox
 from grader.errors import HostError
-from grader.portable import own_group, wait_for_children
+from grader.portable import own_session, wait_for_children
 from tests.arena.support import printed, run_script
 from tests.faulty import ROOT, RUBRIC, VICTIM, result_in
 from tests.support.processes import lives
@@ -156,7 +156,7 @@ def test_ctrl_c_while_a_program_is_started_ends_it(monkeypatch: pytest.MonkeyPat
     try:
         with (
             pytest.raises(KeyboardInterrupt),
-            own_group(["sleep", "3600"], cwd=tmp_path, env=dict(os.environ), stdout=1, stderr=2),
+            own_session(["sleep", "3600"], cwd=tmp_path, env=dict(os.environ), stdout=1, stderr=2),
         ):
             pytest.fail("the interrupt was lost")
     finally:

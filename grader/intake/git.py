@@ -20,7 +20,7 @@ from typing import IO
 
 from grader.host_programs import find_user_program, loading_environment, with_absolute_paths
 from grader.intake.credentials import Access, is_refusal, scrubbed
-from grader.portable import own_group
+from grader.portable import own_session
 
 _QUIET = {
     "core.hooksPath": os.devnull,
@@ -198,7 +198,7 @@ class Git:
         if git is None:
             raise GitMissing("git is not installed")
         command = [*_limits(), git, *options, *args]
-        with own_group(command, cwd=cwd, env=environment, stdout=stdout, stderr=stderr) as process:
+        with own_session(command, cwd=cwd, env=environment, stdout=stdout, stderr=stderr) as process:
             yield process
 
     def _local_environment(self) -> dict[str, str]:

@@ -22,7 +22,7 @@ from grader.checks import partial as partial_
 from grader.checks.registry import parts
 from grader.files import temporary_folder
 from grader.model.verdict import Status
-from grader.portable import own_group
+from grader.portable import own_session
 
 HINTS = 4
 SHOWN_TESTS = 20
@@ -163,7 +163,7 @@ def _run(command: list[str], folder: Path, timeout_s: float, handed: tuple[int, 
     """Return the exit code. What the tests started ends with them. Raises TestsBroken after `timeout_s`."""
     with (
         (folder / "output").open("wb") as output,
-        own_group(
+        own_session(
             command,
             cwd=folder,
             env=_environment(),

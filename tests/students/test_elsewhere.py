@@ -53,7 +53,7 @@ def test_files_are_checked_and_the_way_to_the_rest_is_said(system: str, work: Pa
     rest = [line for line in ran.stdout.splitlines() if "docs/how-to/without-ros.md" in line]
     assert len(rest) == 1
     assert "Only your files were checked: " in ran.stdout
-    assert "All of it is committed and pushed" in ran.stdout
+    assert "Everything is committed and pushed" in ran.stdout
     assert not list(work.parent.parent.glob("grader-*"))
 
 
