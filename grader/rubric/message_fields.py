@@ -41,6 +41,23 @@ USUAL_TYPES = {
     "scan": "sensor_msgs/LaserScan",
 }
 """Of topics whose type a rubric does not say, most often: a name that is all but one of a field's is a slip."""
+SYSTEM_TYPES = {
+    "/tf": "tf2_msgs/TFMessage",
+    "/tf_static": "tf2_msgs/TFMessage",
+    "/rosout": "rosgraph_msgs/Log",
+    "/rosout_agg": "rosgraph_msgs/Log",
+    "/clock": "rosgraph_msgs/Clock",
+}
+POSES = (
+    "nav_msgs/Odometry",
+    "geometry_msgs/Pose",
+    "geometry_msgs/PoseStamped",
+    "geometry_msgs/PoseWithCovariance",
+    "geometry_msgs/PoseWithCovarianceStamped",
+    "geometry_msgs/Pose2D",
+    "turtlesim/Pose",
+)
+"""Types of which a pose can be read, odometry before all others."""
 COUNTED = frozenset({"minimum", "maximum", "start"})
 """Of counters, the values that their field has."""
 STAMPED = "is_stamp"
@@ -159,11 +176,15 @@ def _no_value(kind: str, value: object) -> str:
     """Return why a field of a primitive type is never so."""
     if isinstance(value, list | tuple | Mapping):
         return f"is one value, not {value!r}"
+    if value is None:
+        return "is empty here: give it a value"
     wanted = KINDS.get(kind, "a number")
     got = "a text" if isinstance(value, str) else "true or false" if isinstance(value, bool) else "a number"
     if wanted != got and not (kind.startswith("float") and value in {".inf", "-.inf", "+.inf", ".nan"}):
         return f"is {wanted}, not {value!r}"
     low, high = limits_of(kind) or (0, 0)
+    if isinstance(value, float) and low < high and not value.is_integer():
+        return f"is {kind}, a whole number, and never {value:g}"
     if isinstance(value, int | float) and low < high and not low <= value <= high:
         return f"is {kind}, {low} to {high}, and never {value:g}"
     return ""
@@ -280,6 +301,7 @@ def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
     known = Definitions(rubric)
     yield from _no_types(rubric, known)
     yield from _quoted_params(rubric)
+    yield from _other_kinds(rubric)
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     for index, criterion in as_maps(rubric.get("criteria")):
         scenario = scenarios.get(str(criterion.get("scenario")), {})
@@ -400,6 +422,36 @@ def _quoted_params(rubric: dict[str, Any]) -> Iterator[Fault]:
             yield at, f'"{value}" in quotes is text, and elsewhere {param} is a number: write {value}'
 
 
+def _other_kinds(rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield values of a field that are of another kind than those which earlier criteria ask for in it."""
+    first: dict[tuple[str, str], tuple[str, str]] = {}
+    for index, criterion in as_maps(rubric.get("criteria")):
+        given, name = as_map(criterion.get("with")), str(criterion.get("id"))
+        parts: list[tuple[KeyPath, dict[str, Any]]] = [((), given)]
+        parts += [((key,), as_map(given.get(key))) for key in ("cause", "effect")]
+        for at, asked in parts:
+            for key in ("value", "min", "max"):
+                kind, place = _kind_of(asked.get(key)), (str(asked.get("topic")), str(asked.get("field")))
+                if kind and "field" in asked and "*" not in place[1]:
+                    earlier, other = first.setdefault(place, (name, kind))
+                    if other != kind:
+                        fault = f"is {kind}, and {earlier} has {other} for {place[1]} of {place[0]}"
+                        yield ("criteria", index, "with", *at, key), fault
+
+
+def _kind_of(value: object) -> str:
+    """Return what kind of a value it is, in words; "" for none."""
+    kinds = {
+        bool: "true or false",
+        int: "a number",
+        float: "a number",
+        str: "a text",
+        list: "a list",
+        dict: "a map",
+    }
+    return kinds.get(type(value), "")
+
+
 def _other_type(path: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
     """Yield a type that a topic has not elsewhere in the rubric: two types on one topic are never connected."""
     topic, kind = given.get("topic"), str(given.get("type"))
@@ -446,7 +498,7 @@ def _no_bounds(field: Field, given: dict[str, Any], what: str) -> str:
 def types_of(topic: str, rubric: dict[str, Any], scenario: dict[str, Any] | None = None) -> Iterator[object]:
     """Yield the types that the rubric gives a topic: those that it sends there or asks for, and that of a program of
     the scenario."""
-    yield from ("tf2_msgs/TFMessage",) if topic in {"/tf", "/tf_static"} else ()
+    yield from (SYSTEM_TYPES[topic],) if topic in SYSTEM_TYPES else ()
     programs = topics_of_programs(scenario or {})
     yield from (programs[topic],) if topic in programs else ()
     for _, criterion in as_maps(rubric.get("criteria")):
@@ -530,7 +582,8 @@ def _sent_fields(scenario: dict[str, Any], known: Definitions) -> Iterator[tuple
         ]
     for at, kind, part, value in sent:
         own = known.text(kind, SUFFIXES[part])
-        shape = known.shape(kind, part) if own and isinstance(value, dict) else None
+        is_known = own or part in PARTS[".action"]  # other types are looked at where they are sent
+        shape = known.shape(kind, part) if is_known and isinstance(value, dict) else None
         if shape is not None and (fault := shape.misfit(value)):
             yield at, fault
         elif shape is None and (part or kind.partition("/")[0] not in noetic_messages()):

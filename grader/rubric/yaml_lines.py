@@ -18,6 +18,7 @@ MAX_DEPTH = 50
 MAX_NUMBER = (1 << 63) - 1
 MAX_NUMBER_LETTERS = 100
 TEXT_TAG = "tag:yaml.org,2002:str"
+INT_TAG = "tag:yaml.org,2002:int"
 MERGE_TAG = "tag:yaml.org,2002:merge"
 PLAIN_TAGS = frozenset({"tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"})
 
@@ -96,7 +97,7 @@ def source_of(raw: bytes, name: str, form: Form) -> Source:
 def packages_in(rubric: dict[str, Any]) -> list[str]:
     """Return the packages that students hand in, as a rubric names them: one, or a list."""
     given = rubric.get("package")
-    return [name for _, name in as_texts(given)] if isinstance(given, list) else [str(given)]
+    return [given] if isinstance(given, str) else [name for _, name in as_texts(given)]
 
 
 def texts_at(path: Path, name: str, key: str) -> tuple[str, ...]:
@@ -259,7 +260,7 @@ class _Reader:
         for merge_node in [value for key, value in node.value if key.tag == MERGE_TAG]:
             data = {**self._merge(merge_node, path), **data}
         for key_node, value_node in node.value:
-            key = self._key(key_node, path)
+            key = self._key(key_node, value_node, path)
             if key is None:
                 continue
             line = key_node.start_mark.line + 1
@@ -281,14 +282,16 @@ class _Reader:
             return {key: value for part in parts for key, value in part.items()}
         raise yaml.MarkedYAMLError(problem="<< takes a map or a list of maps", problem_mark=node.start_mark)
 
-    def _key(self, node: yaml.Node, path: KeyPath) -> str | None:
+    def _key(self, node: yaml.Node, value: yaml.Node, path: KeyPath) -> str | None:
         if node.tag == MERGE_TAG:
             return None
         if isinstance(node, yaml.ScalarNode) and (node.tag == TEXT_TAG or self.form.written_keys):
             return str(node.value)
         shown = node.value if isinstance(node, yaml.ScalarNode) else "this"
         line = node.start_mark.line + 1
-        self.faults.append((path, f"{shown} on line {line} is not a string: put the key in quotes"))
+        is_cut = node.tag == INT_TAG and value.start_mark.index == value.end_mark.index
+        remedy = "a decimal number has a point, no comma" if is_cut else "put the key in quotes"
+        self.faults.append((path, f"{shown} on line {line} is not a string: {remedy}"))
         return None
 
     def _scalar(self, node: yaml.Node, path: KeyPath) -> Value:
