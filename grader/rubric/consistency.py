@@ -6,6 +6,7 @@ Works on the data as read, so that a fault in one place hides none elsewhere.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -58,6 +59,14 @@ def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = 
     faults += _packages(rubric, scenarios, criteria)
     faults += reference_faults(rubric, checks)
     return faults
+
+
+def swallowed_keys(rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield keys of the rubric that are a part of the handout's text, as they are indented like it."""
+    handout = str(rubric.get("handout"))
+    for key in ("made_up", "scenarios", "criteria"):
+        if key not in rubric and re.search(rf"(^|\s){key}:\s", handout):
+            yield ("handout",), f'"{key}:" counts as its text: begin that line without blanks'
 
 
 def _packages(

@@ -53,6 +53,7 @@ def doubts(data: object) -> Iterator[Fault]:
     yield from _short_runs(scenarios)
     yield from _misnamed_processes(rubric, scenarios)
     yield from _first_packages(rubric, scenarios)
+    yield from _lone_quotes(rubric)
     yield from _same_criteria(criteria)
     yield from _other_rates(criteria, scenarios)
     for index, criterion in criteria:
@@ -73,6 +74,13 @@ def _short_runs(scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
             if is_number(given_s) and given_s < least_s:
                 fault = f"{given_s:g} s is very short: on a busy machine a correct package may need more"
                 yield ("scenarios", name, "until", key), fault
+
+
+def _lone_quotes(rubric: dict[str, Any]) -> Iterator[Fault]:
+    for path, text in texts_in((), rubric):
+        for quote in ('"', "'"):
+            if text.count(quote) == 1 and (text.startswith(quote) or text.endswith(quote)):
+                yield path, f"has one quotation mark, {quote}, and another one nowhere"
 
 
 def _words(name: str) -> set[str]:

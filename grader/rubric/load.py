@@ -16,7 +16,7 @@ from grader.model.message_rate import RateBounds
 from grader.model.record import Record
 from grader.model.result import RubricOrigin
 from grader.model.version import RUBRIC, UPDATE, Versioned
-from grader.rubric.consistency import cross_faults
+from grader.rubric.consistency import cross_faults, swallowed_keys
 from grader.rubric.course import load_course, split_name
 from grader.rubric.doubts import doubts
 from grader.rubric.fault_words import model_faults
@@ -246,7 +246,7 @@ def _faults(source: Source, samples: Sequence[Value], beside: Beside, folder: Pa
         return [
             source.fault((), "a rubric is a map of keys and values, beginning with schema: grader.rubric/1")
         ]
-    found = [*source.faults, *made_up_faults(source.data), *beside.faults]
+    found = [*source.faults, *swallowed_keys(source.data), *made_up_faults(source.data), *beside.faults]
     for sample in samples:
         faults = [
             *model_faults(Rubric, sample),

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
+from grader.checks.support.fields import is_number
 from grader.evidence.definitions import Field, Types, parse
 from grader.installable import noetic_messages
 from grader.model.message_definitions import (
@@ -115,6 +116,10 @@ class Shape(NamedTuple):
     def inner(self, field: Field, name: str, done: str) -> Field | None:
         """Return a field of a field; None where that is not known. Raises Misfit."""
         there = {one.name: one for one in self.types.get(field.type, ())}
+        if not re.fullmatch(r"\w+", name):
+            raise Misfit(
+                f'no field is called "{name}": between a field and its value are a colon and a blank'
+            )
         if field.array and there:
             raise Misfit(f"{self.what}: {done} is a list: write {done}[0].{name}, or {done}[*].{name}")
         if name in there:
@@ -415,9 +420,11 @@ def _quoted_params(rubric: dict[str, Any]) -> Iterator[Fault]:
             given.append(((*path, "value"), asked.get("name"), asked.get("value")))
         elif criterion.get("check") == "launch-runs":
             given += [((*path, "params", key), key, one) for key, one in as_map(asked.get("params")).items()]
-    numbers = {str(name).strip("/") for _, name, value in given if isinstance(value, int | float)}
+    numbers = {str(name).strip("/") for _, name, value in given if is_number(value)}
     for at, param, value in given:
         yield from _quoted(at, value)
+        if isinstance(value, bool) and str(param).strip("/") in numbers:
+            yield at, f"is true or false, and elsewhere {param} is a number"
         if isinstance(value, str) and _NUMBER.fullmatch(value) and str(param).strip("/") in numbers:
             yield at, f'"{value}" in quotes is text, and elsewhere {param} is a number: write {value}'
 
@@ -440,7 +447,9 @@ def _other_kinds(rubric: dict[str, Any]) -> Iterator[Fault]:
 
 
 def _kind_of(value: object) -> str:
-    """Return what kind of a value it is, in words; "" for none."""
+    """Return what kind of a value it is, in words; "" for none, and for one that is made up."""
+    if isinstance(value, dict) and value.keys() == {"made_up"}:
+        return ""
     kinds = {
         bool: "true or false",
         int: "a number",

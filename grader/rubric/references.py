@@ -150,6 +150,8 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
         fault += "; programs of the students' own go under scripts" if path[-2:-1] == ("programs",) else ""
     elif to == "program" and value.partition("/")[0] not in own:
         fault = ros_packages().program_fault(value)
+    elif to == "dependency" and len(names := re.split(r"[.,]?\s+|,", value.strip())) > 1:
+        fault = f"is one name: write {', '.join(names)}"
     elif to == "dependency":
         meant = "" if value in own else closest(value, own, cutoff=SURE)
         fault = f'there is no package "{value}" (did you mean "{meant}"?)' if meant else ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import date
@@ -21,6 +22,26 @@ TEXT_TAG = "tag:yaml.org,2002:str"
 INT_TAG = "tag:yaml.org,2002:int"
 MERGE_TAG = "tag:yaml.org,2002:merge"
 PLAIN_TAGS = frozenset({"tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"})
+
+AT_BEGINNING = "^"
+"""Before a problem that is told where the part begins in which PyYAML finds it, not where that is seen."""
+YAML_PROBLEMS = {
+    "mapping values are not allowed": (
+        "a colon where no key can stand: text with a colon needs quotes; else look for a colon, a dash or a blank that "
+        "is missing here or in the line above, or for another indentation"
+    ),
+    "could not find expected ':'": "^a key needs a colon and a blank after it",
+    "but found '<block sequence start>'": "this dash is not under those of its list",
+    "expected <block end>": (
+        "this does not belong to the part that begins on line {line}: look at its indentation, its dash and its quotes"
+    ),
+    "expected ',' or '}'": "the {{ of line {line} is not closed, or a comma is missing between its keys",
+    "expected ',' or ']'": "the [ of line {line} is not closed, or a comma is missing between its items",
+    "unexpected end of stream": "^a quotation mark that is not closed",
+    "undefined alias": "nothing above has this name, with &: text that begins with * needs quotes",
+    "the node content": "a comma, or a bracket, too many",
+}
+"""What PyYAML says, and what is told."""
 
 KeyPath = tuple[str | int, ...]
 Value: TypeAlias = "dict[str, Any] | list[Any] | str | int | float | None"
@@ -211,8 +232,13 @@ def _yaml_fault(error: yaml.YAMLError, text: str, name: str) -> str:
         return f"{name}:{line}: a character that YAML does not allow (U+{ord(_char(error)):04X})"
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     problem = getattr(error, "problem", None) or "is not YAML"
+    begun = getattr(error, "context_mark", None) or mark
     if "'\\t'" in problem:
         problem = "a tab: YAML is indented with spaces only"
+    elif words := next((words for sign, words in YAML_PROBLEMS.items() if sign in problem), ""):
+        if words.startswith(AT_BEGINNING):
+            mark = begun
+        problem = words.removeprefix(AT_BEGINNING).format(line=begun.line + 1 if begun else 1)
     return f"{name}:{mark.line + 1 if mark else 1}: {problem}"
 
 
@@ -302,6 +328,8 @@ class _Reader:
             value = self.loader.construct_object(node)
         except (ValueError, OverflowError) as error:
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark) from error
+        if self.form is RUBRIC and isinstance(value, int | float) and (odd := _other_base(node.value)):
+            return self._refuse(path, f"{node.value} is {value:g} in YAML, {odd}", value)
         if isinstance(value, int) and abs(value) > MAX_NUMBER:
             return self._refuse(path, f"is too large a number: {node.value[:40]}", 0)
         if value is None or isinstance(value, bool | int | str):
@@ -320,6 +348,13 @@ class _Reader:
     def _refuse(self, path: KeyPath, message: str, stand_in: Value = 0.0) -> Value:
         self.faults.append((path, message))
         return stand_in
+
+
+def _other_base(written: str) -> str:
+    """Return how to write a number that YAML does not read as people do; empty where it does."""
+    if re.fullmatch(r"[-+]?0[0-7_]+", written):
+        return f"as its first digit is 0: write {written.lstrip('-+0') or 0}"
+    return "in minutes and seconds: write it without a colon, or in quotes" if ":" in written else ""
 
 
 def as_map(value: object) -> dict[str, Any]:

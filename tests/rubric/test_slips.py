@@ -278,6 +278,27 @@ def test_a_slip_of_the_list_is_refused(examples: Path, slip: dict[str, str]) -> 
     assert faults(path) == [f"spoiled.yaml:{slip['fault']}"]
 
 
+def test_a_key_that_is_indented_like_the_handout_counts_as_its_text(examples: Path) -> None:
+    path = _spoiled(examples, "params-and-namespaces", "\nmade_up:", "\n  made_up:")
+    told = '"made_up:" counts as its text: begin that line without blanks'
+    assert faults(path)[0] == f"spoiled.yaml:9: handout: {told}"
+
+
+def test_a_made_up_value_without_a_name(examples: Path) -> None:
+    path = _spoiled(
+        examples, "params-and-namespaces", "value: {made_up: color}}, sc", "value: {made_up: 5}}, sc"
+    )
+    told = "takes the name of one value: {made_up: rate}"
+    assert faults(path) == [f"spoiled.yaml:48: criteria[3].with.value.made_up: {told}"]
+
+
+def test_a_warp_of_nothing_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "lab.yaml"
+    text = (rubrics_folder() / "leeds-comp3631-lab1.yaml").read_text(encoding="utf-8")
+    path.write_text(text.replace("warp: 20", "warp: 0"), encoding="utf-8")
+    assert faults(path) == ["lab.yaml:21: scenarios.wraps.warp: must be at least 1, not 0"]
+
+
 def test_more_rows_than_come_of_a_few_messages(examples: Path) -> None:
     sent = "steps: [{publish: {topic: /steps, type: std_msgs/Float64, values: [1, 2, 0.25]}}]"
     path = _spoiled(examples, "record-and-replay", "steps: [{play: {bag: bags/walk.bag}}]", sent)
