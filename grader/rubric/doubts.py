@@ -12,13 +12,13 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
-from grader.rubric.message_fields import services_in
+from grader.rubric.message_fields import POSES, VELOCITIES, services_in
 from grader.rubric.spelling import texts_in
 from grader.rubric.standins import set_in, topics_of_programs
 from grader.rubric.started import starts_of
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
-from grader.wording import plural
+from grader.wording import join_words, plural
 
 SHORT = {"limit_s": 3.0, "first_message_s": 3.0, "quiet_s": 1.0, "alive_s": 0.5, "window_s": 2.0}
 """Conditions of `until` that a correct package may miss on a busy machine if they are shorter."""
@@ -62,6 +62,7 @@ def doubts(data: object) -> Iterator[Fault]:
         yield from _other_process(at, given, scenario, scenarios)
         yield from _fewer_answers(at, criterion, scenario)
         yield from _cancelled_goal(at, given, scenario)
+        yield from _added_up(at, criterion, scenario)
         yield from _set_otherwise(at, criterion, scenario)
         yield from _other_run(criteria, index, scenarios)
         yield from _shifted_numbers(index, criterion, rubric)
@@ -191,6 +192,20 @@ def _cancelled_goal(at: KeyPath, given: dict[str, Any], scenario: dict[str, Any]
     if is_number(after_s) and given.get("status", "SUCCEEDED") == "SUCCEEDED" and "feedback" not in given:
         fault = f"the step cancels this goal after {after_s:g} s: is its status PREEMPTED?"
         yield (*at, "status" if "status" in given else "goal"), fault
+
+
+def _added_up(at: KeyPath, criterion: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield places that are read of velocities, beside a program that says where the robot is."""
+    given, topics = as_map(criterion.get("with")), topics_of_programs(scenario)
+    poses = [topic for topic, kind in topics.items() if kind in POSES and topic != "/odom"]
+    is_place = (
+        str(criterion.get("check")) in {"ends-at", "stays-within"} and given.get("relative") is not True
+    )
+    if is_place and poses and topics.get(str(given.get("topic"))) in VELOCITIES:
+        yield (
+            (*at, "topic"),
+            f"velocities are added up from (0, 0): the place itself is on {join_words(poses)}",
+        )
 
 
 def _set_otherwise(at: KeyPath, criterion: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:

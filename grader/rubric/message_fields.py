@@ -59,6 +59,9 @@ POSES = (
     "turtlesim/Pose",
 )
 """Types of which a pose can be read, odometry before all others."""
+VELOCITIES = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
+PLACES = frozenset({"ends-at", "path", "stays-within"})
+"""Checks of where a robot is."""
 COUNTED = frozenset({"minimum", "maximum", "start"})
 """Of counters, the values that their field has."""
 STAMPED = "is_stamp"
@@ -314,6 +317,8 @@ def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
         if criterion.get("check") == "stamps":
             given = {"field": "header", STAMPED: True, **given}
         yield from _judged_fields(path, given, known, rubric, scenario)
+        if str(criterion.get("check")) in PLACES:
+            yield from _no_place(path, given, rubric, scenario)
         if criterion.get("check") == "topic-type":
             yield from _other_type(path, given, rubric)
         yield from _expected(path, criterion, known, scenario)
@@ -375,6 +380,22 @@ def _judged_fields(
     for key, inner in given.items():
         if isinstance(inner, dict):
             yield from _judged_fields((*path, key), inner, known, rubric, scenario)
+
+
+def _no_place(
+    path: KeyPath, given: dict[str, Any], rubric: dict[str, Any], scenario: dict[str, Any]
+) -> Iterator[Fault]:
+    """Yield topics of which no place of a robot can be read."""
+    types = {str(kind) for kind in types_of(str(given.get("topic")), rubric, scenario)}
+    own = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+    is_known = (
+        types and all(kind.partition("/")[0] in noetic_messages() for kind in types) and not own & types
+    )
+    if is_known and "fields" not in given and types.isdisjoint({*POSES, *VELOCITIES}):
+        yield (
+            (*path, "topic"),
+            f"{given['topic']} carries {min(types)}, which has neither a pose nor a velocity",
+        )
 
 
 def _counted(path: KeyPath, given: dict[str, Any], types: list[str]) -> Iterator[Fault]:

@@ -284,14 +284,6 @@ def test_a_key_that_is_indented_like_the_handout_counts_as_its_text(examples: Pa
     assert faults(path)[0] == f"spoiled.yaml:9: handout: {told}"
 
 
-def test_a_made_up_value_without_a_name(examples: Path) -> None:
-    path = _spoiled(
-        examples, "params-and-namespaces", "value: {made_up: color}}, sc", "value: {made_up: 5}}, sc"
-    )
-    told = "takes the name of one value: {made_up: rate}"
-    assert faults(path) == [f"spoiled.yaml:48: criteria[3].with.value.made_up: {told}"]
-
-
 def test_a_warp_of_nothing_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "lab.yaml"
     text = (rubrics_folder() / "leeds-comp3631-lab1.yaml").read_text(encoding="utf-8")
