@@ -16,7 +16,15 @@ from grader.rubric.fault_words import model_faults
 from grader.rubric.model import ManualParams
 from grader.rubric.references import reference_faults
 from grader.rubric.scenario import ROSTEST_ENDING
-from grader.rubric.step_faults import given_steps, of_type, private, served_faults, slash, step_faults
+from grader.rubric.step_faults import (
+    empty_in,
+    given_steps,
+    of_type,
+    private,
+    served_faults,
+    slash,
+    step_faults,
+)
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import did_you_mean, join_words
 
@@ -416,6 +424,9 @@ def _misfits(at: KeyPath, kind: str, values: list[tuple[int, Any]]) -> Iterator[
         yield (*at, "type"), unknown
         return
     for position, value in values:
+        if empty := empty_in(value):
+            yield (*at, "values", position), f"{empty} is empty: give it a value"
+            continue
         fields = value if isinstance(value, dict) else {"data": value}
         if wrong := misfit(lambda fields=fields: encode(kind, fields)):  # type: ignore[misc]
             yield (*at, "values", position), wrong

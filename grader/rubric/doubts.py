@@ -114,9 +114,9 @@ def _first_packages(rubric: dict[str, Any], scenarios: Mapping[str, dict[str, An
         for index, start in as_maps(one.get("start"))
         if start.get("program") is None and start.get("tests") is None
     ]
-    if len(packages) > 1 and any("package" in start for _, start in starts):
+    if len(packages) > 1 and any(start.get("package") is not None for _, start in starts):
         for at, start in starts:
-            if "package" not in start:
+            if start.get("package") is None:
                 yield (
                     at,
                     f"is started from {packages[0]}, the first package: if it is of another one, give package",

@@ -65,7 +65,7 @@ def _tests_without_run(rubric: dict[str, Any], scenarios: Mapping[str, dict[str,
     }
     for index, criterion in as_maps(rubric.get("criteria")):
         file = str(as_map(criterion.get("with")).get("file"))
-        if criterion.get("check") == "pytest" and "scenario" not in criterion and file in runs:
+        if criterion.get("check") == "pytest" and criterion.get("scenario") is None and file in runs:
             yield ("criteria", index, "scenario"), f"is missing: {runs[file]} runs {file}"
 
 
@@ -80,11 +80,16 @@ def _other_packages(rubric: dict[str, Any], scenarios: Mapping[str, dict[str, An
                 if isinstance(start.get(key), str):
                     at: KeyPath = ("scenarios", name, "start", index, key)
                     named.append(
-                        (at, _plain(start[key]), str(start.get("package", first)), "package" in start)
+                        (
+                            at,
+                            _plain(start[key]),
+                            str(start.get("package") or first),
+                            start.get("package") is not None,
+                        )
                     )
     for index, criterion in as_maps(rubric.get("criteria")):
-        given, owner = as_map(criterion.get("with")), str(criterion.get("package", first))
-        at, is_given = ("criteria", index, "with"), "package" in criterion
+        given, owner = as_map(criterion.get("with")), str(criterion.get("package") or first)
+        at, is_given = ("criteria", index, "with"), criterion.get("package") is not None
         if criterion.get("check") == "executable" and isinstance(given.get("path"), str):
             named.append(((*at, "path"), _plain(given["path"]), owner, is_given))
         asked = given.get("name")

@@ -221,19 +221,19 @@ def misfits(
     for place, value in values:
         later = () if endless or not _changes(value) else range(MOMENTS)
         moments = [first, *(FIRST._replace(number=number, total=MOMENTS) for number in later)]
-        if empty := _empty(value):
+        if empty := empty_in(value):
             yield place, f"{empty} is empty: give it a value"
         elif wrong := next(filter(None, (message_type.misfit(value, moment) for moment in moments)), ""):
             yield place, wrong
 
 
-def _empty(value: object, done: str = "") -> str:
+def empty_in(value: object, done: str = "") -> str:
     """Return where a value has a key or an item without anything; "" if nowhere."""
     if value is None:
         return done
     inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     named = ((f"[{key}]" if isinstance(key, int) else f".{key}", inner) for key, inner in inside)
-    return next(filter(None, (_empty(inner, (done + key).lstrip(".")) for key, inner in named)), "")
+    return next(filter(None, (empty_in(inner, (done + key).lstrip(".")) for key, inner in named)), "")
 
 
 def _changes(value: object) -> bool:
