@@ -18,6 +18,7 @@ from grader.checks.support.fields import (
     Reading,
     bounds_text,
     differences,
+    has_hole,
     is_within,
     no_field,
     readings,
@@ -368,6 +369,10 @@ class FieldEqualsParams(Record):
             raise ValueError("when is for value, not for values")
         if self.tolerance and any(isinstance(one, str) for one in (self.value, *self.values)):
             raise ValueError("tolerance is for numbers, and text has none: write a number without quotes")
+        if self.tolerance and any(isinstance(one, bool) for one in (self.value, *self.values)):
+            raise ValueError("tolerance is for numbers, and true and false are none")
+        if self.value == {} or any(map(has_hole, (self.value, *self.values))):
+            raise ValueError("value: something in it is empty")
         return self
 
     @property

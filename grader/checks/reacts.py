@@ -58,6 +58,8 @@ class Condition(Record):
             raise ValueError("give field with min, max or both, or field with value, or none of them")
         if self.min is not None and self.max is not None and self.min > self.max:
             raise ValueError(f"min, {self.min:g}, is more than max, {self.max:g}")
+        if self.tolerance and isinstance(self.value, bool):
+            raise ValueError("tolerance is for numbers, and true and false are none")
         if self.tolerance and isinstance(self.value, str):
             raise ValueError("tolerance is for numbers, and text has none: write a number without quotes")
         return self

@@ -10,6 +10,7 @@ from pydantic import AfterValidator
 from grader.checks.registry import Refers, check
 from grader.checks.support.processes import (
     GlobalName,
+    GlobalPattern,
     PublishedTopic,
     TypeName,
     is_called,
@@ -130,7 +131,7 @@ def _other_definition(channel: Channel, params: TopicTypeParams) -> Verdict | No
 class OnlyTopicsParams(Record):
     """The topics of the lab."""
 
-    topics: tuple[GlobalName, ...]
+    topics: tuple[GlobalPattern, ...]
     """The topics that may be published: full names, or the beginning of names followed by `*`:
     `/square/*`."""
 

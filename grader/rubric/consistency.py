@@ -6,6 +6,7 @@ Works on the data as read, so that a fault in one place hides none elsewhere.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -15,7 +16,15 @@ from grader.rubric.fault_words import model_faults
 from grader.rubric.model import ManualParams
 from grader.rubric.references import reference_faults
 from grader.rubric.scenario import ROSTEST_ENDING
-from grader.rubric.step_faults import given_steps, of_type, private, served_faults, slash, step_faults
+from grader.rubric.step_faults import (
+    empty_in,
+    given_steps,
+    of_type,
+    private,
+    served_faults,
+    slash,
+    step_faults,
+)
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import did_you_mean, join_words
 
@@ -58,6 +67,14 @@ def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = 
     faults += _packages(rubric, scenarios, criteria)
     faults += reference_faults(rubric, checks)
     return faults
+
+
+def swallowed_keys(rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield keys of the rubric that are a part of the handout's text, as they are indented like it."""
+    handout = str(rubric.get("handout"))
+    for key in ("made_up", "scenarios", "criteria"):
+        if key not in rubric and re.search(rf"(^|\s){key}:\s", handout):
+            yield ("handout",), f'"{key}:" counts as its text: begin that line without blanks'
 
 
 def _packages(
@@ -343,6 +360,7 @@ def _starts(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
 
 
 def _params(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
+    first: dict[str, int] = {}
     for index, param in as_maps(scenario.get("params")):
         at = (*path, "params", index)
         of_file, named = param.get("file") is not None, param.get("name") is not None
@@ -354,6 +372,8 @@ def _params(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
                     yield (*at, key), "is for a parameter with a name, not for a file"
         elif named and (param.get("value") is None) == (param.get("made_up") is None):
             yield at, "give one of value and made_up"
+        if isinstance(name := param.get("name"), str) and first.setdefault(name.strip("/"), index) != index:
+            yield (*at, "name"), f"{name} is set by params[{first[name.strip('/')]}] already"
         yield from private((*at, "name"), param.get("name"))
         if not str(param.get("name")).startswith("~"):
             yield from slash((*at, "name"), param.get("name"), "a parameter")
@@ -404,6 +424,9 @@ def _misfits(at: KeyPath, kind: str, values: list[tuple[int, Any]]) -> Iterator[
         yield (*at, "type"), unknown
         return
     for position, value in values:
+        if empty := empty_in(value):
+            yield (*at, "values", position), f"{empty} is empty: give it a value"
+            continue
         fields = value if isinstance(value, dict) else {"data": value}
         if wrong := misfit(lambda fields=fields: encode(kind, fields)):  # type: ignore[misc]
             yield (*at, "values", position), wrong
@@ -427,7 +450,18 @@ def _until(path: KeyPath, until: dict[str, Any], scenario: dict[str, Any]) -> It
     for index, name in as_texts(until.get("ended")):
         if name not in names:
             yield (*path, "ended", index), f'there is no start "{name}"{did_you_mean(name, names)}'
+    yield from _lasting(path, until, scenario)
+
+
+def _lasting(path: KeyPath, until: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield times of a run that can never pass, and a window without topics."""
+    if is_number(until.get("window_s")) and not until.get("topics"):
+        yield (*path, "window_s"), "is for the topics of topics, and there are none"
+    if until.get("topics") and until.get("window_s") is None:
+        yield (*path, "topics"), "are those of window_s, which is missing"
     limit_s = until.get("limit_s", 60.0)
+    if limit_s == 0 and not (scenario.get("steps") and len(until) == 1):
+        yield (*path, "limit_s"), "with 0 the run is over as soon as it is set up: give it some seconds"
     for key in ("window_s", "alive_s", "quiet_s"):
         value_s = until.get(key)
         if isinstance(value_s, int | float) and isinstance(limit_s, int | float) and value_s >= limit_s > 0:

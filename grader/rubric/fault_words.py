@@ -103,6 +103,9 @@ def _holds(data: object, part: str | int) -> bool:
 
 def _unknown(key: str, value: object, keys: Collection[str]) -> str:
     """Return what an unknown key may be: a slip, or the rest of a text that YAML has cut off at a comma."""
+    glued = re.match(r"(\w+)(?:\s*[:=]\s*|\s+)(?=\S)", key)
+    if glued and glued[1] in keys:
+        return f": write {glued[1]}, a colon and a blank before its value"
     cut = value is None and " " in key
     return ": between { and }, text with a comma needs quotes" if cut else did_you_mean(key, keys)
 
@@ -132,12 +135,27 @@ def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str
 
 def _remedy(path: KeyPath, kind: str, value: object) -> str:
     """Return how to write what was meant."""
+    if shape := _other_shape(path, kind, value):
+        return shape
     if kind == "string_type" and isinstance(value, int | float):
         return ": put it in quotes"
     number = _NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
     if number and MUST_BE[kind].endswith("number"):
         unit = UNITS.get(str(path[-1]).rpartition("_")[2], "") if path else ""
         return f": write {number[1]}" + (f", the key says {unit}" if unit and number[2] else "")
+    return ""
+
+
+def _other_shape(path: KeyPath, kind: str, value: object) -> str:
+    """Return what is missing, or too much, where a list is a map, a map is a text, and the like."""
+    is_map = kind in {"dict_type", "model_type"}
+    if kind in {"tuple_type", "list_type"} and isinstance(value, dict | str):
+        return ": write a dash and a blank before each item, or [ and ] around them all"
+    if is_map and isinstance(value, list) and all(isinstance(one, dict) for one in value):
+        return ": its keys have no dash before them"
+    is_glued = isinstance(value, str) and is_map and re.match(r"\w+\s*[:=]?\s*\S", value)
+    if is_glued or (value is None and path and re.search(r"[:\s]", str(path[-1]))):
+        return ": between a key and its value are a colon and a blank"
     return ""
 
 

@@ -1,17 +1,23 @@
-"""Frames and angles that tf does not have: names with a slash, parents for children, radians for degrees."""
+"""Frames and angles that tf does not have: names with a slash, parents for children, radians for degrees; and degrees
+where messages have radians."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from grader.checks.support.fields import is_number
+from grader.rubric.message_fields import POSES, types_of
 from grader.rubric.step_faults import given_steps
-from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 
 FRAME_KEYS = frozenset({"frame_id", "child_frame_id"})
 ANGLES = frozenset({"rotation_deg", "rpy_deg", "heading_deg"})
+IN_RADIANS = frozenset({"angular", "theta", "angular_velocity", "angle_min", "angle_max", "angle_increment"})
+"""Fields of ROS's messages that are angles, or angles in a second."""
+IN_DEGREES = frozenset({30, 45, 60, 90, 120, 135, 150, 180, 225, 270, 315, 360})
+"""Angles that are meant in degrees: as radians they are several turns."""
 UNEQUAL = 0.02
 """So far from 1 is not a quaternion's length whose numbers are rounded."""
 ROUNDED = 0.004
@@ -19,8 +25,7 @@ ROUNDED = 0.004
 
 
 def frame_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
-    """Yield frames that begin with a slash, angles in radians where degrees are asked, and parents that are children
-    elsewhere."""
+    """Yield frames that begin with a slash, angles in the other unit, and parents that are children elsewhere."""
     scenarios, criteria = as_map(rubric.get("scenarios")), list(as_maps(rubric.get("criteria")))
     for name, scenario in scenarios.items():
         for index, step in as_maps(as_map(scenario).get("steps")):
@@ -28,10 +33,122 @@ def frame_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
                 at = ("scenarios", name, "steps", index, "transform", key)
                 yield from _slash(at, as_map(step.get("transform")).get(key))
         yield from _in_values(("scenarios", name), scenario)
+        yield from _two_parents(("scenarios", name), as_map(scenario))
+        asked = [
+            pair
+            for n, one in criteria
+            if one.get("scenario") != name and not any(_swapped_frames(n, criteria, _run_of(one, scenarios)))
+            for pair in _asked_frames([one])
+        ]
+        yield from _swapped_steps(("scenarios", name), as_map(scenario), asked)
+        yield from _sent_turns(("scenarios", name), as_map(scenario), rubric)
     for index, criterion in criteria:
-        yield from _in_values(("criteria", index, "with"), criterion.get("with"))
+        scenario, given = _run_of(criterion, scenarios), as_map(criterion.get("with"))
+        yield from _in_values(("criteria", index, "with"), given)
+        yield from _judged_turns(("criteria", index, "with"), given, rubric, scenario)
         if criterion.get("check") == "transform":
-            yield from _swapped_frames(index, criteria, as_map(scenarios.get(str(criterion.get("scenario")))))
+            yield from _swapped_frames(index, criteria, scenario)
+            yield from _no_pose(("criteria", index, "with"), criterion, rubric, scenario)
+
+
+def _run_of(criterion: dict[str, Any], scenarios: dict[str, Any]) -> dict[str, Any]:
+    return as_map(scenarios.get(str(criterion.get("scenario"))))
+
+
+def _own_packages(rubric: dict[str, Any]) -> set[str]:
+    """Return the packages whose messages may have angles in any unit."""
+    return {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+
+
+def _sent_turns(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield angles in degrees in what a scenario sends, in messages and requests of ROS's own types."""
+    sent = [((*path, "probes", n), one) for n, one in as_maps(scenario.get("probes"))]
+    sent += [((*path, "calls", n), one) for n, one in as_maps(scenario.get("calls"))]
+    for index, step in as_maps(scenario.get("steps")):
+        sent += [((*path, "steps", index, key), as_map(step.get(key))) for key in ("publish", "call")]
+    for at, one in sent:
+        if str(one.get("type")).partition("/")[0] in _own_packages(rubric):
+            continue
+        for key in ("value", "values", "request"):
+            yield from _turns((*at, key), one.get(key))
+
+
+def _turns(path: KeyPath, value: object, *, is_angle: bool = False) -> Iterator[Fault]:
+    if is_angle and is_number(value) and abs(value) in IN_DEGREES:
+        yield path, f"angles are in radians here: write {math.radians(value):.4f} for {value:g} degrees"
+    inside: Iterable[tuple[str | int, object]] = ()
+    if isinstance(value, dict):
+        inside = value.items()
+    elif isinstance(value, list):
+        inside = enumerate(value)
+    for key, inner in inside:
+        yield from _turns((*path, key), inner, is_angle=is_angle or key in IN_RADIANS)
+
+
+def _judged_turns(
+    path: KeyPath, given: dict[str, Any], rubric: dict[str, Any], scenario: dict[str, Any]
+) -> Iterator[Fault]:
+    """Yield angles in degrees that a criterion asks for in a field of one of ROS's own types."""
+    field, topic = str(given.get("field")), str(given.get("topic"))
+    types = [str(kind) for kind in types_of(topic, rubric, scenario)]
+    own = [kind for kind in types if kind.partition("/")[0] in _own_packages(rubric)]
+    is_turn = field.startswith("angular.") or field.partition(".")[0].partition("[")[0] in IN_RADIANS
+    if is_turn and not own and (types or field.startswith("angular.")):
+        for key in ("value", "values", "min", "max"):
+            yield from _turns((*path, key), given.get(key), is_angle=True)
+    for key in ("cause", "effect"):
+        if isinstance(given.get(key), dict):
+            yield from _judged_turns((*path, key), given[key], rubric, scenario)
+
+
+def _two_parents(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield frames that the steps of one scenario place in two others: tf has them in one of these at a time."""
+    parents: dict[str, str] = {}
+    for index, step in as_maps(scenario.get("steps")):
+        given = as_map(step.get("transform"))
+        parent, child = str(given.get("parent")), str(given.get("child"))
+        if given and parents.setdefault(child, parent) != parent:
+            fault = f"{child} is in {parents[child]} already: a frame has one parent"
+            yield (*path, "steps", index, "transform", "child"), fault
+
+
+def _no_pose(
+    path: KeyPath, criterion: dict[str, Any], rubric: dict[str, Any], scenario: dict[str, Any]
+) -> Iterator[Fault]:
+    """Yield a topic of poses that has none, and poses of the grader's that no transform can follow."""
+    given = as_map(criterion.get("with"))
+    topic = given.get("pose_of")
+    if not isinstance(topic, str):
+        return
+    types = {str(kind) for kind in types_of(topic, rubric, scenario)}
+    known = {kind for kind in types if kind.partition("/")[0] not in _own_packages(rubric)}
+    if known and known.isdisjoint(POSES):
+        yield (*path, "pose_of"), f"{topic} carries {min(known)}, which has no pose"
+    for index, step in as_maps(scenario.get("steps")):
+        publish = as_map(step.get("publish"))
+        if publish.get("topic") == topic and publish.get("type") == POSES[0]:
+            at = ("scenarios", str(criterion.get("scenario")), "steps", index, "publish", "value")
+            faults = _unlike(as_map(publish.get("value")), given, str(criterion.get("id")))
+            yield from (((*at, *key), fault) for key, fault in faults)
+
+
+def _unlike(value: dict[str, Any], given: dict[str, Any], name: str) -> Iterator[Fault]:
+    """Yield what the odometry that is sent lacks, or has otherwise than the transform that a criterion wants to follow
+    it."""
+    pose, header = as_map(as_map(value.get("pose")).get("pose")), as_map(value.get("header"))
+    if not pose.get("orientation"):
+        yield (
+            ("pose", "pose"),
+            "has no orientation, and tf takes none that is all zero: write {w: 1}, or {rpy_deg: [0, 0, 90]}",
+        )
+    found = (header.get("frame_id"), value.get("child_frame_id"))
+    if given.get("through") is True or found == (given.get("child"), given.get("parent")):
+        return
+    asks = f"{name} asks for a transform from {given.get('parent')} to {given.get('child')}"
+    keys: tuple[KeyPath, ...] = (("header", "frame_id"), ("child_frame_id",))
+    for key, frame, asked in zip(keys, found, (given.get("parent"), given.get("child")), strict=True):
+        if frame != asked and not str(frame).startswith("/"):
+            yield key, f"is {frame}, and {asks}" if frame else f"is missing: {asks}"
 
 
 def _slash(path: KeyPath, frame: object) -> Iterator[Fault]:
@@ -94,14 +211,31 @@ def _swapped_frames(
     if given.get("through") is True:
         return
     sent = [(one.get("parent"), one.get("child")) for one in given_steps(scenario, "transform")]
-    asked = [as_map(one.get("with")) for n, one in criteria if n < index and one.get("check") == "transform"]
-    sent += [(one.get("parent"), one.get("child")) for one in asked if one.get("through") is not True]
+    sent += _asked_frames([one for n, one in criteria if n < index])
     for publish in given_steps(scenario, "publish"):
         value = as_map(publish.get("value"))
         if publish.get("topic") == given.get("pose_of"):
             sent.append((as_map(value.get("header")).get("frame_id"), value.get("child_frame_id")))
     if parent and child and (child, parent) in sent:
-        yield (
-            ("criteria", index, "with", "parent"),
-            f"{child} is the parent elsewhere in the rubric, and {parent} the child: a frame has one parent",
-        )
+        yield ("criteria", index, "with", "parent"), _swapped(parent, child)
+
+
+def _asked_frames(criteria: Iterable[dict[str, Any]]) -> list[tuple[object, object]]:
+    """Return the parents and children for which criteria ask, but for those with other frames between them."""
+    asked = [as_map(one.get("with")) for one in criteria if one.get("check") == "transform"]
+    return [(one.get("parent"), one.get("child")) for one in asked if one.get("through") is not True]
+
+
+def _swapped_steps(
+    path: KeyPath, scenario: dict[str, Any], asked: list[tuple[object, object]]
+) -> Iterator[Fault]:
+    """Yield transforms of the grader's whose parent is the child for criteria of other runs."""
+    for index, step in as_maps(scenario.get("steps")):
+        given = as_map(step.get("transform"))
+        parent, child = given.get("parent"), given.get("child")
+        if (child, parent) in asked and (parent, child) not in asked:
+            yield (*path, "steps", index, "transform", "parent"), _swapped(parent, child)
+
+
+def _swapped(parent: object, child: object) -> str:
+    return f"{child} is the parent elsewhere in the rubric, and {parent} the child: a frame has one parent"

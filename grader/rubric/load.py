@@ -16,8 +16,9 @@ from grader.model.message_rate import RateBounds
 from grader.model.record import Record
 from grader.model.result import RubricOrigin
 from grader.model.version import RUBRIC, UPDATE, Versioned
-from grader.rubric.consistency import cross_faults
+from grader.rubric.consistency import cross_faults, swallowed_keys
 from grader.rubric.course import load_course, split_name
+from grader.rubric.doubts import doubts
 from grader.rubric.fault_words import model_faults
 from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics_folder
 from grader.rubric.made_up import draw_values, faults_of_sample, made_up_faults, sample_data, with_values
@@ -199,7 +200,8 @@ def read_beside_rubric(rubric: LoadedRubric) -> dict[str, bytes]:
 def doubts_of(loaded: LoadedRubric, name: str) -> list[str]:
     """Return what may be a slip in the rubric of that file, each as `name:line: key.path: why`."""
     source = read_source(loaded.path, name)
-    return [source.fault(*doubt) for doubt in doubtful_names(source.data, loaded.path.parent)]
+    found = [*doubtful_names(source.data, loaded.path.parent), *doubts(source.data)]
+    return [source.fault(*doubt) for doubt in sorted(found, key=lambda doubt: source.line(doubt[0]))]
 
 
 def refuse_newer(source: Source, known: Versioned) -> None:
@@ -244,7 +246,7 @@ def _faults(source: Source, samples: Sequence[Value], beside: Beside, folder: Pa
         return [
             source.fault((), "a rubric is a map of keys and values, beginning with schema: grader.rubric/1")
         ]
-    found = [*source.faults, *made_up_faults(source.data), *beside.faults]
+    found = [*source.faults, *swallowed_keys(source.data), *made_up_faults(source.data), *beside.faults]
     for sample in samples:
         faults = [
             *model_faults(Rubric, sample),

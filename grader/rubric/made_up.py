@@ -356,6 +356,7 @@ def made_up_faults(data: Mapping[str, Any]) -> Iterator[Fault]:
             yield path, f'made_up declares no value "{name}"{did_you_mean(name, declared)}'
         elif not _PLACE.match(dotted(path)):
             yield path, "made-up values belong in scenarios, and in with, hint and reproduce of criteria"
+    yield from _no_names({key: part for key, part in data.items() if key != KEY}, ())
     yield from (
         ((KEY, name), "is used nowhere: remove it, or use it") for name in declared if name not in used
     )
@@ -367,6 +368,15 @@ def made_up_faults(data: Mapping[str, Any]) -> Iterator[Fault]:
             ):
                 run = criterion.get("scenario") or "a criterion without a scenario"
                 yield path, f'{run} gives programs no "{name}": they could not know it'
+
+
+def _no_names(part: object, path: KeyPath) -> Iterator[Fault]:
+    """Yield places of made-up values that have no name."""
+    if isinstance(part, dict) and part.keys() == {KEY} and not isinstance(part[KEY], str):
+        yield (*path, KEY), "takes the name of one value: {made_up: rate}"
+    elif isinstance(part, dict | list):
+        for key, inner in part.items() if isinstance(part, dict) else enumerate(part):
+            yield from _no_names(inner, (*path, key))
 
 
 def _declared_values(data: Mapping[str, Any]) -> dict[str, MadeUp]:

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
+from grader.checks.support.fields import is_number
 from grader.evidence.definitions import Field, Types, parse
 from grader.installable import noetic_messages
 from grader.model.message_definitions import (
@@ -41,6 +42,26 @@ USUAL_TYPES = {
     "scan": "sensor_msgs/LaserScan",
 }
 """Of topics whose type a rubric does not say, most often: a name that is all but one of a field's is a slip."""
+SYSTEM_TYPES = {
+    "/tf": "tf2_msgs/TFMessage",
+    "/tf_static": "tf2_msgs/TFMessage",
+    "/rosout": "rosgraph_msgs/Log",
+    "/rosout_agg": "rosgraph_msgs/Log",
+    "/clock": "rosgraph_msgs/Clock",
+}
+POSES = (
+    "nav_msgs/Odometry",
+    "geometry_msgs/Pose",
+    "geometry_msgs/PoseStamped",
+    "geometry_msgs/PoseWithCovariance",
+    "geometry_msgs/PoseWithCovarianceStamped",
+    "geometry_msgs/Pose2D",
+    "turtlesim/Pose",
+)
+"""Types of which a pose can be read, odometry before all others."""
+VELOCITIES = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
+PLACES = frozenset({"ends-at", "path", "stays-within"})
+"""Checks of where a robot is."""
 COUNTED = frozenset({"minimum", "maximum", "start"})
 """Of counters, the values that their field has."""
 STAMPED = "is_stamp"
@@ -98,6 +119,10 @@ class Shape(NamedTuple):
     def inner(self, field: Field, name: str, done: str) -> Field | None:
         """Return a field of a field; None where that is not known. Raises Misfit."""
         there = {one.name: one for one in self.types.get(field.type, ())}
+        if not re.fullmatch(r"\w+", name):
+            raise Misfit(
+                f'no field is called "{name}": between a field and its value are a colon and a blank'
+            )
         if field.array and there:
             raise Misfit(f"{self.what}: {done} is a list: write {done}[0].{name}, or {done}[*].{name}")
         if name in there:
@@ -159,11 +184,15 @@ def _no_value(kind: str, value: object) -> str:
     """Return why a field of a primitive type is never so."""
     if isinstance(value, list | tuple | Mapping):
         return f"is one value, not {value!r}"
+    if value is None:
+        return "is empty here: give it a value"
     wanted = KINDS.get(kind, "a number")
     got = "a text" if isinstance(value, str) else "true or false" if isinstance(value, bool) else "a number"
     if wanted != got and not (kind.startswith("float") and value in {".inf", "-.inf", "+.inf", ".nan"}):
         return f"is {wanted}, not {value!r}"
     low, high = limits_of(kind) or (0, 0)
+    if isinstance(value, float) and low < high and not value.is_integer():
+        return f"is {kind}, a whole number, and never {value:g}"
     if isinstance(value, int | float) and low < high and not low <= value <= high:
         return f"is {kind}, {low} to {high}, and never {value:g}"
     return ""
@@ -280,6 +309,7 @@ def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
     known = Definitions(rubric)
     yield from _no_types(rubric, known)
     yield from _quoted_params(rubric)
+    yield from _other_kinds(rubric)
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     for index, criterion in as_maps(rubric.get("criteria")):
         scenario = scenarios.get(str(criterion.get("scenario")), {})
@@ -287,6 +317,8 @@ def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
         if criterion.get("check") == "stamps":
             given = {"field": "header", STAMPED: True, **given}
         yield from _judged_fields(path, given, known, rubric, scenario)
+        if str(criterion.get("check")) in PLACES:
+            yield from _no_place(path, given, rubric, scenario)
         if criterion.get("check") == "topic-type":
             yield from _other_type(path, given, rubric)
         yield from _expected(path, criterion, known, scenario)
@@ -350,6 +382,22 @@ def _judged_fields(
             yield from _judged_fields((*path, key), inner, known, rubric, scenario)
 
 
+def _no_place(
+    path: KeyPath, given: dict[str, Any], rubric: dict[str, Any], scenario: dict[str, Any]
+) -> Iterator[Fault]:
+    """Yield topics of which no place of a robot can be read."""
+    types = {str(kind) for kind in types_of(str(given.get("topic")), rubric, scenario)}
+    own = {*packages_in(rubric), *(name for _, name in as_texts(rubric.get("packages")))}
+    is_known = (
+        types and all(kind.partition("/")[0] in noetic_messages() for kind in types) and not own & types
+    )
+    if is_known and "fields" not in given and types.isdisjoint({*POSES, *VELOCITIES}):
+        yield (
+            (*path, "topic"),
+            f"{given['topic']} carries {min(types)}, which has neither a pose nor a velocity",
+        )
+
+
 def _counted(path: KeyPath, given: dict[str, Any], types: list[str]) -> Iterator[Fault]:
     """Yield values of a counter that its field never has."""
     for key in COUNTED & given.keys():
@@ -393,11 +441,45 @@ def _quoted_params(rubric: dict[str, Any]) -> Iterator[Fault]:
             given.append(((*path, "value"), asked.get("name"), asked.get("value")))
         elif criterion.get("check") == "launch-runs":
             given += [((*path, "params", key), key, one) for key, one in as_map(asked.get("params")).items()]
-    numbers = {str(name).strip("/") for _, name, value in given if isinstance(value, int | float)}
+    numbers = {str(name).strip("/") for _, name, value in given if is_number(value)}
     for at, param, value in given:
         yield from _quoted(at, value)
+        if isinstance(value, bool) and str(param).strip("/") in numbers:
+            yield at, f"is true or false, and elsewhere {param} is a number"
         if isinstance(value, str) and _NUMBER.fullmatch(value) and str(param).strip("/") in numbers:
             yield at, f'"{value}" in quotes is text, and elsewhere {param} is a number: write {value}'
+
+
+def _other_kinds(rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield values of a field that are of another kind than those which earlier criteria ask for in it."""
+    first: dict[tuple[str, str], tuple[str, str]] = {}
+    for index, criterion in as_maps(rubric.get("criteria")):
+        given, name = as_map(criterion.get("with")), str(criterion.get("id"))
+        parts: list[tuple[KeyPath, dict[str, Any]]] = [((), given)]
+        parts += [((key,), as_map(given.get(key))) for key in ("cause", "effect")]
+        for at, asked in parts:
+            for key in ("value", "min", "max"):
+                kind, place = _kind_of(asked.get(key)), (str(asked.get("topic")), str(asked.get("field")))
+                if kind and "field" in asked and "*" not in place[1]:
+                    earlier, other = first.setdefault(place, (name, kind))
+                    if other != kind:
+                        fault = f"is {kind}, and {earlier} has {other} for {place[1]} of {place[0]}"
+                        yield ("criteria", index, "with", *at, key), fault
+
+
+def _kind_of(value: object) -> str:
+    """Return what kind of a value it is, in words; "" for none, and for one that is made up."""
+    if isinstance(value, dict) and value.keys() == {"made_up"}:
+        return ""
+    kinds = {
+        bool: "true or false",
+        int: "a number",
+        float: "a number",
+        str: "a text",
+        list: "a list",
+        dict: "a map",
+    }
+    return kinds.get(type(value), "")
 
 
 def _other_type(path: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -446,7 +528,7 @@ def _no_bounds(field: Field, given: dict[str, Any], what: str) -> str:
 def types_of(topic: str, rubric: dict[str, Any], scenario: dict[str, Any] | None = None) -> Iterator[object]:
     """Yield the types that the rubric gives a topic: those that it sends there or asks for, and that of a program of
     the scenario."""
-    yield from ("tf2_msgs/TFMessage",) if topic in {"/tf", "/tf_static"} else ()
+    yield from (SYSTEM_TYPES[topic],) if topic in SYSTEM_TYPES else ()
     programs = topics_of_programs(scenario or {})
     yield from (programs[topic],) if topic in programs else ()
     for _, criterion in as_maps(rubric.get("criteria")):
@@ -530,7 +612,8 @@ def _sent_fields(scenario: dict[str, Any], known: Definitions) -> Iterator[tuple
         ]
     for at, kind, part, value in sent:
         own = known.text(kind, SUFFIXES[part])
-        shape = known.shape(kind, part) if own and isinstance(value, dict) else None
+        is_known = own or part in PARTS[".action"]  # other types are looked at where they are sent
+        shape = known.shape(kind, part) if is_known and isinstance(value, dict) else None
         if shape is not None and (fault := shape.misfit(value)):
             yield at, fault
         elif shape is None and (part or kind.partition("/")[0] not in noetic_messages()):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import os
 import pickle
@@ -9,10 +10,11 @@ import re
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache, partial
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -23,6 +25,8 @@ from grader.checks.registry import parts
 from grader.files import temporary_folder
 from grader.model.verdict import Status
 from grader.portable import own_session
+from grader.rubric.yaml_lines import Fault, as_map, as_maps
+from grader.wording import join_words
 
 HINTS = 4
 SHOWN_TESTS = 20
@@ -53,6 +57,70 @@ class PytestParams(Record):
                 f'select: "{word}" is in the name of the file, too, and so fits all its tests: rename one'
             )
         return self
+
+
+class _Test(NamedTuple):
+    """A test, and the names by which `-k` knows it."""
+
+    name: str
+    names: tuple[str, ...]
+
+
+def select_faults(rubric: dict[str, Any], files: Mapping[str, bytes]) -> Iterator[Fault]:
+    """Yield what criteria select of an instructor's tests, and none of them is called."""
+    for index, criterion in as_maps(rubric.get("criteria")):
+        given = as_map(criterion.get("with"))
+        file, select = str(given.get("file")), given.get("select")
+        if (
+            criterion.get("check") == "pytest"
+            and file in files
+            and isinstance(select, str)
+            and select.strip()
+        ):
+            tests = _tests_in(files[file])
+            try:
+                expression = ast.parse(select.strip(), mode="eval").body
+                fits = not tests or any(_fits(expression, test.names) for test in tests)
+            except (SyntaxError, ValueError):  # pytest has more forms
+                continue
+            if not fits:
+                there = join_words(sorted({test.name for test in tests}))
+                yield ("criteria", index, "with", "select"), f"fits no test of {file}: there is {there}"
+
+
+def _tests_in(raw: bytes) -> list[_Test]:
+    """Return the tests of a file; none where they cannot be known."""
+    try:
+        tree = ast.parse(raw)
+    except (SyntaxError, ValueError):
+        return []
+    if "params=" in raw.decode(errors="replace"):  # of fixtures: their ids are selected, too
+        return []
+    classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+    places = [(tree.body, []), *((one.body, [one.name, *_words_of(one)]) for one in classes)]
+    return [
+        _Test(node.name, (node.name, *above, *_words_of(node)))
+        for body, above in places
+        for node in body
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test")
+    ]
+
+
+def _words_of(node: ast.ClassDef | ast.FunctionDef) -> list[str]:
+    """Return the words of the decorators, of which pytest makes markers and ids."""
+    return [word for one in node.decorator_list for word in re.findall(r"\w+", ast.unparse(one))]
+
+
+def _fits(expression: ast.expr, names: Sequence[str]) -> bool:
+    """Return whether a test is selected, as pytest's `-k` says. Raises ValueError for what is no such expression."""
+    if isinstance(expression, ast.BoolOp):
+        found = [_fits(one, names) for one in expression.values]
+        return all(found) if isinstance(expression.op, ast.And) else any(found)
+    if isinstance(expression, ast.UnaryOp) and isinstance(expression.op, ast.Not):
+        return not _fits(expression.operand, names)
+    if isinstance(expression, ast.Name):
+        return any(expression.id.lower() in name.lower() for name in names)
+    raise ValueError(ast.dump(expression))
 
 
 class TestsBroken(Exception):

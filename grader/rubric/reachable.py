@@ -52,6 +52,7 @@ def reach_faults(
         if about.check in {"ends-at", "path", "stays-within"}:
             yield from _too_far(about, others)
     yield from _contradictions(criteria, scenarios)
+    yield from _other_ends(criteria)
 
 
 def _too_many(
@@ -71,7 +72,7 @@ def _too_many(
         warp = scenario.get("warp", Scenario.model_fields["warp"].default)
         warp = warp if scenario.get("clock") == "warped" else 1
         for topic, count in as_map(until.get("messages")).items():
-            if not all(isinstance(n, int | float) for n in (limit_s, warp, count)) or topic not in rates:
+            if not all(map(is_number, (limit_s, warp, count))) or topic not in rates or warp <= 0:
                 continue
             takes_s = count / rates[topic] / warp
             if takes_s > limit_s:
@@ -325,6 +326,9 @@ def _goal_faults(
     if robot.field_m is not None and not _is_inside(goal, robot.field_m, tolerance_m):
         yield at, _outside(*goal)
         return
+    if fault := _not_last(about, others, goal):
+        yield at, fault
+        return
     away_m = math.dist(start, goal) - 2 * tolerance_m if start else 0
     if away_m > farthest_m:
         yield at, f"it cannot come so far: {limit}"
@@ -340,6 +344,21 @@ def _goal_faults(
             yield at, f"is outside of the box that {one.get('id')} keeps it in"
 
 
+def _not_last(about: Asked, others: Sequence[dict[str, Any]], goal: tuple[float, float]) -> str:
+    """Return that the robot is judged at the end of the run, and its last goal is another; empty where it may be this
+    one."""
+    topics = {as_map(one.get("with")).get("asked_on") for one in others if one.get("check") == about.check}
+    spots = {topic: _asked_spots(topic, about.scenario) for topic in topics if isinstance(topic, str)}
+    last = {topic: found[-1] for topic, found in spots.items() if found and found[-1] is not None}
+    if about.given.get("asked_on") is not None or not last:
+        return ""
+    if any(math.dist(spot, goal) <= about.given["tolerance_m"] for spot in last.values() if spot):
+        return ""
+    topic, spot = next(iter(last.items()))
+    asks = f"the last message on {topic} asks for {_pair(spot or goal)}"
+    return f"without asked_on this is where the run ends, and {asks}: write asked_on: {topic}, with number"
+
+
 def _is_between(spot: tuple[float, float], corners: Sequence[Any], tolerance_m: float) -> bool:
     return all(
         min(a, b) - tolerance_m <= one <= max(a, b) + tolerance_m
@@ -351,13 +370,35 @@ def _pair(spot: tuple[float, float]) -> str:
     return f"({spot[0]:g}, {spot[1]:g})"
 
 
+def _other_ends(criteria: Sequence[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+    """Yield goals of actions for which an earlier criterion wants another status, or another result."""
+    before: dict[tuple[str, ...], tuple[str, dict[str, Any]]] = {}
+    for index, criterion in criteria:
+        given = as_map(criterion.get("with"))
+        if criterion.get("check") != "action-result" or given.keys() <= {
+            "action",
+            "goal",
+            "feedback",
+            "tolerance",
+        }:
+            continue
+        key = tuple(map(str, (criterion.get("scenario"), given.get("action"), given.get("goal", 1))))
+        earlier, other = before.setdefault(key, (str(criterion.get("id")), given))
+        status, other_status = (one.get("status", "SUCCEEDED") for one in (given, other))
+        if status != other_status:
+            fault = (
+                f"{earlier} wants this goal, number {key[2]}, {other_status}: give one of them another goal"
+            )
+            yield ("criteria", index, "with", "status" if "status" in given else "goal"), fault
+
+
 class _Demand(NamedTuple):
     """Between which values a criterion wants a field, or which word or truth value, in every message or in some."""
 
     low: float
     high: float
     every: bool
-    word: str | bool | None = None
+    word: str | bool | tuple[Any, ...] | None = None
     is_cause: bool = False
 
     def excludes(self, other: _Demand) -> bool:
@@ -366,7 +407,17 @@ class _Demand(NamedTuple):
             return False
         if self.word is None or other.word is None:
             return self.word is other.word and (self.low > other.high or self.high < other.low)
+        if isinstance(self.word, tuple) and isinstance(other.word, tuple):
+            return not _may_be_equal(self.word, other.word, (self.high, other.high))
         return type(self.word) is type(other.word) and self.word != other.word
+
+
+def _may_be_equal(one: tuple[Any, ...], other: tuple[Any, ...], tolerances: tuple[float, float]) -> bool:
+    """Return whether a list may be both of these; of what is no number, nothing is said."""
+    if len(one) != len(other):
+        return False
+    pairs = [(a, b) for a, b in zip(one, other, strict=True) if is_number(a) and is_number(b)]
+    return all(abs(a - b) <= sum(tolerances) for a, b in pairs)
 
 
 def _contradictions(
@@ -426,5 +477,7 @@ def _demands(check: str, asked: dict[str, Any]) -> Iterator[_Demand]:
                 yield _Demand(one - tolerance, one + tolerance, every)
             elif isinstance(one, str | bool):
                 yield _Demand(0, 0, every, one)
+            elif isinstance(one, list) and check == "field-equals":
+                yield _Demand(0, tolerance, every, tuple(one))
     if value is None and is_number(low) and is_number(high) and check != "field-equals":
         yield _Demand(low, high, every)

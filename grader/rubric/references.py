@@ -22,6 +22,7 @@ from grader.rubric.reachable import reach_faults
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
 from grader.rubric.spelling import texts_in
 from grader.rubric.standins import PROGRAMS, asked_faults, only_publisher, parameter_faults
+from grader.rubric.started import started_faults
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import closest, did_you_mean, join_words
@@ -37,6 +38,9 @@ ASKED_OF_STUDENT = frozenset({
     "counter-step", "counter-wrap", "reacts",
 })  # fmt: skip
 """Checks of messages on a topic that the student has to publish on."""
+WHERE_IT_IS = frozenset({"ends-at", "stays-within", "path"})
+NEVER_OF_GRADER = frozenset({"latched", "counter-start", "counter-step", "counter-wrap"})
+"""Checks of the student's messages that have no `of`."""
 _DIGITS = re.compile(r"\d+")
 _TOPIC = re.compile(r"(?:^|:=)(/[\w/]*\w)")
 
@@ -64,6 +68,7 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
     yield from field_faults(rubric)
     yield from frame_faults(rubric)
     yield from _unused_faults(rubric, scenarios, checks)
+    yield from started_faults(rubric, scenarios, checks)
     yield from _unknown_topics(rubric, scenarios, checks)
     yield from reach_faults(rubric, scenarios, checks)
     yield from _unknown_causes(rubric, scenarios, checks)
@@ -145,6 +150,8 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
         fault += "; programs of the students' own go under scripts" if path[-2:-1] == ("programs",) else ""
     elif to == "program" and value.partition("/")[0] not in own:
         fault = ros_packages().program_fault(value)
+    elif to == "dependency" and len(names := re.split(r"[.,]?\s+|,", value.strip())) > 1:
+        fault = f"is one name: write {', '.join(names)}"
     elif to == "dependency":
         meant = "" if value in own else closest(value, own, cutoff=SURE)
         fault = f'there is no package "{value}" (did you mean "{meant}"?)' if meant else ""
@@ -236,20 +243,26 @@ def _of_grader(
             if part == "request" and one.get("service") in _served_names(scenario):
                 fault = f"the grader offers {one['service']} itself (serves): a student's node should call it"
                 yield ("scenarios", name, *at, "service"), fault
-    asked = {
+    asked = [
         str(as_map(c.get("with")).get("topic"))
         for _, c in criteria
         if str(c.get("check")) in ASKED_OF_STUDENT
-    }
+    ]
     for index, criterion in criteria:
         path, given = ("criteria", index, "with"), as_map(criterion.get("with"))
         scenario = scenarios.get(str(criterion.get("scenario")), {})
-        is_place = str(criterion.get("check")) in {"ends-at", "stays-within"} and given.get("of") is None
+        check = str(criterion.get("check"))
+        is_place = check in WHERE_IT_IS and given.get("of") is None
         for at, topic in (
             (("effect",), as_map(given.get("effect")).get("topic")),
-            ((), is_place and given.get("topic")),
+            ((), (is_place or check in NEVER_OF_GRADER) and given.get("topic")),
         ):
-            if isinstance(topic, str) and topic in _sent_by_grader(scenario) - asked:
+            program = only_publisher(topic, scenario) if at and isinstance(topic, str) else ""
+            if program:
+                fault = f"{program} publishes on {topic}: name the one on which the student's node answers"
+                yield (*path, *at, "topic"), fault
+            others = asked.count(str(topic)) - (check in NEVER_OF_GRADER)
+            if isinstance(topic, str) and topic in _sent_by_grader(scenario) and not others:
                 fault = (
                     f"the grader itself sends on {topic}: name the one on which the student's node answers"
                 )
@@ -593,7 +606,7 @@ def _starts(scenario: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _values_of(starts: list[dict[str, Any]], key: str) -> list[str]:
-    return [str(start[key]) for start in starts if start.get(key) is not None]
+    return [start[key] for start in starts if isinstance(start.get(key), str)]
 
 
 def _instead(name: str, there: list[str]) -> str:

@@ -19,7 +19,7 @@ ONE_NAME = re.compile(
 """A topic, a service, a node or a parameter, and a file of the student's."""
 PLAIN_NAMES = {
     "script", "parent", "child", "publisher", "subscriber", "frame_id", "child_frame_id", "names", "opened", "columns",
-    "launch", "folders",
+    "launch", "folders", "path",
 }  # fmt: skip
 """Keys of names that have neither a slash nor a known ending: programs, nodes, frames, columns and folders; or of lists
 of them."""
@@ -31,6 +31,16 @@ _WORD = r"[^\W\d]\w+"
 CHARS_MIN = 3
 """Of names of so few letters, one that differs in a letter is another name."""
 PROSE = {"title", "handout", "hint", "reproduce"}
+FREE_TEXTS = {*FIELDS, "line", "definition", "answers"}
+"""Keys of other texts in which a blank may be meant."""
+
+
+def _blank_ends(data: object) -> Iterator[Fault]:
+    """Yield names with a blank before or after them, which no name has and nobody sees."""
+    for path, text in texts_in((), data):
+        is_free = {*PROSE, *WORDS, *FREE_TEXTS} & {*path} or path[:1] == ("made_up",)
+        if text != text.strip() and text.strip() and not is_free and "\n" not in text:
+            yield path, f'has a blank before or after it: write "{text.strip()}"'
 
 
 def doubtful_names(data: object, folder: Path) -> Iterator[Fault]:
@@ -48,7 +58,8 @@ def doubtful_names(data: object, folder: Path) -> Iterator[Fault]:
 
 def misspelt_names(data: object, folder: Path) -> Iterator[Fault]:
     """Yield those of them that are one letter off from a name that other lines have, and words of texts that are one
-    letter off from one that the handout has in backticks."""
+    letter off from one that the handout has in backticks; and names with a blank at an end."""
+    yield from _blank_ends(data)
     for path, text, near in (*_named_once(data, folder), *_misspelt_words(data, code=True), *_package(data)):
         if near:
             fault = f'nothing else in the rubric names {text} (did you mean "{near}"?): '

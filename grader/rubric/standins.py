@@ -6,10 +6,13 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from grader.checks.support.fields import is_number
 from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, as_texts
 from grader.wording import closest
 
 LIKELY, SURE = 0.7, 0.85
+WHOLE_TURN = 6.3
+"""In radians, rounded up."""
 
 
 class Program(NamedTuple):
@@ -136,7 +139,11 @@ def _no_parameter(program: Program, private: str) -> str:
 
 
 def _are_numbers(value: object, count: int) -> bool:
-    return isinstance(value, list) and len(value) == count and all(isinstance(n, int | float) for n in value)
+    return isinstance(value, list) and len(value) == count and all(map(is_number, value))
+
+
+def _is_in_radians(place: object) -> bool:
+    return isinstance(place, list) and abs(place[2]) <= WHOLE_TURN
 
 
 def _are_all(value: object, is_one: Callable[[object], bool], at_least: int = 0) -> bool:
@@ -145,7 +152,10 @@ def _are_all(value: object, is_one: Callable[[object], bool], at_least: int = 0)
 
 FORMS: Mapping[str, tuple[str, Callable[[object], bool]]] = {
     "robot": ("turtlebot3 or stage", lambda value: value in ["turtlebot3", "stage"]),
-    "start": ("[x, y, heading], in metres and radians", lambda value: _are_numbers(value, 3)),
+    "start": (
+        "[x, y, heading], in metres and radians",
+        lambda value: _are_numbers(value, 3) and _is_in_radians(value),
+    ),
     "boxes": ("[[x0, y0, x1, y1], …]", lambda value: _are_all(value, lambda box: _are_numbers(box, 4))),
     "walls": (
         "[[[x, y], [x, y], …], …], lines of two points and more",
@@ -162,7 +172,7 @@ def asked_faults(
 ) -> Iterator[tuple[KeyPath, str]]:
     """Yield what a criterion asks of such a program and it does not have. The rest of the rubric names the topics in
     `named`."""
-    for at, topic in _topics(given):
+    for at, topic in asked_topics(given):
         if topic not in named and (near := _near_topic(topic, scenario)):
             yield at, f'no program of the scenario has {topic} (did you mean "{near}"?)'
     nodes = {program.node: program for program in PROGRAMS.values()}
@@ -184,12 +194,13 @@ def asked_faults(
                 yield ("params", name), f'{program} has no parameter {private} (did you mean "{near}"?)'
 
 
-def _topics(given: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+def asked_topics(given: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the topics of a criterion's parameters, and where they stand."""
     if isinstance(given.get("topic"), str):
         yield ("topic",), given["topic"]
     yield from ((("topics", index), topic) for index, topic in as_texts(given.get("topics")))
     for key, inner in given.items():
-        yield from (((key, *at), topic) for at, topic in _topics(as_map(inner)))
+        yield from (((key, *at), topic) for at, topic in asked_topics(as_map(inner)))
 
 
 def _near_topic(topic: str, scenario: dict[str, Any]) -> str:

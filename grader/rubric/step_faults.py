@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.checks.support.fields import is_number
+from grader.checks.support.processes import odd_name
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.errors import EvidenceError
 from grader.installable import noetic_messages
@@ -35,6 +36,8 @@ ROWS_PER_MESSAGE, ROWS_PER_S = 3, 100
 """A node that writes more than this into a table is none of a lab's."""
 NOT_FINITE = (".inf", "-.inf", ".nan")
 WAITS = ("seconds", "topic", "node")
+MOMENTS = 20
+"""At so many messages of a row a value that changes is looked at, the first and the last among them."""
 
 
 def given_steps(scenario: dict[str, Any], kind: str) -> list[dict[str, Any]]:
@@ -214,10 +217,29 @@ def misfits(
             f"ROS Noetic has no message type {kind}{did_you_mean(kind, [f'{package}/{n}' for n in names])}",
         )
         return
-    message_type, moment = MessageType(kind), FIRST._replace(total=None if endless else 1)
+    message_type, first = MessageType(kind), FIRST._replace(total=None if endless else 1)
     for place, value in values:
-        if wrong := message_type.misfit(value, moment):
+        later = () if endless or not _changes(value) else range(MOMENTS)
+        moments = [first, *(FIRST._replace(number=number, total=MOMENTS) for number in later)]
+        if empty := empty_in(value):
+            yield place, f"{empty} is empty: give it a value"
+        elif wrong := next(filter(None, (message_type.misfit(value, moment) for moment in moments)), ""):
             yield place, wrong
+
+
+def empty_in(value: object, done: str = "") -> str:
+    """Return where a value has a key or an item without anything; "" if nowhere."""
+    if value is None:
+        return done
+    inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    named = ((f"[{key}]" if isinstance(key, int) else f".{key}", inner) for key, inner in inside)
+    return next(filter(None, (empty_in(inner, (done + key).lstrip(".")) for key, inner in named)), "")
+
+
+def _changes(value: object) -> bool:
+    """Return whether a value differs from message to message."""
+    inside = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return (isinstance(value, dict) and bool({"from", "each"} & value.keys())) or any(map(_changes, inside))
 
 
 def _transform(at: KeyPath, transform: dict[str, Any]) -> Iterator[Fault]:
@@ -272,9 +294,11 @@ def _wait(at: KeyPath, wait: dict[str, Any]) -> Iterator[Fault]:
 
 
 def slash(path: KeyPath, name: object, what: str) -> Iterator[Fault]:
-    """Yield a fault for a name that does not begin with a slash."""
+    """Yield a fault for a name that does not begin with a slash, or that no one can have."""
     if isinstance(name, str) and not name.startswith("/"):
         yield path, f'{what} begins with a slash: "/{name}"'
+    elif isinstance(name, str) and (fault := odd_name(name)):
+        yield path, fault
 
 
 def private(path: KeyPath, name: object) -> Iterator[Fault]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import date
@@ -18,8 +19,29 @@ MAX_DEPTH = 50
 MAX_NUMBER = (1 << 63) - 1
 MAX_NUMBER_LETTERS = 100
 TEXT_TAG = "tag:yaml.org,2002:str"
+INT_TAG = "tag:yaml.org,2002:int"
 MERGE_TAG = "tag:yaml.org,2002:merge"
 PLAIN_TAGS = frozenset({"tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"})
+
+AT_BEGINNING = "^"
+"""Before a problem that is told where the part begins in which PyYAML finds it, not where that is seen."""
+YAML_PROBLEMS = {
+    "mapping values are not allowed": (
+        "a colon where no key can stand: text with a colon needs quotes; else look for a colon, a dash or a blank that "
+        "is missing here or in the line above, or for another indentation"
+    ),
+    "could not find expected ':'": "^a key needs a colon and a blank after it",
+    "but found '<block sequence start>'": "this dash is not under those of its list",
+    "expected <block end>": (
+        "this does not belong to the part that begins on line {line}: look at its indentation, its dash and its quotes"
+    ),
+    "expected ',' or '}'": "the {{ of line {line} is not closed, or a comma is missing between its keys",
+    "expected ',' or ']'": "the [ of line {line} is not closed, or a comma is missing between its items",
+    "unexpected end of stream": "^a quotation mark that is not closed",
+    "undefined alias": "nothing above has this name, with &: text that begins with * needs quotes",
+    "the node content": "a comma, or a bracket, too many",
+}
+"""What PyYAML says, and what is told."""
 
 KeyPath = tuple[str | int, ...]
 Value: TypeAlias = "dict[str, Any] | list[Any] | str | int | float | None"
@@ -96,7 +118,7 @@ def source_of(raw: bytes, name: str, form: Form) -> Source:
 def packages_in(rubric: dict[str, Any]) -> list[str]:
     """Return the packages that students hand in, as a rubric names them: one, or a list."""
     given = rubric.get("package")
-    return [name for _, name in as_texts(given)] if isinstance(given, list) else [str(given)]
+    return [given] if isinstance(given, str) else [name for _, name in as_texts(given)]
 
 
 def texts_at(path: Path, name: str, key: str) -> tuple[str, ...]:
@@ -210,8 +232,13 @@ def _yaml_fault(error: yaml.YAMLError, text: str, name: str) -> str:
         return f"{name}:{line}: a character that YAML does not allow (U+{ord(_char(error)):04X})"
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     problem = getattr(error, "problem", None) or "is not YAML"
+    begun = getattr(error, "context_mark", None) or mark
     if "'\\t'" in problem:
         problem = "a tab: YAML is indented with spaces only"
+    elif words := next((words for sign, words in YAML_PROBLEMS.items() if sign in problem), ""):
+        if words.startswith(AT_BEGINNING):
+            mark = begun
+        problem = words.removeprefix(AT_BEGINNING).format(line=begun.line + 1 if begun else 1)
     return f"{name}:{mark.line + 1 if mark else 1}: {problem}"
 
 
@@ -259,7 +286,7 @@ class _Reader:
         for merge_node in [value for key, value in node.value if key.tag == MERGE_TAG]:
             data = {**self._merge(merge_node, path), **data}
         for key_node, value_node in node.value:
-            key = self._key(key_node, path)
+            key = self._key(key_node, value_node, path)
             if key is None:
                 continue
             line = key_node.start_mark.line + 1
@@ -281,14 +308,16 @@ class _Reader:
             return {key: value for part in parts for key, value in part.items()}
         raise yaml.MarkedYAMLError(problem="<< takes a map or a list of maps", problem_mark=node.start_mark)
 
-    def _key(self, node: yaml.Node, path: KeyPath) -> str | None:
+    def _key(self, node: yaml.Node, value: yaml.Node, path: KeyPath) -> str | None:
         if node.tag == MERGE_TAG:
             return None
         if isinstance(node, yaml.ScalarNode) and (node.tag == TEXT_TAG or self.form.written_keys):
             return str(node.value)
         shown = node.value if isinstance(node, yaml.ScalarNode) else "this"
         line = node.start_mark.line + 1
-        self.faults.append((path, f"{shown} on line {line} is not a string: put the key in quotes"))
+        is_cut = node.tag == INT_TAG and value.start_mark.index == value.end_mark.index
+        remedy = "a decimal number has a point, no comma" if is_cut else "put the key in quotes"
+        self.faults.append((path, f"{shown} on line {line} is not a string: {remedy}"))
         return None
 
     def _scalar(self, node: yaml.Node, path: KeyPath) -> Value:
@@ -299,6 +328,8 @@ class _Reader:
             value = self.loader.construct_object(node)
         except (ValueError, OverflowError) as error:
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark) from error
+        if self.form is RUBRIC and isinstance(value, int | float) and (odd := _other_base(node.value)):
+            return self._refuse(path, f"{node.value} is {value:g} in YAML, {odd}", value)
         if isinstance(value, int) and abs(value) > MAX_NUMBER:
             return self._refuse(path, f"is too large a number: {node.value[:40]}", 0)
         if value is None or isinstance(value, bool | int | str):
@@ -317,6 +348,13 @@ class _Reader:
     def _refuse(self, path: KeyPath, message: str, stand_in: Value = 0.0) -> Value:
         self.faults.append((path, message))
         return stand_in
+
+
+def _other_base(written: str) -> str:
+    """Return how to write a number that YAML does not read as people do; empty where it does."""
+    if re.fullmatch(r"[-+]?0[0-7_]+", written):
+        return f"as its first digit is 0: write {written.lstrip('-+0') or 0}"
+    return "in minutes and seconds: write it without a colon, or in quotes" if ":" in written else ""
 
 
 def as_map(value: object) -> dict[str, Any]:

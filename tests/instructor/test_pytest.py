@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.errors import RubricError
 from grader.model.verdict import Status
 from grader.rubric.load import load_rubric
 from tests.evidence.bags import CHATTER, write_bag
@@ -143,9 +144,12 @@ def test_broken_tests_are_an_error_and_never_a_pass(tmp_path, tests, hint):
 
 
 @pytest.mark.full
-def test_a_selection_of_nothing_or_of_nonsense_is_an_error(tmp_path):
+def test_a_selection_of_nothing_is_refused_and_of_nonsense_an_error(tmp_path):
     none = TESTS.replace("test_lab.py", "test_lab.py, select: nowhere")
-    assert broken(tmp_path, MIXED, none) == "test_lab.py holds no test that fits 'nowhere'"
+    with pytest.raises(RubricError, match=r"select: fits no test of test_lab\.py: there is test_counts"):
+        broken(tmp_path, MIXED, none)
+    named = MIXED + "\n@pytest.fixture(params=['somewhere'])\ndef place(request):\n    return request.param\n"
+    assert broken(tmp_path, named, none) == "test_lab.py holds no test that fits 'nowhere'"
     nonsense = TESTS.replace("test_lab.py", "test_lab.py, select: '((('")
     assert "pytest ended with code 4" in broken(tmp_path, MIXED, nonsense)
 

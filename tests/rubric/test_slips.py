@@ -20,7 +20,7 @@ import yaml
 from grader.errors import RubricError
 from grader.ros_packages import STANDINS
 from grader.rubric.find import rubrics_folder
-from grader.rubric.load import load_rubric
+from grader.rubric.load import doubts_of, load_rubric
 from grader.rubric.standins import FIELD_M, ROBOTS
 from grader.rubric.standins import PROGRAMS as PROGRAMS_KNOWN
 from tests.rubric.samples import faults
@@ -258,12 +258,37 @@ def test_a_slip_is_refused(examples: Path, name: str, old: str, new: str, fault:
     assert faults(_spoiled(examples, name, old, new)) == [f"spoiled.yaml:{fault}"]
 
 
-@pytest.mark.parametrize(
-    "slip", yaml.safe_load(SLIPS.read_text(encoding="utf-8")), ids=lambda slip: slip["fault"]
-)
+LISTED = yaml.safe_load(SLIPS.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("slip", [slip for slip in LISTED if "doubt" in slip], ids=lambda slip: slip["doubt"])
+def test_what_may_be_a_slip_is_a_warning(examples: Path, slip: dict[str, str]) -> None:
+    path = _spoiled(examples, slip["lab"], slip["old"], slip["new"])
+    assert doubts_of(load_rubric(str(path)), path.name) == [f"spoiled.yaml:{slip['doubt']}"]
+
+
+@pytest.mark.parametrize("path", sorted(rubrics_folder().rglob("*.yaml")), ids=lambda path: path.stem)
+def test_a_rubric_of_the_graders_own_loads_without_a_word(path: Path) -> None:
+    assert doubts_of(load_rubric(str(path)), path.name) == []
+
+
+@pytest.mark.parametrize("slip", [slip for slip in LISTED if "fault" in slip], ids=lambda slip: slip["fault"])
 def test_a_slip_of_the_list_is_refused(examples: Path, slip: dict[str, str]) -> None:
     path = _spoiled(examples, slip["lab"], slip["old"], slip["new"])
     assert faults(path) == [f"spoiled.yaml:{slip['fault']}"]
+
+
+def test_a_key_that_is_indented_like_the_handout_counts_as_its_text(examples: Path) -> None:
+    path = _spoiled(examples, "params-and-namespaces", "\nmade_up:", "\n  made_up:")
+    told = '"made_up:" counts as its text: begin that line without blanks'
+    assert faults(path)[0] == f"spoiled.yaml:9: handout: {told}"
+
+
+def test_a_warp_of_nothing_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "lab.yaml"
+    text = (rubrics_folder() / "leeds-comp3631-lab1.yaml").read_text(encoding="utf-8")
+    path.write_text(text.replace("warp: 20", "warp: 0"), encoding="utf-8")
+    assert faults(path) == ["lab.yaml:21: scenarios.wraps.warp: must be at least 1, not 0"]
 
 
 def test_more_rows_than_come_of_a_few_messages(examples: Path) -> None:

@@ -185,6 +185,14 @@ def _close(got: float, wanted: float, tolerance: float) -> bool:
     return both_nan or math.isclose(got, wanted, rel_tol=FLOAT32, abs_tol=tolerance)
 
 
+def has_hole(value: object) -> bool:
+    """Return whether a list or map has a key or an item without anything."""
+    inside = (
+        value.values() if isinstance(value, Mapping) else value if isinstance(value, list | tuple) else ()
+    )
+    return any(one is None or has_hole(one) for one in inside)
+
+
 def is_number(value: object) -> TypeGuard[float]:
     """Return whether it is a number, and no truth value."""
     return isinstance(value, int | float) and not isinstance(value, bool)

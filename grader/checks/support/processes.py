@@ -6,6 +6,7 @@ signal handler then waits for a lock that the interrupted call holds.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Collection, Iterable, Iterator
 from typing import Annotated, Literal, NamedTuple
@@ -189,6 +190,8 @@ Anonymous = Literal["allowed", "required", "forbidden"]
 _KINDS = {"allowed": "plain or anonymous", "required": "anonymous", "forbidden": "plain"}
 _SUFFIX = re.compile(r"_\d+_\d+$")
 _ANONYMOUS = r"(_\d+_\d+)?"
+_ODD = re.compile(r"[\s*?{}\[\]()#:,;=\"']")
+"""What is in no name of the graph, and may have come into one from YAML or a shell."""
 TypeName = Annotated[str, Field(pattern=r"^[A-Za-z]\w*/[A-Za-z]\w*$")]
 
 
@@ -248,7 +251,23 @@ def _bases(names: Iterable[str]) -> list[str]:
 def _global(name: str) -> str:
     if not name.startswith("/"):
         raise ValueError(f'a name of the graph begins with a slash: "/{name}"')
+    if fault := odd_name(name):
+        raise ValueError(fault)
     return name
+
+
+def _global_pattern(name: str) -> str:
+    _global(name.removesuffix("*").rstrip("/") or "/")
+    return name
+
+
+def odd_name(name: str) -> str:
+    """Return why no topic, service, node or parameter has this name; empty where one may have it."""
+    if odd := _ODD.search(name):
+        return f"no name of ROS's has {json.dumps(odd[0])} in it: {json.dumps(name)}"
+    if "//" in name or (len(name) > 1 and name.endswith("/")):
+        return f'has a slash too many: "/{"/".join(part for part in name.split("/") if part)}"'
+    return ""
 
 
 def plain_type(name: str) -> str:
@@ -263,5 +282,7 @@ def is_called(node: str, name: str) -> bool:
 
 GlobalName = Annotated[str, AfterValidator(_global)]
 """A topic's, a service's or a parameter's full name."""
+GlobalPattern = Annotated[str, AfterValidator(_global_pattern)]
+"""Such a name, or a pattern for several: `/square/*`."""
 PublishedTopic = Annotated[GlobalName, Refers("published")]
 """A topic on which the student publishes."""

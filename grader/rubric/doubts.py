@@ -1,0 +1,284 @@
+"""What may be a slip in a rubric and may be meant: each is a warning, and the rubric is used as it is.
+
+Names that one line alone has are in `spelling.py`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import Any
+
+from grader.checks.support.fields import is_number
+from grader.rubric.message_fields import POSES, VELOCITIES, services_in
+from grader.rubric.spelling import texts_in
+from grader.rubric.standins import set_in, topics_of_programs
+from grader.rubric.started import starts_of
+from grader.rubric.step_faults import given_steps
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.wording import join_words, plural
+
+SHORT = {"limit_s": 3.0, "first_message_s": 3.0, "quiet_s": 1.0, "alive_s": 0.5, "window_s": 2.0}
+"""Conditions of `until` that a correct package may miss on a busy machine if they are shorter."""
+STRICT = 0.02
+"""Of a rate, the least tolerance that a busy machine keeps."""
+JUDGED = ("check", "scenario", "package", "with")
+"""What makes a criterion judge something."""
+WORDS = {
+    "one": 1,
+    "two": 2,
+    "twice": 2,
+    "three": 3,
+    "four": 4,
+    "five": 5,
+    "ten": 10,
+    "twenty": 20,
+    "fifty": 50,
+}
+_NUMBER = rf"\d+(?:\.\d+)?|{'|'.join(WORDS)}"
+PER_SECOND = re.compile(rf"\b({_NUMBER})(?: ?Hz\b|(?: \w+)? (?:a|per) second)", re.IGNORECASE)
+SHIFTS = (10, 100, 0.1, 0.01, -1)
+"""By so much a number is another where a digit is forgotten, or a sign."""
+EXPECTED = ("value", "values", "numbers", "rate_hz", "result", "expect", "goal", "start", "min", "max")
+"""Keys of what a criterion asks for, as numbers."""
+
+
+def doubts(data: object) -> Iterator[Fault]:
+    """Yield what may be a slip."""
+    rubric = as_map(data)
+    scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
+    criteria = as_maps(rubric.get("criteria"))
+    yield from _short_runs(scenarios)
+    yield from _misnamed_processes(rubric, scenarios)
+    yield from _first_packages(rubric, scenarios)
+    yield from _lone_quotes(rubric)
+    yield from _same_criteria(criteria)
+    yield from _other_rates(criteria, scenarios)
+    for index, criterion in criteria:
+        at, given = ("criteria", index, "with"), as_map(criterion.get("with"))
+        scenario = scenarios.get(str(criterion.get("scenario")), {})
+        yield from _other_process(at, given, scenario, scenarios)
+        yield from _fewer_answers(at, criterion, scenario)
+        yield from _cancelled_goal(at, given, scenario)
+        yield from _added_up(at, criterion, scenario)
+        yield from _set_otherwise(at, criterion, scenario)
+        yield from _other_run(criteria, index, scenarios)
+        yield from _shifted_numbers(index, criterion, rubric)
+
+
+def _short_runs(scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
+    for name, scenario in scenarios.items():
+        for key, least_s in SHORT.items():
+            given_s = as_map(scenario.get("until")).get(key)
+            if is_number(given_s) and given_s < least_s:
+                fault = f"{given_s:g} s is very short: on a busy machine a correct package may need more"
+                yield ("scenarios", name, "until", key), fault
+
+
+def _lone_quotes(rubric: dict[str, Any]) -> Iterator[Fault]:
+    for path, text in texts_in((), rubric):
+        for quote in ('"', "'"):
+            if text.count(quote) == 1 and (text.startswith(quote) or text.endswith(quote)):
+                yield path, f"has one quotation mark, {quote}, and another one nowhere"
+
+
+def _words(name: str) -> set[str]:
+    return {word for word in re.split(r"[^a-z0-9]+", PurePosixPath(name).stem.lower()) if word}
+
+
+def _misnamed_processes(rubric: dict[str, Any], scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield processes that are called as another script of the rubric's, and not as their own."""
+    texts = [text for _, text in texts_in((), rubric)]
+    scripts = {name for text in texts for name in re.findall(r"[\w./-]+\.py\b", text)}
+    for scenario, one in scenarios.items():
+        for index, start in as_maps(one.get("start")):
+            name, script = start.get("name"), start.get("script")
+            if not isinstance(name, str) or not isinstance(script, str) or _words(name) & _words(script):
+                continue
+            meant = sorted(other for other in scripts if _words(name) <= _words(other))
+            if meant:
+                fault = (
+                    f"the process is called {name}, and elsewhere the rubric has {meant[-1]}: is it that one?"
+                )
+                yield ("scenarios", scenario, "start", index, "script"), fault
+
+
+def _first_packages(rubric: dict[str, Any], scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield starts without a package, if others have one."""
+    packages = packages_in(rubric)
+    starts = [
+        (("scenarios", name, "start", index), start)
+        for name, one in scenarios.items()
+        for index, start in as_maps(one.get("start"))
+        if start.get("program") is None and start.get("tests") is None
+    ]
+    if len(packages) > 1 and any(start.get("package") is not None for _, start in starts):
+        for at, start in starts:
+            if start.get("package") is None:
+                yield (
+                    at,
+                    f"is started from {packages[0]}, the first package: if it is of another one, give package",
+                )
+
+
+def _same_criteria(criteria: Sequence[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+    first: dict[str, str] = {}
+    for index, criterion in criteria:
+        judged = json.dumps([criterion.get(key) for key in JUDGED], sort_keys=True)
+        other = first.setdefault(judged, str(criterion.get("id")))
+        if other != criterion.get("id") and criterion.get("check") != "manual":
+            yield ("criteria", index, "check"), f"judges the same as {other}, with the same parameters"
+
+
+def _other_rates(
+    criteria: Sequence[tuple[int, dict[str, Any]]], scenarios: Mapping[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield rates of a topic for which an earlier criterion wants another one, in a run of the same processes."""
+    before: dict[tuple[str, ...], tuple[str, float]] = {}
+    for index, criterion in criteria:
+        given, scenario = as_map(criterion.get("with")), scenarios.get(str(criterion.get("scenario")), {})
+        rate_hz = given.get("rate_hz")
+        if not is_number(rate_hz):
+            continue
+        started = json.dumps([scenario.get("start"), scenario.get("params")], sort_keys=True)
+        key = (str(given.get("topic")), str(given.get("of")), started)
+        earlier, other_hz = before.setdefault(key, (str(criterion.get("id")), rate_hz))
+        if rate_hz != other_hz:
+            fault = f"{earlier} wants {other_hz:g} Hz on {key[0]}, not {rate_hz:g}"
+            yield ("criteria", index, "with", "rate_hz"), fault
+
+
+def _other_process(
+    at: KeyPath, given: dict[str, Any], scenario: dict[str, Any], scenarios: Mapping[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield names that a node has to have, and that are those of another process."""
+    process, names = given.get("process"), as_texts(given.get("names"))
+    starts = [start for one in scenarios.values() for start in starts_of(one)]
+    others = {str(start.get("name")) for start in starts} - {str(process)}
+    own = [start for start in starts_of(scenario) if start.get("name") == process]
+    for index, name in names:
+        is_own = any(_words(name) & {*_words(str(process)), *_words(str(one.get("script")))} for one in own)
+        if own and not is_own and name.strip("/") in others:
+            fault = f"{name} is the name of another process of the rubric, and this is about {process}"
+            yield (*at, "names", index), fault
+
+
+def _fewer_answers(at: KeyPath, criterion: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield fewer answers than there are calls: they are compared with the first of these."""
+    given = as_map(criterion.get("with"))
+    expect, service = given.get("expect"), given.get("service")
+    made = [
+        one for _, part, one in services_in(scenario) if part == "request" and one.get("service") == service
+    ]
+    if (
+        criterion.get("check") == "service-answers"
+        and isinstance(expect, list)
+        and 0 < len(expect) < len(made)
+    ):
+        calls = f"{criterion.get('scenario')} calls {service} {plural(len(made), 'time')}"
+        fault = f"{calls}, and here are {plural(len(expect), 'answer')}: they are compared with the first"
+        yield (*at, "expect"), fault
+
+
+def _cancelled_goal(at: KeyPath, given: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield goals that a step cancels and that should succeed."""
+    goals = [one for one in given_steps(scenario, "action") if one.get("name") == given.get("action")]
+    number = given.get("goal", 1)
+    if not isinstance(number, int) or not 0 < number <= len(goals):
+        return
+    after_s = goals[number - 1].get("cancel_after_s")
+    if is_number(after_s) and given.get("status", "SUCCEEDED") == "SUCCEEDED" and "feedback" not in given:
+        fault = f"the step cancels this goal after {after_s:g} s: is its status PREEMPTED?"
+        yield (*at, "status" if "status" in given else "goal"), fault
+
+
+def _added_up(at: KeyPath, criterion: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield places that are read of velocities, beside a program that says where the robot is."""
+    given, topics = as_map(criterion.get("with")), topics_of_programs(scenario)
+    poses = [topic for topic, kind in topics.items() if kind in POSES and topic != "/odom"]
+    is_place = (
+        str(criterion.get("check")) in {"ends-at", "stays-within"} and given.get("relative") is not True
+    )
+    if is_place and poses and topics.get(str(given.get("topic"))) in VELOCITIES:
+        yield (
+            (*at, "topic"),
+            f"velocities are added up from (0, 0): the place itself is on {join_words(poses)}",
+        )
+
+
+def _set_otherwise(at: KeyPath, criterion: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield parameters that the scenario sets to one value, and that should have another one."""
+    given = as_map(criterion.get("with"))
+    name, value = given.get("name"), given.get("value")
+    values = [one.get("value") for _, one in set_in(scenario) if one.get("name") == name and "value" in one]
+    if criterion.get("check") == "param-value" and values and value not in values:
+        yield (*at, "value"), f"{criterion.get('scenario')} sets {name} to {json.dumps(values[-1])}"
+
+
+def _other_run(
+    criteria: Sequence[tuple[int, dict[str, Any]]], index: int, scenarios: Mapping[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield topics that another run is about, with other processes, and that this one nowhere names."""
+    criterion = dict(criteria)[index]
+    name, topic = str(criterion.get("scenario")), as_map(criterion.get("with")).get("topic")
+    here = scenarios.get(name, {})
+    if not isinstance(topic, str) or "start" not in here or _is_named(topic, here):
+        return
+    for _, other in criteria:
+        run = scenarios.get(str(other.get("scenario")), {})
+        is_same = as_map(other.get("with")).get("topic") == topic and other.get("scenario") != name
+        if is_same and _is_named(topic, run) and _processes(run).isdisjoint(_processes(here)):
+            fault = f"nothing in {name} names {topic}, and {other.get('scenario')} does"
+            yield ("criteria", index, "scenario"), f"{fault}: is this criterion for that run?"
+            return
+
+
+def _is_named(topic: str, scenario: dict[str, Any]) -> bool:
+    named = any(text == topic or topic in text.split(":=") for _, text in texts_in((), scenario))
+    return named or topic in topics_of_programs(scenario)
+
+
+def _processes(scenario: dict[str, Any]) -> set[str]:
+    """Return what a scenario starts of the student's, each with the arguments that rename its topics."""
+    keys = ("script", "launch", "load", "built", "package")
+    return {
+        json.dumps(
+            [[start.get(key) for key in keys], [a for _, a in as_texts(start.get("args")) if a[:1] != "_"]]
+        )
+        for start in starts_of(scenario)
+        if start.get("program") is None
+    }
+
+
+def _shifted_numbers(index: int, criterion: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield numbers that only this line has, and that the criterion's title or the handout has with another sign, or
+    ten times as large or as small."""
+    about = [str(criterion.get(key, "")) for key in ("title", "hint")]
+    prose = " ".join([*about, str(rubric.get("handout", ""))])
+    said = {float(number) for number in re.findall(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w]|\.\d)", prose)}
+    said_hz = {float(WORDS.get(number.lower(), number)) for number in PER_SECOND.findall(prose)}
+    there = [number for _, number in _numbers_in((), rubric)]
+    for key in EXPECTED:
+        for at, number in _numbers_in((key,), as_map(criterion.get("with")).get(key)):
+            known = said_hz if key == "rate_hz" else said
+            shifts = SHIFTS[:-1] if key in {"min", "max"} else SHIFTS
+            meant = next((number / by for by in shifts if round(number / by, 9) in known), None)
+            is_round = key != "rate_hz" and re.fullmatch(r"0?\.?0*10*", f"{abs(number):.9g}") is not None
+            if number in said | known or meant is None or is_round or there.count(number) > 1:
+                continue
+            if known is said_hz and len(known) > 1:
+                continue
+            yield (
+                ("criteria", index, "with", *at),
+                f"{number:g} is on no other line, and the rubric's text has {meant:g}",
+            )
+
+
+def _numbers_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, float]]:
+    if is_number(value):
+        yield path, float(value)
+    elif isinstance(value, dict | list):
+        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _numbers_in((*path, key), inner)
