@@ -45,7 +45,7 @@ _HEADS = {
     **dict.fromkeys(("except", "finally"), "try: pass\n"),
 }
 _GAP = re.compile(r"(?<=[\w\")\]])\s+(?=[\w\"(\[{])")
-_CLOSED_ENOUGH = re.compile(r"([\w\")\]}]:?|\(:)$")
+_CLOSED_ENOUGH = re.compile(r"([\w\")\]}]:?|\(:|[\w.]\()$")
 _STATEMENTS = (
     "assert", "break", "class", "continue", "def", "del", "elif", "else", "except", "finally", "for", "from", "global",
     "if", "import", "pass", "raise", "return", "try", "while", "with",
@@ -97,6 +97,28 @@ _HABITS = (
     _Habit(r"^\s*(using\s+namespace\b|#\s*include\b)", "this is C++, not Python", DELETE_LINE),
     _Habit(r"(?<![\w.])(r[^\w\s]spy|ro[^\w\s]py|ros[^\w\s]y|rosp[^\w\s.])\.", "`rospy` is misspelt as `{0}`",
            "", ((r"(?<![\w.])(?:r[^\w\s]spy|ro[^\w\s]py|ros[^\w\s]y|rosp[^\w\s.])(?=\.)", "rospy"),)),
+    _Habit(r"(?<![\w.])rospy\s*[,;:]\s*[A-Za-z]\w*\s*[(:]", "a dot belongs behind `rospy`",
+           "", ((r"(?<![\w.])rospy\s*[,;:]\s*(?=[A-Za-z]\w*\s*[(:])", "rospy."),)),
+    _Habit(r"^\s*from\s+\w+[,;:]\s*\w+\s+import\b", "a dot belongs between the parts of a module's name",
+           "", ((r"^(\s*from\s+\w+)[,;:]\s*(?=\w+\s+import\b)", r"\1."),)),
+    _Habit(r"^\s*from\s+[\w.]+\s+(?!import\b)([A-Za-z]{5,7})\s+[\w*]", "Python writes `import`, not `{0}`",
+           "", ((r"^(\s*from\s+[\w.]+\s+)[A-Za-z]{5,7}(?=\s+[\w*])", r"\1import"),)),
+    _Habit(r"^\s*(?:while|if|elif)\s+(?!not\b)([notNOT]{2,4})\s+[\w(]", "Python writes `not`, not `{0}`",
+           "", ((r"^(\s*(?:while|if|elif)\s+)[notNOT]{2,4}(?=\s+[\w(])", r"\1not"),)),
+    _Habit(r"^\s*(?!if\b)([a-zA-Z]{1,3})\s+__name__\s*==", "Python writes `if`, not `{0}`",
+           "", ((r"^(\s*)[a-zA-Z]{1,3}(?=\s+__name__)", r"\1if"),)),
+    _Habit(r"^\s*(?!def\b)([defDEF]{2,4})\s+\w+\s*\(.*\)\s*:$", "Python writes `def`, not `{0}`",
+           "", ((r"^(\s*)[defDEF]{2,4}(?=\s+\w+\s*\()", r"\1def"),)),
+    _Habit(r"^\s*(?:if|elif|while)\b[^=(:]*=[:;]\s*\S", "two values are compared by `==`",
+           "", ((r"=[:;](?=\s*\S)", "=="),)),
+    _Habit(r"[(,]\s*[a-z_]\w*\s*[:;]\s*[\w.\"]+\s*[,)]", "an argument of a call gets its value by `=`",
+           "", ((r"([(,]\s*[a-z_]\w*)\s*[:;]\s*(?=[\w.\"]+\s*[,)])", r"\1="),)),
+    _Habit(r"\w\.\s+\w+\s*=(?!=)[^=]*\)", "a comma belongs between two arguments",
+           "", ((r"(?<=\w)\.\s+(?=\w+\s*=(?!=))", ", "),)),
+    _Habit(r"\w\s*=\s*[\w.]+\s*,\s*[A-Za-z][\w.]*\s*\)", "a value without a name comes after one with a name", "",
+           ((r"(\w+\s*=\s*[\w.]+)\s*,\s*([A-Za-z][\w.]*)\s*\)", r"\2, \1)"),)),
+    _Habit(r"^\s*[a-z_]\w*\s+(?:rospy\.\w+\(|\"\")(?!.*=\s*=)", "`=` is missing between the name and its value",
+           "", ((r"^(\s*[a-z_]\w*)\s+(?=rospy\.\w+\(|\"\")", r"\1 = "),)),
     _Habit(r"^\s*>>>", "`>>>` is printed by Python's prompt", "leave it out", ((r">>>\s?", ""),)),
     _Habit(r"^\s*//", "a comment begins with `#` in Python", "", ((r"//+\s*", "# "),)),
     _Habit(r"^\s*/\*", "a comment begins with `#` in Python",
@@ -288,7 +310,8 @@ def _with_separator(code: str, texts: list[str]) -> Iterator[str]:
         before, after = code[: gap.start()], code[gap.end() :]
         text = texts[before.count('""') - 1] if before.endswith('""') and texts else ""
         depth = sum(map(before.count, "([{")) - sum(map(before.count, ")]}"))
-        if re.search(r"%[\d.]*[sdfgir]", text):
+        places = re.findall(r"%[\d.]*[sdfgir]", text)
+        if len(places) == 1 or (places and after.startswith("(")):
             found.append(f"{before} % {after}")
         elif depth > 0 or re.match(r"\s*(from|import)\b", code):
             found.append(f"{before}, {after}")
@@ -301,13 +324,22 @@ def _with_bracket(line: str, message: str, column: int | None) -> Iterator[str]:
     at = (column or 0) - 1
     if shorter := _without_unmatched(line, message, column):
         code, comment, texts = _taken_apart(line)
-        called = re.sub(r"^(\s*(?:\w+\.)+\w+)\)$", r"\1()", code)
+        asked = _ASKED.sub(r"\1()", code, count=1)
+        called = re.sub(r"((?:^|[\s(=%])(?:\w+\.)+[a-z_]+)\)$", r"\1()", code)
+        called = re.sub(
+            r"^(\s*def\s+(?:\w*(?:callback|cb|handler)(?=msg|data|message|req))?\w*?)((?:(?<=callback)|(?<=cb)|(?<=handler))(?:msg|data|message|req)|)\):$",
+            r"\1(\2):",
+            called,
+        )
+        filled = _GLUED.sub(r"\1(\2)", code)
         opened = _OPENED.sub(lambda found: f"{_log_call(found[1])}(", code, count=1)
-        yield from (_together(one, comment, texts) for one in (called, opened) if one != code)
+        yield from (_together(one, comment, texts) for one in (asked, filled, called, opened) if one != code)
         yield shorter
-    if (wrong := re.search(r"'(.)' does not match opening parenthesis '(.)'", message)) and line[
-        at : at + 1
-    ] == wrong[1]:
+    wrong = re.search(r"'(.)' does not match opening parenthesis '(.)'", message)
+    opener = line.rfind("{", 0, at) if wrong and wrong[2] == "{" else 0
+    if wrong and opener > 0 and re.match(r"\w", line[opener - 1]):  # `name{` is nothing
+        yield line[:opener] + {")": "(", "]": "["}[wrong[1]] + line[opener + 1 :]
+    if wrong and line[at : at + 1] == wrong[1]:
         yield line[:at] + _CLOSING[wrong[2]] + line[at + 1 :]
     if "expecting '}'" in message:
         quotes = [found.start() for found in re.finditer("[\"']", line)]
@@ -328,6 +360,12 @@ _OPENED = re.compile(
     r"((?:\w+\.)+?\w+?|\bprint)(?:\s*\)(?=[\w\"])|(?=\"\")|(?<=\w)(?=rospy\.)|\s+(?=[\w\"]+\s*\)$))"
 )
 """A call whose `(` is missing: `pub.publish)x)`, `pub.publish"x")`, `pub.publish x)`, `rospy.loginforospy.…)`."""
+_GLUED = re.compile(r"(\.(?:publish|Rate|Duration|sleep|loginfo|logwarn|logerr|get_param))(\w+)\)$")
+"""A call whose `(` is missing before its value: `pub.publishtext)`, `rospy.Rate10)`."""
+_ASKED = re.compile(
+    r"(\.(?:get_caller_id|get_name|get_namespace|get_rostime|get_time|is_shutdown|now|to_sec))\)"
+)
+"""A call without values whose `(` is missing: `rospy.get_time)`."""
 _LOG_CALLS = ("logdebug", "loginfo", "logwarn", "logerr", "logfatal")
 
 
@@ -361,6 +399,8 @@ def _with_quote(line: str, message: str, column: int | None) -> Iterator[str]:
     if other is None:
         return
     begin = line.index(quote, at) + 1
+    if opened := re.search(r"(?:[(,]|=)\s*(?=[^(),=\s\"'][^(),=\"']*$)", line[:at]):
+        yield f"{line[: opened.end()]}{quote}{line[opened.end() :]}"
     for found in re.finditer(other, line[begin:]):
         yield line[: begin + found.start()] + quote + line[begin + found.end() :]
     if name := re.match(r"[\w/~]+(?=\s*[,)\]])", line[begin:]):

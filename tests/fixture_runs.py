@@ -55,7 +55,7 @@ TOGETHER = {
     ),
     "mcr2-basic-comms": (
         "talker-missing+listener-name",
-        "chatter-other-topic+launch-no-name+build-unknown-component",
+        "chatter-other-topic+build-unknown-component",
         "rate-sleep-without-brackets+listener-not-executable+manifest-no-buildtool",
         "message-constant-time+launch-namespace-apart+cmake-no-catkin-package",
         "ok-launch-terminals+talker-anonymous",

@@ -23,7 +23,7 @@ from grader.checks.support.text import near_names, shown
 from grader.model.package import CMAKE, CMakeCall, CMakeFacts, Fault, PackageFacts, meant_command
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
-from grader.wording import join_words
+from grader.wording import is_one_edit, join_words
 
 NOT_CALLED = "no catkin_install_python(…) is called"
 NO_FILE = "there is no CMakeLists.txt"
@@ -155,19 +155,26 @@ def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
     if slip := _misspelt(facts, "find_package"):
         yield _respell(slip, "find_package")
     elif not any(c.args[:1] == ("catkin",) for c in packages):
-        slip = next((c for c in packages if c.args and c.args[0].casefold() == "catkin"), None)
+        slip = next((c for c in packages if c.args and _stands_for_catkin(c.args[0])), None)
         why = "find_package(catkin …) is missing"
         if slip is None:
             yield Wrong(why, "add find_package(catkin REQUIRED)", below=project, uncalled="find_package")
         else:
             why = f"{why} (line {slip.line} says {slip.args[0]})"
-            yield Wrong(why, f"write catkin in place of {slip.args[0]}", slip.line)
+            place = "before" if slip.args[0].isupper() else "in place of"
+            yield Wrong(why, f"write catkin {place} {slip.args[0]}", slip.line)
     if slip := _misspelt(facts, "catkin_package"):
         yield _respell(slip, "catkin_package")
     elif _first(facts, "catkin_package") is None:
         above = next((c for c in packages if c.args[:1] == ("catkin",)), project)
         why = "catkin_package(…) is missing"
         yield Wrong(why, "add catkin_package()", below=above, uncalled="catkin_package")
+
+
+def _stands_for_catkin(word: str) -> bool:
+    """Return whether the first word of find_package(…) is a slip of catkin's name, or what comes behind it."""
+    name = word.casefold()
+    return name == "catkin" or is_one_edit(name, "catkin") or word in ("REQUIRED", "COMPONENTS")
 
 
 def _below(call: CMakeCall | None) -> str:

@@ -244,6 +244,7 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
     other = (
         _fell_silent(found, run, package, params)
         or _published_twice(found, run, package, params)
+        or _twice_in_turn(found, run, package, params)
         or _bursts(found, outside, even, params)
     )
     if other is not None:
@@ -296,6 +297,18 @@ def _published_twice(found: Rhythm, run: Run, package: PackageFacts, params: Rat
         return None
     message = f"{_wrong_mean(found, params).message}: {copied} publish on it"
     return failed(message, hint=f"give the one of {copied} that is for another topic that topic's name")
+
+
+def _twice_in_turn(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
+    """The loop publishes the same on two lines that follow each other."""
+    callers = (c.callerid for c in run.student_channels(params.topic))
+    twice = next((s for one in callers for s in slips_of(package, run, one, "publish-twice")), None)
+    if twice is None or found.mean_hz <= params.high_hz:
+        return None
+    wrong = _wrong_mean(found, params)
+    return _explained(
+        wrong, twice, f"{wrong.message}; {twice.file}: {twice.message}", f"in {twice.file}, {twice.fix}"
+    )
 
 
 def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -> Verdict | None:

@@ -58,7 +58,7 @@ class Fault(Record):
     @property
     def advice(self) -> str:
         """What to do on which line; "" if that is not known."""
-        named = self.line is None or self.fix.startswith("below line ")
+        named = self.line is None or re.match(r"(below|delete|write|make) line \d", self.fix)
         where = "" if named else f"line {self.line}: "
         return f"{where}{self.fix}" if self.fix else ""
 
@@ -113,6 +113,7 @@ def meant_command(name: str) -> str:
     if name in CMAKE_COMMANDS or len(name) <= SHORT:
         return ""
     turned = [known for known in CMAKE_COMMANDS if sorted(known.split("_")) == sorted(name.split("_"))]
+    turned += [known for known in CMAKE_COMMANDS if is_one_edit(known, name)]
     near = turned or get_close_matches(name, CMAKE_COMMANDS, 1, ALIKE)
     return near[0] if near else ""
 
@@ -266,7 +267,7 @@ SlipKind = Literal[
     "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
     "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
-    "added-first",
+    "added-first", "publish-twice",
 ]  # fmt: skip
 
 
@@ -288,7 +289,8 @@ class PythonSlip(Record):
     publishes or waits, and that nothing calls; `main-guard`: `__name__` is compared with another word than
     `__main__`. `never-reached`: an endless loop before the first `publish(…)`; `spin-in-loop`: a loop that
     publishes and waits in `spin()`; `loop-left`: a loop that ends in its first turn, or after a number of them;
-    `sleep-outside`: a loop whose `sleep()` is outside it; `sleep-twice`: a loop that waits twice in each turn.
+    `sleep-outside`: a loop whose `sleep()` is outside it; `sleep-twice`: a loop that waits twice in each turn;
+    `publish-twice`: one that publishes the same twice, in lines that follow each other.
     `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it should only be
     named, that takes another number of values than ROS passes, or that does not exist. `callback-waits`: a topic's
     callback that sleeps, or never ends. `queue-size`: a queue size that is a text, with which rospy sends nothing.

@@ -52,7 +52,8 @@ BY_HAND: dict[RepairKind, str] = {
     "python-syntax": "a syntax error: python3 -m py_compile FILE names the line",
     "manifest-line": "a line is missing in package.xml: compare it with one that catkin_create_pkg makes",
     "build-line": "a line is missing in CMakeLists.txt: compare it with one that catkin_create_pkg makes",
-    "launch-syntax": "a launch file that is not well-formed XML: xmllint --noout FILE names the line",
+    "launch-syntax": "a tag or attribute of a launch file that is misspelt or missing, or XML that is not well-formed: "
+    "xmllint --noout FILE names the line",
     "package-name": "a misspelt package name: it is the same in package.xml, in project(…) and in each pkg=",
     "launch-type": "type= without .py: it is the file's whole name, as ls shows it",
     "missing-import": "a name that is not imported: from std_msgs.msg import NAME; or an import of what is not there",
@@ -116,7 +117,9 @@ def _where_and_how(repair: Repair) -> tuple[str, str]:
     new, added = repair.after.split("\n"), _added(repair.before, repair.after)
     if repair.fix != "; ".join(added):
         below = len(new) > 1 and new[0] == repair.before and repair.line is not None
-        named = re.match(r"(delete|start|indent|remove the `#` of|in place of) lines? \d", repair.fix)
+        named = re.match(
+            r"(delete|start|indent|write|make|remove the `#` of|in place of) lines? \d", repair.fix
+        )
         if below and not named:
             return repair.file, f"below line {repair.line}, {repair.fix}"
         return repair.file if named else place_of(repair), repair.fix

@@ -12,9 +12,10 @@ import ast
 import builtins
 import re
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, pairwise
 from typing import NamedTuple, TypeGuard
 
+from grader.package.member_repair import with_place
 from grader.package.syntax_repair import Step, edited, is_docstring, last_name, span_of, step_to
 
 GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "logerr")
@@ -152,6 +153,31 @@ def with_globals(text: str) -> Iterator[Step]:
             return
 
 
+def with_lines_turned(text: str) -> Iterator[Step]:
+    """A line of a function that reads what the line right below it gives its only value."""
+    tree, lines = ast.parse(text), text.split("\n")
+    shared = {name for one in tree.body for name in _bound_in(one)} | set(dir(builtins))
+    for function in (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)):
+        names = [n for n in ast.walk(function) if isinstance(n, ast.Name)]
+        stored = [n.id for n in names if not isinstance(n.ctx, ast.Load)]
+        known = shared | {n.arg for n in ast.walk(function) if isinstance(n, ast.arg)}
+        blocks = [n.body for n in ast.walk(function) if isinstance(n, ast.FunctionDef | ast.While | ast.For)]
+        for first, second in chain.from_iterable(map(pairwise, blocks)):
+            given = {
+                n.id for n in ast.walk(second) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+            }
+            read = {n.id for n in ast.walk(first) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+            late = {name for name in given & read - known if stored.count(name) == 1}
+            alone = (
+                first.end_lineno == first.lineno == second.lineno - 1 and second.end_lineno == second.lineno
+            )
+            if late and alone and isinstance(second, ast.Assign):
+                at = first.lineno - 1
+                after = "\n".join([*lines[:at], lines[at + 1], lines[at], *lines[at + 2 :]])
+                yield from step_to("turned", first.lineno, text, after)
+                return
+
+
 NUMBERS = re.compile(r"U?Int\d+|Float\d+|Byte|Char")
 LOGS = re.compile(r"log(debug|info|warn|err|fatal)")
 
@@ -165,6 +191,7 @@ def _wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
     of_numbers = {
         ast.unparse(target) for target, value in values if NUMBERS.fullmatch(_published_type(value))
     }
+    yield from _published_nothing(tree)
     for call in (n for n in ast.walk(tree) if isinstance(n, ast.Call)):
         name = _called(call)
         if name == "sleep" and isinstance(call.func, ast.Attribute) and ast.unparse(call.func.value) in rates:
@@ -178,6 +205,7 @@ def _wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
         elif _is_rospys(call.func, of_rospy):
             yield from _logged(call) if LOGS.fullmatch(name) else ()
             yield from _of_topic(call, types) if name in {"Publisher", "Subscriber"} else ()
+            yield from _type_of_topic(call, types, functions) if name in {"Publisher", "Subscriber"} else ()
             yield from _numbers(call, name)
             yield from _callback(call, name, functions)
             yield from _without_quotes(call, name, functions)
@@ -199,6 +227,28 @@ def _of_topic(call: ast.Call, types: set[str]) -> Iterator[Argument]:
         yield Argument([(given, name)], f"`{name}()` is a message, not a type")
 
 
+def _type_of_topic(call: ast.Call, types: set[str], functions: set[str]) -> Iterator[Argument]:
+    """Of `Subscriber('x', on_x, String)`, whose type comes too late, and `Subscriber('x', on_x)` and
+    `Publisher('x', queue_size=1)`, which have none, where the script imports just one."""
+    first, second, third, *_ = [*call.args, None, None, None]
+    named = {k.arg for k in call.keywords}
+    if isinstance(second, ast.Name) and second.id in functions and isinstance(third, ast.Name):
+        if _is_type(third.id, types):
+            yield Argument([(second, third.id), (third, second.id)], "the type comes before the callback")
+    elif (
+        len(types) == 1
+        and "*" not in types
+        and "data_class" not in named
+        and third is None
+        and _is_text(first)
+    ):
+        (kind,) = types
+        if isinstance(second, ast.Name) and second.id in functions:
+            yield Argument([(second, f"{kind}, {second.id}")], "the type of the messages is missing")
+        elif second is None:
+            yield Argument([(first, f"{ast.unparse(first)}, {kind}")], "the type of the messages is missing")
+
+
 def _published_type(value: ast.expr) -> str:
     """Return the last name of the type of a `Publisher(…)`; "" of all else."""
     given = value.args[1:2] if isinstance(value, ast.Call) and _called(value) == "Publisher" else []
@@ -213,11 +263,36 @@ def _text_of_a_number(call: ast.Call) -> Iterator[Argument]:
             yield Argument([edit], "the message takes a number, and `str(…)` makes a string of it")
 
 
+def _published_nothing(tree: ast.Module) -> Iterator[Argument]:
+    """Yield `publish()` where its function gives a value to one name, and does nothing with it."""
+    for function in (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)):
+        names = [n for n in ast.walk(function) if isinstance(n, ast.Name)]
+        read = {n.id for n in names if isinstance(n.ctx, ast.Load)}
+        unread = {n.id for n in names if isinstance(n.ctx, ast.Store)} - read
+        calls = [n for n in ast.walk(function) if _called(n) == "publish" and isinstance(n, ast.Call)]
+        if len(unread) == len(calls) == 1 and not calls[0].args and not calls[0].keywords:
+            edit = (calls[0], f"{ast.unparse(calls[0].func)}({unread.pop()})")
+            yield Argument([edit], "there is nothing to publish in the brackets")
+
+
 def _logged(call: ast.Call) -> Iterator[Argument]:
     """Of `loginfo('a', b)`, whose text has no place for the value."""
     text, *values = [*call.args, None]
     values = [one for one in values if one is not None]
+    if (
+        len(values) == 1
+        and text is not None
+        and not _is_text(text)
+        and _is_text(values[0])
+        and "%" in values[0].value
+    ):
+        edits = [(text, ast.unparse(values[0])), (values[0], ast.unparse(text))]
+        yield Argument(edits, "the string comes first, then its values")
+        return
     if _is_text(text) and values and "%" not in text.value:
+        if len(values) == 1 and (right := with_place(repr(text.value))):
+            yield Argument([(text, right)], "the string has no `%` in it")
+            return
         places = " ".join(["%s"] * len(values))
         blank = "" if not text.value or text.value[-1].isspace() else " "
         edit = (text, repr(f"{text.value}{blank}{places}"))

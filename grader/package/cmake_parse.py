@@ -17,6 +17,7 @@ from cmake_parser import ast as nodes
 from cmake_parser.interpreter import Context
 
 from grader.model.package import CMAKE, CMakeCall, CMakeFacts, Fault
+from grader.package.cmake_slips import find_slip, is_open
 from grader.package.reading import printable, read_markup
 from grader.wording import lines_text
 
@@ -204,7 +205,7 @@ class _Reader:
         try:
             resolved = resolve_args(self.context, [_escape(t) for t in tokens if t.kind != "COMMENT"])
         except (CMakeError, RecursionError) as error:
-            line = tokens[0].line
+            line = next((token.line for token in tokens if is_open(token.value)), tokens[0].line)
             cause = "a variable `${...}` is never closed by `}`"
             self.fault = self.fault or Fault(
                 file=file, line=line, kind=type(error).__name__, message=str(error), cause=cause
@@ -280,6 +281,8 @@ def _explain_fault(text: str, end: int, file: str, message: str) -> Fault:
     half = join_half_comment(text)
     if half is not None:
         return _fault(file, half.line, message, half.cause, fix=half.fix)
+    if (slip := find_slip(text, line)) is not None:
+        return _fault(file, slip.number, message, slip.why, fix=slip.fix)
     if unparsed is not None and text[unparsed.span].startswith('"'):
         line, cause, fix = unparsed.line, 'a quote `"` is opened here and never closed', ""
     elif head := missing_head(tokens, text):

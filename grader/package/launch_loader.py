@@ -19,6 +19,7 @@ from grader.installable import known_packages
 from grader.model.package import Fault, LaunchArg, LaunchLine, LaunchLoad, LaunchNode, LaunchParam
 from grader.model.record import Record
 from grader.package.xml import line_of
+from grader.package.xml_slips import ATTRIBUTES
 
 INCLUDES_MAX = 50
 DEPTH_MAX = 10
@@ -35,10 +36,6 @@ _VALUE_CHARS_MAX = 4_000
 _TRUE, _FALSE = frozenset({"true", "1"}), frozenset({"false", "0"})
 
 Remaps = tuple[tuple[str, str], ...]
-_NODE_ATTRIBUTES = frozenset({
-    "pkg", "type", "name", "args", "machine", "respawn", "respawn_delay", "required", "ns", "clear_params", "output",
-    "cwd", "launch-prefix", "if", "unless",
-})  # fmt: skip
 
 
 class Find(Protocol):
@@ -387,4 +384,4 @@ def _plain(path: str) -> str | None:
 
 def unknown_attributes(element: etree._Element) -> tuple[str, ...]:
     """Return attributes of a `<node>` that roslaunch does not know, the first ten."""
-    return tuple(str(name)[:100] for name in element.attrib if name not in _NODE_ATTRIBUTES)[:10]
+    return tuple(str(name)[:100] for name in element.attrib if name not in ATTRIBUTES["launch"]["node"])[:10]

@@ -19,6 +19,7 @@ from lxml import etree
 from grader.model.package import MANIFEST, Dependency, Fault, Manifest, Person
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_xml
+from grader.package.xml_slips import TAGS
 from grader.syntax_fixes import Reason
 
 _TEXT_CHARS_MAX = 4_000
@@ -35,8 +36,8 @@ _CONTEXT = {"ROS_VERSION": "1", "ROS_DISTRO": "noetic", "ROS_PYTHON_VERSION": "3
 # catkin_pkg's message, the tag whose line is named, and the words ({0}, {1}: the pattern's groups)
 _CAUSES: tuple[tuple[str, ...], ...] = (
     (r'contain a single "package" root', "", "the file must hold one `<package> ... </package>`"),
-    (r'exactly one "(\w+)" tag', "{0}", "there must be exactly one `<{0}>` tag"),
-    (r'not contain more than one "(\w+)"', "{0}", "there may be only one `<{0}>` tag"),
+    (r'exactly one "(\w+)" tag', "{0}", "there must be exactly one `<{0}>` tag", "delete one of them"),
+    (r'not contain more than one "(\w+)"', "{0}", "there may be only one `<{0}>` tag", "delete one of them"),
     (r'"(\w+)" tag must have the attribute "(\w+)"', "{0}", '`<{0}>` needs {1}="..."'),
     (r'Invalid email ""', "maintainer", '`<maintainer>` needs email="name@place.org"'),
     (r'Invalid email "(.*?)"', "maintainer", "`{0}` is not an e-mail address", "write name@place.org"),
@@ -68,11 +69,6 @@ _CAUSES: tuple[tuple[str, ...], ...] = (
 )  # fmt: skip
 
 
-_KNOWN_TAGS = (
-    *("name", "version", "description", "author", "maintainer", "license", "url", "export"),
-    *("depend", "build_depend", "build_export_depend", "buildtool_depend", "buildtool_export_depend"),
-    *("exec_depend", "test_depend", "doc_depend"),
-)
 _ALIKE = 0.8
 
 
@@ -128,7 +124,8 @@ def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
         message = str(getattr(error, "msg", error))[:_MESSAGE_CHARS_MAX]
     place, reason = explain(message, root)
     strange = re.search(r"must not contain the following tags: (\w+)", message)
-    if strange and (near := difflib.get_close_matches(strange[1], _KNOWN_TAGS, 1, _ALIKE)):
+    near = difflib.get_close_matches(strange[1], TAGS["package"], 1, _ALIKE) if strange else []
+    if strange and near and near[0] != strange[1]:
         reason = reason._replace(
             fix=f"write `<{near[0]}>` instead of `<{strange[1]}>`, and the same in its closing tag"
         )

@@ -40,6 +40,9 @@ _TYPOGRAPHIC = (
 )
 TEXT_CHARS_MAX = SOURCE_CHARS_MAX = 300
 _VAGUE = (
+    "multiple exception",
+    "expression cannot contain assignment",
+    "expected 'except'",
     *("invalid syntax", "expected ':'", "invalid decimal", "unexpected EOF", "cannot assign", "can't assign"),
     "Did you mean to use 'from",
 )

@@ -23,9 +23,11 @@ from grader.package.call_repair import (
     with_callbacks,
     with_calls,
     with_globals,
+    with_lines_turned,
     with_quoted_calls,
     with_values_called,
 )
+from grader.package.member_repair import with_members
 from grader.package.syntax_repair import (
     Step,
     as_python3,
@@ -39,6 +41,7 @@ from grader.package.syntax_repair import (
     syntax_error,
     with_line,
 )
+from grader.wording import is_one_edit
 
 OLD_NAMES = {"raw_input": "input", "xrange": "range", "unicode": "str", "basestring": "str", "unichr": "chr"}
 MESSAGES = {
@@ -55,7 +58,9 @@ OBVIOUS_NAMES = {
     **dict.fromkeys(("_name_", "__name", "_name", "name__"), "__name__"),
 }
 NAME_CHARS_MIN = 4
-"""Shorter names differ by one letter because they are different names."""
+"""Of shorter names, a letter that is not the same is the larger part."""
+SHORT_NAME_CHARS_MIN = 2
+"""Names of one letter are different names."""
 SIZE = re.compile(r"^U|\d+")
 """What sets number types of one kind apart: `UInt8`, `Int16`."""
 SLIP_CHARS = 3
@@ -116,6 +121,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             lambda t: _with_modules(t, types),
             lambda t: _with_classes(t, types),
             lambda t: _with_imports(t, types),
+            lambda t: with_members(t, ROSPY),
             _with_quotes,
             _with_names,
             _with_attributes,
@@ -125,6 +131,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             with_callbacks,
             with_arguments,
             with_globals,
+            with_lines_turned,
             _with_start,
             _with_main,
             _with_spin,
@@ -196,8 +203,13 @@ def _with_modules(text: str, types: list[str]) -> Iterator[Step]:
             continue
         module = node.module
         package, _, inner = module.partition(".")
+        if module.endswith("msg") and module.removesuffix("msg") in known:
+            package, inner = module.removesuffix("msg"), ""
         names = {alias.name for alias in node.names}
-        if inner not in ("", "msg", "msgs") or (package in known and inner == "msg"):
+        misspelt = (
+            inner not in ("", "msg") and not is_one_edit(inner.lower(), "msg") and inner.lower() != "msg"
+        )
+        if misspelt or (package in known and inner == "msg"):
             continue
         near = package if package in known else next(iter(get_close_matches(package, known, 1, 0.85)), "")
         lines, at = text.split("\n"), node.lineno - 1
@@ -313,7 +325,10 @@ def _import_meant(text: str, name: str) -> str:
     used = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
     for one in (n for n in tree.body if isinstance(n, ast.Import) and len(n.names) == 1):
         module = one.names[0].name
-        is_slip = module[:SLIP_CHARS] == name[:SLIP_CHARS] and module not in OF_ROS and module not in used
+        alike = (
+            module[:SLIP_CHARS] == name[:SLIP_CHARS] or module.lower() == name or is_one_edit(module, name)
+        )
+        is_slip = alike and module not in OF_ROS and module not in used
         if is_slip and one.names[0].asname is None and lines[one.lineno - 1].strip() == f"import {module}":
             return with_line(lines, one.lineno - 1, lines[one.lineno - 1].replace(module, name))
     return ""
@@ -348,8 +363,10 @@ def _with_names(text: str) -> Iterator[Step]:
     for block in (n for n in tree.body if not isinstance(n, ast.Import | ast.ImportFrom)):
         own = shared | (_bound(ast.Module([block], [])) if isinstance(block, ast.FunctionDef) else set())
         missing = [n for n in ast.walk(block) if isinstance(n, ast.Name) and n.id not in known]
+        stated = (n.value for n in ast.walk(block) if isinstance(n, ast.Expr))
+        alone = {n.id for n in stated if isinstance(n, ast.Name) and _is_slip(n.id.lower(), "pass")}
         for name in dict.fromkeys(n.id for n in missing):
-            meant = OBVIOUS_NAMES.get(name) or _meant_by(name, own)
+            meant = OBVIOUS_NAMES.get(name) or _meant_by(name, own) or (name in alone and "pass") or ""
             spans = [span for n in missing if n.id == name and (span := span_of(lines, n))]
             if meant and spans:
                 after = edited(text, [(*span, meant) for span in spans])
@@ -415,9 +432,22 @@ def _keys_of_parameters(tree: ast.Module) -> Iterator[ast.Name]:
 
 
 def _meant_by(name: str, own: set[str]) -> str:
+    """Return the one name of the script's own that is meant by one that has no value; "" where there is not one."""
+    if always := [one for one in ("__name__", "True", "False", "None") if is_one_edit(name, one)]:
+        return always[0]
     longer = [one for one in own if len(one) >= NAME_CHARS_MIN]
     near = get_close_matches(name, longer, 2, 0.8) if len(name) >= NAME_CHARS_MIN else []
-    return near[0] if len(near) == 1 else ""
+    if len(near) == 1 or len(name) < SHORT_NAME_CHARS_MIN:
+        return near[0] if near else ""
+    slips = [one for one in own if len(one) >= SHORT_NAME_CHARS_MIN and _is_slip(name, one)]
+    return slips[0] if len(slips) == 1 else ""
+
+
+def _is_slip(name: str, other: str) -> bool:
+    """Return whether two short names differ by capitals, by a letter that is missing, or by two that are exchanged; by
+    another letter they are different names."""
+    one, two = name.lower(), other.lower()
+    return one == two or (is_one_edit(one, two) and (len(one) != len(two) or sorted(one) == sorted(two)))
 
 
 def _bound_by(statement: ast.stmt) -> set[str]:
@@ -441,7 +471,11 @@ def _with_attributes(text: str) -> Iterator[Step]:
         plain = {name.lower(): name for name in ROSPY}
         if isinstance(node.ctx, ast.Store):
             continue  # a value is given to it: `rospy.rate = 10`
-        meant = plain.get(node.attr.lower()) or next(iter(get_close_matches(node.attr, ROSPY, 1, 0.85)), "")
+        near = [
+            *get_close_matches(node.attr, ROSPY, 1, 0.85),
+            *(one for one in ROSPY if is_one_edit(node.attr, one)),
+        ]
+        meant = plain.get(node.attr.lower()) or next(iter(near), "")
         span = span_of(lines, node)
         if meant and span is not None and not node.attr.startswith("_"):
             line, _, end = span
@@ -487,7 +521,9 @@ def _with_main(text: str) -> Iterator[Step]:
             word, span = node.comparators[0], span_of(lines, node.comparators[0])
             if (
                 isinstance(word, ast.Constant)
-                and str(word.value).strip("_ ").lower() == "main" != word.value
+                and (
+                    str(word.value).strip("_ ").lower() == "main" or is_one_edit(str(word.value), "__main__")
+                )
                 and span
             ):
                 if word.value != "__main__":

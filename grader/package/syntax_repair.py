@@ -29,8 +29,12 @@ STATEMENT_LINES_MAX = 12
 ODD_LINES_MAX = 3
 FIXERS = ("print", "except", "exec", "raise", "repr", "ne", "numliterals", "long", "unicode")
 OLD_PRINT = re.compile(r"\bprint\b(?!\s*\()")
+ALL_OVER = ("tabs", "python2", "braces", "characters")
+OF_SIGNS = re.compile("does not match opening|unmatched|unterminated")
 OUTERMOST = re.compile(r"(import|from)\s|if\s+__name__\b")
 EMPTY_EXCEPT = re.compile(r"expected an indented block after 'except' statement on line (\d+)")
+OF_BLOCK = re.compile(r"(elif|else|except|finally|try)\b")
+ROSPY_COMMA = re.compile(r"(?<![\w.])rospy\s*[,;:]\s*(?=[A-Za-z]\w*\s*[(:])")
 CONTINUES = re.compile(r"(elif|else|except|finally)\b")
 
 Step = dict[str, Any]
@@ -67,22 +71,34 @@ def make_readable(text: str) -> list[Step]:
 
 
 def _one_step(text: str, error: Error) -> Step | None:
+    """Return the first step after which the text parses, else the first after which it is read further: that one at
+    once, where such mistakes are all over a file."""
+    further = None
     for cause, candidate in _candidates(text, error):
         if candidate == text:
             continue
         left = syntax_error(candidate)
-        further = left is not None and (left["line"] > error["line"] or _is_next(error, left))
-        if left is None or further:
-            word = re.match(r"name '(\w+)'", error["message"])
-            line = (
-                _first_changed(text, candidate)
-                if cause in ("braces", "commented", "level", "line")
-                else error["line"]
-            )
-            found = {"cause": cause, "line": line, "error": error, "text": candidate}
-            added = candidate.split("\n")[line - 1].strip() if cause == "line" else ""
-            return {**found, "word": word[1] if word else added}
-    return None
+        if left is None:
+            return _step(cause, text, candidate, error)
+        if further is None and (left["line"] > error["line"] or _is_next(error, left)):
+            further = _step(cause, text, candidate, error)
+            if cause in ALL_OVER:
+                return further
+    return further
+
+
+def _step(cause: str, text: str, candidate: str, error: Error) -> Step:
+    word = re.match(r"name '(\w+)'", error["message"])
+    is_elsewhere = cause in ("braces", "commented", "level", "line", "twice", "turned")
+    line = _first_changed(text, candidate) if is_elsewhere else error["line"]
+    added = candidate.split("\n")[line - 1].strip() if cause == "line" else ""
+    return {
+        "cause": cause,
+        "line": line,
+        "error": error,
+        "text": candidate,
+        "word": word[1] if word else added,
+    }
 
 
 def _first_changed(before: str, after: str) -> int:
@@ -105,9 +121,11 @@ def _like_the_line_before(text: str, number: int) -> str:
 
 
 def _is_next(error: Error, left: Error) -> bool:
-    """Tabs are told before all else, wherever they are, and of open brackets the last one."""
+    """Tabs are told before all else, wherever they are, then brackets and quotes, and of open brackets the last one."""
     spaces = ("TabError", "IndentationError")
     if error["kind"] in spaces:
+        return left["kind"] not in spaces
+    if OF_SIGNS.search(error["message"]) and not OF_SIGNS.search(left["message"]):
         return left["kind"] not in spaces
     return all("never closed" in one["message"] for one in (error, left)) and left["line"] < error["line"]
 
@@ -121,14 +139,10 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     at = error["line"] - 1
     if not 0 <= at < len(lines):
         return
+    yield "token", with_line(lines, at, ROSPY_COMMA.sub("rospy.", lines[at]))
     if "global declaration" in error["message"]:
         yield from _with_global_first(text, error["line"])
-    if error["message"].startswith(("expected an indented block", "unindent does not match")):
-        yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
-    yield from (("line", candidate) for candidate in _with_line_back(lines, at, error["message"]))
-    if error["message"].startswith(("unexpected indent", "unindent does not match")):
-        yield from (("commented", candidate) for candidate in _with_head_uncommented(lines, at))
-        yield from (("level", candidate) for candidate in _with_block_moved(lines, at))
+    yield from _in_their_blocks(lines, at, error["message"])
     yield from (("python2", candidate) for candidate in as_python3(lines, at))
     if any(map(without_brace, lines[: at + 1])):
         yield "braces", _without_braces(lines)
@@ -137,8 +151,28 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
         for changed in corrections(lines[line], *told):
             cause = "characters" if changed == lines[line].translate(PLAIN) else "token"
             yield cause, with_line(lines, line, changed)
+    if error["kind"] == "IndentationError" or OF_BLOCK.match(lines[at].strip()):
+        moved = [("level", candidate) for candidate in _with_line_moved(lines, at)]
+        moved += [("turned", candidate) for candidate in _with_lines_turned(lines, at)]
+        yield from (one for one in moved if syntax_error(one[1]) is None)
     if reason_of_line(lines[at]).fix == DELETE_LINE:
         yield "token", "\n".join([*lines[:at], *lines[at + 1 :]])
+
+
+def _in_their_blocks(lines: list[str], at: int, message: str) -> Iterator[tuple[str, str]]:
+    """Yield the causes and the texts with a line that its block lacks, or with lines in the block that they belong
+    to."""
+    if "expected an indented block" in message and at and lines[at].strip() == lines[at - 1].strip():
+        yield "twice", "\n".join([*lines[:at], *lines[at + 1 :]])
+    if "expected an indented block" in message and at and OUTERMOST.match(lines[at - 1].strip()):
+        yield "level", with_line(lines, at - 1, lines[at - 1].lstrip())
+    if message.startswith(("expected an indented block", "unindent does not match")):
+        yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
+    yield from (("line", candidate) for candidate in _with_line_back(lines, at, message))
+    if message.startswith(("unexpected indent", "unindent does not match")):
+        yield from (("commented", candidate) for candidate in _with_head_uncommented(lines, at))
+        yield from (("turned", candidate) for candidate in _with_head_first(lines, at))
+        yield from (("level", candidate) for candidate in _with_block_moved(lines, at))
 
 
 def _without_braces(lines: list[str]) -> str:
@@ -264,6 +298,32 @@ def _with_block_moved(lines: list[str], at: int) -> Iterator[str]:
         " " * (_width(line) - own + level) + line.lstrip() if line.strip() else line for line in lines[at:end]
     ]
     yield "\n".join([*lines[:at], *moved, *lines[end:]])
+
+
+def _with_head_first(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with a line that stands right above `def …:`, and belongs right below it, there."""
+    below = lines[at + 1 : at + 3]
+    stands_alone = at == 0 or not lines[at - 1].strip()
+    is_head = len(below) > 1 and re.match(r"(def|class)\b.*:", below[0])
+    if stands_alone and is_head and _width(below[1]) == _width(lines[at]):
+        yield "\n".join([*lines[:at], below[0], lines[at], *lines[at + 2 :]])
+
+
+def _with_line_moved(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with the line, or the one above it, as far in as another line of the file, the nearest first."""
+    above = next((n for n in range(at - 1, -1, -1) if without_texts(lines[n]).strip()), at)
+    widths = {_width(line) for line in lines if line.strip()} | {_width(lines[above]) + 4}
+    for number in dict.fromkeys((at, above)):
+        own = _width(lines[number])
+        for width in sorted(widths - {own}, key=lambda width: abs(width - own)):
+            yield with_line(lines, number, " " * width + lines[number].lstrip())
+
+
+def _with_lines_turned(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with the line exchanged with the one above it, or with the one below it."""
+    for first in (at - 1, at):
+        if 0 <= first < len(lines) - 1 and lines[first].strip() and lines[first + 1].strip():
+            yield "\n".join([*lines[:first], lines[first + 1], lines[first], *lines[first + 2 :]])
 
 
 def _width(line: str) -> int:

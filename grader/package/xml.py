@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator
 from difflib import get_close_matches
@@ -11,17 +10,20 @@ from itertools import islice
 from lxml import etree
 
 from grader.model.package import Fault
+from grader.package.line_slips import LineSlip, changed_line, doubled_and_turned
+from grader.package.xml_slips import ATTRIBUTES, DECLARATION, TAGS, slips_of
 from grader.syntax_fixes import Reason
 
-_TYPOGRAPHIC = re.compile("[\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u2033\u00ab\u00bb]")
+TYPOGRAPHIC = re.compile("[\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u2033\u00ab\u00bb]")
 
-_NO_END = r"Premature end of data in tag (\S+) line (\d+)"
+NO_END = r"Premature end of data in tag (\S+) line (\d+)"
+_MISMATCH = r"tag mismatch: (\S+) line (\d+) and ([^\s,]+)"
 _NO_QUOTE = (r"Unescaped '<' not allowed in attr", r"AttValue: ['\"] expected")
 # libxml2's message and what it means ({0}, {1}: the pattern's groups, {root}: the root tag)
 _CAUSES: tuple[tuple[str, ...], ...] = (
     (r"Document is empty", "the file is empty", "write `<{root}>` and `</{root}>` into it"),
     (r"Start tag expected", "there is something before the first tag", "the file must start with `<{root}>`"),
-    (_NO_END, "`<{0}>` on line {1} is never closed", "add `</{0}>`"),
+    (NO_END, "`<{0}>` on line {1} is never closed", "add `</{0}>`"),
     (r"hyphen|must not contain '--'", "`--` is not allowed inside a comment `<!-- ... -->`", "delete it there"),
     (r"Comment not terminated", "a comment is opened by `<!--` and never closed", "write `-->` where it ends"),
     (r"Extra content at the end",
@@ -59,6 +61,10 @@ _TAGS_MAX = 2_000
 _OPENERS_A_TAG = 20
 _MESSAGES = 50
 _LAST_LINE = 65_535
+COMMENT = re.compile(r"<!--(.*?)-->", re.DOTALL)
+_SLIPS_CHARS_MAX = 20_000
+_SLIPS_LINES_MAX = 300
+_OF_TEXT = ("param", "rosparam", "arg")
 
 
 def parse_xml(
@@ -143,16 +149,21 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
     message = re.sub(
         r", line \d+, column \d+$", "", said[:_MESSAGE_CHARS_MAX] + said[_MESSAGE_CHARS_MAX:][-40:]
     ).strip()
-    # the error's own log holds what went wrong with other files before, too
     text = _line(data, line)
+    of_root = _never_opened(message, data, root)
+    slip = None if of_root else find_slip(data.decode("utf-8", "replace"), root)
+    if slip is not None:
+        words = {"cause": slip.why[:_MESSAGE_CHARS_MAX], "fix": slip.fix[:_MESSAGE_CHARS_MAX]}
+        return Fault(file=file, line=slip.number, kind="XMLSyntaxError", message=message, **words)
     known = 0 < column <= len(text) + 1
+    # the error's own log holds what went wrong with other files before, too
     log = [str(entry.message)[:_MESSAGE_CHARS_MAX] for entry in islice(parser.error_log, _MESSAGES)]
     reason, opened = _explain(message, log, text, root=root)
     if opened and opened != line:
         line, text = opened, _line(data, opened)
         column = text.find("<") + 1
         known = column > 0
-    reason = _opened_again(message, data, text, root) or _never_opened(message, data, root) or reason
+    reason = of_root or reason
     return Fault(
         file=file,
         line=line or None,
@@ -165,36 +176,25 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
     )
 
 
-def _opened_again(message: str, data: bytes, text: str, root: str) -> Reason | None:
-    """Return what is to be said where the root's tag stands a second time, in place of the one that closes it; None
-    where it does not."""
-    twice = "end of data" in message and text.strip() == f"<{root}>" and f"</{root}>".encode() not in data
-    if not twice or len(re.findall(rf"<{re.escape(root)}[\s>]".encode(), data)) < 2:
-        return None
-    return Reason(
-        f"`<{root}>` opens the file a second time here, where it should end", f"write `</{root}>` for it"
-    )
-
-
 def _never_opened(message: str, data: bytes, root: str) -> Reason | None:
     """Return what is to be said where other tags stand outside of the root's, which is never opened; None where it is,
     or where one tag holds all the others."""
     text = data.decode("utf-8", "replace")
-    first = _first_tag(text, root)
+    first = first_tag(text, root)
     if "Extra content at the end" not in message or first is None:
         return None
-    return Reason(f"`<{root}>` is missing", f"above line {first + 1}, write `{_opening(text, root)}`")
+    return Reason(f"`<{root}>` is missing", f"above line {first + 1}, write `{opening_tag(text, root)}`")
 
 
-def _opening(text: str, root: str) -> str:
+def opening_tag(text: str, root: str) -> str:
     """Return the root's tag; that of a manifest with the format that its other tags are of (REP 127, 140)."""
     is_later = root == "package" and re.search(r"<(exec_)?depend>", text)
     return f'<{root} format="2">' if is_later else f"<{root}>"
 
 
-def _first_tag(text: str, root: str) -> int | None:
+def first_tag(text: str, root: str) -> int | None:
     """Return the line, from 0, of the first tag of a file that never opens its root's; None where it does."""
-    plain = _COMMENT.sub(lambda found: "\n" * found[0].count("\n"), text)
+    plain = COMMENT.sub(lambda found: "\n" * found[0].count("\n"), text)
     lines = (n for n, line in enumerate(plain.split("\n")) if re.match(r"\s*<\w", line))
     return None if re.search(rf"<{re.escape(root)}[\s>/]", plain) else next(lines, None)
 
@@ -212,10 +212,10 @@ def _explain(message: str, log: list[str], line: str, *, root: str) -> tuple[Rea
     if line.startswith(("<<<<<<<", "=======", ">>>>>>>")):
         why = "git's merge markers (`<<<<<<<`) are still in the file"
         return Reason(why, "keep one version and delete the markers"), None
-    if "AttValue" in message and (quote := _TYPOGRAPHIC.search(line)):
+    if "AttValue" in message and (quote := TYPOGRAPHIC.search(line)):
         why = f"a typographic quote {quote[0]} was copied from a PDF or a web page"
         return Reason(why, 'type plain quotes (")'), None
-    if mismatch := re.search(r"tag mismatch: (\S+) line (\d+) and (\S+)", message):
+    if mismatch := re.search(_MISMATCH, message):
         return _mismatch(mismatch[1], int(mismatch[2]), mismatch[3], root)
     begun = next(filter(None, (re.search(r"end of Start Tag (\S+) line (\d+)", m) for m in log)), None)
     at = int(begun[2]) if begun else None
@@ -225,7 +225,7 @@ def _explain(message: str, log: list[str], line: str, *, root: str) -> tuple[Rea
     for pattern, *words in _CAUSES:
         if found := re.search(pattern, message):
             reason = Reason(*(text.format(*found.groups(), root=root) for text in words))
-            return reason, int(found[2]) if pattern == _NO_END else at if pattern in _NO_QUOTE else None
+            return reason, int(found[2]) if pattern == NO_END else at if pattern in _NO_QUOTE else None
     return Reason(), None
 
 
@@ -244,114 +244,106 @@ def _mismatch(opened: str, line: int, closed: str, root: str) -> tuple[Reason, i
     return Reason(f"{tag} is still open where `</{closed}>` comes", fix), line
 
 
-# ---- one edit that makes a file well-formed
-
-EDITS_MAX = 4
-"""The same slip is often in several tags, since one is copied from the other."""
-_ATTRIBUTE = re.compile(r"(?<=\s)([\w:-]+)(\s*=\s*)(\"[^\"]*\"|'[^']*'|[^\s\"'<>/]+)")
-_COMMENT = re.compile(r"<!--(.*?)-->", re.DOTALL)
+# ---- slips of one line
 
 
-def well_formed(text: str, file: str, *, root: str) -> list[str]:
-    """Return the texts that lead to a well-formed file, an edit each, the last of them well-formed; nothing where it is
-    so already, or no plain edits make it so."""
-    steps: list[str] = []
-    for _ in range(EDITS_MAX):
-        _, fault = parse_xml((steps[-1] if steps else text).encode(), file, root=root)
-        if fault is None:
-            return steps
-        at = _reached(fault)
-        each = dict.fromkeys(_edits(steps[-1] if steps else text, fault, root))
-        found = [(parse_xml(one.encode(), file, root=root)[1], one) for one in each]
-        whole = next((one for later, one in found if later is None), None)
-        further = next((one for later, one in found if later is not None and _reached(later) > at), None)
-        if (best := whole or further) is None:
-            return []
-        steps.append(best)
-    return steps if parse_xml(steps[-1].encode(), file, root=root)[1] is None else []
+def find_slip(text: str, root: str) -> LineSlip | None:
+    """Return the one slip near the first error without which a file is a good one, or is read further; None where there
+    is no error, no such slip, or what the parser says of the error is the slip."""
+    if len(text) > _SLIPS_CHARS_MAX or re.search(r"^(<{7}|={7}|>{7})", text, re.MULTILINE):
+        return None
+    _, error = _tried(text)
+    message = error.msg or "" if error is not None else ""
+    mismatch = re.search(_MISMATCH, message)
+    if error is None or (mismatch and _is_closed_wrongly(mismatch[1], mismatch[3], root)):
+        return None
+    at, further = error.position[0], None
+    for slip in _slips_near(at, message, text, root):
+        element, later = _tried(slip.text)
+        if element is not None and not _strange_things(element, root):
+            return slip
+        if later is not None and later.position[0] > at and further is None and slip.is_within:
+            further = slip
+    return further
 
 
-def _reached(fault: Fault) -> float:
-    """Return how far the parser came: a tag that is never closed is noticed at the end."""
-    return math.inf if "end of data" in fault.message else fault.line or 0
+def find_strange(text: str, root: str) -> LineSlip | None:
+    """Return a slip that leaves a file well-formed, and makes a tag or an attribute one that there is none of, or text:
+    `<Node …/>`, `node …/>`; None where there is no such slip."""
+    element, _ = _tried(text) if len(text) <= _SLIPS_CHARS_MAX else (None, None)
+    before = _strange_things(element, root) if element is not None else 0
+    lines = text.split("\n")
+    for number in range(1, min(len(lines), _SLIPS_LINES_MAX) + 1) if before else ():
+        for slip in _slips_in(lines, number, root):
+            changed, _ = _tried(slip.text)
+            if changed is not None and _strange_things(changed, root) < before:
+                return slip
+    return None
 
 
-def _edits(text: str, fault: Fault, root: str) -> Iterator[str]:
-    """Yield texts with one edit by what the parser said, the likeliest first."""
-    message, lines = fault.message, text.split("\n")
-    at = min(max((fault.line or 1) - 1, 0), len(lines) - 1)
-    if fault.kind != "XMLSyntaxError" or lines[at].startswith(("<<<<<<<", "=======", ">>>>>>>")):
-        return
-    if mismatch := re.search(r"tag mismatch: (\S+) line (\d+) and (\S+)", message):
-        yield from _matching(lines, mismatch[1], int(mismatch[2]) - 1, mismatch[3], root)
-    elif unclosed := re.search(_NO_END, message):
-        yield from _closed(lines, unclosed[1], int(unclosed[2]) - 1, root)
-    elif re.search(r"hyphen|must not contain '--'", message):
-        yield _COMMENT.sub(lambda found: f"<!--{re.sub(r'-(?=-)|-$', '- ', found[1])}-->", text)
-    elif "EntityRef" in message:
-        yield re.sub(r"&(?!#?\w+;)", "&amp;", text)
-    elif "Extra content at the end" in message and (first := _first_tag(text, root)) is not None:
-        end = [] if f"</{root}>" in text else [f"</{root}>", ""]
-        yield "\n".join([*lines[:first], _opening(text, root), *lines[first:], *end])
-    elif "XML declaration allowed only" in message:
-        yield text.lstrip()
-    last = at + 1 == len(lines) or lines[at + 1].lstrip().startswith("<")
-    for line in (_quoted(lines[at]), *_ended(lines[at], last=last)):
-        yield "\n".join([*lines[:at], line, *lines[at + 1 :]])
+def _is_closed_wrongly(opened: str, closed: str, root: str) -> bool:
+    """Return whether a tag that there is has a slip where it is closed."""
+    return opened in TAGS.get(root, ()) and bool(get_close_matches(closed.lower(), [opened], cutoff=0.7))
 
 
-def _matching(lines: list[str], opened: str, line: int, closed: str, root: str) -> Iterator[str]:
-    """Yield the lines with the right closing tag, or with the tag closed that is open."""
-    closing = next((i for i in range(line, len(lines)) if f"</{closed}" in lines[i]), None)
-    alike = opened.lower() == closed.lower() or bool(get_close_matches(closed, [opened], cutoff=0.7))
-    if closing is not None and alike:
-        right = lines[closing].replace(f"</{closed}", f"</{opened}", 1)
-        yield "\n".join([*lines[:closing], right, *lines[closing + 1 :]])
-    if closing is not None and opened == root:
-        left = re.sub(rf"</{re.escape(closed)}\s*>", "", lines[closing], count=1)
-        yield "\n".join([*lines[:closing], left, *lines[closing + 1 :]])
-    yield from _closed(lines, opened, line, root)
+def _tried(text: str) -> tuple[etree._Element | None, etree.XMLSyntaxError | None]:
+    """Return the root of a text, or None and its first error."""
+    try:
+        return etree.fromstring(text.encode(errors="replace"), _parser("utf-8")), None
+    except etree.XMLSyntaxError as error:
+        return None, error
 
 
-def _closed(lines: list[str], tag: str, line: int, root: str) -> Iterator[str]:
-    """Yield the lines with an open tag closed: by `/` before its `>`, all that are left open so, or behind its text."""
-    text = "\n".join(lines)
-    if tag == root:
-        above, _, below = text.rpartition(f"<{root}>")
-        if f"<{root}" in above and not below.strip():
-            yield f"{above}</{root}>{below}"
-        yield f"{text.rstrip()}\n</{root}>\n"
-    elif tag == "group" and (end := text.rfind(f"</{root}>")) >= 0:
-        yield f"{text[:end]}</{tag}>\n{text[end:]}"
-    if tag in {root, "group"}:
-        return
-    begun = re.compile(rf"<{re.escape(tag)}\b[^<>]*(?<!/)>(?=\s*(?:<|\Z))")
-    for found in begun.finditer(text):
-        first, last = (text.count("\n", 0, place) for place in found.span())
-        if first <= line <= last:
-            yield f"{text[: found.end() - 1].rstrip()}/>{text[found.end() :]}"
-    if f"</{tag}" not in text:
-        yield begun.sub(lambda found: f"{found[0][:-1].rstrip()}/>", text)
-    if 0 <= line < len(lines):
-        yield "\n".join([*lines[:line], f"{lines[line].rstrip()}</{tag}>", *lines[line + 1 :]])
+def _slips_near(at: int, message: str, text: str, root: str) -> Iterator[LineSlip]:
+    """Yield the slips of the lines that the parser named and of those beside them."""
+    lines = text.split("\n")
+    mismatch = re.search(_MISMATCH, message)
+    begun = re.compile(rf"\s*[^\w\s<>]?{re.escape(mismatch[3])}\b[^<]*>" if mismatch else r"(?!)")
+    told = [at, *map(int, re.findall(r"line (\d+)", message))]
+    told += [n for n, line in enumerate(lines, 1) if begun.match(line)]
+    named = [number for number in told if 0 < number <= len(lines)]
+    above = [max((n for n in range(1, number) if lines[n - 1].strip()), default=0) for number in named]
+    near = [number for number in dict.fromkeys((*named, *above)) if number]
+    for number in near:
+        yield from _slips_in(lines, number, root)
+    yield from _declarations(lines, root)
+    yield from doubled_and_turned(lines, near)
 
 
-def _quoted(line: str) -> str:
-    """Return the line with plain quotes around each value, and a space before each attribute."""
-    plain = re.sub(
-        r"<\s+(?=[\w/])|<<(?=\w)", lambda found: "</" if "/" in found[0] else "<", _TYPOGRAPHIC.sub('"', line)
-    )
-    apart = re.sub(r"(=\s*(?:\"[^\"]*\"|'[^']*'))(?=[\w-]+\s*=)", r"\1 ", plain)
-    with_sign = re.sub(r"(?<=\s)([\w-]+)(?=\"[^\"]*\"(?:\s|/|>))", r"\1=", apart)
-    return _ATTRIBUTE.sub(lambda m: m[0] if m[3][0] in "\"'" else f'{m[1]}{m[2]}"{m[3]}"', with_sign)
+def _slips_in(lines: list[str], number: int, root: str) -> Iterator[LineSlip]:
+    return (changed_line(lines, number, line, why) for why, line in slips_of(lines[number - 1], root))
 
 
-def _ended(line: str, *, last: bool) -> Iterator[str]:
-    """Yield the line with a quote where a value can begin or end, and, if it is the tag's last, with the tag's end."""
-    if line.count('"') % 2:
-        places = [*re.finditer(r"\s+[\w-]+\s*=|\s*/?>|\s*$", line), *re.finditer(r"(?<==)(?=[^\s\"'])", line)]
-        yield from (f'{line[: place.start()]}"{line[place.start() :]}' for place in places)
-    bare = line.rstrip()
-    yield re.sub(r"/\s+>$", "/>", bare)
-    if not bare.endswith(">") and last:
-        yield from (f"{bare.rstrip('/')}/>", f"{bare}>")
+def _declarations(lines: list[str], root: str) -> Iterator[LineSlip]:
+    """Yield the lines with a good `<?xml … ?>` as their first one, where it is not, or not the first."""
+    at = next((n for n, line in enumerate(lines) if n and line.lstrip().startswith("<?xml")), 0)
+    if at and any(lines[:at]):
+        moved = "\n".join([lines[at].lstrip(), *lines[:at], *lines[at + 1 :]])
+        yield LineSlip(
+            "`<?xml … ?>` stands below another line",
+            at + 1,
+            f"make line {at + 1} the first line of the file",
+            moved,
+        )
+    if re.search(r"xml|version|1\.0", lines[0]) and f"<{root}" not in lines[0]:
+        whole = "\n".join([DECLARATION, *lines[1:]])
+        yield LineSlip("the first line has a slip", 1, f"write `{DECLARATION}`", whole)
+
+
+def _strange_things(root: etree._Element, name: str) -> int:
+    """Return how many tags and attributes there are of which there are none in such a file, and how many pieces of text
+    where none belongs, or that look like a tag."""
+    strange = int(root.tag != name)
+    inner = [e for e in root.iter(etree.Element) if name == "launch" or e in (root, *root)]
+    for element in inner:
+        tag = str(element.tag)
+        known = ATTRIBUTES.get(name, {}).get(tag)
+        strange += (tag not in TAGS[name] if name in TAGS else 0) or (tag == name and element is not root)
+        strange += sum(one not in known for one in element.attrib) if known else 0
+        strange += (
+            sum(bool(re.search("[\"'<>]", str(value))) for value in element.attrib.values()) if known else 0
+        )
+        holds_tags = element is root or (name == "launch" and tag not in _OF_TEXT)
+        texts = [element.text or "", *(child.tail or "" for child in element)]
+        strange += sum(bool(one.strip()) if holds_tags else ">" in one for one in texts)
+    return strange

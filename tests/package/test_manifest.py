@@ -70,7 +70,7 @@ def test_what_catkin_warns_of_is_advice(old, new, advice, capfd):
         ("</package>", "", 2, "`<package>` on line 2 is never closed"),
         ("<?xml", "\n<?xml", 2, "comes before `<?xml ... ?>`: delete it"),
         ("<depend>rospy</depend>", "<<<<<<< HEAD", 9, ""),
-        ("<package format", "<Package format", 10, "with other capital letters"),
+        ("<package format", "<Package format", 2, "`<Package>`: it is called `<package>`"),
     ],
 )
 def test_what_catkin_refuses_is_a_fault(old, new, line, cause):

@@ -352,7 +352,7 @@ CASES = {
     "installed-no-dollar": Case(
         {CMAKELISTS: CMAKE + INSTALL.replace("$", "").replace("scripts/other.py", "src/talker.py src/listener.py"),
          **INSTALLED},
-        ["build-line"], "CMakeLists.txt line 9: write DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION}", INSTALLS,
+        ["build-line"], "CMakeLists.txt line 9: write `DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION}", INSTALLS,
     ),
     "installed-misspelt": Case(
         {CMAKELISTS: CMAKE + INSTALL.replace("scripts/other.py", "src/talker src/listener"), **INSTALLED},

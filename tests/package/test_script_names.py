@@ -168,6 +168,8 @@ COUNTERS = {
     "below-another": (f"{LOOP}    p.publish(1)\nc += 1\n", None),
     "two-sleeps": (f"{LOOP}    p.publish(c)\n    r.sleep()\n    rospy.sleep(1)\n", ("sleep-twice", 5, "delete line 5")),
     "sleeps-apart": (f"{LOOP}    r.sleep()\n    p.publish(c)\n    r.sleep()\n", ("sleep-twice", 5, "delete line 5")),
+    "same-message-again": (f"{LOOP}    p.publish(c)\n    p.publish(c)\n    r.sleep()\n",
+                           ("publish-twice", 4, "delete line 4")),
     "two-messages": (f"{LOOP}    p.publish(c)\n    r.sleep()\n    p.publish(c)\n    r.sleep()\n", None),
 }  # fmt: skip
 
@@ -176,7 +178,7 @@ COUNTERS = {
 def test_what_a_loop_does_to_its_counter_and_its_rate(tmp_path, case):
     code, found = COUNTERS[case]
     (tmp_path / "a.py").write_text(code)
-    kinds = ("set-in-loop", "reset-early", "sleep-twice", "no-effect")
+    kinds = ("set-in-loop", "reset-early", "sleep-twice", "publish-twice", "no-effect")
     slips = [(s.kind, s.line, s.fix) for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind in kinds]
     assert slips == ([found] if found else [])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from grader.package.launch import parse_launch
-from grader.package.xml import well_formed
+from grader.package.xml_edits import well_formed
 
 TALKER = '<node pkg="lab" type="talker.py" name="talker" output="screen"/>'
 RIGHT = f"""\
@@ -86,4 +86,4 @@ def test_what_is_right_or_has_no_plain_edit_stays(text: str) -> None:
 def test_a_root_that_is_opened_where_it_is_to_end_is_told_so() -> None:
     fault = parse_launch(RIGHT.replace("</launch>", "<launch>").encode(), "a.launch").fault
     assert fault is not None
-    assert (fault.line, fault.advice) == (4, "line 4: write `</launch>` for it")
+    assert (fault.line, fault.advice) == (4, "line 4: write `</launch>`")

@@ -257,24 +257,26 @@ def assigned_late(tree):
         if not isinstance(function, ast.FunctionDef):
             continue
         taken = {one.arg for one in ast.walk(function.args) if isinstance(one, ast.arg)} | outside
-        names = [n for n in walk_own(function) if isinstance(n, ast.Name) and n.id not in taken]
+        inside = list(walk_own(function))
         stored = {}
-        for statement in function.body:
-            for n in ast.walk(statement):
-                if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store):
-                    stored.setdefault(n.id, statement)
-        for n in names:
-            given = stored.get(n.id)
-            if (
-                not isinstance(n.ctx, ast.Load)
-                or not isinstance(given, ast.Assign)
-                or given.lineno <= n.lineno
-            ):
-                continue
-            above = next(s for s in function.body if s.end_lineno >= n.lineno)
-            message = "line %d, which gives `%s` its value, comes after it" % (given.lineno, n.id)
-            fix = "move line %d above line %d" % (given.lineno, above.lineno)
-            yield slip(n.lineno, "undefined", message, fix=fix, name=n.id)
+        for n in inside:
+            if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store):
+                stored[n.id] = min(n.lineno, stored.get(n.id, n.lineno))
+        for block in [function.body, *(n.body for n in inside if isinstance(n, (ast.While, ast.For)))]:
+            yield from assigned_late_in(block, {name: stored[name] for name in stored if name not in taken})
+
+
+def assigned_late_in(block, stored):
+    """Names that a block reads above its line that gives them their first value. `stored` are the lines of these."""
+    given = {one.lineno: one for one in block if isinstance(one, ast.Assign)}
+    late = {name: line for name, line in stored.items() if line in given}
+    for statement in block if late else ():
+        for n in walk_own(ast.Module([statement], [])):
+            if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load) and late.get(n.id, 0) > n.lineno:
+                line = late[n.id]
+                message = "line %d, which gives `%s` its value, comes after it" % (line, n.id)
+                fix = "move line %d above line %d" % (line, statement.lineno)
+                yield slip(n.lineno, "undefined", message, fix=fix, name=n.id)
 
 
 def walk_own(function):

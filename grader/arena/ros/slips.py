@@ -71,10 +71,10 @@ def slips(tree):
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             found.append(slip(node.lineno, "input", message))
     finders = (
-        misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice, callbacks,
-        waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops, clock_values, counter_slips,
-        counter_starts, without_effect, assigned_late, hidden_names, subscribed_again, imports,
-        taken_off, unstarted_servers,
+        misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice,
+        publishes_twice, callbacks, waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops,
+        clock_values, counter_slips, counter_starts, without_effect, assigned_late, hidden_names, subscribed_again,
+        imports, taken_off, unstarted_servers,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
@@ -306,6 +306,19 @@ def sleeps_twice(tree):
             lines = (body[at[0]].lineno, body[at[1]].lineno)
             message = "the loop sleeps on line %d and again on line %d" % lines
             yield slip(lines[1], "sleep-twice", message, fix="delete line %d" % lines[1])
+
+
+def publishes_twice(tree):
+    """Loops in which two lines that follow each other publish the same."""
+    for loop in walk(tree):
+        body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
+        for at in range(1, len(body)):
+            first, second = body[at - 1], body[at]
+            given = isinstance(first, ast.Expr) and called_name(first.value) == "publish"
+            if given and ast.dump(first) == ast.dump(second):
+                message = "the loop publishes on line %d and the same again on line %d"
+                message %= (first.lineno, second.lineno)
+                yield slip(second.lineno, "publish-twice", message, fix="delete line %d" % second.lineno)
 
 
 def waiting_callbacks(tree):

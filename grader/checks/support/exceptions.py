@@ -352,6 +352,8 @@ def _no_type(message: str, source: str, topic: ast.expr, type_: ast.expr) -> Mea
         return f"`{shown(ast.unparse(type_))}` is a message, not a type", rewritten(
             source, (type_, type_.func)
         )
+    if "topic name" in message and isinstance(topic, ast.Name) and topic.id[:1].isupper():
+        return "the topic's name is missing", f"write the topic's name, in quotes, before `{shown(topic.id)}`"
     if "topic name" in message and not is_text(topic):
         return "the topic's name is not text", "write the topic's name in quotes"
     hint = "import the type of the messages, as in `from std_msgs.msg import String`"

@@ -132,7 +132,7 @@ def _scripts(
     named = [PurePosixPath(path).name for path in (*wanted.scripts, *wanted.installed)]
     asked = {PurePosixPath(path).name for path in wanted.launch_files}
     launches = [f for f in package.launch_files if PurePosixPath(renames.get(f.path, f.path)).name in asked]
-    named += [node.type or "" for launch in launches for node in (*launch.nodes, *launch.brings)]
+    named += [node.type for launch in launches for node in (*launch.nodes, *launch.brings) if node.type]
     named += [f"{name}.py" for name in named]
     names = dict.fromkeys(PurePosixPath(file.path).name for file in python)
     named += [right for name in named if name not in names for right in names if is_near(name, right)]

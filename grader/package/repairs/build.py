@@ -14,6 +14,7 @@ from grader.model.message_definitions import meant_type
 from grader.model.package import CMAKE, INTERFACE_FOLDERS, MANIFEST, PackageFacts, meant_command
 from grader.model.repair import RepairKind
 from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
+from grader.package.cmake_slips import find_slip, is_open
 from grader.package.manifest import parse_manifest, required_tags
 from grader.package.repairs.editing import Files, naming_files, rename_word, repair_xml
 from grader.package.repairs.files import is_own
@@ -26,6 +27,16 @@ INSTALL = "catkin_install_python"
 CALL_LINES_MAX = 30
 GENERATE, GENERATION = "generate_messages", "message_generation"
 FORMAT_1 = r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>"
+VALUES = (
+    (r"(<package)(?=>(?:.|\n)*<(?:exec_depend|build_export_depend|depend)>)", r'\1 format="2"',
+     'the tags below belong to `format="2"`'),
+    (r"(<package\s+format\s*=\s*[\"'])(?![123][\"'])[^\"']*", r"\g<1>2", "there is no such format"),
+    (r"(<version>)(?!\s*\d+\.\d+\.\d+\s*<)[^<]*(?=<)", r"\g<1>0.0.0", "this is not a version"),
+    (r"(<maintainer\b[^>]*email=[\"'])(?![^\"'@]+@[\w-]+(?:\.[\w-]+)+[\"'])[^\"']*", r"\1you@example.org",
+     "this is not an e-mail address"),
+    (r"(?<=>)(\s*<(name|version|description)>[^<]*</\2>)(?=\1)", "", "the same tag is there twice"),
+)  # fmt: skip
+"""What a tag of a manifest says that catkin refuses, what is written for it, and the reason."""
 RUN_NEEDS = re.compile(r"<(?:depend|run_depend|exec_depend|build_export_depend)>\s*([\w-]+)\s*<")
 ALL_NEEDS = re.compile(r"<(build_depend|depend|run_depend|exec_depend)>\s*([\w-]+)\s*<")
 
@@ -39,6 +50,7 @@ def repair_manifest(files: Files, package: PackageFacts, wanted: Wanted) -> str:
     if text is None:
         return package.name
     repair_xml(files, MANIFEST, "package", "manifest-line")
+    _correct_values(files)
     _add_required(files, package.name)
     _add_buildtool(files)
     for name in wanted.dependencies:
@@ -79,34 +91,57 @@ def _parses(text: str) -> bool:
     return parse_xml(text.encode(), MANIFEST, root="package")[0] is not None
 
 
+def _correct_values(files: Files) -> None:
+    """Correct what catkin refuses: a format, a version, an address, a tag that is there twice."""
+    for pattern, new, message in VALUES:
+        text = files.text(MANIFEST) or ""
+        plain = _blank_comments(text)
+        found = re.search(pattern, plain) if _parses(text) else None
+        if found:
+            changed = text[: found.start()] + found.expand(new) + text[found.end() :]
+            line = text.count("\n", 0, found.end() - len(found[0].lstrip())) + 1
+            fix = "" if new else f"delete line {line}"
+            files.change("manifest-line", MANIFEST, changed, f"line {line} of {MANIFEST}: {message}", fix)
+
+
+def _blank_comments(text: str) -> str:
+    """Return the text with blanks in place of its comments, so that all else stays where it is."""
+    return re.sub(r"<!--.*?-->", lambda found: re.sub(r"[^\n]", " ", found[0]), text, flags=re.DOTALL)
+
+
 def _add_required(files: Files, name: str) -> None:
     """Add the tags without which catkin refuses a manifest."""
     for tag, line in required_tags(name).items():
         text = files.text(MANIFEST) or ""
-        if _parses(text) and not re.search(rf"<{tag}\b", _without_comments(text)):
+        if _parses(text) and not re.search(rf"<{tag}\b", _blank_comments(text)):
             _insert(files, line, f"{MANIFEST} has no <{tag}>")
 
 
 def _add_buildtool(files: Files) -> None:
     text = files.text(MANIFEST) or ""
-    if not re.search(r"<buildtool_depend[^>]*>\s*catkin\s*<", _without_comments(text)) and _parses(text):
-        message = f"{MANIFEST} does not name catkin as its build tool"
+    plain = _blank_comments(text)
+    if re.search(r"<buildtool_depend[^>]*>\s*catkin\s*<", plain) or not _parses(text):
+        return
+    message = f"{MANIFEST} does not name catkin as its build tool"
+    given = next(
+        (m for m in re.finditer(r"<buildtool_depend>([\w-]+)<", plain) if is_near(m[1], "catkin")), None
+    )
+    if given is not None:
+        changed = f"{text[: given.start(1)]}catkin{text[given.end(1) :]}"
+        files.change("manifest-line", MANIFEST, changed, f"{message}: it names {given[1]}")
+    else:
         _insert(files, "<buildtool_depend>catkin</buildtool_depend>", message)
 
 
 def _add_dependency(files: Files, name: str) -> None:
     text = files.text(MANIFEST) or ""
-    given = {match[2] for match in ALL_NEEDS.finditer(_without_comments(text))}
+    given = {match[2] for match in ALL_NEEDS.finditer(_blank_comments(text))}
     if name in given or not _parses(text):
         return
     old = re.search(FORMAT_1, text) is not None
     lines = [f"<build_depend>{name}</build_depend>", f"<run_depend>{name}</run_depend>"]
     message = f"{MANIFEST} does not name {name}, which the lab needs"
     _insert(files, "\n".join(lines) if old else f"<depend>{name}</depend>", message)
-
-
-def _without_comments(text: str) -> str:
-    return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
 
 
 def _insert(files: Files, tags: str, message: str) -> None:
@@ -121,8 +156,8 @@ def _insert(files: Files, tags: str, message: str) -> None:
         changed = "\n".join([*lines[:at], *(f"{indentation}{tag}" for tag in tags.split("\n")), *lines[at:]])
         if (
             _parses(changed)
-            and _without_comments(changed) != _without_comments(text)
-            and tags.split("\n", 1)[0] in _without_comments(changed)
+            and _blank_comments(changed) != _blank_comments(text)
+            and tags.split("\n", 1)[0] in _blank_comments(changed)
         ):
             files.change("manifest-line", MANIFEST, changed, message)
             return
@@ -135,10 +170,13 @@ def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted)
     """Find what `CMakeLists.txt` lacks. `name` is the package's name in the manifest."""
     if files.text(CMAKE) is None:
         return
+    _correct_line(files)
     _close_bracket(files)
     if commands_of(_cmake(files).encode()) is None:
         return
     _spell_commands(files)
+    _spell_keywords(files)
+    _correct_version(files)
     needs = " ".join(wanted.dependencies or ("rospy", "std_msgs"))
     if not _has(files, package, "project"):
         _add_call(files, "project(…)", f"project({name or wanted.package})", ("cmake_minimum_required",))
@@ -164,9 +202,12 @@ def _cmake(files: Files) -> str:
     return files.text(CMAKE) or ""
 
 
+def _commands_of(files: Files) -> list[Command]:
+    return commands_of(_cmake(files).encode()) or []
+
+
 def _commands(files: Files, *names: str) -> list[Command]:
-    found = commands_of(_cmake(files).encode()) or []
-    return [c for c in found if c.identifier.lower() in names]
+    return [c for c in _commands_of(files) if c.identifier.lower() in names]
 
 
 def _words(command: Command) -> list[Token]:
@@ -186,18 +227,104 @@ def _calls_catkin(files: Files, package: PackageFacts) -> bool:
 
 
 def _spell_catkin(files: Files) -> None:
-    """Write the name of catkin in lower case in find_package(…)."""
+    """Write the name of catkin as the first word of find_package(…): in place of a slip of it, or in front of what is
+    there in its place."""
     for command in _commands(files, "find_package"):
-        name = next(iter(_words(command)), None)
-        if name is not None and name.value != "catkin" and name.value.lower() == "catkin":
-            message = f"line {command.line} of {CMAKE}: find_package(…) names {name.value}, and not catkin"
-            fix = f"write catkin instead of {name.value}"
-            files.change("build-line", CMAKE, _replace_token(_cmake(files), name, "catkin"), message, fix)
+        words = _words(command)
+        first = words[0] if words else None
+        if first is None or first.value == "catkin":
+            continue
+        behind = next((word for word in words[1:] if word.value == "catkin"), None)
+        text = _cmake(files)
+        if first.value in ("REQUIRED", "COMPONENTS"):
+            text = _replace_token(text, behind, "") if behind is not None else text
+            text, fix = (
+                _replace_token(text, first, f"catkin {first.value}"),
+                f"write catkin before {first.value}",
+            )
+        elif is_near(first.value, "catkin"):
+            text, fix = _replace_token(text, first, "catkin"), f"write catkin instead of {first.value}"
+        else:
+            continue
+        message = f"line {command.line} of {CMAKE}: find_package(…) names {first.value}, and not catkin"
+        files.change("build-line", CMAKE, text, message, fix)
+        return
+
+
+KEYWORDS = {
+    "cmake_minimum_required": ("VERSION",),
+    "find_package": ("REQUIRED", "COMPONENTS"),
+    "add_message_files": ("FILES",),
+    "add_service_files": ("FILES",),
+    "add_action_files": ("FILES",),
+    "generate_messages": ("DEPENDENCIES",),
+    INSTALL: ("PROGRAMS", "DESTINATION"),
+}
+"""Words of these calls that have to be in capitals and spelt so."""
+FIRST = {"cmake_minimum_required": "VERSION", INSTALL: "PROGRAMS"}
+"""The words without which these calls mean nothing, and that come first."""
+
+
+def _spell_keywords(files: Files) -> None:
+    """Spell the keywords of calls right, and write those that have to be the first word."""
+    for name, keywords in KEYWORDS.items():
+        for at in range(len(_commands(files, name))):
+            for keyword in keywords:
+                words = _words(_commands(files, name)[at])
+                stray = next(
+                    (w for w in words if is_near(w.value, keyword) and w.value not in keywords), None
+                )
+                if stray is not None and keyword not in [w.value for w in words]:
+                    message = f"line {stray.line} of {CMAKE}: {name}(…) has no keyword {stray.value}: it is {keyword}"
+                    changed = _replace_token(_cmake(files), stray, keyword)
+                    files.change("build-line", CMAKE, changed, message)
+            _put_first(files, name, _words(_commands(files, name)[at]))
+
+
+def _put_first(files: Files, name: str, words: Sequence[Token]) -> None:
+    right = FIRST.get(name, "")
+    values = [word.value for word in words]
+    if not right or not words or values[0] == right or "$" in values[0] or values[0].upper() == right:
+        return
+    text = _cmake(files)
+    behind = words[values.index(right)] if right in values else None
+    text = _replace_token(text, behind, "") if behind is not None else text
+    message = f"line {words[0].line} of {CMAKE}: {name}(…) does not begin with {right}"
+    fix = f"write {right} before {values[0]}"
+    files.change("build-line", CMAKE, _replace_token(text, words[0], f"{right} {values[0]}"), message, fix)
+
+
+def _correct_version(files: Files) -> None:
+    """Give cmake_minimum_required(VERSION …) a version that there is."""
+    for command in _commands(files, "cmake_minimum_required"):
+        words = _words(command)
+        given = words[1] if len(words) > 1 else None
+        if [word.value for word in words] == ["VERSION"]:
+            message = f"line {command.line} of {CMAKE}: {command.identifier}(…) has no version"
+            files.change(
+                "build-line", CMAKE, _replace_token(_cmake(files), words[0], "VERSION 3.0.2"), message
+            )
             return
+        right = re.fullmatch(r"[23](\.\d+){1,3}(\.\.\.[\d.]+)?", given.value) if given is not None else None
+        if given is not None and right is None and "$" not in given.value:
+            message = f"line {given.line} of {CMAKE}: there is no version {given.value} of CMake"
+            files.change("build-line", CMAKE, _replace_token(_cmake(files), given, "3.0.2"), message)
 
 
 def _replace_token(text: str, token: Token, new: str) -> str:
     return text[: token.span.start] + new + text[token.span.stop :]
+
+
+def _correct_line(files: Files) -> None:
+    """Correct the one line with which the file cannot be read, or a variable is not closed."""
+    text = _cmake(files)
+    fault = parse_tree_of(text.encode(), CMAKE)[1]
+    words = [token for command in _commands_of(files) for token in _words(command)]
+    line = fault.line if fault is not None else next((t.line for t in words if is_open(t.value)), None)
+    slip = find_slip(text, line or 0) if join_half_comment(text) is None else None
+    if slip is not None:
+        message = f"line {slip.number} of {CMAKE}: {slip.why}"
+        files.change("build-line", CMAKE, slip.text, message, slip.fix)
 
 
 def _close_bracket(files: Files) -> None:
@@ -238,7 +365,7 @@ _PLACE = re.compile(
 def _spell_commands(files: Files) -> None:
     """Spell commands right that have nearly the name of a known one, unless the file defines them."""
     defined = {words[0].value.lower() for c in _commands(files, "function", "macro") if (words := _words(c))}
-    for command in reversed(commands_of(_cmake(files).encode()) or []):
+    for command in reversed(_commands_of(files)):
         name = command.identifier
         right = "" if name.lower() in defined else meant_command(name.lower())
         if right:
@@ -287,7 +414,7 @@ def _declare_exported(files: Files) -> None:
     """Declare in `package.xml` what `catkin_package(CATKIN_DEPENDS …)` names, as catkin asks for."""
     for call in _commands(files, "catkin_package"):
         for name in _values_of(call, "CATKIN_DEPENDS"):
-            text = _without_comments(files.text(MANIFEST) or "")
+            text = _blank_comments(files.text(MANIFEST) or "")
             if re.fullmatch(r"\w+", name) and name not in RUN_NEEDS.findall(text):
                 tag = "run_depend" if re.search(FORMAT_1, text) else "exec_depend"
                 message = (
@@ -428,6 +555,10 @@ def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -
     right = wanted if _is_meant(files, package, name, wanted) else name
     for command in _commands(files, "project")[:1]:
         words = _words(command)
+        if not words:
+            text, at = _cmake(files), command.span.stop - 1
+            message = f"line {command.line} of {CMAKE}: project(…) has no name"
+            files.change("build-line", CMAKE, f"{text[:at]}{name}{text[at:]}", message)
         if words and words[0].value.strip('"') not in (name, right) and "$" not in words[0].value:
             given = words[0].value
             message = f"line {command.line} of {CMAKE}: project({given}) is not the package's name, {name}"
@@ -478,7 +609,7 @@ def _install(files: Files, package: PackageFacts, wanted: Wanted) -> None:
     there = {path for path in (_place(own, files, script) for script in wanted.installed) if path}
     calls = _commands(files, INSTALL)
     named = {_plain(t.value) for c in calls for t in _words(c)}
-    if any("$" in name and not name.startswith("${CATKIN_") for name in named):
+    if any("$" in name and not name.upper().startswith("${CATKIN_") for name in named):
         return  # which scripts a variable holds is for CMake to say
     missing = sorted(there - named)
     if missing and not calls:
@@ -557,7 +688,9 @@ def _replace_stray(files: Files, own: Sequence[str], path: str) -> bool:
     name = PurePosixPath(path).name
     for call in _commands(files, INSTALL):
         for token in _words(call):
-            if _plain(token.value) not in own and _is_about(PurePosixPath(token.value).name, name):
+            given = _plain(token.value)
+            same = re.sub(r"[\\/]", "", given) == path.replace("/", "")
+            if given not in own and (same or _is_about(PurePosixPath(given).name, name)):
                 message = f"line {call.line} of {CMAKE}: {token.value} does not exist; the script is {path}"
                 fix = f"write {path} instead of {token.value}"
                 files.change("build-line", CMAKE, _replace_token(_cmake(files), token, path), message, fix)
@@ -583,12 +716,21 @@ def _correct_destination(files: Files, scripts: Collection[str]) -> None:
         at = next((i for i, t in enumerate(words) if t.value == "DESTINATION"), len(words))
         given = words[at + 1] if at + 1 < len(words) else None
         names_one = any(_plain(t.value) in scripts for t in words)
-        if names_one and at == len(words) and "PROGRAMS" in [t.value for t in words]:
+        place = next((w for w in words if "CATKIN_PACKAGE_BIN_DESTINATION" in w.value.upper()), None)
+        if names_one and at in (len(words), len(words) - 1) and "PROGRAMS" in [t.value for t in words]:
             text, last = _cmake(files), words[-1].span.stop
-            message = f"line {call.line} of {CMAKE}: {call.identifier}(…) has no DESTINATION"
-            files.change("build-line", CMAKE, f"{text[:last]}\n  DESTINATION {BIN}{text[last:]}", message)
+            lacks = "DESTINATION" if at == len(words) else "place behind DESTINATION"
+            message = f"line {call.line} of {CMAKE}: {call.identifier}(…) has no {lacks}"
+            if place is not None:
+                text = _replace_token(text, words[at], "") if at < len(words) else text
+                changed = _replace_token(text, place, f"DESTINATION {BIN}")
+            elif at < len(words):
+                changed = f"{text[:last]} {BIN}{text[last:]}"
+            else:
+                changed = f"{text[:last]}\n  DESTINATION {BIN}{text[last:]}"
+            files.change("build-line", CMAKE, changed, message)
             return
-        if given and names_one and given.value != BIN and given.value.strip("${}").startswith("CATKIN_"):
+        if given and names_one and given.value != BIN and "CATKIN_" in given.value.upper():
             message = f"line {call.line} of {CMAKE}: {given.value} is not where rosrun looks"
             fix = f"write DESTINATION {BIN}"
             files.change("build-line", CMAKE, _replace_token(_cmake(files), given, BIN), message, fix)

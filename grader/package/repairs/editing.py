@@ -20,7 +20,8 @@ from grader.files import atomic_write, open_untrusted
 from grader.model.package import CMAKE, MANIFEST
 from grader.model.repair import Repair, RepairKind, added_lines
 from grader.package.reading import LEFT_OUT
-from grader.package.xml import parse_xml, well_formed
+from grader.package.xml import find_strange, parse_xml
+from grader.package.xml_edits import well_formed
 from grader.portable import BINARY, CLOEXEC, DIRECTORY, NOFOLLOW, READ
 
 TEXT_BYTES_MAX = 64_000
@@ -131,11 +132,14 @@ def repair_xml(files: Files, file: str, root: str, kind: RepairKind) -> bool:
     for after in well_formed(text, file, root=root) if text is not None else ():
         before = files.text(file) or ""
         _, fault = parse_xml(before.encode(), file, root=root)
+        strange = find_strange(before, root) if fault is None else None
         line, old, new = changed_lines(before, after)
-        why = fault.explanation if fault is not None else ""
+        why = fault.explanation if fault is not None else strange.why if strange is not None else ""
         taken = " ".join(one.strip() for one in old.split("\n") if one not in new.split("\n"))
         fix = f"write `{added_lines(old, new)}`" if added_lines(old, new) else f"delete `{taken}`"
         fix = fix if taken or added_lines(old, new) else "delete the blank lines above the first tag"
+        if fault is not None and re.match(r"(delete|write|make) line \d", fault.fix):
+            fix = fault.fix
         place = f"line {fault.line if fault is not None and fault.line else line} of {file}"
         files.change(kind, file, after, f"{place}: {why}", fix)
     return text is not None and files.text(file) != text

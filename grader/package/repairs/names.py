@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import Any, Literal
 
-from grader.model.package import MANIFEST, LaunchFile, PackageFacts, SlipKind
+from grader.model.package import MANIFEST, LaunchFile, LaunchNode, PackageFacts, SlipKind
 from grader.model.record import Record
 from grader.model.repair import RepairKind, as_code
 from grader.package.launch import parse_launch
@@ -187,7 +187,7 @@ _KEY = re.compile(r"^(?P<indent> *)(?P<quote>[\"']?)(?P<key>[A-Za-z_][\w-]*)(?P=
 
 def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: Wanted) -> None:
     """Find the literals of a script that are slips of what the lab asks for, where it asks for nothing else there."""
-    node = next((name.value for name in names if name.role == "node"), "")
+    node = next((name.value for name in names if name.role == "node"), "") or _name_node(files, file, wanted)
     names = [name for name in names if not _repair_slash(files, file, name, wanted)]
     wanted = wanted.model_copy(update={"params": (*wanted.params, *(f"/{node}/{p}" for p in wanted.private))})
     asked_of = {"node": wanted.nodes, "publisher": wanted.topics, "subscriber": wanted.topics}
@@ -210,6 +210,18 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
                 literal = _literal(name, right, node)
                 _replace_literal(files, file, name, literal, literal if literal.startswith("~") else right)
                 node = literal if role == "node" else node
+
+
+def _name_node(files: Files, file: str, wanted: Wanted) -> str:
+    """Give `init_node()` the lab's name that the script has too, and return it; "" where it needs none."""
+    text, name = files.text(file) or "", PurePosixPath(file).stem
+    found = re.search(r"(?<=\binit_node\()\s*(?=\))", text)
+    if found is None or name not in [one.strip("/") for one in wanted.nodes]:
+        return ""
+    after = f"{text[: found.start()]}'{name}'{text[found.end() :]}"
+    line = text.count("\n", 0, found.start()) + 1
+    files.change("missing-call", file, after, f"line {line} of {file}: the node has no name")
+    return name
 
 
 def _is_of_other_role(file: str, role: str, topic: str, wanted: Wanted) -> bool:
@@ -452,8 +464,7 @@ def repair_launch_files(files: Files, package: PackageFacts) -> PackageFacts:
     """Find the edits that make launch files well-formed, and return the package as it is with them."""
     launches = [
         parse_launch((files.text(launch.path) or "").encode(), launch.path)
-        if launch.fault is not None
-        and launch.fault.kind == "XMLSyntaxError"
+        if (launch.fault is None or launch.fault.kind == "XMLSyntaxError")
         and repair_xml(files, launch.path, "launch", "launch-syntax")
         else launch
         for launch in package.launch_files
@@ -470,6 +481,8 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
     scripts = {name for path in names if not (name := PurePosixPath(path).name).endswith(NO_SCRIPTS)}
     programs = scripts | _programs(package)
     nodes = [(launch, node) for launch in package.launch_files for node in launch.nodes]
+    for launch, node in nodes:
+        _complete_node(files, launch.path, node, own, scripts)
     for launch, node in nodes:
         pkg, kind = node.pkg or "", node.type or ""
         if pkg != own and (is_near(pkg, own) or (pkg in ours and {kind, f"{kind}.py"} & scripts)):
@@ -489,6 +502,23 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
     _repair_nodes(files, package, wanted)
     for launch in package.launch_files:
         _repair_params(files, launch, wanted)
+
+
+def _complete_node(files: Files, file: str, node: LaunchNode, own: str, scripts: set[str]) -> None:
+    """Give a node of the package's own the one attribute that it lacks, where the other two say which it is."""
+    there = {"pkg": node.pkg, "type": node.type, "name": node.name}
+    lacking = [attribute for attribute, value in there.items() if not value]
+    kind, lines = node.type or f"{node.name}.py", (files.text(file) or "").split("\n")
+    if len(lacking) != 1 or kind not in scripts or not 0 < node.line <= len(lines):
+        return
+    value = {"pkg": own, "type": kind, "name": PurePosixPath(kind).stem}[lacking[0]]
+    is_empty = re.search(rf"\s{lacking[0]}\s*=", lines[node.line - 1])
+    after = re.sub(r"<node\b", f'<node {lacking[0]}="{value}"', lines[node.line - 1], count=1)
+    if not is_empty and after != lines[node.line - 1]:
+        lines[node.line - 1] = after
+        files.change(
+            "launch-syntax", file, "\n".join(lines), f"line {node.line} of {file}: <node> has no {lacking[0]}"
+        )
 
 
 def _repair_find(files: Files, file: str, own: str) -> None:

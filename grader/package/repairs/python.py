@@ -34,7 +34,7 @@ ATTEMPTS = 3
 Cause = Literal[
     "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
     "old-name", "module", "import", "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument",
-    "unbound", "guard", "start", "main", "spin", "line",
+    "unbound", "guard", "start", "main", "spin", "line", "twice", "turned",
 ]  # fmt: skip
 CALLS = (
     "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "guard",
@@ -247,6 +247,7 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
             file=file,
             place=place,
             line=first.line,
+            below=first.line + 1,
             word=word,
             names=names,
             calls=calls,
@@ -288,6 +289,8 @@ WORDS: dict[Cause, tuple[str, str]] = {
      "write `global {word}` as the first line of the function"),
     "guard": ("{place}: `__name__` is never {word!r}", ""),
     "line": ("{place}: the line `{word}` is missing", ""),
+    "twice": ("{place}: the line above is there twice", "delete line {line}"),
+    "turned": ("lines {line} and {below} of {file} are the wrong way round", "write line {below} above line {line}"),
     "start": ("{place}: the lines from here on belong to {calls}, so nothing runs them", ""),
     "main": ("{place}: nothing calls {calls}", "add `if __name__ == '__main__':`, and {calls} below it"),
     "spin": ("{file} ends as soon as it has subscribed, because nothing keeps it running",

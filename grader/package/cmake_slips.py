@@ -1,0 +1,68 @@
+"""Slips in the brackets and commands of `CMakeLists.txt`: what a line says, and what it should say."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from cmake_parser import CMakeError, parse_raw
+
+from grader.model.package import CMAKE_COMMANDS
+from grader.package.line_slips import LineSlip, changed_line, doubled_and_turned
+
+_CHARS_MAX = 12_000
+_CALL_LINES_MAX = 12
+_COMMANDS = "|".join(sorted(CMAKE_COMMANDS, key=len, reverse=True))
+_BEGIN = "the command's `(` is missing"
+_VARIABLE = "a variable is written `${{{1}}}`"
+# what a line has, what it should have, and the reason ({0}, {1}: the pattern's groups)
+_PATTERNS = (
+    (rf"^(\s*)({_COMMANDS})\s*[{{\[<]", r"\1\2(", "the command's bracket is `(`, and not another one"),
+    (rf"^(\s*)({_COMMANDS})(?=[A-Za-z/$])(?!\w*\s*\()", r"\1\2(", _BEGIN),
+    (rf"^(\s*)({_COMMANDS})\s*$", r"\1\2(", _BEGIN),
+    (r"()\$[(\[](\w+)[)}\]]", r"${\2}", _VARIABLE),
+    (r"()\$\{(\w+)[)\]](?=\s|$|\))", r"${\2}", _VARIABLE),
+    (r"()\$\{(\w+)(?=\s|$|\))", r"${\2}", _VARIABLE),
+    (r"()\$(\w+)\}", r"${\2}", _VARIABLE),
+    (r"()(?<![\w$}])[^\w\s(\"$/]?\{(\w+)\}", r"${\2}", _VARIABLE),
+    (r"[}\]>]\s*$", ")", "the command's bracket is closed by `)`, and not by another one"),
+)  # fmt: skip
+
+
+def find_slip(text: str, number: int) -> LineSlip | None:
+    """Return the one slip near a line of a file that CMake cannot read without which it can be; None where there is no
+    such slip."""
+    lines = text.split("\n")
+    if len(text) > _CHARS_MAX or not 0 < number <= len(lines) or is_good(text):
+        return None
+    begun = range(max(1, number - _CALL_LINES_MAX), number)
+    first = next((n for n in reversed(begun) if re.match(r"\s*\w+\s*[({]?", lines[n - 1])), number)
+    last = min(len(lines), number + _CALL_LINES_MAX)
+    near = [number, *range(number + 1, last + 1), *range(first, number)]
+    slips = (*(one for n in near for one in _slips_in(lines, n)), *doubled_and_turned(lines, near))
+    return next((slip for slip in slips if is_good(slip.text)), None)
+
+
+def _slips_in(lines: list[str], number: int) -> Iterator[LineSlip]:
+    code, sign, comment = lines[number - 1].partition("#")
+    for pattern, new, why in _PATTERNS:
+        found = re.search(pattern, code)
+        if found:
+            changed = code[: found.start()] + found.expand(new) + code[found.end() :]
+            yield changed_line(lines, number, changed + sign + comment, why.format(*found.groups()))
+
+
+def is_good(text: str) -> bool:
+    """Return whether it can be read, calls only commands by names that there are, and closes each of its variables."""
+    try:
+        commands = list(parse_raw(text, skip_comments=True))
+    except (CMakeError, RecursionError):
+        return False
+    words = [str(token.value) for command in commands for token in command.args if token.kind != "COMMENT"]
+    closed = not any(map(is_open, words))
+    return closed and not any("_" in word and word in CMAKE_COMMANDS for word in words)
+
+
+def is_open(word: str) -> bool:
+    """Return whether a variable in the word is begun and not closed, or closed and not begun."""
+    return bool(re.search(r"[{}]|\$\w", re.sub(r"\$\w*\{[^\s{}]*\}|\$<.*>", "", word)))

@@ -1,0 +1,196 @@
+"""Repairs of what belongs to an object: a dot that is missing or another sign, a misspelt member or argument.
+
+The text of a script that parses comes in, and the steps go out that repair it, as in `call_repair.py`. It runs in a
+child process as `source_repair.py` does: the standard library only, and nothing is executed.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import io
+import re
+import tokenize
+from collections.abc import Collection, Iterator
+from itertools import chain
+
+from grader.package.syntax_repair import Step, edited, last_name, span_of, step_to
+from grader.wording import is_one_edit
+
+MEMBERS = {
+    "Publisher": ("publish", "unregister", "get_num_connections"),
+    "Rate": ("sleep", "remaining"),
+    "message": ("data",),
+}
+"""By what makes the object, or a message of std_msgs: what belongs to it."""
+OF_TEXTS = tuple(name for name in dir(str) if not name.startswith("_"))
+ALL_MEMBERS = frozenset(chain.from_iterable(MEMBERS.values()))
+KEYWORDS = {
+    "Publisher": ("queue_size", "latch", "data_class", "subscriber_listener", "tcp_nodelay", "name"),
+    "Subscriber": (
+        "queue_size",
+        "callback",
+        "callback_args",
+        "data_class",
+        "buff_size",
+        "tcp_nodelay",
+        "name",
+    ),
+    "init_node": ("anonymous", "name", "argv", "log_level", "disable_signals"),
+}
+PLACE = re.compile(r"(?:(?<=\s)|^)[^\w\s%]?([sdf])$")
+"""What is left of the `%s` at the end of a text."""
+
+Edit = tuple[tuple[int, int, int], str]
+"""Line (from 0), start and end of what is replaced, and what is written for it."""
+
+
+def with_members(text: str, of_rospy: Collection[str]) -> Iterator[Step]:
+    """Yield the steps after which names of objects and of what belongs to them are as they are meant. `of_rospy` are
+    the names that rospy has."""
+    for find in (_dots, _misspelt_members, _misspelt_keywords, _lost_values, _lost_places):
+        for edit, why in find(text, of_rospy):
+            (line, _, _), _ = edit
+            for step in step_to("argument", line + 1, text, edited(text, [(*edit[0], edit[1])]), why):
+                yield step
+                yield from with_members(step["text"], of_rospy)
+                return
+
+
+def _bound(tree: ast.Module) -> set[str]:
+    names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and not isinstance(n.ctx, ast.Load)}
+    names |= {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.ClassDef)}
+    names |= {n.arg for n in ast.walk(tree) if isinstance(n, ast.arg)}
+    imports = (n for n in ast.walk(tree) if isinstance(n, ast.Import | ast.ImportFrom))
+    return names | {(a.asname or a.name).partition(".")[0] for n in imports for a in n.names}
+
+
+def _dots(text: str, of_rospy: Collection[str]) -> Iterator[tuple[Edit, str]]:
+    """Yield `rospy,spin()` and `rospyspin()`, for `rospy.spin()`, and `"chatter". String`, for `"chatter", String`."""
+    bound = _bound(ast.parse(text))
+    if "*" in bound:
+        return
+    known = bound | set(dir(builtins))
+    given = list(tokenize.generate_tokens(io.StringIO(text).readline))
+    for first, sign, second in zip(given, given[1:], given[2:], strict=False):
+        members = of_rospy if first.string == "rospy" else ALL_MEMBERS
+        is_own = first.type == tokenize.NAME and first.string in bound and second.string not in known
+        place = (sign.start[0] - 1, sign.start[1], sign.end[1])
+        if is_own and sign.string in (",", ";", ":") and second.string in members:
+            yield (place, "."), f"a dot belongs between `{first.string}` and `{second.string}`"
+        if (
+            first.type == tokenize.STRING
+            and "{" in first.string
+            and sign.string == ","
+            and second.string == "format"
+        ):
+            yield (place, "."), "a dot belongs between the string and `format`"
+        is_value = first.type == tokenize.STRING or first.string[:1].isupper()
+        if sign.string == "." and is_value and second.type == tokenize.NAME and second.string in bound:
+            yield (place, ","), f"a comma belongs between `{first.string}` and `{second.string}`"
+    for name in (one for one in given if one.type == tokenize.NAME and one.string not in known):
+        for owner in ("rospy", *sorted(bound - {"rospy"})):
+            member = name.string.removeprefix(owner)
+            if member != name.string and member in (of_rospy if owner == "rospy" else ALL_MEMBERS):
+                span = (name.start[0] - 1, name.start[1], name.end[1])
+                yield (span, f"{owner}.{member}"), f"the dot is missing in `{name.string}`"
+
+
+def _misspelt_members(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
+    """Yield `rate.slep()` and `msg.Data`."""
+    tree, lines = ast.parse(text), text.split("\n")
+    kinds = {
+        ast.unparse(n.targets[0]): last_name(n.value.func)
+        for n in ast.walk(tree)
+        if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)
+    }
+    stored = {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
+    messages = _messages_of_std(tree)
+    for node in (n for n in ast.walk(tree) if isinstance(n, ast.Attribute)):
+        members: tuple[str, ...] = MEMBERS["message"] if id(node.value) in messages else ()
+        of_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        members = OF_TEXTS if of_text else MEMBERS.get(kinds.get(ast.unparse(node.value), ""), members)
+        right = _near(node.attr, members) if node.attr not in {*members, *stored} else ""
+        span = span_of(lines, node)
+        if right and span is not None:
+            line, _, end = span
+            yield ((line, end - len(node.attr), end), right), f"`{node.attr}` is called `{right}`"
+
+
+def _messages_of_std(tree: ast.Module) -> set[int]:
+    """Return the uses of callbacks' messages that are of std_msgs, whose field is `data`, by their identity."""
+    imports = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module == "std_msgs.msg"]
+    types = {a.asname or a.name for n in imports for a in n.names}
+    calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and last_name(n.func) == "Subscriber"]
+    named = {last_name(c.args[2]) for c in calls if len(c.args) > 2 and last_name(c.args[1]) in types}
+    functions = [
+        n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and n.name in named and n.args.args
+    ]
+    return {
+        id(use)
+        for function in functions
+        for use in ast.walk(function)
+        if isinstance(use, ast.Name) and use.id == function.args.args[-1].arg
+    }
+
+
+def _misspelt_keywords(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
+    """Yield `Publisher(…, quue_size=10)`, and `queue_size10`."""
+    lines = text.split("\n")
+    for call in (n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Call)):
+        keywords = KEYWORDS.get(last_name(call.func), ())
+        for one in (k for k in call.keywords if keywords and k.arg and k.arg not in keywords):
+            right, at = _near(str(one.arg), keywords), one.lineno - 1
+            if right and at < len(lines) and (found := re.search(rf"\b{one.arg}(?=\s*=)", lines[at])):
+                yield (
+                    ((at, *found.span()), right),
+                    f"there is no argument `{one.arg}`: it is called `{right}`",
+                )
+        for name in (n for n in call.args if isinstance(n, ast.Name)):
+            found = re.fullmatch(r"(queue_size)_?(\d+)", name.id) if keywords else None
+            span = span_of(lines, name) if found else None
+            if found and span is not None:
+                yield (span, f"{found[1]}={found[2]}"), f"`=` is missing between `{found[1]}` and its value"
+
+
+def _lost_values(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
+    """Yield `rate : rospy.Rate(10)`, which says what type a name has, and gives it no value."""
+    lines = text.split("\n")
+    for node in (n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.AnnAssign) and n.value is None):
+        span, kind = span_of(lines, node.target), node.annotation
+        is_value = isinstance(kind, ast.Call | ast.BinOp) or (
+            isinstance(kind, ast.Constant) and kind.value is not None
+        )
+        colon = lines[span[0]].find(":", span[2]) if span is not None else -1
+        if is_value and span is not None and colon >= 0:
+            yield ((span[0], colon, colon + 1), "="), "a name gets its value by `=`, and not by `:`"
+
+
+def _lost_places(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
+    """Yield `"hello world s" % x` and `"hello world %s" & x`."""
+    lines = text.split("\n")
+    for node in (n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.BinOp)):
+        left, span = node.left, span_of(lines, node.left)
+        if not isinstance(left, ast.Constant) or not isinstance(left.value, str) or span is None:
+            continue
+        line, start, end = span
+        if isinstance(node.op, ast.BitAnd) and "%" in left.value and (at := lines[line].find("&", end)) >= 0:
+            yield ((line, at, at + 1), "%"), "`%` belongs between a string and its values, and not `&`"
+        if (
+            isinstance(node.op, ast.Mod)
+            and "%" not in left.value
+            and (right := with_place(lines[line][start:end]))
+        ):
+            yield (span, right), "the string has no `%` in it"
+
+
+def with_place(source: str) -> str:
+    """Return the source of a text whose last word was `%s`, with its `%` again; "" of any other text."""
+    quote, inner = source[-1:], source[:-1]
+    changed = PLACE.sub(r"%\1", inner)
+    return changed + quote if changed != inner and quote in "'\"" else ""
+
+
+def _near(word: str, names: Collection[str]) -> str:
+    """Return the name of which a word is a slip; "" where there is none."""
+    return next((one for one in names if word.lower() == one or is_one_edit(word.lower(), one)), "")
