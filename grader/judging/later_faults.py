@@ -152,11 +152,9 @@ class Later:
         scripts = scripts_of(criterion, facts.rubric, package)
         self._slips = [slip for slip in package.slips if slip.file in scripts]
         names = names_started(criterion, facts.rubric) - {PurePosixPath(path).name for path in scripts}
-        later = {old: new for old, new in moved.items() if PurePosixPath(new).name in names}
-        self._slips += [
-            s.model_copy(update={"file": later[s.file]}) for s in package.slips if s.file in later
-        ]
-        self._paths = scripts | {*later} | sources_of(criterion, facts.rubric, package)
+        later = {old for old, new in moved.items() if PurePosixPath(new).name in names}
+        self._slips += [slip for slip in package.slips if slip.file in later]
+        self._paths = scripts | later | sources_of(criterion, facts.rubric, package)
         self._slips += self._texts_of_cpp()
         self._ran = not verdict.cause and not later
         """Names are told already then, and only what is behind them is not."""

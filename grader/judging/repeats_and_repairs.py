@@ -416,8 +416,10 @@ def _hints_and_next(
     """Return the hints on the repairs and, behind them, the copy's own. A line that this one writes anew, the only one
     of `lines`, needs no other."""
     then = _at_its_line(copy)
-    anew = set(lines) if then.startswith("on line ") else set()
-    hints = clauses + advice_on(one for one in repairs if {(one.file, one.line)} != anew)
+    anew = [one for one in repairs if {(one.file, one.line)} == set(lines) and then.startswith("on line ")]
+    for one in anew:  # by the name that the file has yet
+        then = re.sub(r"^on line \d+ of [^,]+", f"on line {one.line} of {one.file}", then)
+    hints = clauses + advice_on(one for one in repairs if one not in anew)
     return [*hints, *([f"{'then ' if hints else ''}{then}"] if then else [])]
 
 
