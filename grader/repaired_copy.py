@@ -19,6 +19,7 @@ from grader.judging.repeats_and_repairs import (
     BUILD,
     DONE_BEFORE_RUNS,
     concerns,
+    is_first_line_added,
     is_unmade,
     is_used_by,
     launched_in,
@@ -82,7 +83,11 @@ def choose_repairs(
     )
     # of a script that the build makes a program of, neither its bit nor its first line is used
     made = {c.mistake.name for c in criteria if c.mistake is not None and is_unmade(c)}
-    before = [one for one in counting if one.kind in DONE_BEFORE_RUNS and one.file not in made]
+    before = [
+        one
+        for one in counting
+        if one.kind in DONE_BEFORE_RUNS and one.file not in made and not is_first_line_added(one, rubric)
+    ]
     return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios or unblocks else ((), ())
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import Annotated, NamedTuple
 
@@ -59,14 +59,14 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         Begin with `cmake_minimum_required(VERSION 3.0.2)`, `project(<name in package.xml>)`,
         `find_package(catkin REQUIRED COMPONENTS rospy std_msgs)` and `catkin_package()`.
     """
-    wanted = package.manifest.name if package.manifest else params.name
-    names = (wanted, params.name)
+    given = package.manifest.name if package.manifest else params.name
+    names = (given, params.name)
     expected = f"project({params.name}), find_package(catkin …), catkin_package(…)"
     facts = package.cmake
     if facts is None:
-        return _no_file(package, wanted).about(expected=expected)
+        return _no_file(package, params.name).about(expected=expected)
     # what is missing may stand behind the line that cannot be read
-    wrong = [one for one in _wrong(facts, names) if facts.fault is None or one.line is not None]
+    wrong = [one for one in _wrong(package, facts, names) if facts.fault is None or one.line is not None]
     named = [c for c in facts.calls if c.name in {"project", "find_package", "catkin_package"}]
     measured = ", ".join(map(_call_text, named[:CALLS_SHOWN])) or "none of the three calls"
     fault = facts.fault
@@ -138,19 +138,38 @@ def _respell(call: CMakeCall, name: str) -> Wrong:
     return Wrong(why, f"write {name} instead of {call.name}", call.line)
 
 
-def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
-    """Yield what is wrong or missing."""
-    wanted = names[0]
+def _of_workspace(package: PackageFacts, facts: CMakeFacts, wanted: str) -> Wrong | None:
+    """Return the fault of a file that `catkin_init_workspace` made, and not of a package."""
+    made = _first(facts, "catkin_workspace")
+    if made is None or _first(facts, "catkin_package") is not None:
+        return None
+    declared = package.manifest.dependencies if package.manifest else ()
+    needs = " ".join(dict.fromkeys(d.name for d in declared if d.name != "catkin"))
+    found = f"find_package(catkin REQUIRED{f' COMPONENTS {needs}' if needs else ''})"
+    why = f"it is the file that catkin_init_workspace makes for the folder src/ of a workspace: line {made.line}"
+    lines = f"cmake_minimum_required(VERSION 3.0.2), project({wanted}), {found} and catkin_package()"
+    return Wrong(
+        f"{why} calls catkin_workspace()", f"write these lines in place of all of it: {lines}", made.line
+    )
+
+
+def _wrong(package: PackageFacts, facts: CMakeFacts, names: tuple[str, str]) -> Iterator[Wrong]:
+    """Yield what is wrong or missing. The names are the manifest's and the lab's, which both are to have."""
+    given, wanted = names
+    if other := _of_workspace(package, facts, wanted):
+        yield other
+        return
+    both = "" if given == wanted else f" here, and <name>{wanted}</name> in package.xml"
     project = _first(facts, "project")
     if project is None and (slip := _misspelt(facts, "project")):
         yield _respell(slip, "project")
     elif project is None:
         least = _first(facts, "cmake_minimum_required")
-        yield Wrong("project(…) is missing", f"add project({wanted})", below=least, uncalled="project")
+        yield Wrong("project(…) is missing", f"add project({wanted}){both}", below=least, uncalled="project")
     elif not project.args or project.args[0] not in names:
         name = project.args[0] if project.args else ""
-        message = f"line {project.line}: project({name}) differs from the package's name {wanted}"
-        yield Wrong(message, f"write project({wanted})", project.line)
+        message = f"line {project.line}: project({name}) differs from the package's name {given}"
+        yield Wrong(message, f"write project({wanted}){both}", project.line)
     packages = [c for c in facts.calls if c.name == "find_package"]
     if slip := _misspelt(facts, "find_package"):
         yield _respell(slip, "find_package")
@@ -244,7 +263,7 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
     named = join_words(dict.fromkeys(shown(one.path) for one in of_python))
     measured = f"catkin_install_python installs {named or 'no script'}"
     calls = tuple(FileCitation(file=o.call.file, line=o.call.line) for o in of_python)
-    lacks = {s: lack for s in params.scripts if (lack := _lack(package, all_named, s))}
+    lacks = {s: lack for s in params.scripts if (lack := _lack(package, all_named, s, params.scripts))}
     if not lacks:
         message = f"{facts.file} installs {names}"
         cited = tuple(dict.fromkeys(calls))
@@ -281,7 +300,9 @@ def _fixes(lacks: dict[str, Lack]) -> Iterator[str]:
         yield fix.replace("{}", " ".join(lack.path for lack in lacks.values() if lack.fix == fix))
 
 
-def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) -> Lack | None:
+def _lack(
+    package: PackageFacts, all_named: Sequence[Installed], script: str, wanted: Sequence[str]
+) -> Lack | None:
     """Return None where `catkin_install_python` puts the script where `rosrun` looks."""
     paths = [f.path for f in copies_of(package, script)] or [script]
     hits = [one for one in all_named if any(names_script(one, path) for path in paths)]
@@ -294,6 +315,8 @@ def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) ->
     if blurred is not None:
         why = f"only CMake knows which scripts {blurred.path} holds, and it did not finish"
         return Lack(why, "build the package with catkin_make", _line(blurred), unsure=True)
+    if not hits and not any(one.call.name == PYTHON for one in all_named):
+        return _without_call(package, all_named, paths[0], {PurePosixPath(one).name for one in wanted})
     return _why_unnamed(package, all_named, hits, paths[0])
 
 
@@ -330,11 +353,6 @@ def _why_unnamed(
             why, f"replace {other} with catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(hits[0])
         )
     of_python = [one for one in all_named if one.call.name == PYTHON]
-    if not of_python and package.cmake and (slip := _misspelt(package.cmake, PYTHON)):
-        why, fix = _respell(slip, PYTHON)[:2]
-        return Lack(f"{why}, so nothing installs {{}}", fix, FileCitation(file=slip.file, line=slip.line))
-    if not of_python:
-        return _without_call(package, all_named, path)
     names = {
         PurePosixPath(one.path).name: one
         for one in of_python
@@ -366,7 +384,12 @@ def _named_elsewhere(package: PackageFacts, one: Installed, path: str) -> Lack:
     return Lack(why, f"write {path} in place of {shown(one.path)}", _line(one))
 
 
-def _without_call(package: PackageFacts, all_named: Sequence[Installed], path: str) -> Lack:
+def _without_call(
+    package: PackageFacts, all_named: Sequence[Installed], path: str, wanted: Collection[str]
+) -> Lack:
+    if package.cmake and (slip := _misspelt(package.cmake, PYTHON)):
+        why, respelt = _respell(slip, PYTHON)[:2]
+        return Lack(f"{why}, so nothing installs {{}}", respelt, FileCitation(file=slip.file, line=slip.line))
     fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN})"
     if beside := package.folder_beside:
         path = path.removeprefix(f"{beside}/")
@@ -378,7 +401,11 @@ def _without_call(package: PackageFacts, all_named: Sequence[Installed], path: s
         (one for one in all_named if one.kind == "PROGRAMS" and one.path.endswith(".py")), None
     ):
         why = f"line {of_programs.call.line}: install(PROGRAMS …) does not name {{}}"
-        return Lack(why, "write {} into it, after PROGRAMS", _line(of_programs), path)
+        if any(
+            PurePosixPath(one.path).name in wanted for one in all_named
+        ):  # it is told to become the right one
+            return Lack(why, "write {} into it, after PROGRAMS", _line(of_programs), path)
+        return Lack(f"{why}, and is not {PYTHON}(…)", f"{fix} below it", _line(of_programs), path)
     why = f"{NOT_CALLED}, so nothing installs {{}}"
     above = next(iter(cmake_calls(package, "catkin_package")), None)
     line = FileCitation(file=above.file, line=above.line) if above else None

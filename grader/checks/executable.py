@@ -17,6 +17,7 @@ from grader.checks.support.scripts import (
     find_script,
     installed,
     is_found,
+    move_hint,
     names_script,
     paths_by_name,
     shebang_obstacles,
@@ -25,7 +26,7 @@ from grader.checks.support.scripts import (
 from grader.checks.support.text import near_names, shown
 from grader.evidence.events import CATKIN_MAKE
 from grader.evidence.run import Run
-from grader.model.package import Fault, PackageFacts, SourceFile
+from grader.model.package import CMAKE, Fault, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.submission import chmod_hint
 from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, inconclusive, passed, unjudged
@@ -90,9 +91,10 @@ def _moved(package: PackageFacts, path: str, wanted: str) -> str:
     """Return that the script goes elsewhere, and what names its place; "" where it is there."""
     if path in (wanted, f"{package.folder_beside}/{wanted}"):
         return ""
-    calls = {one.call.line: one.call.file for one in installed(package) if names_script(one, path)}
-    written = "".join(f", and write {wanted} in {file}, line {line}" for line, file in calls.items())
-    return f"the handout puts it at {wanted}; move it there{written}"
+    calls = {one.call.line: one.call for one in installed(package) if names_script(one, path)}
+    places = (f"in the {one.name}(…) on line {line} of {one.file}" for line, one in calls.items())
+    where = join_words(places) or f"where you name it in {CMAKE}"
+    return f"the handout puts it at {wanted}; move it there, and write {wanted} {where}"
 
 
 def _judge_file(package: PackageFacts, build: Run, found: SourceFile, params: ExecutableParams) -> Verdict:
@@ -200,11 +202,15 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     alike = [p for p in scripts if not near and _has_role_of(p, path)]
     seen = f"; there is {alike[0]}" if len(alike) == 1 else seen
     hint = (
-        f"git mv {movable[0]} {path}{_where_named(package, movable[0])}"
+        f"{move_hint(package, movable[0], path)}{_where_named(package, movable[0])}"
         if movable
         else add_hint(package, path)
     )
-    hint = f"{hint}, or git mv {alike[0]} {path} if that is meant to be it" if len(alike) == 1 else hint
+    hint = (
+        f"{hint}, or {move_hint(package, alike[0], path)} if that is meant to be it"
+        if len(alike) == 1
+        else hint
+    )
     kind: MistakeKind = "file-elsewhere" if movable or len(alike) == 1 else "file-missing"
     if not movable and (elsewhere := package.hints_on(wanted.name)):
         where, _, hint = elsewhere[0].partition(": ")

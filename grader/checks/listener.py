@@ -19,6 +19,7 @@ from grader.checks.support.console_output import (
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.processes import GlobalName, lives, named_at, not_started
 from grader.checks.support.text import (
+    IN_OWN_WORDS,
     OTHER_WORDS_SHARE,
     SPIN,
     VALUE,
@@ -125,7 +126,7 @@ def _other_words(
     message = f"{_how_many(missing, probes)} printed, but not as '{wanted}'{seen}"
     blank = params.template.removesuffix(VALUE).endswith(" ")
     glued = params.template.replace(f" {VALUE}", VALUE)
-    hint = f"print '{wanted}', in the handout's own words"
+    hint = f"print '{wanted}', {IN_OWN_WORDS}"
     if any(f'data: "{missing[0].value}"' in line for line in said):
         hint = f"print '{wanted}': of the message only its .data, which is the text"
     elif blank and said and all(text_places(missing, lines, glued)):

@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import DependencyName, NoParams, PackageName, check
-from grader.checks.support.scripts import add_hint, find_script
+from grader.checks.support.scripts import add_hint, find_script, move_hint
 from grader.checks.support.text import near_names, shown
 from grader.model.package import Manifest, PackageFacts, meant_manifest
 from grader.model.record import Record
@@ -104,7 +104,7 @@ def _slips(package: PackageFacts, params: LayoutParams) -> Iterator[Slip]:
         if found is None or _is_below(found.path, script) or found.path.startswith(moved):
             continue
         what = f"{PurePosixPath(script).name} is at {found.path}, not at {script}"
-        yield Slip(what, f"git mv {found.path} {script}", found.path)
+        yield Slip(what, move_hint(package, found.path, script), found.path)
 
 
 def _is_below(path: str, script: str) -> bool:
@@ -326,7 +326,7 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
     places += [
         f"project({name}) in {c.file}, line {c.line}"
         for c in calls
-        if c.name == "project" and c.args[:1] == (found.name,)
+        if c.name == "project" and c.args[:1] != (name,)
     ]
     lines: dict[str, dict[str, None]] = {}
     for launch in package.launch_files:
@@ -338,7 +338,9 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
     ]
     such = f"$(find {found.name})"
     such += f" or `from {found.name}.msg import …`" if package.interfaces else ""
-    search = f"`grep -rnw {found.name} .` shows whether it stands anywhere else, as in {such}"
+    made = next((word for c in calls for word in c.args if word.startswith(f"{found.name}_gen")), "")
+    words, such = ("", f"{such} or {made}") if made else ("w", such)
+    search = f"`grep -rn{words} {found.name} .` shows whether it stands anywhere else, as in {such}"
     return f"write {join_words(places[:PLACES_SHOWN])}; {search}"
 
 

@@ -27,7 +27,7 @@ from grader.checks.support.parameters import (
     yaml_keys,
 )
 from grader.checks.support.processes import GlobalName, Life, first_interrupt_ns, life, lives, not_started
-from grader.checks.support.scripts import add_hint, can_be_moved, find_script, paths_by_name
+from grader.checks.support.scripts import add_hint, can_be_moved, find_script, move_hint, paths_by_name
 from grader.checks.support.text import get_param, log_param, near_names, set_param, shown
 from grader.checks.support.topics import cite, no_node
 from grader.evidence.events import ParamEvent
@@ -129,7 +129,7 @@ def _no_file(package: PackageFacts, build: Run, path: str, wanted: list[str]) ->
     there = near or yaml
     seen = f"; there is {join_words(there)}" if there else ""
     movable = [p for p in near if can_be_moved(p, path)]
-    hint = f"git mv {movable[0]} {path}" if movable else add_hint(package, path)
+    hint = move_hint(package, movable[0], path) if movable else add_hint(package, path)
     verdict = failed(f"{path} is not in the package{seen}", hint=hint)
     return verdict.lost_by("file-elsewhere" if movable else "file-missing", path)
 

@@ -20,7 +20,17 @@ from grader.checks.support.processes import (
     named_at,
     nodes_of,
 )
-from grader.checks.support.text import GET_TIME, INIT, LOOP, SPIN, VALUE, in_words, init, refuse_others
+from grader.checks.support.text import (
+    GET_TIME,
+    IN_OWN_WORDS,
+    INIT,
+    LOOP,
+    SPIN,
+    VALUE,
+    in_words,
+    init,
+    refuse_others,
+)
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -217,7 +227,7 @@ def _judge_heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesPara
 def _other_words(params: CopiesParams) -> Verdict:
     wanted = in_words(params.template)
     message = f"{params.listener} prints what both copies send, but not as '{wanted}'"
-    return unjudged(message, hint=f"print '{wanted}', in the handout's own words")
+    return unjudged(message, hint=f"print '{wanted}', {IN_OWN_WORDS}")
 
 
 def _judge_both(

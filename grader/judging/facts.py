@@ -306,11 +306,18 @@ def scripts_of(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> s
 SOURCES = {".c", ".cc", ".cpp", ".cxx"}
 
 
+def names_started(criterion: Criterion, rubric: Rubric) -> set[str]:
+    """Return the names of the programs that the criterion's scenario starts."""
+    scenario = rubric.scenarios.get(criterion.scenario or "")
+    started = scenario.start if scenario is not None else ()
+    return {PurePosixPath(one.script).name for one in started if one.script}
+
+
 def sources_of(criterion: Criterion, rubric: Rubric, package: PackageFacts) -> set[str]:
     """Return the paths of the C++ sources of the programs that the criterion's scenario starts."""
     scenario = rubric.scenarios.get(criterion.scenario or "")
     started = scenario.start if scenario is not None else ()
-    names = {PurePosixPath(one.script).name for one in started if one.script}
+    names = names_started(criterion, rubric)
     every = any(one.built for one in started)
     made = [
         one for one in programs(package) if every or one.target in names or any(map(one.is_called, names))

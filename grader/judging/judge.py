@@ -116,6 +116,7 @@ def judge_all_runs(
             placed = cite_commented_call(placed, facts.package_of(criterion), build)
             placed = cite_find(placed, criterion, facts.package_of(criterion), build)
             shown[criterion.id] = show_lines(cite_name(placed, build), build)
+    shown = {name: _without_git(verdict, facts.package) for name, verdict in shown.items()}
     names = lab_names(rubric, {i for i, v in shown.items() if v.status.is_lost}, facts.package)
     results = tuple(
         result_of(c, with_lab_names(shown[c.id], names), rubric.digits, uses.get(c.id), values_of(rubric, c))
@@ -204,14 +205,19 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
             found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
         found = _with_package_name(found, criterion, facts)
-        hint = without_git(found.hint, facts.package)
-        return found if hint == found.hint else found.model_copy(update={"hint": hint})
+        return _without_git(found, facts.package)
     except NotRecorded as missing:
         return missing.verdict
     except EvidenceError as error:
         return inconclusive(error.message, hint=error.hint)
     except Exception as error:  # noqa: BLE001 - whatever goes wrong in a check must not cost a student a mark
         return _verdict_of_crash(check, error)
+
+
+def _without_git(verdict: Verdict, package: PackageFacts | None) -> Verdict:
+    """Return the verdict with a hint that works where the package was not handed in with git."""
+    hint = without_git(verdict.hint, package)
+    return verdict if hint == verdict.hint else verdict.model_copy(update={"hint": hint})
 
 
 def _with_package_name(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:

@@ -23,6 +23,7 @@ from grader.checks.support.launch import (
 from grader.checks.support.launch_names import find_renaming
 from grader.checks.support.missing_names import name_slip
 from grader.checks.support.text import (
+    IN_OWN_WORDS,
     SAID_DATA,
     SAID_VALUE,
     SECONDS,
@@ -39,9 +40,9 @@ from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ
-from grader.judging.facts import SOURCES, Facts, scripts_of, sources_of
+from grader.judging.facts import SOURCES, Facts, names_started, scripts_of, sources_of
 from grader.model.package import PackageFacts, PythonSlip
-from grader.model.verdict import Verdict
+from grader.model.verdict import FileCitation, Verdict
 from grader.rubric.model import Criterion, Rubric
 from grader.wording import join_words, significant
 
@@ -58,6 +59,7 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
     the criteria that were not reached."""
     later: dict[str, list[str]] = {}
     retyped: dict[str, tuple[str, str]] = {}
+    moved = dict(filter(None, map(_moved_script, verdicts.values())))
     for criterion in rubric.criteria:
         verdict = verdicts[criterion.id]
         package = facts.package_of(criterion)
@@ -81,10 +83,19 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
         ):
             told += unset_arg_fixes(file, verdict.hint)
         elif verdict.unjudged or verdict.of_machine or criterion.check in OF_TOPICS:
-            own_later = Later(criterion, verdict, package, facts)
+            own_later = Later(criterion, verdict, package, facts, moved)
             told += own_later.faults()
             retyped |= own_later.retyped
     return {name: _with_later(verdict, later.get(name, ()), retyped) for name, verdict in verdicts.items()}
+
+
+def _moved_script(verdict: Verdict) -> tuple[str, str] | None:
+    """Return the only script that is told to become the one that is missing, and the path of that one."""
+    files = [one.file for one in verdict.citations if isinstance(one, FileCitation)]
+    elsewhere = verdict.mistake is not None and verdict.mistake.kind == "file-elsewhere"
+    if verdict.mistake is None or not elsewhere or len(files) != 1 or f"mv {files[0]} " not in verdict.hint:
+        return None
+    return (files[0], verdict.mistake.name) if files[0].endswith(".py") else None
 
 
 def _of_its_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: Rubric) -> str | None:
@@ -106,6 +117,12 @@ def _with_later(verdict: Verdict, later: Iterable[str], retyped: Mapping[str, tu
     told = [one for one in new if not _imports_again(one, hint)]
     if not told or not hint:
         return verdict
+    for one in list(told):  # the same advice, with its line
+        general = f"{one.partition(' on line ')[0]}, {IN_OWN_WORDS}"
+        told = [other for other in told if other != one or general not in hint]
+        hint = hint.replace(general, one)
+    if not told:
+        return verdict.model_copy(update={"hint": hint})
     # what is not wanted is not imported first
     for wanted, other in (retyped[one] for one in told if one in retyped):
         package, _, name = wanted.partition("/")
@@ -119,7 +136,14 @@ def _with_later(verdict: Verdict, later: Iterable[str], retyped: Mapping[str, tu
 class Later:
     """What a criterion that was not reached would be lost by next, as far as the sources say so in plain values."""
 
-    def __init__(self, criterion: Criterion, verdict: Verdict, package: PackageFacts, facts: Facts) -> None:
+    def __init__(
+        self,
+        criterion: Criterion,
+        verdict: Verdict,
+        package: PackageFacts,
+        facts: Facts,
+        moved: Mapping[str, str],
+    ) -> None:
         self._criterion, self._verdict, self._package = criterion, verdict, package
         self._rubric, self._run = facts.rubric, facts.runs.get(criterion.scenario or "")
         self._build = facts.runs.get(PACKAGE_RUN)
@@ -127,9 +151,12 @@ class Later:
         self._topic = str(self._wanted.get("topic", ""))
         scripts = scripts_of(criterion, facts.rubric, package)
         self._slips = [slip for slip in package.slips if slip.file in scripts]
-        self._paths = scripts | sources_of(criterion, facts.rubric, package)
+        names = names_started(criterion, facts.rubric) - {PurePosixPath(path).name for path in scripts}
+        later = {old for old, new in moved.items() if PurePosixPath(new).name in names}
+        self._slips += [slip for slip in package.slips if slip.file in later]
+        self._paths = scripts | later | sources_of(criterion, facts.rubric, package)
         self._slips += self._texts_of_cpp()
-        self._ran = not verdict.cause
+        self._ran = not verdict.cause and not later
         """Names are told already then, and only what is behind them is not."""
         self.retyped: dict[str, tuple[str, str]] = {}
         """Of faults of a type: the one that the lab wants, and the one that the script has."""

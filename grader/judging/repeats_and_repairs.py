@@ -132,8 +132,12 @@ def apply_repaired_copy(
         verdict, copy = first[criterion.id], on_copy[criterion.id]
         share = min(rubric.share_of(one.kind) for one in needed) if criterion.points else 1.0
         told = _as_handed_in(charged or needed, repairs)
-        shared = _share(_with_old_names(copy, repairs), told, share)
-        verdicts[criterion.id] = _charge(verdict, copy, told) if charged else shared
+        placed = _with_old_names(copy, repairs)
+        verdicts[criterion.id] = (
+            _charge(verdict, copy, told, cited_lines(placed.citations))
+            if charged
+            else _share(placed, told, share)
+        )
         uses[criterion.id] = Repaired(repairs=told, share=share, charged=bool(charged))
     return verdicts, uses
 
@@ -227,6 +231,14 @@ def is_used_by(
     return repair.kind != "launch-type" and (launches or not (known or name in launched))
 
 
+def is_first_line_added(repair: Repair, rubric: Rubric) -> bool:
+    """Return whether a script that the rubric starts lacks its first line. The arena adds it before any run, and a copy
+    with it would have all lines one further down than the script that was handed in."""
+    added = repair.kind == "shebang" and repair.after.count("\n") > repair.before.count("\n")
+    name = PurePosixPath(repair.file).name
+    return added and any(name in _started_files(one) for one in rubric.scenarios.values())
+
+
 def _started_files(scenario: Scenario) -> set[str]:
     """Return the names of the files that the scenario starts."""
     return {PurePosixPath(path).name for s in scenario.start for path in (s.script, s.launch) if path}
@@ -277,12 +289,16 @@ def _charges(
     for repair in sorted(needed, key=lambda one: one.kind not in NAMES):
         asking = [c for c in rubric.criteria if c.scenario is None and _asks_for(first[c.id], repair)]
         if repair.kind in OF_BUILDS:  # of a file with several faults, those that speak of this line
-            new = _words(repair.after) - _words(repair.before)
+            new = _new_words(repair)
             asking = [c for c in asking if c.id in better or new & _words(first[c.id].message)]
-        asking = [c for c in asking if _names(c, repair)] or asking
+        sought = [c for c in asking if _seeks(first[c.id], repair)]
+        asking = sought or [c for c in asking if _names(c, repair)] or asking
         if asking:
             charges[repair] = {min(asking, key=lambda c: _lines_away(first[c.id], repair)).id}
             continue
+        own = [c for c in rubric.criteria if repair.kind == "node-name" and _names(c, repair)]
+        if any(first[c.id].status.is_lost and c.id not in better for c in own):
+            continue  # the criterion of the name says by itself what is wrong with it
         possible = [c for c in criteria if repair in needs[c.id]]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
@@ -292,6 +308,11 @@ def _charges(
         charges[repair] = set((counting if named else other or counting)[:1])
         misnamed |= charges[repair] if named else set()
     return charges
+
+
+def _seeks(found: Verdict, repair: Repair) -> bool:
+    """Return whether a criterion is lost by the very call that the repair adds."""
+    return found.sought_name("call") in _new_words(repair)
 
 
 def _lines_away(found: Verdict, repair: Repair) -> float:
@@ -333,8 +354,15 @@ def _words(text: str) -> set[str]:
     return set(re.findall(r"[\w.-]+", text))
 
 
-def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdict:
-    """Return the loss, with the repairs that were seen to help as its hint, and what the copy loses it by."""
+def _new_words(repair: Repair) -> set[str]:
+    return _words(repair.after) - _words(repair.before)
+
+
+def _charge(
+    verdict: Verdict, copy: Verdict, repairs: Sequence[Repair], lines: Collection[tuple[str, int]]
+) -> Verdict:
+    """Return the loss, with the repairs that were seen to help as its hint, and what the copy loses it by, at these
+    lines of the package as it is."""
     blocked = verdict.status is Status.BLOCKED
     is_next = _is_next(verdict, copy, repairs) or (blocked and copy.status.is_lost and not copy.unjudged)
     if blocked:
@@ -368,7 +396,7 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
     elif is_next and is_new:
         untold = [clause for clause in copy.message.split("; ") if clause not in said]
         words += [f"with that repaired, {'; '.join(untold)}"] if untold else []
-        hints += [f"then {_at_its_line(copy)}"] if copy.hint else []
+        hints = _hints_and_next(clauses, [one for one in repairs if one not in told], copy, lines)
     if verdict.mistake and any(one.kind == "file-name" for one in repairs):
         verdict = verdict.lost_by("file-elsewhere", verdict.mistake.name)
     update: dict[str, object] = {
@@ -376,9 +404,23 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         "hint": "; ".join(hints),
         "citations": (*_uncited(verdict, repairs, told), *verdict.citations),
     }
-    if any(PurePosixPath(one.file).name == CMAKE for one in repairs):  # how the call is written is told
+    of_cmake = (one for one in repairs if PurePosixPath(one.file).name == CMAKE)
+    if any(one not in told for one in of_cmake):  # how the call is written is told
         update["sought"] = tuple(one for one in verdict.sought if one.kind not in {"call", "uncalled"})
     return verdict.model_copy(update=update)
+
+
+def _hints_and_next(
+    clauses: list[str], repairs: Iterable[Repair], copy: Verdict, lines: Collection[tuple[str, int]]
+) -> list[str]:
+    """Return the hints on the repairs and, behind them, the copy's own. A line that this one writes anew, the only one
+    of `lines`, needs no other."""
+    then = _at_its_line(copy)
+    anew = [one for one in repairs if {(one.file, one.line)} == set(lines) and then.startswith("on line ")]
+    for one in anew:  # by the name that the file has yet
+        then = re.sub(r"^on line \d+ of [^,]+", f"on line {one.line} of {one.file}", then)
+    hints = clauses + advice_on(one for one in repairs if one not in anew)
+    return [*hints, *([f"{'then ' if hints else ''}{then}"] if then else [])]
 
 
 def _uncited(verdict: Verdict, repairs: Sequence[Repair], told: Collection[Repair]) -> Iterator[FileCitation]:
@@ -405,10 +447,9 @@ def _is_told(repair: Repair, hint: str) -> bool:
         return repair.file in hint and "chmod" in hint
     if repair.kind == "parameter-name" and repair.before.strip() == repair.after.strip():
         return f"line {repair.line}" in hint
-    new = _words(repair.after) - _words(repair.before)
-    return (
-        repair.kind == "package-name" and repair.file in OF_PACKAGES and new <= _words(hint) and new != set()
-    )
+    new = _new_words(repair)
+    of_package = repair.kind in {"package-name", *OF_BUILDS} and repair.file in OF_PACKAGES
+    return of_package and new <= _words(hint) and new != set()
 
 
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:

@@ -227,7 +227,7 @@ def test_a_script_that_has_to_move_is_told_the_line_that_names_it(tmp_path) -> N
     line = (CMAKE + installed).split("\n").index(installed.strip()) + 1
     assert told.status is Status.PASS
     assert told.hint.endswith(
-        f"move it there, and write scripts/numeric_talker.py in CMakeLists.txt, line {line}"
+        f"write scripts/numeric_talker.py in the catkin_install_python(…) on line {line} of CMakeLists.txt"
     )
 
 

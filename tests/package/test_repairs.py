@@ -59,6 +59,7 @@ TWICE = "class A:\n    n = 1\n    def g(self, x): return x\n"
 DEEPER = "        if late:\n            wait()\n"
 OWN = {"msg/Level.msg": "float64 level\n", "src/level.py": "from lab.msg import Level\n"}
 OWN_CMAKE = CMAKE.replace("rospy)\n", "message_generation rospy)\nadd_message_files(FILES Level.msg)\n")
+RUN_OWN = {**OWN, TALKER: SCRIPT.replace("import Int8\n", "import Int8\nfrom lab.msg import Level\n")}
 SERVICE = {**OWN, "srv/Two.srv": "int64 a\n---\n", "src/level.py": "from lab.srv import Two\n"}
 SERVICE_CMAKE = CMAKE.replace(
     "rospy)\n", "message_generation rospy)\nadd_service_files(FILES Two.srv)\ngenerate_messages()\n"
@@ -104,6 +105,10 @@ CASES = {
     "utf-16": Case({TALKER: SCRIPT.encode("utf-16")}, ["encoding"], "saved as UTF-16"),
     "latin-1": Case({TALKER: SCRIPT.replace("import rospy\n", "import rospy  # caf\u00e9\n").encode("latin-1")},
                 ["encoding"], "not saved as UTF-8"),
+    "no-shebang-and-a-slip": Case(
+        swapped(TALKER, ("#!/usr/bin/env python3\n", ""), ("rospy.Publisher", "rospy.Publishr")),
+        ["shebang", "missing-call"], "src/talker.py line 6: write `publisher = ", after={TALKER: SCRIPT},
+    ),
     "no-shebang": Case(swapped(TALKER, ("#!/usr/bin/env python3\n", "")), ["shebang"], "cannot be started"),
     "shebang-blank": Case({TALKER: "\n" + SCRIPT}, ["shebang"], "`#!` comes on line 2"),
     "tabs-of-8": Case(swapped(TALKER, ("        publisher.pub", "\tpublisher.pub")), ["python-syntax"],
@@ -490,6 +495,11 @@ CASES = {
         {LAUNCHED: None, "src/trial.launch": LAUNCH.replace("talker.py", "talker")}, ["file-name", "launch-type"],
         wanted=STARTED, after={"src/activity1.launch": LAUNCH},
     ),
+    "launch-file-of-a-misspelt-script": Case(
+        {TALKER: None, "src/talkr.py": SCRIPT, LAUNCHED: None,
+         "src/trial.launch": LAUNCH.replace("talker.py", "talkr.py")},
+        ["file-name", "file-name"], wanted=STARTED, after={"src/activity1.launch": LAUNCH},
+    ),
     "launch-file-of-something-else": Case(
         {LAUNCHED: None, "src/trial.launch": LAUNCH.replace("talker.py", "signals.py")}, [], wanted=STARTED,
     ),
@@ -516,7 +526,7 @@ CASES = {
         "names message_runtime", after={XML: "  <exec_depend>message_runtime</exec_depend>"},
     ),
     "own-message": Case(
-        {**OWN, CMAKELISTS: CMAKE}, ["build-line"] * 3, "write message_generation after COMPONENTS",
+        {**RUN_OWN, CMAKELISTS: CMAKE}, ["build-line"] * 3, "write message_generation after COMPONENTS",
         after={CMAKELISTS: OWN_CMAKE.replace("\ncatkin_p", "\ngenerate_messages()\ncatkin_p")},
     ),
     "own-message-that-nothing-uses": Case({**SERVICE, CMAKELISTS: SERVICE_CMAKE}, [], ""),
@@ -525,8 +535,12 @@ CASES = {
         "add `add_message_files(FILES Level.msg)`",
     ),
     "own-message-of-the-template": Case(
-        {**OWN, CMAKELISTS: CMAKE.replace("catkin_p", f"{TEMPLATE}\ncatkin_p")}, ["build-line"] * 3,
+        {**RUN_OWN, CMAKELISTS: CMAKE.replace("catkin_p", f"{TEMPLATE}\ncatkin_p")}, ["build-line"] * 3,
         "lines 8 to 11; CMakeLists.txt: in place of lines 4 to 7 write add_message_files(FILES Level.msg)",
+    ),
+    "own-message-of-another-exercise": Case({**OWN, CMAKELISTS: CMAKE}, []),
+    "own-message-of-another-exercise-that-the-build-asks-for": Case(
+        {**OWN, CMAKELISTS: f"{CMAKE}add_dependencies(talker lab_generate_messages_cpp)\n"}, ["build-line"] * 3,
     ),
     "own-message-after-package": Case(
         {**OWN, CMAKELISTS: OWN_CMAKE + "generate_messages(\n)\n"}, ["build-line"],
@@ -545,6 +559,19 @@ CASES = {
         {**OWN, "msg/Level.msg": "Float64 level\n",
          CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")},
         ["build-line"], "write `float64 level`",
+    ),
+    "manifest-of-rosbuild": Case(
+        swapped(TALKER, ("import rospy\n", "import rospy\nimport roslib; roslib.load_manifest('old_lab')\n")),
+        ["missing-import"], "delete line 3", after={TALKER: "import rospy\n\nfrom"},
+    ),
+    "manifest-of-rosbuild-that-is-there": Case(
+        swapped(TALKER, ("import rospy\n", "import rospy\nimport roslib; roslib.load_manifest('lab')\n")), [],
+    ),
+    "cmake-of-a-workspace": Case({CMAKELISTS: "project(Project)\nfind_package(catkin)\ncatkin_workspace()\n"}, []),
+    "project-and-package-of-other-names": Case(
+        {CMAKELISTS: CMAKE.replace("project(lab)", "project(other)"), XML: MANIFEST.replace(">lab<", ">lessons<"),
+         LAUNCHED: LAUNCH.replace('"lab"', '"lessons"')},
+        ["build-line"], "write project(lab) here, and <name>lab</name> in package.xml",
     ),
     "own-message-of-no-use": Case({"msg/Level.msg": "float64 level\n"}, []),
     "another-topic": Case(swapped(TALKER, ("'numeric_chatter'", "'numbers'")), []),

@@ -158,6 +158,11 @@ def _below_call(file: Path, line: int, code: str) -> None:
     _edit(file, last, [code], below=True)
 
 
+def _move(old: Path, new: Path) -> None:
+    new.parent.mkdir(parents=True, exist_ok=True)
+    old.rename(new)
+
+
 _CODE_AT = r"write (?:`(?P<code>[^`]+)`|(?P<bare>[a-z_]+\(.*\)))"
 _TAG, _NAME = r"<(?:\w+)>[^<]*</\w+>", r"<name>.*</name>"
 _DEEDS: tuple[tuple[str, Callable[[Path, Path, re.Match[str], int | None], object]], ...] = (
@@ -166,7 +171,7 @@ _DEEDS: tuple[tuple[str, Callable[[Path, Path, re.Match[str], int | None], objec
     (r"as UTF-8 without BOM$", lambda _t, f, _m, _l: f.write_text(f.read_text(encoding="utf-8-sig"))),
     (r"^write (#!\S+ \S+) as the very first line",
      lambda _t, f, m, _l: f.write_text(f"{m[1]}\n{f.read_text()}")),
-    (r"^git mv (\S+) (\S+)$", lambda top, _f, m, _l: (top / m[1]).rename(top / m[2])),
+    (r"^(?:mkdir -p \S+ && )?(?:git )?mv (\S+) (\S+)$", lambda top, _f, m, _l: _move(top / m[1], top / m[2])),
     (r"^replace the tabs: start line (\d+) with (\d+) spaces$",
      lambda _t, f, m, _l: _indent(f, int(m[1]), to=int(m[2]))),
     (r"^below line (\d+) add `(<.+>)`$",

@@ -22,9 +22,9 @@ from grader.installable import (
     noetic_messages,
 )
 from grader.model.message_definitions import meant_type
-from grader.model.package import CMAKE, MANIFEST, Fault, PackageFacts, meant_command
+from grader.model.package import CMAKE, MANIFEST, CMakeCall, Fault, PackageFacts, meant_command
 from grader.model.verdict import FileCitation
-from grader.wording import join_words
+from grader.wording import join_words, numbers_text
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
 ONE_EDIT = 0.88
@@ -36,6 +36,13 @@ FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error tha
 _QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
 """As compilers and linkers write them."""
 CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
+OF_TARGETS = (
+    "add_executable",
+    "add_library",
+    "target_link_libraries",
+    "add_dependencies",
+    "set_target_properties",
+)
 OF_CATKIN = ("catkin_package", "catkin_install_python", "catkin_python_setup")
 """Commands that `find_package(catkin …)` defines."""
 STANDARD = {
@@ -209,12 +216,28 @@ def _missing_launch(found: re.Match[str], package: PackageFacts, _lines: Sequenc
 
 def _missing_source(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     made = [*cmake_calls(package, "add_executable"), *cmake_calls(package, "add_library")]
-    named = [word for call in made for word in call.args if posixpath.splitext(word)[1] in CPP_SUFFIXES]
+    named = [word for call in made for word in _sources(call)]
     absent = [word for word in dict.fromkeys(named) if package.file(word) is None]
     if len(absent) > 1 and found[1] in absent:
         words = f"targets are built from {join_words(absent)}"
-        return _missing_files(absent, package, words, "the calls that name them")
-    return _missing_files([found[1]], package, f"a target is built from {found[1]}")
+        taken = _calls_of_targets(package, made, absent)
+        return _missing_files(absent, package, words, "the calls that name them", taken)
+    taken = _calls_of_targets(package, made, [found[1]])
+    return _missing_files([found[1]], package, f"a target is built from {found[1]}", leave=taken)
+
+
+def _calls_of_targets(package: PackageFacts, made: Sequence[CMakeCall], absent: Sequence[str]) -> str:
+    """Return how the targets that are built of nothing but absent files are left out: all of their calls."""
+    targets = {c.args[0] for c in made if c.args and set(_sources(c)) and set(_sources(c)) <= set(absent)}
+    lines = {c.line for c in cmake_calls(package, *OF_TARGETS) if c.args and c.args[0] in targets}
+    words = "line" if len(lines) == 1 else "lines"
+    return (
+        f"delete what is built from them: the calls on {words} {numbers_text(sorted(lines))}" if lines else ""
+    )
+
+
+def _sources(call: CMakeCall) -> list[str]:
+    return [word for word in call.args if posixpath.splitext(word)[1] in CPP_SUFFIXES]
 
 
 def no_types(package: PackageFacts) -> Explained | None:
@@ -289,23 +312,31 @@ def _missing_script(found: re.Match[str], package: PackageFacts, _lines: Sequenc
 
 
 def _missing_files(
-    paths: Sequence[str], package: PackageFacts, words: str, where: str = "that call"
+    paths: Sequence[str], package: PackageFacts, words: str, where: str = "that call", leave: str = ""
 ) -> Explained:
     """Return what `words` says of files that are not in the package, with the paths of those that lie elsewhere in it.
 
-    `where` is what names them.
+    `where` is what names them, and `leave` how to leave them out where it is more than not to name them.
     """
-    near = {path: found[0] for path in paths if (found := near_names(path, (f.path for f in package.files)))}
+    there = [f.path for f in package.files]
+    alike = {path: [one for one in there if _is_same_language(one, path)] for path in paths}
+    near = {path: found[0] for path in paths if (found := near_names(path, alike[path]))}
     seen = f"; there is {join_words(dict.fromkeys(near.values()))}" if near else ""
     if len(paths) == 1:
-        hint = f"add {paths[0]} and push it, or remove it from {where}"
+        hint = f"add {paths[0]} and push it, or {leave.replace('them', 'it') or f'remove it from {where}'}"
         hint = f"write {near[paths[0]]} there" if near else hint
         return Explained(f"{words}, which is not in the package{seen}", hint)
     hints = [f"write {right} instead of {path}" for path, right in near.items()]
     if rest := [path for path in paths if path not in near]:
         them = "them" if len(rest) > 1 else "it"
-        hints.append(f"add {join_words(rest)} and push {them}, or take {them} out of {where}")
+        hints.append(f"add {join_words(rest)} and push {them}, or {leave or f'take {them} out of {where}'}")
     return Explained(f"{words}, which are not in the package{seen}", "; ".join(hints))
+
+
+def _is_same_language(one: str, other: str) -> bool:
+    """Return whether one file could be built or run in the place of the other: none of Python's for one of C++."""
+    is_cpp = [posixpath.splitext(path)[1] in CPP_SUFFIXES for path in (one, other)]
+    return is_cpp[0] == is_cpp[1]
 
 
 def _below(path: str, package: PackageFacts) -> str:

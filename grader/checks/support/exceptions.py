@@ -22,6 +22,7 @@ HIDDEN = (
 """Functions of Python's whose names beginners give to variables."""
 NUMBER_OF_PARTS = "not every message has so many parts"
 _NO_FILE = re.compile(r"No such file or directory: '([^']+)'")
+_NOT_WRITABLE = re.compile(r"(?:Permission denied|Read-only file system): '([^']+)'")
 _UNPACKED = re.compile(r"(not enough|too many) values to unpack \(expected (\d+)(?:, got (\d+))?")
 _NO_NUMBER = re.compile(
     r"(?:invalid literal for int\(\) with base \d+|could not convert string to float): (.+)"
@@ -461,6 +462,18 @@ def _file(message: str, _source: str, _marked: tuple[int, int] | None) -> Meanin
     )
 
 
+def _unwritable(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    """Of a file where only the administrator may write."""
+    found = _NOT_WRITABLE.search(message)
+    if found is None or found[1].startswith("/dev/"):
+        return None
+    path = f"os.path.expanduser('~/{shown(found[1].rpartition('/')[2])}')"
+    return (
+        "a node may not write to this place",
+        f"delete this line if the lab does not ask for a file, or `import os`, and open `{path}`",
+    )
+
+
 def _command(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
     found = _COMMAND.match(message)
     if found is None:
@@ -490,6 +503,7 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
     "UnboundLocalError": _local,
     "AttributeError": _attribute,
     "FileNotFoundError": _file,
+    **dict.fromkeys(("PermissionError", "OSError"), _unwritable),
     "CalledProcessError": _command,
     "ServiceException": _service,
     "ZeroDivisionError": _zero,

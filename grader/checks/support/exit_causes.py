@@ -564,9 +564,11 @@ def _broken(found: Traceback, package: PackageFacts) -> str:
 
 
 def _imported(found: Traceback) -> str:
-    """Return the student's line that imports something, if it was the last of the student's to be run."""
+    """Return the student's line that imports something, and does nothing else, if it was the last of the student's to
+    be run."""
     source = found.own_frames[-1].source if found.own_frames else ""
-    return source if re.match(r"(import|from)\s", source) else ""
+    only = all(re.match(r"\s*((import|from)\s|$)", part) for part in source.split(";"))
+    return source if only else ""
 
 
 def process_tracebacks(

@@ -16,6 +16,7 @@ from grader.checks.support.scripts import (
     cmake_calls,
     find_script,
     is_elsewhere,
+    move_hint,
     paths_by_name,
     programs,
     shebang_obstacles,
@@ -145,12 +146,13 @@ def _unreadable(
         message = f"{launch} is not in the package{seen}"
         movable = [p for p in near if can_be_moved(p, launch) and (not wanted or started.get(p, wanted))]
         movable += full[:1] if len(full) == 1 else []
-        hint = f"git mv {movable[0]} launch/{launch}" if movable else add_hint(package, f"launch/{launch}")
+        path = f"launch/{launch}"
+        hint = move_hint(package, movable[0], path) if movable else add_hint(package, path)
         if parts and set(parts.values()) == wanted and not movable:
             hint = f"{hint}, with the <node>s of {join_words(parts)} in it"
-        place = movable[0] if movable else f"launch/{launch}"
+        place = movable[0] if movable else path
         verdict = failed(message, hint=hint, citations=(FileCitation(file=place),))
-        return verdict.lost_by("file-elsewhere" if movable else "file-missing", f"launch/{launch}")
+        return verdict.lost_by("file-elsewhere" if movable else "file-missing", path)
     if file.fault is None:
         return None
     line = f", line {file.fault.line}" if file.fault.line else ""

@@ -105,6 +105,13 @@ def add_hint(package: PackageFacts, path: str) -> str:
     return f"write {path}{then}"
 
 
+def move_hint(package: PackageFacts, path: str, wanted: str) -> str:
+    """Return the command that moves a file, with the one before it that makes a folder that is not there."""
+    folder = PurePosixPath(wanted).parent.as_posix()
+    there = folder == "." or any(file.path.startswith(f"{folder}/") for file in package.files)
+    return f"{'' if there else f'mkdir -p {folder} && '}git mv {path} {wanted}"
+
+
 def without_git(hint: str, package: PackageFacts | None) -> str:
     """Return the hint with commands that work where the package is in no git repository."""
     return hint if package is None or handed_in_with_git(package) else hint.replace("git mv ", "mv ")

@@ -15,6 +15,7 @@ from grader.untrusted_text import visible, without_colours
 from grader.wording import closest, is_one_edit, shorten
 
 SIMILARITY = 0.8
+IN_OWN_WORDS = "in the handout's own words"
 OTHER_WORDS_SHARE = 0.5
 """Of the points, for what is said at the right place in other words than the handout's."""
 SLIP_CHARS_MIN = 4

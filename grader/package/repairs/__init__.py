@@ -72,7 +72,7 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     paths = [renames.get(f.path, f.path) for f in scripts if f.python and f.link is None]
     names = repair_python(files, paths, package, wanted.types)
     name = repair_manifest(files, package, wanted)
-    repair_cmake(files, package, name, wanted)
+    repair_cmake(files, package, name, wanted, [f.path for f in scripts])
     rename_package(files, package, wanted)
     files_now = [renames.get(f.path, f.path) for f in package.files if is_own(f.path)]
     repair_launch_names(files, repair_launch_files(files, package), files_now, wanted)
@@ -133,9 +133,10 @@ def _scripts(
     asked = {PurePosixPath(path).name for path in wanted.launch_files}
     launches = [f for f in package.launch_files if PurePosixPath(renames.get(f.path, f.path)).name in asked]
     named += [node.type for launch in launches for node in (*launch.nodes, *launch.brings) if node.type]
-    named += [f"{name}.py" for name in named]
+    named += [f"{name}.py" for name in named if not PurePosixPath(name).suffix]
     names = dict.fromkeys(PurePosixPath(file.path).name for file in python)
-    named += [right for name in named if name not in names for right in names if is_near(name, right)]
+    there = {*names, *(PurePosixPath(path).name for path in renames.values())}
+    named += [right for name in named if name not in there for right in names if is_near(name, right)]
     found: dict[str, SourceFile] = {}
     for name in dict.fromkeys(named):
         for file in python:

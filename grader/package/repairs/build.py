@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import takewhile
 from pathlib import PurePosixPath
 
@@ -25,6 +25,9 @@ from grader.wording import join_words, lines_text
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 INSTALL = "catkin_install_python"
 CALL_LINES_MAX = 30
+OF_WORKSPACE = "catkin_workspace"
+OF_GENERATION = re.compile(r"_generate_messages|_gen(cpp|py)$")
+"""Targets that generate_messages(…) makes."""
 GENERATE, GENERATION = "generate_messages", "message_generation"
 FORMAT_1 = r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>"
 VALUES = (
@@ -166,13 +169,16 @@ def _insert(files: Files, tags: str, message: str) -> None:
 # ---- CMakeLists.txt
 
 
-def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted) -> None:
-    """Find what `CMakeLists.txt` lacks. `name` is the package's name in the manifest."""
+def repair_cmake(
+    files: Files, package: PackageFacts, name: str, wanted: Wanted, scripts: Collection[str]
+) -> None:
+    """Find what `CMakeLists.txt` lacks. `name` is the package's name in the manifest, `scripts` are those that are
+    run."""
     if files.text(CMAKE) is None:
         return
     _correct_line(files)
     _close_bracket(files)
-    if commands_of(_cmake(files).encode()) is None:
+    if commands_of(_cmake(files).encode()) is None or _is_of_workspace(files):
         return
     _spell_commands(files)
     _spell_keywords(files)
@@ -188,7 +194,8 @@ def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted)
     if not _has(files, package, "catkin_package"):
         below = (GENERATE, "find_package", "project")
         _add_call(files, "catkin_package()", "catkin_package()", below)
-    _make_interfaces(files, package, name)
+    if _needs_interfaces(files, package, name, scripts):
+        _make_interfaces(files, package, name)
     if not package.folder_beside:  # what it names is right once it lies there itself
         _install(files, package, wanted)
         _correct_paths(files, package)
@@ -196,6 +203,11 @@ def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted)
     _correct_include(files)
     _declare_exported(files)
     _name_project(files, package, name, wanted.package)
+
+
+def _is_of_workspace(files: Files) -> bool:
+    """Return whether the file is what `catkin_init_workspace` makes: the package needs one of its own."""
+    return bool(_commands(files, OF_WORKSPACE)) and not _commands(files, "catkin_package")
 
 
 def _cmake(files: Files) -> str:
@@ -426,9 +438,23 @@ def _declare_exported(files: Files) -> None:
 # ---- messages, services and actions of the package's own
 
 
+def _needs_interfaces(files: Files, package: PackageFacts, name: str, scripts: Collection[str]) -> bool:
+    """Return whether what is run uses the package's own definitions, or the build asks for what is made of them. Those
+    of another exercise in the same package keep nothing from running."""
+    asked = any(word.kind != "COMMENT" and OF_GENERATION.search(word.value) for word in _all_words(files))
+    run = [f.path for f in package.files if is_own(f.path) and (f.path in scripts or f.path.endswith(CPP))]
+    return asked or bool(_commands(files, GENERATE)) or bool(_used_kinds(files, package, name, run))
+
+
+def _all_words(files: Files) -> Iterator[Token]:
+    for command in commands_of(_cmake(files).encode()) or []:
+        yield from command.args
+
+
 def _make_interfaces(files: Files, package: PackageFacts, name: str) -> None:
     """Find what CMakeLists.txt lacks to make the package's own messages, services and actions, where code uses them."""
-    used = _used_kinds(files, package, name)
+    code = [f.path for f in package.files if is_own(f.path) and (f.python or f.path.endswith(CPP))]
+    used = _used_kinds(files, package, name, code)
     made = {c: _definitions(package, folder) for c, folder in INTERFACE_FOLDERS.items() if folder in used}
     if not any(made.values()):
         return
@@ -469,11 +495,10 @@ def _definitions(package: PackageFacts, folder: str) -> list[str]:
     return sorted(p.name for p in paths if str(p.parent) == folder and p.suffix == f".{folder}")
 
 
-def _used_kinds(files: Files, package: PackageFacts, name: str) -> set[str]:
-    """Return of which folders of definitions the package's code imports, or includes, what is made of them: itself, or
-    in a field of another definition. Which one a header of C++ is made of is not asked."""
+def _used_kinds(files: Files, package: PackageFacts, name: str, sources: Iterable[str]) -> set[str]:
+    """Return of which folders of definitions these sources import, or include, what is made of them: itself, or in a
+    field of another definition. Which one a header of C++ is made of is not asked."""
     made = re.compile(rf"\b{re.escape(name)}(?:\.(msg|srv)\b|/\w+\.h\b)")
-    sources = (f.path for f in package.files if is_own(f.path) and (f.python or f.path.endswith(CPP)))
     found = {one[1] for path in sources for one in made.finditer(files.text(path) or "")}
     paths = [PurePosixPath(one.path) for one in package.interfaces]
     folders = {path.stem: path.parent.name for path in paths}
@@ -563,7 +588,9 @@ def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -
             given = words[0].value
             message = f"line {command.line} of {CMAKE}: project({given}) is not the package's name, {name}"
             kind: RepairKind = "package-name" if is_near(given, name) else "build-line"
-            files.change(kind, CMAKE, _replace_token(_cmake(files), words[0], name), message)
+            both = f"write project({wanted}) here, and <name>{wanted}</name> in {MANIFEST}"
+            fix = both if wanted and wanted != right else ""
+            files.change(kind, CMAKE, _replace_token(_cmake(files), words[0], name), message, fix)
 
 
 def _add_call(files: Files, what: str, line: str, below: Sequence[str], names: Sequence[str] = ()) -> None:

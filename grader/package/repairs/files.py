@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import PurePosixPath
 
 from grader.model.package import CMAKE, MANIFEST, PackageFacts, SourceFile
@@ -129,6 +129,8 @@ def _repair_shebang(files: Files, script: SourceFile, text: str) -> None:
         after = [wanted, *lines]
     message = f"{script.path} cannot be started: {problem}"
     files.change("shebang", script.path, "\n".join(after), message, f"write {wanted} as the very first line")
+    if after == [wanted, *lines]:
+        files.put(script.path, text)  # what else is repaired is told by its line in the file as it is
 
 
 # ---- names of files
@@ -151,7 +153,9 @@ def find_renames(package: PackageFacts, wanted: Wanted) -> dict[str, str]:
             renames[old] = str(PurePosixPath(old).with_name(name))
         elif name not in names:
             other = {*right, *renames}
-            meant = _meant_launch(package, wanted, name, other) or _meant_script(package, wanted, name, other)
+            meant = _meant_launch(package, wanted, name, renames) or _meant_script(
+                package, wanted, name, other
+            )
             renames |= {meant: str(PurePosixPath(meant).with_name(name))} if meant else {}
     return renames
 
@@ -170,13 +174,16 @@ def _meant_script(package: PackageFacts, wanted: Wanted, name: str, others: set[
     return meant[0] if len(meant) == 1 else ""
 
 
-def _meant_launch(package: PackageFacts, wanted: Wanted, name: str, others: set[str]) -> str:
-    """Return the only launch file that starts what the one of this name has to start; "" if there is none."""
-    scripts = {script for launch, script in wanted.started if PurePosixPath(launch).name == name}
+def _meant_launch(package: PackageFacts, wanted: Wanted, name: str, renames: Mapping[str, str]) -> str:
+    """Return the only launch file that starts what the one of this name has to start, by the names that the scripts
+    have before `renames`; "" if there is none."""
+    before = {PurePosixPath(new).name: PurePosixPath(old).name for old, new in renames.items()}
+    asked = {script for launch, script in wanted.started if PurePosixPath(launch).name == name}
+    right = {PurePosixPath(path).name for path in _wanted_files(wanted)}
     found = [
         path
-        for path in package.launches_of(scripts)
-        if PurePosixPath(path).name not in others and path not in others
+        for path in package.launches_of({before.get(script, script) for script in asked})
+        if PurePosixPath(path).name not in right and path not in renames
     ]
     return found[0] if len(found) == 1 else ""
 

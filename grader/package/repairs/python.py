@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
-from grader.installable import exists_somewhere, noetic_messages
+from grader.installable import exists_somewhere, known_packages, noetic_messages
 from grader.limited_child import ChildLimits, run_limited
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -85,6 +85,7 @@ def repair_python(
 ) -> dict[str, tuple[Name, ...]]:
     """Find what keeps the sources from running, and return the names that they use once they do."""
     _delete_imports(files, scripts, package)
+    _delete_manifests(files, scripts, package)
     texts = {script: text for script in scripts if (text := files.text(script))}
     names: dict[str, tuple[Name, ...]] = {}
     for entry in _examine(texts, types):
@@ -111,8 +112,34 @@ def _delete_imports(files: Files, scripts: Sequence[str], package: PackageFacts)
         if not what:
             continue
         message = f"line {slip.line} of {slip.file}: there is no {what}"
-        after = "\n".join([*lines[: slip.line - 1], *lines[slip.line :]])
-        files.change("missing-import", slip.file, after, message, slip.fix)
+        files.change("missing-import", slip.file, _emptied(lines, slip.line), message, slip.fix)
+
+
+def _emptied(lines: Sequence[str], line: int) -> str:
+    """Return the text with an empty line in place of this one: the others are told by the lines that they have."""
+    return "\n".join([*lines[: line - 1], "", *lines[line:]])
+
+
+def _delete_manifests(files: Files, scripts: Sequence[str], package: PackageFacts) -> None:
+    """Delete `roslib.load_manifest(…)`, which only rosbuild needed, of packages that there are none of."""
+    declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
+    there = {package.name, *(one.name for one in package.also), *declared, *known_packages()}
+    for file in scripts:
+        lines = (files.text(file) or "").split("\n")
+        for number, line in enumerate(lines, start=1):
+            loaded = LOADED.fullmatch(line)
+            if loaded is None or loaded[1] in there:
+                continue
+            if sum("roslib." in one.partition("#")[0] for one in lines) > 1:
+                continue
+            message = (
+                f"line {number} of {file}: there is no package {loaded[1]}, and catkin needs no such line"
+            )
+            files.change("missing-import", file, _emptied(lines, number), message, f"delete line {number}")
+
+
+LOADED = re.compile(r"""(?:import roslib\s*;\s*)?roslib\.load_manifest\(["']([\w-]+)["']\)\s*(?:#.*)?""")
+"""A line that asks for a package by its name, and does nothing else."""
 
 
 IMPORT = re.compile(r"(?:import|from)\s[^(\\;]*")
