@@ -117,7 +117,7 @@ _HABITS = (
            "", ((r"(?<=\w)\.\s+(?=\w+\s*=(?!=))", ", "),)),
     _Habit(r"\w\s*=\s*[\w.]+\s*,\s*[A-Za-z][\w.]*\s*\)", "a value without a name comes after one with a name", "",
            ((r"(\w+\s*=\s*[\w.]+)\s*,\s*([A-Za-z][\w.]*)\s*\)", r"\2, \1)"),)),
-    _Habit(r"^\s*[a-z_]\w*\s+(?:rospy\.\w+\(|\"\")(?!.*=\s*=)", "`=` is missing between the name and its value",
+    _Habit(rf"^\s*(?!(?:{_RESERVED}|print|exec)\b)[a-z_]\w*\s+(?:rospy\.\w+\(|\"\")(?!.*=\s*=)", "`=` is missing between the name and its value",
            "", ((r"^(\s*[a-z_]\w*)\s+(?=rospy\.\w+\(|\"\")", r"\1 = "),)),
     _Habit(r"^\s*>>>", "`>>>` is printed by Python's prompt", "leave it out", ((r">>>\s?", ""),)),
     _Habit(r"^\s*//", "a comment begins with `#` in Python", "", ((r"//+\s*", "# "),)),
