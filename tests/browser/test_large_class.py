@@ -131,7 +131,7 @@ def test_each_action_of_the_review(visit, out, took) -> None:
     _through_the_pages(page, took, timing)
     page.goto(home)
     took["one filter of it"] = timing.following(
-        page.get_by_role("link", name=re.compile("^Inconclusive")).click
+        page.get_by_role("link", name=re.compile("^Not decided yet")).click
     )
     assert rows.all_inner_texts() == OPEN
     took["open a row"] = timing.following(rows.nth(1).click)
