@@ -1,4 +1,4 @@
-"""What may be a slip in a rubric and may be meant: each is a warning, and the rubric is used as it is.
+"""What in a rubric may be a slip and may be meant: each is a warning, and the rubric is used as it is.
 
 Names that one line alone has are in `spelling.py`.
 """
@@ -81,7 +81,7 @@ def _lone_quotes(rubric: dict[str, Any]) -> Iterator[Fault]:
     for path, text in texts_in((), rubric):
         for quote in ('"', "'"):
             if text.count(quote) == 1 and (text.startswith(quote) or text.endswith(quote)):
-                yield path, f"has one quotation mark, {quote}, and another one nowhere"
+                yield path, f"has one quotation mark, {quote}, without its partner"
 
 
 def _words(name: str) -> set[str]:
@@ -89,7 +89,7 @@ def _words(name: str) -> set[str]:
 
 
 def _misnamed_processes(rubric: dict[str, Any], scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
-    """Yield processes that are called as another script of the rubric's, and not as their own."""
+    """Yield processes with the name of another script of the rubric's."""
     texts = [text for _, text in texts_in((), rubric)]
     scripts = {name for text in texts for name in re.findall(r"[\w./-]+\.py\b", text)}
     for scenario, one in scenarios.items():
