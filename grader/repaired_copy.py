@@ -37,6 +37,7 @@ from grader.rubric.model import Rubric
 
 REPAIRED, REPEATED = "repaired-1", "repeated-1"
 REPAIRS_MAX = 4
+"""So many lines are repaired, however many mistakes are on one."""
 
 
 def choose_repairs(
@@ -70,7 +71,9 @@ def choose_repairs(
         )
         return used or any(concerns(one, c, rubric, by_id, built=built, launched=launched) for c in blocked)
 
-    chosen = [one for one in counting if one.kind not in DONE_BEFORE_RUNS and helps(one)][:REPAIRS_MAX]
+    helping = [one for one in counting if one.kind not in DONE_BEFORE_RUNS and helps(one)]
+    places = list(dict.fromkeys((one.file, one.line or one.before) for one in helping))[:REPAIRS_MAX]
+    chosen = [one for one in helping if (one.file, one.line or one.before) in places]
     scenarios = {
         name
         for name in lost

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from grader.checks.registry import DependencyName, NoParams, PackageName, check
 from grader.checks.support.scripts import add_hint, find_script, move_hint
 from grader.checks.support.text import near_names, shown
-from grader.model.package import Manifest, PackageFacts, meant_manifest
+from grader.model.package import MANIFEST, Manifest, PackageFacts, meant_manifest
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
 from grader.wording import join_words, plural
@@ -392,7 +392,8 @@ def _unreadable(package: PackageFacts) -> Verdict:
         hint = "write package.xml beside CMakeLists.txt, as catkin_create_pkg makes it, and push it"
         if package.cmake is None:
             hint = "write package.xml and CMakeLists.txt, as catkin_create_pkg makes them, and push both"
-        return failed("there is no package.xml", measured="no file", hint=meant or hint)
+        absent = failed("there is no package.xml", measured="no file", hint=meant or hint)
+        return absent.lost_by("file-elsewhere" if meant else "file-missing", MANIFEST)
     line = f", line {fault.line}" if fault.line else ""
     return failed(
         f"{fault.file}{line} cannot be read: {fault.explanation}",

@@ -21,7 +21,7 @@ from grader.checks.support.text import texts_in
 from grader.evidence.events import CATKIN_MAKE, PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.model.package import CMAKE, MANIFEST, PackageFacts
-from grader.model.repair import Repair, advice_on, place_of
+from grader.model.repair import Repair, advice_on, messages_of, place_of
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines, failed, share_text
 from grader.rubric.model import Criterion, Rubric
@@ -366,7 +366,7 @@ def _charge(
     blocked = verdict.status is Status.BLOCKED
     is_next = _is_next(verdict, copy, repairs) or (blocked and copy.status.is_lost and not copy.unjudged)
     if blocked:
-        message = "; ".join(one.message for one in repairs)
+        message = "; ".join(messages_of(repairs))
         verdict = failed(
             message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
         )
@@ -381,14 +381,8 @@ def _charge(
         clauses = [clause for clause in clauses if any(_is_told(one, clause) for one in told)]
     hints = clauses + advice_on(one for one in repairs if one not in told)
     said = verdict.message
-    words = [
-        said,
-        *(
-            one.message
-            for one in repairs
-            if PurePosixPath(one.file).name not in said and one.message not in said
-        ),
-    ]
+    unsaid = [one for one in repairs if PurePosixPath(one.file).name not in said]
+    words = [said, *(words for words in messages_of(unsaid) if words not in said)]
     is_new = not copy.hint or not set(copy.hint.split("; ")) <= set(hints)
     if further:
         words += [f"with that repaired, it is blocked by {copy.blocked_by}"]
@@ -429,6 +423,7 @@ def _uncited(verdict: Verdict, repairs: Sequence[Repair], told: Collection[Repai
     with_lines = {file for file, line in cited if line is not None}
     for one in repairs:
         is_new = one.line is not None and (one.file, one.line) not in cited
+        cited.add((one.file, one.line))
         if is_new and not (one in told and one.file in with_lines):
             yield FileCitation(file=one.file, line=one.line)
 

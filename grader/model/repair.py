@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from itertools import groupby, zip_longest
+from itertools import groupby
 from typing import Literal, get_args
 
 from pydantic import Field
@@ -97,6 +97,21 @@ def place_of(repair: Repair) -> str:
     return repair.file if repair.line is None else f"{repair.file} line {repair.line}"
 
 
+def messages_of(repairs: Iterable[Repair]) -> list[str]:
+    """Return what is wrong by each of the repairs; of several on one line, the place once."""
+    found: list[str] = []
+    before = ""
+    for message in (one.message for one in repairs):
+        named = _PLACE.match(message)
+        here = named[0] if named is not None else ""
+        found.append(message.removeprefix(here) if here == before else message)
+        before = here
+    return found
+
+
+_PLACE = re.compile(r"line \d+ of [^:]+: ")
+
+
 def added_lines(before: str, after: str) -> str:
     """Return the lines that are new, on one line."""
     return "; ".join(_added(before, after))
@@ -138,13 +153,17 @@ def _blanks(line: str) -> str:
 
 
 def advice_on(repairs: Iterable[Repair]) -> list[str]:
-    """Return the advice for each of the repairs, as one for those that follow each other on one line. Of two that
-    write the same line, the last has both."""
-    made = list(repairs)
-    last = [
-        one for one, later in zip_longest(made, made[1:]) if later is None or not _is_rewritten(one, later)
-    ]
-    each = map(_where_and_how, last)
+    """Return the advice for each of the repairs, as one for those that follow each other on one line. Those that write
+    the same line are told as one, by what it was and will be."""
+    joined: list[Repair] = []
+    for repair in repairs:
+        if joined and _is_rewritten(joined[-1], repair):
+            before = joined.pop().before
+            fix = added_lines(before, repair.after)
+            joined.append(repair.model_copy(update={"before": before, "fix": fix}))
+        else:
+            joined.append(repair)
+    each = map(_where_and_how, joined)
     return [
         f"{place}: {', and '.join(how for _, how in found)}"
         for place, found in groupby(each, key=lambda one: one[0])

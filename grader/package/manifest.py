@@ -18,7 +18,7 @@ from lxml import etree
 
 from grader.model.package import MANIFEST, Dependency, Fault, Manifest, Person
 from grader.package.reading import read_markup
-from grader.package.xml import line_of, parse_xml
+from grader.package.xml import find_strange, line_of, parse_xml
 from grader.package.xml_slips import TAGS
 from grader.syntax_fixes import Reason
 
@@ -115,13 +115,13 @@ def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
     root, fault = parse_xml(data, MANIFEST, root="package", encoding="utf-8")
     if root is None:
         return None, fault
-    said: list[str] = []
-    try:
-        with _FILTERS, warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # catkin_pkg's own use of pyparsing
-            return _manifest(_meaning(root, said), root, said), None
-    except (InvalidPackage, AssertionError, ValueError, RecursionError) as error:
-        message = str(getattr(error, "msg", error))[:_MESSAGE_CHARS_MAX]
+    manifest, message = _read(root)
+    if manifest is not None:
+        return manifest, None
+    slip = find_strange(data.decode("utf-8"), "package")
+    whole, _ = parse_xml(slip.text.encode(), MANIFEST, root="package") if slip is not None else (None, None)
+    if slip is not None and whole is not None and _read(whole)[0] is not None:
+        return None, _fault(slip.number, "InvalidPackage", "; ".join(message.split("\n")), slip.why, slip.fix)
     place, reason = explain(message, root)
     strange = re.search(r"must not contain the following tags: (\w+)", message)
     near = difflib.get_close_matches(strange[1], TAGS["package"], 1, _ALIKE) if strange else []
@@ -130,6 +130,17 @@ def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
             fix=f"write `<{near[0]}>` instead of `<{strange[1]}>`, and the same in its closing tag"
         )
     return None, _fault(place, "InvalidPackage", "; ".join(message.split("\n")), *reason)
+
+
+def _read(root: etree._Element) -> tuple[Manifest | None, str]:
+    """Return the manifest of a well-formed file, or None and what catkin_pkg says of it."""
+    said: list[str] = []
+    try:
+        with _FILTERS, warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # catkin_pkg's own use of pyparsing
+            return _manifest(_meaning(root, said), root, said), ""
+    except (InvalidPackage, AssertionError, ValueError, RecursionError) as error:
+        return None, str(getattr(error, "msg", error))[:_MESSAGE_CHARS_MAX]
 
 
 def _fault(line: int | None, kind: str, message: str, cause: str, fix: str = "") -> Fault:

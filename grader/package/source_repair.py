@@ -13,7 +13,7 @@ import builtins
 import re
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 from itertools import pairwise
 from typing import Any
@@ -214,10 +214,17 @@ def _with_modules(text: str, types: list[str]) -> Iterator[Step]:
         near = package if package in known else next(iter(get_close_matches(package, known, 1, 0.85)), "")
         lines, at = text.split("\n"), node.lineno - 1
         after = re.sub(rf"from\s+{re.escape(module)}\b", f"from {near}.msg", lines[at], count=1)
-        if near and names <= known[near] and after != lines[at]:
+        if near and all(_is_near_one(name, known[near]) for name in names) and after != lines[at]:
             for step in step_to("module", at + 1, text, with_line(lines, at, after), module):
                 text = step["text"]
                 yield step
+
+
+def _is_near_one(name: str, known: Collection[str]) -> bool:
+    """Return whether it is one of the classes, or a slip in one, which `_with_classes` puts right."""
+    return name in known or any(
+        is_one_edit(name.lower(), one.lower()) or name.lower() == one.lower() for one in known
+    )
 
 
 def _with_classes(text: str, types: list[str]) -> Iterator[Step]:
@@ -237,7 +244,8 @@ def _with_classes(text: str, types: list[str]) -> Iterator[Step]:
         same = {name.lower(): name for name in {*MESSAGES.get(package, "").split(), *of_lab}}
         for alias in (one for one in node.names if one.name not in known and one.asname is None):
             used = [n for n in uses if n.id == alias.name]
-            right = get_close_matches(alias.name, unbound, 1, 0.8) if not used else []
+            other_letters = [name for name in sorted(unbound) if name.lower() == alias.name.lower()]
+            right = other_letters or get_close_matches(alias.name, unbound, 1, 0.8) if not used else []
             # of other packages not all classes are known: Pose may be there beside Pose2D
             near = get_close_matches(alias.name, of_lab, 1, 0.75) if package == "std_msgs" else []
             meant = next(iter(right or near), same.get(alias.name.lower(), ""))

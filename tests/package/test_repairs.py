@@ -196,7 +196,7 @@ CASES = {
                          "rospy.loginfo('a: %s', 1)"),
             "text-for-a-number": ([("publish(1)", "publish(str(1))")], 1, "makes a string of it", "publish(1)"),
             "class": ([("\ndef main():", f"{TWICE}a = A\na.g(1)\ndef main():")], 1, "is the class itself", "a = A()"),
-            "of-self": ([("\ndef main():", f"{TWICE}    def f(self): g(n)\ndef main():")], 2, "belongs to the class A",
+            "of-self": ([("\ndef main():", f"{TWICE}    def f(self): g(n)\ndef main():")], 1, "belongs to the class A",
                         "self.g(self.n)"),
             "callback": ([("\nmain()", "\nrospy.on_shutdown('main')\nmain()")], 1, "'main' is a string",
                          "down(main)"),
@@ -238,7 +238,7 @@ CASES = {
                                 ["missing-call"], "Int88 is not defined",
                                 after={TALKER: "from std_msgs.msg import Int8"}),
     "guard-twice": Case(swapped(TALKER, ("\nmain()", "\nif _name_ == '_main_':\n    main()")),
-                        ["missing-call", "missing-call"], "_name_ is not defined",
+                        ["missing-call"], "_name_ is not defined",
                         after={TALKER: "if __name__ == '__main__':"}),
     "letter": Case(swapped(TALKER, ("rospy.Rate(", "rospu.Rate(")), ["missing-call"], "rospu is not defined",
                    after={TALKER: "rospy.Rate("}),
@@ -281,7 +281,7 @@ CASES = {
         ["topic-name"], "line 2 of src/a.cpp: the topic /men should be /mean", asking(topics=("/mean",)),
         {"src/a.cpp": 'advertise<std_msgs::Int8>("/mean", 1);'},
     ),
-    "import-capitals": Case(swapped(TALKER, ("import Int8", "import int8")), ["missing-import"], "talker.py uses Int8"),
+    "import-capitals": Case(swapped(TALKER, ("import Int8", "import int8")), ["missing-call"], "int8"),
     "class-in-other-letters": Case(swapped(TALKER, ("Int8", "int8")), ["missing-call"], "int8"),
     "class-of-another-name": Case(
         swapped(TALKER, ("import Int8", "import Int8\nfrom turtlesim.msg import Int8Pose")), [],
@@ -361,9 +361,8 @@ CASES = {
     ),
     "installed-misspelt": Case(
         {CMAKELISTS: CMAKE + INSTALL.replace("scripts/other.py", "src/talker src/listener"), **INSTALLED},
-        ["build-line", "build-line"],
-        "write src/listener.py instead of src/listener; "
-        "CMakeLists.txt line 8: write src/talker.py instead of src/talker",
+        ["build-line"],
+        "CMakeLists.txt line 8: write `src/talker.py src/listener.py`",
         INSTALLS,
     ),
     "line-ends-that-do-no-harm": Case(
@@ -588,6 +587,10 @@ CASES = {
         swapped(TALKER, ("    publisher = ", "    rospy.Subscriber('numeric_chater', Int8, print)\n    publisher = "),
                 ("'numeric_chatter'", "'numeric_chattr'")), ["topic-name"], "numeric_chattr should be /numeric_chatter",
         wanted=asking(does=(("src/talker.py", "publisher", "/numeric_chatter"),))),
+    "two-on-one-line": Case(
+        swapped(TALKER, ("std_msgs.msg import Int8", "std_msg.msg import int8")), ["missing-import", "missing-call"],
+        "messages are not imported from std_msg.msg", after={TALKER: "from std_msgs.msg import Int8"},
+    ),
     "nothing": Case({}, []),
 }  # fmt: skip
 

@@ -18,7 +18,7 @@ from typing import BinaryIO
 
 from grader.files import atomic_write, open_untrusted
 from grader.model.package import CMAKE, MANIFEST
-from grader.model.repair import Repair, RepairKind, added_lines
+from grader.model.repair import Repair, RepairKind, added_lines, messages_of
 from grader.package.reading import LEFT_OUT
 from grader.package.xml import find_strange, parse_xml
 from grader.package.xml_edits import well_formed
@@ -114,7 +114,10 @@ class Files:
         *,
         asks_input: bool = False,
     ) -> None:
-        """Remember that the file's text becomes `after`. Without a `fix`, the changed lines say it."""
+        """Remember that the file's text becomes `after`. Without a `fix`, the changed lines say it.
+
+        What changes the line again that the last repair changed, and is of its kind, is one repair with that.
+        """
         file = self._renamed.get(file, file)
         before = self.text(file)
         if before is None or before == after or not _is_unicode(before + after):
@@ -123,6 +126,17 @@ class Files:
         self._texts[file] = after
         words = {"message": message, "fix": fix or added_lines(old, new)}
         made = Repair(kind=kind, file=file, line=line, before=old, after=new, asks_input=asks_input, **words)
+        last = self.repairs[-1] if self.repairs else None
+        if last is not None and (last.kind, last.file, last.line, last.after) == (kind, file, line, old):
+            made = made.model_copy(
+                update={
+                    "before": last.before,
+                    "message": "; ".join(messages_of([last, made])),
+                    "fix": added_lines(last.before, new),
+                    "asks_input": asks_input or last.asks_input,
+                }
+            )
+            self.repairs.pop()
         self.repairs.append(made)
 
 

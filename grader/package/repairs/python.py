@@ -9,6 +9,7 @@ import json
 import re
 import time
 from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
@@ -104,7 +105,12 @@ def _delete_imports(files: Files, scripts: Sequence[str], package: PackageFacts)
     for slip in sorted(unused, key=lambda s: s.line, reverse=True):
         lines = (files.text(slip.file) or "").split("\n")
         text = lines[slip.line - 1] if slip.line <= len(lines) else ""
-        if slip.file not in scripts or slip.message in own or not IMPORT.fullmatch(text):
+        if (
+            slip.file not in scripts
+            or slip.message in own
+            or not IMPORT.fullmatch(text)
+            or _is_misspelt(text)
+        ):
             continue
         what = _unknown_message(text)
         if (slip.file, slip.line) in lacking and not exists_somewhere(slip.message, own):
@@ -144,6 +150,17 @@ LOADED = re.compile(r"""(?:import roslib\s*;\s*)?roslib\.load_manifest\(["']([\w
 
 IMPORT = re.compile(r"(?:import|from)\s[^(\\;]*")
 """A line that is one import, and nothing else."""
+
+
+def _is_misspelt(line: str) -> bool:
+    """Return whether a message is imported of which both the package and the class have a slip, so that it is meant."""
+    found = re.fullmatch(r"from (\w+)\.msg import (\w+)", line.strip())
+    known = noetic_messages()
+    near = get_close_matches(found[1], known, 1, 0.85) if found and found[1] not in known else []
+    classes = [one.lower() for name in near for one in known[name]]
+    return found is not None and any(
+        found[2].lower() == one or is_one_edit(found[2].lower(), one) for one in classes
+    )
 
 
 def _unknown_message(line: str) -> str:
