@@ -155,11 +155,14 @@ def first_interrupt_ns(run: Run) -> int | None:
 
 
 def observed_until_ns(run: Run) -> int | None:
-    """Return up to when silence is a living node's own: the first Ctrl-C. None where none was recorded."""
+    """Return up to when silence is a living node's own: the first Ctrl-C, or before it the last tick of a fast clock,
+    which stands still then. None where neither was recorded."""
     own = [one for one in lives(run) if not one.ended_early and not one.by_step]
     ends = [one.until_ns(run) for one in own if one.end_ns is not None]
-    pressed = first_interrupt_ns(run)
-    return min(ends if pressed is None else [*ends, pressed], default=None)
+    ends += [pressed] if (pressed := first_interrupt_ns(run)) is not None else []
+    if run.clock == "warped" and ends:
+        ends += [c.times_ns[-1] for c in run.channels if c.topic == "/clock" and c.by_grader and c.times_ns]
+    return min(ends, default=None)
 
 
 def fell_silent(one: Life, run: Run) -> bool:
