@@ -180,7 +180,7 @@ def _wrong(package: PackageFacts, facts: CMakeFacts, names: tuple[str, str]) -> 
             yield Wrong(why, "add find_package(catkin REQUIRED)", below=project, uncalled="find_package")
         else:
             why = f"{why} (line {slip.line} says {slip.args[0]})"
-            place = "before" if slip.args[0].isupper() else "in place of"
+            place = "before" if slip.args[0].isupper() else "instead of"
             yield Wrong(why, f"write catkin {place} {slip.args[0]}", slip.line)
     if slip := _misspelt(facts, "catkin_package"):
         yield _respell(slip, "catkin_package")
