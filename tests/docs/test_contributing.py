@@ -21,6 +21,10 @@ GIT = shutil.which("git") or "git"
 STYLE = (("check", "--no-cache"), ("format", "--no-cache", "--check"))
 LIKE, LIKE_PACKAGE = "york-ele00118m-lab7", "lab_exercises"
 LAB, PACKAGE = "our-lab1", "our_first_node"
+INHERITED = re.compile(
+    r"(PATH|HOME|PIP_\w+|UV_\w+|SSL_\w+|REQUESTS_\w+|https?_proxy|no_proxy)$", re.IGNORECASE
+)
+"""What a machine has to say about where programs and packages come from."""
 LAB_FILES = re.compile(r"^\| `([^`]+)` \| .* \|$", re.MULTILINE)
 
 
@@ -116,7 +120,7 @@ def clones(followed: Callable[[str], Path]) -> Callable[[str], Path]:
 def _run(clone: Path, *words: str, limit_s: int = 250, **environment: str) -> str:
     """Return what Python prints in the clone. Raises AssertionError where it does not end with 0."""
     own = {"PYTHONPATH": str(clone), "PYTEST_ADDOPTS": "-p no:cacheprovider"}
-    inherited = {name: os.environ[name] for name in ("PATH", "HOME") if name in os.environ}
+    inherited = {name: value for name, value in os.environ.items() if INHERITED.match(name)}
     done = subprocess.run(
         [sys.executable, *words],
         cwd=clone,

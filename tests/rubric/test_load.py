@@ -254,7 +254,7 @@ def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("no-such-lab", 'there is no rubric "no-such-lab"'),
+        ("nowhere", 'there is no rubric "nowhere"'),
         ("no/such.yaml", "no/such.yaml: there is no such file"),
         ("/", "/: is a folder, not a rubric file"),
     ],
