@@ -26,7 +26,7 @@ from grader.rubric.model import Criterion, Rubric
 from grader.rubric.own_checks import Beside, known_checks, read_instructor, run_checks_file
 from grader.rubric.scenario import Scenario
 from grader.rubric.spelling import doubtful_names, misspelt_names
-from grader.rubric.yaml_lines import Source, Value, as_map, read_source
+from grader.rubric.yaml_lines import Fault, KeyPath, Source, Value, as_map, read_source
 
 PIN = "#sha256:"
 """Between a rubric's name and the digest that it must have."""
@@ -241,6 +241,9 @@ def packages_of_labs() -> dict[str, str]:
     return {lab.id: lab.package for lab in known_labs()}
 
 
+_NO_FIELD = re.compile(r"has no field \w+")
+
+
 def _faults(source: Source, samples: Sequence[Value], beside: Beside, folder: Path) -> list[str]:
     if not isinstance(source.data, dict):
         return [
@@ -260,8 +263,11 @@ def _faults(source: Source, samples: Sequence[Value], beside: Beside, folder: Pa
         for path, fault in misspelt_names(source.data, folder)
         if known.isdisjoint(path[:n] for n in range(1, len(path) + 1))
     ]
-    unique = dict.fromkeys(found)
-    told = [source.fault(*fault) for fault in sorted(unique, key=lambda fault: source.line(fault[0]))]
+    unique: dict[tuple[KeyPath, str], Fault] = {}
+    for path, fault in found:  # where ROS is, its files and the known types both lack a field
+        lacked = _NO_FIELD.search(fault)
+        unique.setdefault((path, lacked[0] if lacked else fault), (path, fault))
+    told = [source.fault(*fault) for fault in sorted(unique.values(), key=lambda one: source.line(one[0]))]
     file = Path(source.name).parent / str(source.data.get("checks"))
     return [*told, *(f"{file}:{line}: {message}" for line, message in beside.own.faults)]
 
