@@ -65,25 +65,22 @@ def choose_repairs(
     counting = [one for one in found if rubric.share_of(one.kind) > 0 and (typed or not one.asks_input)]
     built, launched = built or not needs_build(facts), launched_in(facts)
 
-    def helps(one: Repair) -> bool:
-        used = any(
-            is_used_by(rubric.scenarios[name], one, rubric, built=built, launched=launched) for name in lost
-        )
-        return used or any(concerns(one, c, rubric, by_id, built=built, launched=launched) for c in blocked)
+    def uses(name: str, one: Repair) -> bool:
+        return is_used_by(rubric.scenarios[name], one, rubric, built=built, launched=launched)
 
-    helping = [one for one in counting if one.kind not in DONE_BEFORE_RUNS and helps(one)]
+    def unblocks(one: Repair) -> bool:
+        return any(concerns(one, c, rubric, by_id, built=built, launched=launched) for c in blocked)
+
+    helping = [
+        one
+        for one in counting
+        if one.kind not in DONE_BEFORE_RUNS and (any(uses(name, one) for name in lost) or unblocks(one))
+    ]
     places = list(dict.fromkeys((one.file, one.line or one.before) for one in helping))[:REPAIRS_MAX]
     chosen = [one for one in helping if (one.file, one.line or one.before) in places]
-    scenarios = {
-        name
-        for name in lost
-        if any(
-            is_used_by(rubric.scenarios[name], one, rubric, built=built, launched=launched) for one in chosen
-        )
-    }
-    unblocks = any(
-        concerns(one, c, rubric, by_id, built=built, launched=launched) for c in blocked for one in chosen
-    )
+    scenarios = sorted(name for name in lost if any(uses(name, one) for one in chosen))
+    if not scenarios and not any(map(unblocks, chosen)):
+        return (), ()
     # of a script that the build makes a program of, neither its bit nor its first line is used
     made = {c.mistake.name for c in criteria if c.mistake is not None and is_unmade(c)}
     before = [
@@ -91,7 +88,7 @@ def choose_repairs(
         for one in counting
         if one.kind in DONE_BEFORE_RUNS and one.file not in made and not is_first_line_added(one, rubric)
     ]
-    return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios or unblocks else ((), ())
+    return (*before, *chosen), tuple(scenarios)
 
 
 def _find_in_all(submission: Submission, facts: PackageFacts, rubric: Rubric) -> list[Repair]:

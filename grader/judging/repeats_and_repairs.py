@@ -407,13 +407,15 @@ def _charge(
 def _hints_and_next(
     clauses: list[str], repairs: Iterable[Repair], copy: Verdict, lines: Collection[tuple[str, int]]
 ) -> list[str]:
-    """Return the hints on the repairs and, behind them, the copy's own. A line that this one writes anew, the only one
-    of `lines`, needs no other."""
+    """Return the hints on the repairs, followed by the copy's own. Where this one rewrites the only one of `lines`, no
+    other hint on that line is needed."""
     then = _at_its_line(copy)
-    anew = [one for one in repairs if {(one.file, one.line)} == set(lines) and then.startswith("on line ")]
-    for one in anew:  # by the name that the file has yet
+    rewritten = [
+        one for one in repairs if {(one.file, one.line)} == set(lines) and then.startswith("on line ")
+    ]
+    for one in rewritten:  # by the name that the file still has
         then = re.sub(r"^on line \d+ of [^,]+", f"on line {one.line} of {one.file}", then)
-    hints = clauses + advice_on(one for one in repairs if one not in anew)
+    hints = clauses + advice_on(one for one in repairs if one not in rewritten)
     return [*hints, *([f"{'then ' if hints else ''}{then}"] if then else [])]
 
 

@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 
 from grader.model.package import MANIFEST, PackageFacts, SourceFile
 from grader.model.repair import DEFAULT_SHARES, KINDS, Repair, RepairKind
-from grader.package.repairs.build import rename_package, repair_cmake, repair_manifest
+from grader.package.repairs.build import rename_package, repair_cmake
 from grader.package.repairs.editing import (
     BOM,
     Files,
@@ -27,6 +27,7 @@ from grader.package.repairs.editing import (
     write_data,
 )
 from grader.package.repairs.files import find_renames, is_own, rename_files, repair_files, to_utf8
+from grader.package.repairs.manifest import repair_manifest
 from grader.package.repairs.names import (
     CPP,
     Wanted,

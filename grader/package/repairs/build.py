@@ -1,4 +1,4 @@
-"""Lines of `package.xml` and `CMakeLists.txt` without which nothing builds, or which the lab asks for."""
+"""Lines of `CMakeLists.txt` without which nothing builds, or which the lab asks for, and the package's name."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from grader.model.package import CMAKE, INTERFACE_FOLDERS, MANIFEST, PackageFact
 from grader.model.repair import RepairKind
 from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
 from grader.package.cmake_slips import find_slip, is_open
-from grader.package.manifest import parse_manifest, required_tags
-from grader.package.repairs.editing import Files, naming_files, rename_word, repair_xml
+from grader.package.manifest import parse_manifest
+from grader.package.repairs.editing import Files, naming_files, rename_word
 from grader.package.repairs.files import is_own
+from grader.package.repairs.manifest import declare_for_running
 from grader.package.repairs.names import CPP, Wanted, is_near
-from grader.package.xml import parse_xml
 from grader.wording import join_words, lines_text
 
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
@@ -29,39 +29,9 @@ OF_WORKSPACE = "catkin_workspace"
 OF_GENERATION = re.compile(r"_generate_messages|_gen(cpp|py)$")
 """Targets that generate_messages(…) makes."""
 GENERATE, GENERATION = "generate_messages", "message_generation"
-FORMAT_1 = r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>"
-VALUES = (
-    (r"(<package)(?=>(?:.|\n)*<(?:exec_depend|build_export_depend|depend)>)", r'\1 format="2"',
-     'the tags below belong to `format="2"`'),
-    (r"(<package\s+format\s*=\s*[\"'])(?![123][\"'])[^\"']*", r"\g<1>2", "there is no such format"),
-    (r"(<version>)(?!\s*\d+\.\d+\.\d+\s*<)[^<]*(?=<)", r"\g<1>0.0.0", "this is not a version"),
-    (r"(<maintainer\b[^>]*email=[\"'])(?![^\"'@]+@[\w-]+(?:\.[\w-]+)+[\"'])[^\"']*", r"\1you@example.org",
-     "this is not an e-mail address"),
-    (r"(?<=>)(\s*<(name|version|description)>[^<]*</\2>)(?=\1)", "", "the same tag is there twice"),
-)  # fmt: skip
-"""What a tag of a manifest says that catkin refuses, what is written for it, and the reason."""
-RUN_NEEDS = re.compile(r"<(?:depend|run_depend|exec_depend|build_export_depend)>\s*([\w-]+)\s*<")
-ALL_NEEDS = re.compile(r"<(build_depend|depend|run_depend|exec_depend)>\s*([\w-]+)\s*<")
 
 
-# ---- package.xml
-
-
-def repair_manifest(files: Files, package: PackageFacts, wanted: Wanted) -> str:
-    """Find what the manifest lacks, and return the name that the package has in the end."""
-    text = files.text(MANIFEST)
-    if text is None:
-        return package.name
-    repair_xml(files, MANIFEST, "package", "manifest-line")
-    _correct_values(files)
-    _add_required(files, package.name)
-    _add_buildtool(files)
-    for name in wanted.dependencies:
-        _add_dependency(files, name)
-    manifest, _ = parse_manifest((files.text(MANIFEST) or "").encode())
-    if manifest is None:
-        return package.name
-    return manifest.name
+# ---- the name
 
 
 def rename_package(files: Files, package: PackageFacts, wanted: Wanted) -> None:
@@ -88,82 +58,6 @@ def _is_meant(files: Files, package: PackageFacts, name: str, wanted: str) -> bo
     others = {wanted, PurePosixPath(package.path).name} - {name}
     called = projects == [wanted] or (bool(launched & others) and name not in launched)
     return is_near(name, wanted) or (name != wanted and called)
-
-
-def _parses(text: str) -> bool:
-    return parse_xml(text.encode(), MANIFEST, root="package")[0] is not None
-
-
-def _correct_values(files: Files) -> None:
-    """Correct what catkin refuses: a format, a version, an address, a tag that is there twice."""
-    for pattern, new, message in VALUES:
-        text = files.text(MANIFEST) or ""
-        plain = _blank_comments(text)
-        found = re.search(pattern, plain) if _parses(text) else None
-        if found:
-            changed = text[: found.start()] + found.expand(new) + text[found.end() :]
-            line = text.count("\n", 0, found.end() - len(found[0].lstrip())) + 1
-            fix = "" if new else f"delete line {line}"
-            files.change("manifest-line", MANIFEST, changed, f"line {line} of {MANIFEST}: {message}", fix)
-
-
-def _blank_comments(text: str) -> str:
-    """Return the text with blanks in place of its comments, so that all else stays where it is."""
-    return re.sub(r"<!--.*?-->", lambda found: re.sub(r"[^\n]", " ", found[0]), text, flags=re.DOTALL)
-
-
-def _add_required(files: Files, name: str) -> None:
-    """Add the tags without which catkin refuses a manifest."""
-    for tag, line in required_tags(name).items():
-        text = files.text(MANIFEST) or ""
-        if _parses(text) and not re.search(rf"<{tag}\b", _blank_comments(text)):
-            _insert(files, line, f"{MANIFEST} has no <{tag}>")
-
-
-def _add_buildtool(files: Files) -> None:
-    text = files.text(MANIFEST) or ""
-    plain = _blank_comments(text)
-    if re.search(r"<buildtool_depend[^>]*>\s*catkin\s*<", plain) or not _parses(text):
-        return
-    message = f"{MANIFEST} does not name catkin as its build tool"
-    given = next(
-        (m for m in re.finditer(r"<buildtool_depend>([\w-]+)<", plain) if is_near(m[1], "catkin")), None
-    )
-    if given is not None:
-        changed = f"{text[: given.start(1)]}catkin{text[given.end(1) :]}"
-        files.change("manifest-line", MANIFEST, changed, f"{message}: it names {given[1]}")
-    else:
-        _insert(files, "<buildtool_depend>catkin</buildtool_depend>", message)
-
-
-def _add_dependency(files: Files, name: str) -> None:
-    text = files.text(MANIFEST) or ""
-    given = {match[2] for match in ALL_NEEDS.finditer(_blank_comments(text))}
-    if name in given or not _parses(text):
-        return
-    old = re.search(FORMAT_1, text) is not None
-    lines = [f"<build_depend>{name}</build_depend>", f"<run_depend>{name}</run_depend>"]
-    message = f"{MANIFEST} does not name {name}, which the lab needs"
-    _insert(files, "\n".join(lines) if old else f"<depend>{name}</depend>", message)
-
-
-def _insert(files: Files, tags: str, message: str) -> None:
-    """Put the tags below the last dependency, or the licence, or before the end, where the file still parses."""
-    text = files.text(MANIFEST) or ""
-    lines = text.split("\n")
-    after = [i for i, line in enumerate(lines) if re.search(r"</(\w*depend|license)>\s*$", line)]
-    end = next((i for i, line in reversed(list(enumerate(lines))) if "</package>" in line), len(lines))
-    for at in (*[i + 1 for i in reversed(after)], end):
-        around = lines[at - 1] if at else ""
-        indentation = around[: len(around) - len(around.lstrip())] if at in [i + 1 for i in after] else "  "
-        changed = "\n".join([*lines[:at], *(f"{indentation}{tag}" for tag in tags.split("\n")), *lines[at:]])
-        if (
-            _parses(changed)
-            and _blank_comments(changed) != _blank_comments(text)
-            and tags.split("\n", 1)[0] in _blank_comments(changed)
-        ):
-            files.change("manifest-line", MANIFEST, changed, message)
-            return
 
 
 # ---- CMakeLists.txt
@@ -426,13 +320,11 @@ def _declare_exported(files: Files) -> None:
     """Declare in `package.xml` what `catkin_package(CATKIN_DEPENDS …)` names, as catkin asks for."""
     for call in _commands(files, "catkin_package"):
         for name in _values_of(call, "CATKIN_DEPENDS"):
-            text = _blank_comments(files.text(MANIFEST) or "")
-            if re.fullmatch(r"\w+", name) and name not in RUN_NEEDS.findall(text):
-                tag = "run_depend" if re.search(FORMAT_1, text) else "exec_depend"
+            if re.fullmatch(r"\w+", name):
                 message = (
                     f"line {call.line} of {CMAKE}: catkin_package(…) names {name}, and {MANIFEST} does not"
                 )
-                _insert(files, f"<{tag}>{name}</{tag}>", message)
+                declare_for_running(files, name, message)
 
 
 # ---- messages, services and actions of the package's own
