@@ -17,7 +17,7 @@ from grader.checks.support.launch import (
     Slip,
     finished,
     is_exact,
-    node_slip,
+    node_slips,
     nodes_of_program,
     nodes_of_script,
     nodes_up,
@@ -29,7 +29,6 @@ from grader.checks.support.launch import (
     read_launch,
     refusal,
     refusals,
-    roslaunch_error,
     why_died,
     why_not_up,
 )
@@ -42,7 +41,7 @@ from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Status, Verdict, failed, passed, unjudged
+from grader.model.verdict import FileCitation, Status, Verdict, failed, joined, passed, unjudged
 from grader.wording import join_words, plural
 
 
@@ -135,10 +134,8 @@ def _why_unconnected(
     package: PackageFacts, file: LaunchFile, run: Run, params: LaunchConnectsParams
 ) -> Verdict:
     """Return why no two nodes are connected: a wrong attribute, an error of roslaunch's, or what the graph shows."""
-    said = roslaunch_error(run)
-    for node in file.nodes:
-        if wrong := node_slip(package, node.model_copy(update={"file": file.path}), said):
-            return wrong.verdict(quoted(run))
+    if wrong := node_slips(package, file, run):
+        return wrong
     nodes = run.student_nodes()
     ends = [nodes_on(run, params.topic, end) for end in ("publishers", "subscribers")]
     absent = [node for node in file.brings if not nodes_up(run, node)]
@@ -357,9 +354,9 @@ def _find_unnamed(
 ) -> Verdict | None:
     """The file does not even name a node that is wanted. For scripts that is launch-xml's to judge, unless there is
     something to judge here: others that are `found` running."""
-    for script in params.scripts:
-        if verdict := missing_node(package, file, script):
-            return verdict.model_copy(update={"unjudged": verdict.unjudged or not found})
+    missing = joined([lost for one in params.scripts if (lost := missing_node(package, file, one))])
+    if missing is not None:
+        return missing.model_copy(update={"unjudged": missing.unjudged or not found})
     if twins := _twins(file, params):
         return twins
     for name, pkg in params.nodes.items():

@@ -36,6 +36,8 @@ SEEN_IN_RUNS = {"missing-import", "missing-call", "topic-name", "node-name", "pa
 """These are lost in runs, so no criterion of the files asks for them."""
 DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
 """The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
+OF_SYNTAX = {"python-syntax", "launch-syntax"}
+"""Of a line that could not be read, the copy shows for the first time what it says."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 OF_PACKAGES = {MANIFEST, CMAKE}
 GENERATION = re.compile(r"generate_messages|message_generation|add_(message|service|action)_files")
@@ -257,13 +259,11 @@ def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], crit
 def _is_next(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> bool:
     """Return whether a loss is in what was repaired, and the copy loses the criterion by another fault."""
     files = {repair.file for repair in repairs}
-    found = [c for c in one.citations if isinstance(c, FileCitation) and c.file in files]
+    found = {(c.file, c.line) for c in one.citations if isinstance(c, FileCitation) and c.file in files}
     again = {(c.file, c.line) for c in copy.citations if isinstance(c, FileCitation)}
+    read_now = {(repair.file, repair.line) for repair in repairs if repair.kind in OF_SYNTAX}
     return (
-        found != []
-        and not copy.unjudged
-        and not {(c.file, c.line) for c in found} & again
-        and _is_other_fault(one, copy)
+        found != set() and not copy.unjudged and not found & again - read_now and _is_other_fault(one, copy)
     )
 
 
@@ -408,10 +408,13 @@ def _hints_and_next(
     clauses: list[str], repairs: Iterable[Repair], copy: Verdict, lines: Collection[tuple[str, int]]
 ) -> list[str]:
     """Return the hints on the repairs, followed by the copy's own. Where this one rewrites the only one of `lines`, no
-    other hint on that line is needed."""
+    other hint on that line is needed; of a launch file's line it gives one attribute."""
     then = _at_its_line(copy)
+    whole = then.startswith("on line ")
     rewritten = [
-        one for one in repairs if {(one.file, one.line)} == set(lines) and then.startswith("on line ")
+        one
+        for one in repairs
+        if whole and one.kind != "launch-syntax" and {(one.file, one.line)} == set(lines)
     ]
     for one in rewritten:  # by the name that the file still has
         then = re.sub(r"^on line \d+ of [^,]+", f"on line {one.line} of {one.file}", then)

@@ -25,7 +25,15 @@ from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.submission import chmod_hint
-from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, machine_lacks, unjudged
+from grader.model.verdict import (
+    FileCitation,
+    Verdict,
+    failed,
+    inconclusive,
+    joined,
+    machine_lacks,
+    unjudged,
+)
 from grader.untrusted_text import without_colours
 from grader.wording import join_words
 
@@ -213,10 +221,37 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
         there = has_program(owner, name)
         return None if there else _no_program(owner, node, (package, *package.also))._replace(lacks=name)
     if near_names(package.name, [pkg]) or f"[{pkg}/{name}]" in said or _folder(package) == pkg:
-        slip = _slip(node, f"there is no {name} in a package {pkg}", f'write pkg="{package.name}"')
+        fix = f'write pkg="{package.name}"'
+        then = "" if has_program(package, name) else _no_program(package, node, (package,)).fix
+        fix += f" and {then.removeprefix('write ')}" if then.startswith("write type=") else ""
+        slip = _slip(node, f"there is no {name} in a package {pkg}", fix)
         # Where the launch file has the name of the folder or of project(…), the manifest is at fault.
         return slip._replace(of_manifest=pkg in {_folder(package), *_projects(package)}, lacks=name)
     return None
+
+
+def node_slips(package: PackageFacts, file: LaunchFile, run: Run) -> Verdict | None:
+    """Return what is wrong with the file's own nodes, with what roslaunch said in the run; of one fix for several
+    nodes, with all their lines. None where nothing is."""
+    said = "\n".join(_lines(run))
+    found = [
+        slip
+        for node in file.nodes
+        if (slip := node_slip(package, node.model_copy(update={"file": file.path}), said))
+    ]
+    verdict = joined([_at_its_lines(slip, found).verdict() for slip in found])
+    if verdict is None:
+        return None
+    message = verdict.message.replace(f"; {file.path}, ", "; ")
+    return verdict.model_copy(update={"message": f"{message}{quoted(run)}"})
+
+
+def _at_its_lines(slip: Slip, slips: Sequence[Slip]) -> Slip:
+    """Return the slip with a fix that names its line where there are others, and all lines of the same fix."""
+    lines = [str(one.line) for one in slips if one.fix == slip.fix]
+    if len(slips) < 2:
+        return slip
+    return slip._replace(fix=f"on line{'s' if len(lines) > 1 else ''} {join_words(lines)}, {slip.fix}")
 
 
 def later_fixes(file: LaunchFile, script: str) -> Iterator[str]:
