@@ -3,31 +3,27 @@
 from __future__ import annotations
 
 import asyncio
-import base64
-import re
 import secrets
-import signal
 import struct
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from typing_extensions import Self
 
-from grader.arena.admission import MEMINFO, read_numbers
 from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
+from grader.arena.killed_processes import Killed
+from grader.arena.left_files import LeftFiles
 from grader.arena.process_environment import LOOPBACK, ProcessEnvironment, search_path
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.run_state import ROSOUT, RunState, all_compute
-from grader.arena.sandbox_files import HOME
 from grader.errors import ArenaError
 from grader.evidence.events import OTHER_TYPE, STOPPED, TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
-from grader.evidence.run import is_grader_node, left_name
+from grader.evidence.run import is_grader_node
 from grader.evidence.writer import EvidenceChannel, EvidenceWriter
-from grader.files import open_untrusted
 from grader.ros_env import RosInstallation
 
 ARENA = Path(__file__).parent / "ros"
@@ -40,13 +36,7 @@ END_S = 5.0
 GROUPS_S, LOOK_S = 2.0, 0.02
 STUCK_S = 0.5
 """So long a call is waited for at least, though the programs only compute."""
-LISTED_MAX = 200
 PORT = 11311
-"""Begins the details of limits for which a process is ended (`ros/processes.py`)."""
-SHORT = 0.1
-"""Where less than this part of the memory is available, helpers of the system (earlyoom, systemd-oomd) kill too."""
-BELOW = re.compile(r"Killed signal terminated program|process has died \[pid \d+, exit code -9,")
-"""What the compiler's driver and roslaunch say of a process of theirs that SIGKILL ended."""
 
 
 def arena_command(ros: RosInstallation) -> tuple[list[str], dict[str, str]]:
@@ -386,105 +376,7 @@ def _ignore(time_ns: int, fields: dict[str, Any]) -> None:
     """Ignore a call of one of the grader's services: when it was, and what the arena says."""
 
 
-class Killed:
-    """The processes of one run that were killed, and not by the arena: by the kernel of a machine without memory, by
-    a person, or by their own program. Those that broke a limit are not among them.
-
-    A program that kills itself looks like one that is killed once. One that is killed in every run, while the
-    machine has memory, has done it itself: nothing in a sandbox can kill the sandbox's own process.
-    """
-
-    def __init__(self, *, sandboxed: bool) -> None:
-        self._sandboxed = sandboxed
-        self._names: dict[str, None] = {}
-        self._from_outside = False
-        self._limited: set[str] = set()
-        self._stopping: set[str] = set()
-        self._kills_before = _kernel_kills()
-
-    def stopping(self, name: str) -> None:
-        """Take note that from now on the grader ends the process."""
-        self._stopping.add(name)
-
-    def starting(self, name: str) -> None:
-        """Take note that from now on the process ends by itself again."""
-        self._stopping.discard(name)
-
-    def limited(self, name: str) -> None:
-        self._limited.add(name)
-
-    def printed(self, name: str, line: str) -> None:
-        if name not in self._stopping and BELOW.search(line):
-            self._names[name] = None
-
-    def ended(self, record: dict[str, Any]) -> None:
-        """Take note of a process's last event."""
-        if record["signal"] == signal.SIGKILL and record["stopped_by"] is None:
-            self._names[record["name"]] = None
-            self._from_outside |= self._sandboxed and record["exit_code"] is None
-
-    def first(self, *, last_run: bool) -> str:
-        """Return the name of a process that the machine may have killed, or nothing."""
-        own = last_run and not self._from_outside and not self._short_of_memory()
-        return "" if own else next((name for name in self._names if name not in self._limited), "")
-
-    def _short_of_memory(self) -> bool:
-        return _kernel_kills() != self._kills_before or _available() < SHORT
-
-
-def _kernel_kills() -> int:
-    """Return how often this machine's kernel has killed a process for lack of memory
-    (Documentation/filesystems/proc)."""
-    return read_numbers(Path("/proc/vmstat")).get("oom_kill", 0)
-
-
-def _available() -> float:
-    """Return the part of this machine's memory that is available."""
-    memory = read_numbers(MEMINFO)
-    return memory.get("MemAvailable", 0) / memory.get("MemTotal", 1)
-
-
 def _of(nodes: list[str], topics: Mapping[str, list[str]]) -> dict[str, set[str]]:
     """Return which of these nodes each topic has; topics that have none of them are left out."""
     found = {topic: {*callers} & {*nodes} for topic, callers in topics.items()}
     return {topic: own for topic, own in found.items() if own}
-
-
-class LeftFiles:
-    """The files that a run's processes left, as `ros/processes.py` reads them.
-
-    Each is an event, and what is kept of it an attachment, within the run's limits. A file of the package that is as it
-    was handed in is not left by the run.
-    """
-
-    def __init__(self, place: ProcessEnvironment, writer: EvidenceWriter) -> None:
-        self._place, self._writer = place, writer
-        self._left_bytes, self._left_files = place.limits.kept_bytes, place.limits.kept_files
-        self._listed = 0
-
-    def add(self, process: str, path: str, size_bytes: int, data: str | None, time_ns: int) -> None:
-        """Add a file by its path in the sandbox; `data` is base64, or None where the arena does not keep it."""
-        content = None if data is None else base64.b64decode(data)
-        if self._listed >= LISTED_MAX or self._is_handed_in(path, size_bytes, content):
-            return
-        self._listed += 1
-        shown = path.replace(HOME, "~", 1)
-        event = ActorEvent(action="left", actor=process, value=size_bytes, detail=shown)
-        self._writer.event("/grader/actor", time_ns, event)
-        if content is not None and self._left_files and len(content) <= self._left_bytes:
-            self._left_bytes -= len(content)
-            self._left_files -= 1
-            self._writer.attach(left_name(process, shown), content, time_ns, "application/octet-stream")
-
-    def _is_handed_in(self, path: str, size_bytes: int, content: bytes | None) -> bool:
-        sources = PurePosixPath(self._place.inside_workspace, "src")
-        if not PurePosixPath(path).is_relative_to(sources):
-            return False
-        try:
-            with open_untrusted(
-                self._place.workspace.repaired, *PurePosixPath(path).relative_to(sources).parts
-            ) as file:
-                before = file.read(size_bytes + 1)
-        except OSError:
-            return False
-        return len(before) == size_bytes and content in {None, before}

@@ -78,7 +78,7 @@ def open_lab(course: CourseFile, name: str) -> BatchFolder | None:
 
 
 def late_days_taken(course: CourseFile, name: str) -> Counter[str]:
-    """Return by `folder_key` of the student's id what the labs before this one took, as numbers below 0."""
+    """Return by `folder_key` of the student's id how many late days the labs before this one took."""
     used: Counter[str] = Counter()
     for earlier in course.course.labs:
         if earlier == name:
@@ -86,7 +86,7 @@ def late_days_taken(course: CourseFile, name: str) -> Counter[str]:
         batch = open_lab(course, earlier)
         for row in batch.rows() if batch else ():
             if row.result.late is not None:
-                used[folder_key(row.entry.id)] -= row.result.late.late_days_used
+                used[folder_key(row.entry.id)] += row.result.late.late_days_used
     return used
 
 
@@ -99,7 +99,7 @@ def with_late_days(roster: Roster, course: CourseFile, name: str) -> Roster:
     most = days.budget if days.per_lab is None else days.per_lab
 
     def left(entry: Entry) -> int:
-        return max(0, min(most, days.budget + used[folder_key(entry.id)]))
+        return max(0, min(most, days.budget - used[folder_key(entry.id)]))
 
     entries = tuple(entry.model_copy(update={"late_days": left(entry)}) for entry in roster.entries)
     return roster.model_copy(update={"entries": entries})

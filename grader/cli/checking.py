@@ -7,11 +7,13 @@ from what is pushed; git is asked about that in a thread beside the grading, and
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from pathlib import Path
 
 from rich.console import RenderableType
@@ -274,8 +276,9 @@ def _parts(found: GitStatus, encoding: str) -> Iterator[RenderableType]:
 
 def _point(point: Point, encoding: str) -> Iterator[RenderableType]:
     yield Padding(Text(_fit_encoding(point.text, encoding)), (0, 0, 0, 2))
-    for command in filter(None, point.fix.split(" && ")):
-        yield Padding(Text(_fit_encoding(command, encoding), "bold"), (0, 0, 0, 6))
+    for is_between, words in groupby(shlex.split(point.fix), "&&".__eq__):
+        if not is_between:
+            yield Padding(Text(_fit_encoding(shlex.join(words), encoding), "bold"), (0, 0, 0, 6))
 
 
 def _fit_encoding(text: str, encoding: str) -> str:

@@ -30,8 +30,7 @@ from grader.integrations.ci_results import (
     keep,
 )
 from grader.integrations.ci_systems import (
-    GitHubRunner,
-    GitLabRunner,
+    RUNNERS,
     JobSettings,
     read_settings,
     with_pass_mark,
@@ -51,11 +50,7 @@ WHICH = "give the package's folder as path (GRADER_PATH), and the lab as lab (GR
 def run_job(system: str) -> ExitCode:
     """Run the job of `github` or `gitlab`; it fails as `GRADER_FAIL_ON` says."""
     variables = dict(os.environ)
-    teller = (
-        GitHubRunner(variables)
-        if system == "github"
-        else GitLabRunner(Path(variables.get("GRADER_OUT") or "grader-results"))
-    )
+    teller = RUNNERS[system](variables)
     try:
         settings = read_settings(variables)
         with teller.commands_stopped():

@@ -30,7 +30,7 @@ Params = ParamSpec("Params")
 Found = TypeVar("Found")
 
 HELD_BYTES_MAX = 192 << 20
-"""More than the arena records of one submission (`arena/sandbox.py`)."""
+"""More than the arena records of one submission (`arena/limits.py`)."""
 FOREIGN_BYTES_MAX = 96 << 20
 """Of other tools' recordings, which are held unpacked beside it."""
 DECODED_BYTES_MAX = 160 << 20

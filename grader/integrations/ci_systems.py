@@ -3,6 +3,9 @@
 GitHub gets annotations, the step's summary and outputs. Values go into files, each between lines that cannot be
 guessed; while anything of a student's may be printed, the runner is told to ignore commands. For GitLab the reports are
 files that `ci/gitlab.yml` names; later jobs get the points as variables.
+
+A new system needs a class with the methods of `GitHubRunner` and an entry in `RUNNERS`, its name in `grader ci`
+(`cli/commands/integrations.py`), its job number in `COUNTERS`, a file in `ci/` and a guide.
 """
 
 from __future__ import annotations
@@ -288,10 +291,10 @@ VARIABLES = "grader.env"
 
 
 class GitLabRunner:
-    """Tells GitLab's runner through files in `out`."""
+    """Tells GitLab's runner through files in the folder of the results."""
 
-    def __init__(self, out: Path) -> None:
-        self._out = out
+    def __init__(self, variables: Mapping[str, str]) -> None:
+        self._out = Path(variables.get("GRADER_OUT") or OUT)
 
     @contextmanager
     def commands_stopped(self) -> Iterator[None]:
@@ -319,3 +322,6 @@ class GitLabRunner:
         atomic_write(
             self._out / VARIABLES, "".join(f"{name}={value}\n" for name, value in values.items()).encode()
         )
+
+
+RUNNERS: Mapping[str, type[GitHubRunner | GitLabRunner]] = {"github": GitHubRunner, "gitlab": GitLabRunner}

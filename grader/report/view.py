@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from unicodedata import east_asian_width
 
 from grader.errors import PackageNotFound, SubmissionError
-from grader.judging.settle import awarded, lateness
+from grader.judging.settle import awarded, lateness, status_after_overrides
 from grader.judging.summary import total_fields, total_points
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult, GradingResult
@@ -482,7 +482,7 @@ def without_hidden(result: GradingResult, rubric: Rubric) -> GradingResult:
         "late": late,
         "points": late.points if late else points,
         "max_points": round(sum(c.max_points for c in shown), 6),
-        "status": _status(result, shown, awarded(decided)),
+        "status": status_after_overrides(result, shown, awarded(decided)),
     }
     return result.model_copy(update=update)
 
@@ -548,12 +548,3 @@ def _in_one(criteria: list[CriterionResult]) -> tuple[CriterionResult, ...]:
         citations=(),
     )
     return (row,)
-
-
-def _status(result: GradingResult, shown: tuple[CriterionResult, ...], decided: Collection[str]) -> str:
-    if result.error and any(c.counts and c.id not in decided for c in shown):
-        return "error"
-    statuses = {c.status for c in shown if c.counts}
-    if not statuses or Status.ERROR in statuses:
-        return "error"
-    return "inconclusive" if statuses & {Status.INCONCLUSIVE, Status.MANUAL} else "graded"

@@ -24,6 +24,7 @@ from grader.intake.tree import list_entries
 from grader.model.package import BUILD_SPACES
 from grader.model.result import GitStatus, Point
 from grader.portable import MODES_ON_DISK
+from grader.wording import plural
 
 SECONDS = 5.0
 NAMED_AT_MOST = 4
@@ -156,7 +157,7 @@ class _Advice:
         """What is on the disk and not in a commit. What is staged just before a commit is on its way into one."""
         files, commands = self._files, self._commands
         if files.changed and not self._environment.committing:
-            changes = "1 change is" if len(files.changed) == 1 else f"{len(files.changed)} changes are"
+            changes = plural(len(files.changed), "change is", "changes are")
             text = f"{changes} not committed: {listing(list(files.changed))}"
             fix = commands.add_and_commit([p for p in files.changed if p not in files.staged])
             yield Point(kind="uncommitted", text=text, fix=commands.git("status") if files.conflicts else fix)
@@ -164,9 +165,8 @@ class _Advice:
             text = f"git calls it {printable(in_git)}, this disk {printable(on_disk)}: on Linux they differ."
             yield Point(kind="uncommitted", text=text, fix=commands.rename(in_git, on_disk))
         if files.untracked:
-            number = "1 file" if len(files.untracked) == 1 else f"{len(files.untracked)} files"
-            verb = "is" if len(files.untracked) == 1 else "are"
-            text = f"{number} of the package {verb} not in git: {listing(list(files.untracked))}"
+            number = plural(len(files.untracked), "file of the package is", "files of the package are")
+            text = f"{number} not in git: {listing(list(files.untracked))}"
             yield Point(kind="untracked", text=text, fix=commands.add_and_commit(files.untracked))
         if files.pointers:
             text = f"git has only a pointer to another repository for {listing(list(files.pointers))}, not the files."
@@ -210,11 +210,11 @@ class _Advice:
             fix = " && ".join((git("switch", default), git("merge", branch), git("push")))
             return Point(kind="other-branch", text=text, fix=fix)
         if server.ahead:
-            commits = "1 commit is" if server.ahead == 1 else f"{server.ahead} commits are"
+            commits = plural(server.ahead, "commit is", "commits are")
             text = f"{commits} not pushed to {printable(marked)}; {where}"
             fix = f"{git('pull')} && {push}" if server.behind else push
             return Point(kind="unpushed", text=text, fix=fix)
-        commits = "1 commit that is" if server.behind == 1 else f"{server.behind} commits that are"
+        commits = plural(server.behind, "commit that is", "commits that are")
         return Point(kind="unpushed", text=f"{printable(marked)} has {commits} not here", fix=git("pull"))
 
 

@@ -73,7 +73,7 @@ def test_the_verdicts_stay_what_the_disk_says(lab: Clone) -> None:
     assert before["points"] == after["points"]
     assert before["standing"]["points"] == []
     assert [point["kind"] for point in after["standing"]["points"]] == ["untracked"]
-    assert list(after)[:4] == ["schema", "submission", "rubric", "status"]
+    assert list(after)[:3] == ["schema", "submission", "rubric"]
 
 
 @pytest.mark.full
@@ -138,6 +138,13 @@ def test_hostile_text_is_shown_and_obeyed_by_nobody(lab: Clone) -> None:
     done = check(cwd=lab.package)
     assert "\x1b" not in done.stdout
     assert not any(row.lstrip().startswith("::") for row in done.stdout.splitlines())
+
+
+def test_a_file_whose_name_has_a_sign_of_the_shell_stays_one_word(lab: Clone) -> None:
+    (lab.package / "src" / "count && tell.py").write_text(SCRIPT)
+    lines = [row.strip() for row in check(cwd=lab.package).stdout.splitlines()]
+    assert "git add 'src/count && tell.py'" in lines
+    assert "git commit -m Lab" in lines
 
 
 def test_a_point_is_a_record() -> None:

@@ -97,7 +97,8 @@ def example(
 def validate_rubrics(*, files: Annotated[Sequence[str], Argument("FILE", "rubric files")]) -> ExitCode:
     """Check rubric files, and name every fault.
 
-    It warns of a name that one line alone has: it may be right, or misspelt.
+    It warns of what may be meant and may be a slip: a name that one line alone has, two criteria that judge the same,
+    a time that a busy machine exceeds.
     """
     with loading():
         from grader.cli.output import say
