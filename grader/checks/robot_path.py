@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import check
-from grader.checks.support.clocks import Lateness, excused, run_seconds
+from grader.checks.support.clocks import Lateness, excused, lateness, run_seconds
 from grader.checks.support.geometry import (
     MOVED_M,
     Course,
@@ -24,6 +24,7 @@ from grader.checks.support.geometry import (
     relative,
     set_off_s,
     stands,
+    top_speeds,
     track,
     turns_of,
 )
@@ -137,11 +138,21 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
         return unjudged("it never moves", measured=figures, hint=hint)
     words = _in_degrees(run) or what_is_wrong(taken, params.way, course, mirror=params.relative)
     verdict = failed(words.message, hint=words.hint, measured=figures)
-    nearly = followed(taken, params.way.points, 2 * params.tolerance_m)
+    nearly = followed(taken, params.way.points, 2 * params.tolerance_m + _drift_m(run, taken, params.way))
     if not nearly.done and not _strays_late(nearly, params.way):
         return verdict
     # a robot that only just strays may have strayed with a machine that was late itself
     return excused(verdict, run, run.start_ns, run.end_ns, _why_late)
+
+
+def _drift_m(run: Run, path: Sequence[Pose], way: Way) -> float:
+    """Return how far a machine that once stood still leads a robot astray that drives, or turns, by time (m)."""
+    late = lateness(run, run.start_ns, run.end_ns)
+    if late is None:
+        return 0.0
+    speed, turn = top_speeds(path)
+    leg_m = max((math.dist(*leg) for leg in pairwise(way.points)), default=0.0)
+    return late.max_ms / 1e3 * run.warp * max(speed, turn * leg_m)
 
 
 def _strays_late(course: Course, way: Way) -> bool:

@@ -23,6 +23,7 @@ from grader.wording import significant
 SAMPLE_M = 0.02
 SAMPLE_RAD = 0.2
 SAMPLES_MAX = 2000
+MEAN_S = 0.2
 
 Point = tuple[float, float]
 Polyline = tuple[Point, ...]
@@ -136,6 +137,18 @@ def set_off_s(path: Sequence[Pose]) -> float:
 
 def length_m(path: Sequence[Pose]) -> float:
     return sum(math.dist(a.point, b.point) for a, b in pairwise(path))
+
+
+def top_speeds(path: Sequence[Pose]) -> tuple[float, float]:
+    """Return the highest speed (m/s) and turn (rad/s), each over a time long enough for a mean."""
+    speed = turn = 0.0
+    first = path[0] if path else None
+    for pose in path:
+        if first is not None and (lasted := pose.time_s - first.time_s) >= MEAN_S:
+            turned = math.remainder(pose.heading - first.heading, math.tau)
+            speed = max(speed, math.dist(pose.point, first.point) / lasted)
+            turn, first = max(turn, abs(turned) / lasted), pose
+    return speed, turn
 
 
 def off_m(point: Point, start: Point, end: Point) -> float:
