@@ -375,7 +375,7 @@ def _charge(
     told_at_once = paths != [] and all(path in verdict.hint for path in paths)
     if copy.status.is_lost and verdict.hint and (told_at_once or not (is_next or further)):
         return verdict  # the repair brings up what its own advice is about
-    told = [one for one in repairs if _is_told(one, verdict.hint)]
+    told = [one for one in repairs if _is_told(one, verdict.hint) and not _is_further_down(one, verdict)]
     clauses = verdict.hint.split("; ") if told else []
     if any(one not in told for one in repairs):
         clauses = [clause for clause in clauses if any(_is_told(one, clause) for one in told)]
@@ -450,6 +450,13 @@ def _is_told(repair: Repair, hint: str) -> bool:
     new = _new_words(repair)
     of_package = repair.kind in {"package-name", *OF_BUILDS} and repair.file in OF_PACKAGES
     return of_package and new <= _words(hint) and new != set()
+
+
+def _is_further_down(repair: Repair, verdict: Verdict) -> bool:
+    """Return whether the wrong word of a call over several lines stands below the only line that the verdict cites."""
+    lines = [line for file, line in cited_lines(verdict.citations) if file == repair.file]
+    one_word = repair.kind in OF_BUILDS and "\n" not in repair.before + repair.after
+    return one_word and "; " not in verdict.hint and len(lines) == 1 and lines[0] < (repair.line or 0)
 
 
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:

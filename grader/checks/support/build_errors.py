@@ -324,7 +324,10 @@ def _missing_files(
     seen = f"; there is {join_words(dict.fromkeys(near.values()))}" if near else ""
     if len(paths) == 1:
         hint = f"add {paths[0]} and push it, or {leave.replace('them', 'it') or f'remove it from {where}'}"
-        hint = f"write {near[paths[0]]} there" if near else hint
+        if near:
+            (old_folder, old), (folder, new) = map(posixpath.split, (paths[0], near[paths[0]]))
+            here = f"write {new} instead of {old}"
+            hint = here if folder == old_folder else f"write {folder}/{new} there"
         return Explained(f"{words}, which is not in the package{seen}", hint)
     hints = [f"write {right} instead of {path}" for path, right in near.items()]
     if rest := [path for path in paths if path not in near]:
