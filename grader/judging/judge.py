@@ -106,7 +106,9 @@ def judge_all_runs(
         verdicts, uses = apply_repaired_copy(
             rubric, verdicts, on_copy, repairs, built=built, launched=launched_in(of_copy.package)
         )
-    verdicts = add_later_faults(verdicts, rubric, of_copy if repaired else facts)
+        verdicts = add_later_faults(verdicts, rubric, of_copy, handed_in=facts.package, repairs=repairs)
+    else:
+        verdicts = add_later_faults(verdicts, rubric, facts)
     build = first.get(PACKAGE_RUN)
     shown = dict(verdicts)
     if build is not None:
