@@ -114,7 +114,8 @@ def judge_all_runs(
     if build is not None:
         for criterion in rubric.criteria:
             placed = cite_quoted(verdicts[criterion.id], criterion, facts, build)
-            placed = cite_source(placed, criterion, facts, build)
+            used = uses.get(criterion.id)
+            placed = cite_source(placed, criterion, facts, build, used.repairs if used else ())
             placed = cite_commented_call(placed, facts.package_of(criterion), build)
             placed = cite_find(placed, criterion, facts.package_of(criterion), build)
             shown[criterion.id] = show_lines(cite_name(placed, build), build)

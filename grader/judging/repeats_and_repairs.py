@@ -461,10 +461,17 @@ def _is_told(repair: Repair, hint: str) -> bool:
     return of_package and new <= _words(hint) and new != set()
 
 
+def _what_was_done(repairs: Iterable[Repair]) -> str:
+    """Return `a.py renamed and b.py line 6 repaired`."""
+    done: dict[str, dict[str, None]] = {}
+    for one in repairs:
+        done.setdefault("renamed" if one.kind == "file-name" else "repaired", {})[place_of(one)] = None
+    return " and ".join(f"{join_words(places)} {how}" for how, places in done.items())
+
+
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:
-    where = join_words(dict.fromkeys(place_of(repair) for repair in repairs))
     score = copy.score * share
     status = Status.PARTIAL if share < 1 and copy.status is Status.PASS else copy.status
     points = f"{share_text(share)} of the points; " if copy.score and not copy.right else ""
-    message = f"judged on a copy with {where} repaired: {points}{copy.message}"
+    message = f"judged on a copy with {_what_was_done(repairs)}: {points}{copy.message}"
     return copy.model_copy(update={"status": status, "score": score, "message": message})

@@ -18,7 +18,7 @@ from grader.rubric.model import Rubric
 from grader.untrusted_text import CITATIONS_MAX, clip, visible
 from grader.wording import join_words, number, plural
 
-ON_COPY = re.compile(r"judged on a copy with .*? repaired: ")
+ON_COPY = re.compile(r"judged on a copy with .*? (?:renamed|repaired): ")
 NAMES, NUMBERS = re.compile(r"/[\w/~]+"), re.compile(r"-?\d+(\.\d+)?")
 PLACE_CHARS = 300
 SOURCE_CHARS = 60
