@@ -24,6 +24,7 @@ from grader.judging.repeats_and_repairs import (
     is_used_by,
     launched_in,
     needs_build,
+    programs_of_build,
 )
 from grader.model.package import MANIFEST, PackageFacts
 from grader.model.progress import Progress, Silence, StepState
@@ -83,10 +84,15 @@ def choose_repairs(
         return (), ()
     # of a script that the build makes a program of, neither its bit nor its first line is used
     made = {c.mistake.name for c in criteria if c.mistake is not None and is_unmade(c)}
+    made |= {
+        one.before for one in chosen if one.kind == "file-name" and one.before in programs_of_build(facts)
+    }
     before = [
         one
         for one in counting
-        if one.kind in DONE_BEFORE_RUNS and one.file not in made and not is_first_line_added(one, rubric)
+        if one.kind in DONE_BEFORE_RUNS
+        and one.file not in made
+        and not is_first_line_added(one, rubric, chosen)
     ]
     return (*before, *chosen), tuple(scenarios)
 

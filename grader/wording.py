@@ -6,6 +6,7 @@ Pure functions that every room may use. Nothing is escaped here: `untrusted_text
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Sequence
 
 LISTED_MAX = 6
@@ -45,6 +46,12 @@ def join_words(names: Iterable[str], last: str = "and") -> str:
     return " ".join([", ".join(items[:-1]), last, items[-1]]) if len(items) > 1 else "".join(items)
 
 
+def there_is(names: Iterable[str]) -> str:
+    """Return `there is a`, `there are a and b`."""
+    items = list(names)
+    return f"there {'is' if len(items) == 1 else 'are'} {join_words(items)}"
+
+
 def first_few(names: Sequence[str], most: int) -> str:
     """Return `a, b, c and 4 more`: the first `most` names, and how many more there are."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
@@ -54,6 +61,33 @@ def first_few(names: Sequence[str], most: int) -> str:
 def shorten(text: str, chars_max: int) -> str:
     """Return `text`, or its beginning with an ellipsis, at most so many characters."""
     return text if len(text) <= chars_max else text[: chars_max - 1] + "…"
+
+
+ROLES = (
+    ("talker", "publisher", "pub", "pubs", "sender", "emitter", "speaker", "publicador", "emisor"),
+    (
+        *("listener", "subscriber", "sub", "subs", "receiver", "hearer"),
+        *("suscriptor", "subscriptor", "receptor", "oyente"),
+    ),
+    ("server", "service"),
+)
+"""Words for the same kind of node in the names of scripts."""
+PARTS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+
+
+def has_role_of(one: str, other: str) -> bool:
+    """Return whether two scripts are called by different words for the same kind of node, "talker" and
+    "publisher". By the same word they are two that a lab asks for."""
+    given, wanted = ({part.casefold() for part in PARTS.findall(_stem(path))} for path in (one, other))
+    return any(
+        word in wanted and given & {*words} - {word} and word not in given
+        for words in ROLES
+        for word in words
+    )
+
+
+def _stem(path: str) -> str:
+    return path.rpartition("/")[2].partition(".")[0]
 
 
 def closest(word: str, candidates: Iterable[str], *, cutoff: float = 0.6) -> str:

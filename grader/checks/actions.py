@@ -19,7 +19,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
-from grader.wording import join_words, plural, significant
+from grader.wording import join_words, plural, significant, there_is
 
 GOES_ON_NS = 1_000_000_000
 """Feedback so long after a goal was cancelled says that the server goes on with it."""
@@ -278,7 +278,7 @@ def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> V
     servers = [t.removesuffix("/goal") for t in topics_with(run, "subscribers") if t.endswith("/goal")]
     if near := near_names(params.action, servers):
         hint = f"give SimpleActionServer(…) the name '{bare}'"
-        return unjudged(f"{what}; there is {join_words(near)}", hint=hint, measured=join_words(servers))
+        return unjudged(f"{what}; {there_is(near)}", hint=hint, measured=join_words(servers))
     if absent := no_node(package, run, what):
         return absent
     if end := explain_error(package, run):
@@ -286,7 +286,7 @@ def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> V
     if slip := run_slip(package, run, "not-started", "not-called"):
         why = f"{what}: {slip.message} ({slip.file}, line {slip.line})"
         return unjudged(why, hint=slip.fix, measured="no action server", citations=(slip.place,))
-    others = f"; there is {join_words(servers)}" if servers else ""
+    others = f"; {there_is(servers)}" if servers else ""
     hint = f"actionlib.SimpleActionServer('{bare}', …, auto_start=False), and then start()"
     return unjudged(f"{what}{others}", hint=hint, measured=join_words(servers) or "no action server")
 

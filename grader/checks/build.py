@@ -36,7 +36,7 @@ from grader.model.verdict import (
     unjudged,
 )
 from grader.untrusted_text import without_colours
-from grader.wording import join_words, seconds
+from grader.wording import join_words, seconds, there_is
 
 NO_PROGRAM = {"IMPORTED", "ALIAS", "EXCLUDE_FROM_ALL"}
 CANNOT_START = {126, 127}
@@ -208,7 +208,7 @@ def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | No
     if not lost:
         return None
     near = [there[n] for s in lost for n in near_names(PurePosixPath(s).name, there)]
-    seen = f"; there is {join_words(dict.fromkeys(near))}" if near else ""
+    seen = f"; {there_is(dict.fromkeys(near))}" if near else ""
     push = ", then git add, commit and push" if handed_in_with_git(package) else ""
     return unjudged(
         f"catkin_make succeeded, but there is no {join_words(lost, 'or')} to run{seen}",

@@ -30,7 +30,7 @@ from grader.model.package import CMAKE, Fault, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.submission import chmod_hint
 from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, inconclusive, passed, unjudged
-from grader.wording import join_words
+from grader.wording import has_role_of, join_words, there_is
 
 # a script without its first line is run by the shell, which knows no `import`
 TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
@@ -198,9 +198,9 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     near += [p for n, p in names.items() if n == wanted.stem and p not in near]
     movable = [p for p in near if can_be_moved(p, path)]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
-    seen = f"; there is {join_words(near)}" if near else ""
-    alike = [p for p in scripts if not near and _has_role_of(p, path)]
-    seen = f"; there is {alike[0]}" if len(alike) == 1 else seen
+    seen = f"; {there_is(near)}" if near else ""
+    alike = [p for p in scripts if not near and has_role_of(p, path)]
+    seen = f"; {there_is(alike)}" if alike else seen
     hint = (
         f"{move_hint(package, movable[0], path)}{_where_named(package, movable[0])}"
         if movable
@@ -234,25 +234,6 @@ def _where_named(package: PackageFacts, path: str) -> str:
         if n.type == PurePosixPath(path).name and n.pkg == package.name
     ]
     return f"; write the new name in {join_words(dict.fromkeys(places))} too" if places else ""
-
-
-ROLES = (
-    ("talker", "publisher", "pub", "sender", "emitter"),
-    ("listener", "subscriber", "sub", "receiver"),
-    ("server", "service"),
-)
-"""Words for the same kind of node in the names of scripts."""
-
-
-def _has_role_of(one: str, other: str) -> bool:
-    """Return whether two scripts are called by different words for the same kind of node, "talker" and
-    "publisher". By the same word they are two that a lab asks for."""
-    given, wanted = (PurePosixPath(path).stem.casefold().split("_") for path in (one, other))
-    return any(
-        word in wanted and set(words).intersection(given) - {word} and word not in given
-        for words in ROLES
-        for word in words
-    )
 
 
 def _mode_obstacles(file: SourceFile, remarks: tuple[str, ...]) -> Iterator[Obstacle]:

@@ -35,7 +35,7 @@ from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFil
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, joined, passed, unjudged
 from grader.untrusted_text import without_colours
-from grader.wording import join_words, plural
+from grader.wording import join_words, plural, there_is
 
 
 class LaunchXmlParams(Record):
@@ -349,7 +349,7 @@ def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> V
     if slips:
         return slips[0].verdict()
     lying = [f.path for f in package.files if f.path.endswith(".sh")]
-    seen = f"; there is {join_words(lying)} in the package" if lying else ""
+    seen = f"; {there_is(lying)} in the package" if lying else ""
     name = PurePosixPath(lying[0]).name if lying else "<script>.sh"
     hint = f"below <launch>, add {_node_tag(package.name, name)}"
     return failed(f"{file.path} has no <node> that starts a shell script{seen}", hint=hint)

@@ -40,7 +40,7 @@ from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchLoad, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
-from grader.wording import join_words, significant
+from grader.wording import join_words, significant, there_is
 
 SUMMARY = re.compile(r"\s*\*\s+/")  # roslaunch's list of parameters
 OUTSIDE = 'write <rosparam file="$(find {})/{}"/> outside the <node>, without ns'
@@ -355,7 +355,7 @@ def _elsewhere(before: Mapping[str, Any], node: str, wanted: Wanted) -> Verdict:
         message = f"{found} is on the parameter server, but {node} reads {node}/{found.rpartition('/')[2]}"
         return failed(message, hint=hint)
     near = [name for name in before if name.startswith(f"{node}/")]
-    seen = f"; under {node}/ there is {join_words(near)}" if near else ""
+    seen = f"; under {node}/ {there_is(near)}" if near else ""
     message = f"{join_words(wanted)} are not on the parameter server{seen}: {node} reads {node}/{first}"
     return failed(message, hint=hint)
 

@@ -42,7 +42,7 @@ from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, joined, passed, unjudged
-from grader.wording import join_words, plural
+from grader.wording import join_words, plural, there_is
 
 
 class LaunchConnectsParams(Record):
@@ -125,9 +125,7 @@ def _names_missing(nodes: tuple[str, ...], file: LaunchFile, params: LaunchConne
         return None
     cited = (FileCitation(file=file.path, line=1),)
     hint = "the `name` in the launch file is the node's name"
-    return failed(
-        f"{join_words(missing)} did not come up; there is {join_words(nodes)}", hint=hint, citations=cited
-    )
+    return failed(f"{join_words(missing)} did not come up; {there_is(nodes)}", hint=hint, citations=cited)
 
 
 def _why_unconnected(

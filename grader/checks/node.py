@@ -17,6 +17,7 @@ from grader.checks.support.exit_causes import (
 from grader.checks.support.processes import (
     Anonymous,
     Life,
+    all_named_at,
     are_noted,
     base_name,
     fell_silent,
@@ -25,7 +26,6 @@ from grader.checks.support.processes import (
     life,
     lives,
     name_hint,
-    named_at,
     nodes_of,
     not_started,
     wanted_names,
@@ -161,8 +161,14 @@ def _judge_misnamed(
     if not params.names or _fitting(nodes, params):
         return None
     given = params.names, nodes, params.anonymous
-    cited = named_at(package, run, "node-name", base_name(nodes[0])) if nodes else ()
-    return failed(wrong_name(*given), hint=name_hint(*given), citations=cited)
+    cited = all_named_at(package, run, "node-name", base_name(nodes[0])) if nodes else ()
+    if len({one.file for one in cited}) > 1:
+        cited = ()
+    hint = name_hint(*given)
+    if len(cited) > 1:
+        lines = join_words(str(one.line) for one in cited)
+        hint = f"{hint}, on lines {lines} alike: a second call with other arguments ends the node"
+    return failed(wrong_name(*given), hint=hint, citations=cited)
 
 
 def _up_ns(one: Life, run: Run, nodes: tuple[str, ...]) -> int:

@@ -44,7 +44,7 @@ from grader.model.verdict import (
     passed,
     unjudged,
 )
-from grader.wording import join_words, plural
+from grader.wording import join_words, plural, there_is
 
 EXACT = 1e-9
 MISSING = object()
@@ -127,7 +127,7 @@ def _no_file(package: PackageFacts, build: Run, path: str, wanted: list[str]) ->
     near = [names[n] for n in near_names(name, names)]
     near = [p for p in near if not (keys := _keys_of(build, p)) or asked & _parts(keys)]
     there = near or yaml
-    seen = f"; there is {join_words(there)}" if there else ""
+    seen = f"; {there_is(there)}" if there else ""
     movable = [p for p in near if can_be_moved(p, path)]
     hint = move_hint(package, movable[0], path) if movable else add_hint(package, path)
     verdict = failed(f"{path} is not in the package{seen}", hint=hint)
@@ -651,7 +651,7 @@ def _given_at(package: PackageFacts, build: Run, name: str) -> tuple[FileCitatio
 def _not_there(package: PackageFacts, run: Run, names: Iterable[str], params: ParamValueParams) -> Verdict:
     near = near_names(params.name, names)
     if near:
-        message = f"there is no parameter {params.name}; there is {join_words(near)}"
+        message = f"there is no parameter {params.name}; {there_is(near)}"
         hint = "with ~, or inside <node>, a parameter gets the node's name in front; otherwise it does not"
         return failed(message, hint=hint)
     if absent := no_node(package, run, f"there is no parameter {params.name}"):

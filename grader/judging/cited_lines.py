@@ -7,7 +7,8 @@ A verdict and the files that were recorded come in; the verdict goes out with th
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from pathlib import PurePosixPath
 
 from grader.checks.cmake import NOT_CALLED, below_catkin_package
 from grader.checks.support.launch import find_launch
@@ -23,8 +24,9 @@ from grader.checks.support.scripts import (
     lines_that_transform,
 )
 from grader.evidence.run import Run
-from grader.judging.facts import Facts, scripts_of, sources_of
+from grader.judging.facts import Facts, names_started, scripts_of, sources_of
 from grader.model.package import CMAKE, PackageFacts
+from grader.model.repair import Repair
 from grader.model.verdict import Citation, FileCitation, Status, Verdict
 from grader.rubric.model import Criterion
 from grader.wording import join_words, lines_text
@@ -39,15 +41,20 @@ SAYS = {
 """The checks of what a node says, and what a line of Python or C++ calls that says them."""
 
 
-def cite_source(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
+def cite_source(
+    verdict: Verdict, criterion: Criterion, facts: Facts, build: Run, repairs: Iterable[Repair] = ()
+) -> Verdict:
     """Return the verdict; one on what a node says, sends or asks with the line of the script that does so, if it is
-    plain which one that is."""
+    plain which one that is. `repairs` are those of the copy that was judged."""
     package = facts.package_of(criterion)
     placed = any(isinstance(one, FileCitation) for one in verdict.citations)
     lost = verdict.status in {Status.PARTIAL, Status.FAIL} and not verdict.unjudged
     if placed or not lost or package is None or package is not facts.package:
         return verdict
     paths = scripts_of(criterion, facts.rubric, package) | sources_of(criterion, facts.rubric, package)
+    started = names_started(criterion, facts.rubric)
+    renamed = (one for one in repairs if one.kind == "file-name")
+    paths |= {one.before for one in renamed if PurePosixPath(one.after).name in started}
     lines = [
         SourceLine(path, number, text)
         for path in sorted(paths)

@@ -106,13 +106,16 @@ def judge_all_runs(
         verdicts, uses = apply_repaired_copy(
             rubric, verdicts, on_copy, repairs, built=built, launched=launched_in(of_copy.package)
         )
-    verdicts = add_later_faults(verdicts, rubric, of_copy if repaired else facts)
+        verdicts = add_later_faults(verdicts, rubric, of_copy, handed_in=facts.package, repairs=repairs)
+    else:
+        verdicts = add_later_faults(verdicts, rubric, facts)
     build = first.get(PACKAGE_RUN)
     shown = dict(verdicts)
     if build is not None:
         for criterion in rubric.criteria:
             placed = cite_quoted(verdicts[criterion.id], criterion, facts, build)
-            placed = cite_source(placed, criterion, facts, build)
+            used = uses.get(criterion.id)
+            placed = cite_source(placed, criterion, facts, build, used.repairs if used else ())
             placed = cite_commented_call(placed, facts.package_of(criterion), build)
             placed = cite_find(placed, criterion, facts.package_of(criterion), build)
             shown[criterion.id] = show_lines(cite_name(placed, build), build)

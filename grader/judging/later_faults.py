@@ -7,11 +7,12 @@ Only plain values in sources count, no status changes, and what a check says of 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 
 from grader.checks.messages import code_of
 from grader.checks.support.console_output import probes_on
+from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch import (
     NOT_STARTED,
     find_launch,
@@ -22,6 +23,7 @@ from grader.checks.support.launch import (
 )
 from grader.checks.support.launch_names import find_renaming
 from grader.checks.support.missing_names import name_slip
+from grader.checks.support.scripts import SYNTAX
 from grader.checks.support.text import (
     IN_OWN_WORDS,
     SAID_DATA,
@@ -40,9 +42,11 @@ from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.installable import NOTHING_TO_DO
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ
+from grader.judging.copy_lines import text_as_handed_in
 from grader.judging.facts import SOURCES, Facts, names_started, scripts_of, sources_of
 from grader.model.package import PackageFacts, PythonSlip
-from grader.model.verdict import FileCitation, Verdict
+from grader.model.repair import Repair
+from grader.model.verdict import Verdict
 from grader.rubric.model import Criterion, Rubric
 from grader.wording import join_words, significant
 
@@ -54,9 +58,16 @@ RATE_SHARE = 0.05
 """By so much a rate that a script asks for may differ from the right one."""
 
 
-def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Facts) -> dict[str, Verdict]:
+def add_later_faults(
+    verdicts: Mapping[str, Verdict],
+    rubric: Rubric,
+    facts: Facts,
+    *,
+    handed_in: PackageFacts | None = None,
+    repairs: Sequence[Repair] = (),
+) -> dict[str, Verdict]:
     """Return the verdicts; where there was nothing to judge of a node, the hint goes on with what its source shows of
-    the criteria that were not reached."""
+    the criteria that were not reached. `facts` may be those of a copy with these `repairs` of `handed_in`."""
     later: dict[str, list[str]] = {}
     retyped: dict[str, tuple[str, str]] = {}
     moved = dict(filter(None, map(_moved_script, verdicts.values())))
@@ -84,18 +95,18 @@ def add_later_faults(verdicts: Mapping[str, Verdict], rubric: Rubric, facts: Fac
             told += unset_arg_fixes(file, verdict.hint)
         elif verdict.unjudged or verdict.of_machine or criterion.check in OF_TOPICS:
             own_later = Later(criterion, verdict, package, facts, moved)
-            told += own_later.faults()
-            retyped |= own_later.retyped
+            told += own_later.syntax(handed_in or package)
+            told += [text_as_handed_in(one, repairs) for one in own_later.faults()]
+            retyped |= {text_as_handed_in(one, repairs): types for one, types in own_later.retyped.items()}
     return {name: _with_later(verdict, later.get(name, ()), retyped) for name, verdict in verdicts.items()}
 
 
 def _moved_script(verdict: Verdict) -> tuple[str, str] | None:
     """Return the only script that is told to become the one that is missing, and the path of that one."""
-    files = [one.file for one in verdict.citations if isinstance(one, FileCitation)]
-    elsewhere = verdict.mistake is not None and verdict.mistake.kind == "file-elsewhere"
-    if verdict.mistake is None or not elsewhere or len(files) != 1 or f"mv {files[0]} " not in verdict.hint:
+    if verdict.mistake is None or verdict.mistake.kind != "file-elsewhere":
         return None
-    return (files[0], verdict.mistake.name) if files[0].endswith(".py") else None
+    moved = re.findall(rf"\bmv (\S+\.py) {re.escape(verdict.mistake.name)}(?!\S)", verdict.hint)
+    return (moved[0], verdict.mistake.name) if len(moved) == 1 else None
 
 
 def _of_its_file(launched: Criterion, verdicts: Mapping[str, Verdict], rubric: Rubric) -> str | None:
@@ -128,7 +139,8 @@ def _with_later(verdict: Verdict, later: Iterable[str], retyped: Mapping[str, tu
         package, _, name = wanted.partition("/")
         hint = re.sub(rf"from \w+\.msg import {other}\b", f"from {package}.msg import {name}", hint)
     if verdict.of_machine:
-        hint = f"{join_words(told)}. {hint.replace(NOTHING_TO_DO, 'For the rest, ', 1)}"
+        hint = hint.replace(NOTHING_TO_DO, "For the rest, ", 1)
+        hint = f"{join_words(told)}. {hint[:1].upper()}{hint[1:]}"
         return verdict.model_copy(update={"hint": hint})
     return verdict.model_copy(update={"hint": f"{hint}; then {join_words(told)}"})
 
@@ -156,6 +168,7 @@ class Later:
         self._slips += [slip for slip in package.slips if slip.file in later]
         self._paths = scripts | later | sources_of(criterion, facts.rubric, package)
         self._slips += self._texts_of_cpp()
+        self._moved = later
         self._ran = not verdict.cause and not later
         """Names are told already then, and only what is behind them is not."""
         self.retyped: dict[str, tuple[str, str]] = {}
@@ -179,6 +192,13 @@ class Later:
             lines = self._build.file_lines(path)[:LINES_READ] if self._build is not None else []
             for kind, line, text in texts_of_cpp(text[:LINE_CHARS] for text in lines):
                 yield PythonSlip(file=path, line=line, kind=kind, message=text)
+
+    def syntax(self, package: PackageFacts) -> Iterator[str]:
+        """Yield what keeps a script from running that has to be moved first."""
+        for file in package.files if not self._ran else ():
+            fault = file.python_fault if file.path in self._moved else None
+            if fault is not None and fault.kind in SYNTAX:
+                yield f"in {file.path}, {syntax_hint(fault)}"
 
     def _names(self) -> Iterator[str]:
         """Names that are not there; an `except` of one is not reached."""
@@ -264,7 +284,11 @@ class Later:
             yield f"print the `data` of the message on {_line(self._of('prints')[0])}"
 
     def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> str:
-        fault = f"{verb} {wanted} on {_line(slip)}, not {slip.message}"
+        lines = self._build.file_lines(slip.file) if self._build is not None else []
+        making = re.compile(rf"^[^#]*(?<![\w.]){slip.message}\(")
+        others = [str(n) for n, text in enumerate(lines, 1) if n != slip.line and making.search(text)]
+        more = f" (made on line {join_words(others)})" if others else ""
+        fault = f"{verb} {wanted} on {_line(slip)}, not {slip.message}{more}"
         self.retyped[fault] = wanted, slip.message
         return fault
 

@@ -17,9 +17,11 @@ from pathlib import PurePosixPath
 
 from pydantic import ValidationError
 
+from grader.checks.support.scripts import PYTHON, installed, names_script
 from grader.checks.support.text import texts_in
 from grader.evidence.events import CATKIN_MAKE, PACKAGE_RUN
 from grader.evidence.run import Run
+from grader.judging.copy_lines import with_lines_as_handed_in
 from grader.model.package import CMAKE, MANIFEST, PackageFacts
 from grader.model.repair import Repair, advice_on, messages_of, place_of
 from grader.model.result import CriterionResult, Repaired
@@ -90,6 +92,13 @@ def needs_build(package: PackageFacts | None) -> bool:
     return any(path.suffix in MADE_BY_BUILDS or path.name == "setup.py" for path in paths)
 
 
+def programs_of_build(package: PackageFacts) -> set[str]:
+    """Return the paths of the scripts of which the build makes programs: neither their bit nor their first line is
+    used."""
+    named = [one for one in installed(package) if one.call.name == PYTHON]
+    return {file.path for file in package.files if any(names_script(one, file.path) for one in named)}
+
+
 def repairs_of(rubric: Rubric, repaired: Mapping[str, Run]) -> tuple[Repair, ...]:
     """Return the repairs of the copy that was run, as far as the rubric lets them count."""
     written = repaired[PACKAGE_RUN].metadata.get(REPAIRS, "[]") if PACKAGE_RUN in repaired else "[]"
@@ -115,6 +124,7 @@ def apply_repaired_copy(
     that they needed; where they are lost on the copy too, they say why.
     """
     verdicts, uses = dict(first), dict[str, Repaired]()
+    on_copy = {name: with_lines_as_handed_in(verdict, repairs) for name, verdict in on_copy.items()}
     needs = {
         c.id: tuple(one for one in repairs if concerns(one, c, rubric, first, built=built, launched=launched))
         for c in rubric.criteria
@@ -233,11 +243,13 @@ def is_used_by(
     return repair.kind != "launch-type" and (launches or not (known or name in launched))
 
 
-def is_first_line_added(repair: Repair, rubric: Rubric) -> bool:
-    """Return whether a script that the rubric starts lacks its first line. The arena adds it before any run, and a copy
-    with it would have all lines one further down than the script that was handed in."""
+def is_first_line_added(repair: Repair, rubric: Rubric, repairs: Iterable[Repair] = ()) -> bool:
+    """Return whether a script that the rubric starts, by its name or by the one that it gets in `repairs`, lacks its
+    first line. The arena adds it before any run, and a copy with it would have all lines one further down than the
+    script that was handed in."""
     added = repair.kind == "shebang" and repair.after.count("\n") > repair.before.count("\n")
-    name = PurePosixPath(repair.file).name
+    new = {one.before: one.after for one in repairs if one.kind == "file-name"}
+    name = PurePosixPath(new.get(repair.file, repair.file)).name
     return added and any(name in _started_files(one) for one in rubric.scenarios.values())
 
 
@@ -459,10 +471,17 @@ def _is_further_down(repair: Repair, verdict: Verdict) -> bool:
     return one_word and "; " not in verdict.hint and len(lines) == 1 and lines[0] < (repair.line or 0)
 
 
+def _what_was_done(repairs: Iterable[Repair]) -> str:
+    """Return `a.py renamed and b.py line 6 repaired`."""
+    done: dict[str, dict[str, None]] = {}
+    for one in repairs:
+        done.setdefault("renamed" if one.kind == "file-name" else "repaired", {})[place_of(one)] = None
+    return " and ".join(f"{join_words(places)} {how}" for how, places in done.items())
+
+
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:
-    where = join_words(dict.fromkeys(place_of(repair) for repair in repairs))
     score = copy.score * share
     status = Status.PARTIAL if share < 1 and copy.status is Status.PASS else copy.status
     points = f"{share_text(share)} of the points; " if copy.score and not copy.right else ""
-    message = f"judged on a copy with {where} repaired: {points}{copy.message}"
+    message = f"judged on a copy with {_what_was_done(repairs)}: {points}{copy.message}"
     return copy.model_copy(update={"status": status, "score": score, "message": message})

@@ -374,7 +374,9 @@ def _with_names(text: str) -> Iterator[Step]:
         stated = (n.value for n in ast.walk(block) if isinstance(n, ast.Expr))
         alone = {n.id for n in stated if isinstance(n, ast.Name) and _is_slip(n.id.lower(), "pass")}
         for name in dict.fromkeys(n.id for n in missing):
-            meant = OBVIOUS_NAMES.get(name) or _meant_by(name, own) or (name in alone and "pass") or ""
+            guards = name == "name" and any(_is_guard(n) for n in tree.body)
+            meant = OBVIOUS_NAMES.get(name) or (guards and "__name__") or _meant_by(name, own)
+            meant = meant or (name in alone and "pass") or ""
             spans = [span for n in missing if n.id == name and (span := span_of(lines, n))]
             if meant and spans:
                 after = edited(text, [(*span, meant) for span in spans])
@@ -383,6 +385,13 @@ def _with_names(text: str) -> Iterator[Step]:
                     yield step
                     yield from _with_names(text)
                     return
+
+
+def _is_guard(node: ast.stmt) -> bool:
+    """Return whether a statement begins the script's own part, `if name == 'main':` too."""
+    test = node.test if isinstance(node, ast.If) else None
+    word = test.comparators[0] if isinstance(test, ast.Compare) else None
+    return isinstance(word, ast.Constant) and str(word.value).strip("_ ").lower() == "main"
 
 
 def _with_quotes(text: str) -> Iterator[Step]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from grader.model.figure import Figures, GraphFigure
@@ -27,17 +27,20 @@ from grader.report.sentences import (
 from grader.report.text import line, markdown, markdown_block, markdown_code
 from grader.report.view import (
     Loss,
+    MissingFile,
     arrange,
     commands_in,
     missing_file,
+    missing_files,
     not_graded,
     places,
     pointed_at,
     points_of,
     where_to_type,
+    write_files_hint,
 )
 from grader.rubric.model import Rubric
-from grader.wording import number
+from grader.wording import join_words, number
 
 BYTES_MAX = 60_000
 """A comment on GitHub has 65,536 characters, a step's summary 1 MiB."""
@@ -94,6 +97,14 @@ def render_markdown(
         if len(text.encode()) <= BYTES_MAX:
             break
     return text
+
+
+def _why_lost(loss: Loss) -> str:
+    """In a sentence; of several files that are not there, all of them."""
+    paths = list(dict.fromkeys(file.path for file in missing_files(loss)))
+    if len(paths) > 1:
+        return f"{len(paths)} files are not in the package: {join_words(paths)}"
+    return loss.criterion.message or loss.criterion.title
 
 
 def _surely_too_long(result: GradingResult, detail: Detail) -> bool:
@@ -195,7 +206,7 @@ class _Writer:
             c = loss.criterion
             others = sum(other.missing for other in (*loss.blocked, *loss.alike))
             more = f", and {number(others)} more points with it" if others else ""
-            words = markdown(line(c.message or c.title, min(SHORT_CHARS, self._detail.text)))
+            words = markdown(line(_why_lost(loss), min(SHORT_CHARS, self._detail.text)))
             yield f"- {self._code(c.id)}: {points_of(c)}{more}, {STATES[c.status]}: {words}"
         yield from self._more(losses)
         yield ""
@@ -203,7 +214,9 @@ class _Writer:
     def _loss_section(self, loss: Loss) -> Iterator[str]:
         criterion = loss.criterion
         yield from (f"### {self._code(criterion.id)}: {points_of(criterion)}, {STATES[criterion.status]}", "")
-        details = [*self._details(criterion), *self._blocked_lines(loss)]
+        files = missing_files(loss)
+        details = [*(self._files(files) if len(files) > 1 else self._details(criterion))]
+        details += self._blocked_lines(loss if len(files) < 2 else replace(loss, alike=()))
         yield from (*(details or [self._text(criterion.title)]), "")
         for pair in pointed_at(criterion):
             yield from (markdown_block(pair), "")
@@ -220,6 +233,14 @@ class _Writer:
             yield f"- See it yourself: {' '.join([*([where] if where else []), *shown])}"
         if criterion.citations:
             yield f"- Where: {', '.join(self._code(cited) for cited in places(criterion))}"
+
+    def _files(self, files: Sequence[MissingFile]) -> Iterator[str]:
+        """Several files that are not there, each with what it costs and what has to be in it."""
+        for one in files:
+            words = "; ".join(filter(None, [one.holds, one.says]))
+            cost = f"{self._code(one.criterion.id)} {points_of(one.criterion)}"
+            yield f"- {self._code(one.path)} ({cost}): {self._text(words)}"
+        yield f"- Hint: {self._text(write_files_hint(files))}"
 
     def _blocked_lines(self, loss: Loss) -> Iterator[str]:
         if loss.alike:

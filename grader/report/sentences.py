@@ -71,7 +71,7 @@ def _repair_words(repairs: list[Repair], criteria: list[CriterionResult]) -> str
     charged = [c for c in criteria if c.repaired and c.repaired.charged]
     others = [c for c in criteria if c not in charged]
     cost = sum(c.missing for c in charged)
-    if not cost and not any(c.counts for c in others):
+    if not cost and not any(c.counts and c.points for c in others):
         return ""
     wrong = [
         one.message if one.file in one.message else f"{one.message} ({place_of(one)})" for one in repairs

@@ -158,7 +158,7 @@ _COMMAND = rf"""
     (?:(?:(?:sudo\ )?chmod\ \+x|dos2unix)(?:\ {_FILE})+
     | (?:git\ )?mv\ [\w./-]*\w\ [\w./-]*\w
     | git\ (?:add|commit|push|rm|update-index)\b(?:\ -[\w=+-]+)*(?:\ {_FILE})*
-    | (?:mkdir|cd)\ [\w./~-]*\w
+    | (?:mkdir(?:\ -p)?|cd)\ [\w./~-]*\w
     | ros(?:run|launch)\ \w+\ {_FILE}
     | ros(?:topic|node|param|service|msg)\ (?:list|info|echo|hz|pub|type|get|set|load|call|show)\b(?:\ {_FILE})*
     | (?:sudo\ )?apt-get\ install(?:\ [\w.+-]*\w)+)
@@ -169,7 +169,7 @@ _CODE = re.compile(
     | (?P<found>
         <(?P<tag>[A-Za-z]\w*)[^<>`]{{0,200}}>[\w@.-]+</(?P=tag)>  # an element
       | </?[A-Za-z](?:"[^"`]{{0,200}}"|[^<>"`])*>(?!')         # a tag
-      | (?<![\w./-]){_COMMAND}(?![\w-])                       # a command
+      | (?<![\w./-]){_COMMAND}(?:\ &&\ {_COMMAND})*(?![\w-])  # a command, several in one line
       | (?<![\w-])--[a-z][\w-]*
       | (?<![\w.:/-])\w+="[^"`]{{0,200}}"                      # an attribute
       | (?<![\w.:/-])[a-z]\w*=(?:True|False|None|-?\d[\w.]*|…|(?![\w"'=<(\[{{$./-]))  # an argument, an attribute's name

@@ -18,7 +18,7 @@ from grader.rubric.model import Rubric
 from grader.untrusted_text import CITATIONS_MAX, clip, visible
 from grader.wording import join_words, number, plural
 
-ON_COPY = re.compile(r"judged on a copy with .*? repaired: ")
+ON_COPY = re.compile(r"judged on a copy with .*? (?:renamed|repaired): ")
 NAMES, NUMBERS = re.compile(r"/[\w/~]+"), re.compile(r"-?\d+(\.\d+)?")
 PLACE_CHARS = 300
 SOURCE_CHARS = 60
@@ -114,8 +114,7 @@ def _fold_one_edit(losses: Sequence[Loss]) -> Iterator[Loss]:
         folded = next((loss for loss in losses if loss.criterion.id == first), None)
         others = [loss for loss in losses if loss.criterion.id in names]
         if folded is not None and others:
-            paths = [scripts[name].name for name in names]
-            criterion = _joined(folded.criterion, paths)
+            criterion = _joined(folded.criterion, [loss.criterion for loss in others])
             alike = tuple(c for loss in others for c in (loss.criterion, *loss.alike))
             blocked = tuple(c for loss in (folded, *others) for c in loss.blocked)
             joined = Loss(criterion=criterion, blocked=blocked, alike=(*folded.alike, *alike))
@@ -123,16 +122,28 @@ def _fold_one_edit(losses: Sequence[Loss]) -> Iterator[Loss]:
     yield from losses
 
 
-def _joined(criterion: CriterionResult, paths: Sequence[str]) -> CriterionResult:
+def _joined(criterion: CriterionResult, scripts: Sequence[CriterionResult]) -> CriterionResult:
     """Return the criterion of an edit that also makes these scripts executable, with what it does for them."""
+    found = [one.mistake for one in scripts if one.mistake]
+    paths = [one.name for one in found]
     if criterion.check == INSTALL:
-        told = f"{criterion.hint}; the build then makes {join_words(paths)} executable"
-        return criterion.model_copy(update={"hint": told})
+        why = [one.message.partition("; ")[0] for one in scripts]
+        if all(one.kind == "not-executable" for one in found):
+            why, then = [_without_bit(paths)], f"makes {join_words(paths)} executable"
+        else:
+            then = f"makes {'programs' if len(paths) > 1 else 'a program'} of {join_words(paths)}"
+        told = {
+            "message": "; ".join([criterion.message, *why]),
+            "hint": f"{criterion.hint}; the build then {then}",
+        }
+        return criterion.model_copy(update=told)
     own = criterion.mistake.name if criterion.mistake else ""
-    message = f"{join_words([own, *paths])} are not executable"
-    return criterion.model_copy(
-        update={"message": message, "hint": criterion.hint.replace(own, " ".join([own, *paths]))}
-    )
+    hint = criterion.hint.replace(own, " ".join([own, *paths]))
+    return criterion.model_copy(update={"message": _without_bit([own, *paths]), "hint": hint})
+
+
+def _without_bit(paths: Sequence[str]) -> str:
+    return f"{join_words(paths)} {'are' if len(paths) > 1 else 'is'} not executable"
 
 
 def _mistake(loss: Loss, charged: Mapping[Repair, tuple[Repair, ...]]) -> Hashable:

@@ -411,3 +411,32 @@ def test_a_module_that_is_used_and_not_imported_is_meant_by_one_that_is_not_ther
     assert here.hint == "write rospy instead of ros"
     assert not here.of_machine
     assert explain_traceback(said(package, ("b.py", 1, "import ros"), error=error), package).of_machine
+
+
+@pytest.mark.parametrize(
+    ("source", "error"),
+    [
+        ("rospy.loginfo(eval(data.data))", "SyntaxError: invalid syntax"),
+        ("rospy.loginfo(eval(data.data))", "NameError: name 'hello' is not defined"),
+    ],
+)
+def test_a_message_that_is_run_as_code_is_told(tmp_path, source, error):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "listener.py").write_text(f"import rospy\ndef callback(data):\n    {source}\n")
+    package = facts_of(tmp_path)
+    end = explain_traceback(
+        tracebacks(
+            [
+                "Traceback (most recent call last):",
+                f'  File "/home/student/catkin_ws/src/{package.name}/listener.py", line 3, in callback',
+                f"    {source}",
+                '  File "<string>", line 1, in <module>',
+                error,
+            ]
+        )[0],
+        package,
+    )
+    assert end.cause.endswith(
+        "(listener.py, line 3): `eval(…)` takes the text that it is given for Python code"
+    )
+    assert end.hint == "leave `eval(…)` out, and use the text as it is"

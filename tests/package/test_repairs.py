@@ -591,8 +591,25 @@ CASES = {
         swapped(TALKER, ("std_msgs.msg import Int8", "std_msg.msg import int8")), ["missing-import", "missing-call"],
         "messages are not imported from std_msg.msg", after={TALKER: "from std_msgs.msg import Int8"},
     ),
+    "underscores-lost": Case(
+        swapped(TALKER, ("\nmain()", "\nif name == 'main':\n    main()")), ["missing-call"],
+        "write `if __name__ == '__main__':`", after={TALKER: "\nif __name__ == '__main__':\n    main()"},
+    ),
+    "name-that-is-no-guard": Case(swapped(TALKER, ("\nmain()", "\nif name == 'talker':\n    main()")), []),
+    "script-called-by-another-word": Case(
+        {TALKER: None, "src/numeric_pub.py": SCRIPT.replace("'talker'", "'counter'")}, ["file-name"],
+        "src/numeric_pub.py should be called talker.py",
+        wanted=asking(does=((TALKER, "publisher", "/numeric_chatter"), (TALKER, "node-name", "talker"))),
+    ),
     "nothing": Case({}, []),
 }  # fmt: skip
+
+
+def test_a_script_by_another_word_for_its_role_needs_the_topics_of_the_lab(tmp_path: Path) -> None:
+    script = SCRIPT.replace("'numeric_chatter'", "'numbers'")
+    folder = package(tmp_path, {TALKER: None, "src/numeric_pub.py": script})
+    does = ((TALKER, "publisher", "/numeric_chatter"), (TALKER, "node-name", "counter"))
+    assert find_repairs(folder, facts_of(folder), asking(does=does)) == ()
 
 
 @pytest.mark.parametrize("name", CASES)

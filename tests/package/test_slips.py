@@ -158,6 +158,12 @@ def test_where_names_of_the_graph_are_written_is_known(tmp_path):
     ]
 
 
+def test_a_main_guard_without_underscores_is_told_with_its_whole_line(tmp_path):
+    (tmp_path / "a.py").write_text("def main():\n    pass\nif name == 'main':\n    main()\n    exit(0)\n")
+    (slip,) = check_syntax(tmp_path, ["a.py"]).slips
+    assert (slip.kind, slip.fix) == ("misspelt", "write `if __name__ == '__main__':`")
+
+
 def test_letters_in_another_order_are_a_slip(tmp_path):
     (tmp_path / "a.py").write_text("def f(msg):\n    print(mgs.data)\n")
     slip, _ = check_syntax(tmp_path, ["a.py"]).slips

@@ -18,6 +18,7 @@ from grader.model.result import ErrorInfo, Repaired
 from grader.model.verdict import Mistake, Status
 from grader.report.files import result_bytes, write_reports
 from grader.report.forms import FORMS
+from grader.report.markdown import render_markdown
 from grader.report.sentences import repair_words
 from grader.report.terminal import Terminal, open_console
 from grader.report.view import arrange, without_hidden
@@ -171,6 +172,49 @@ def test_scripts_that_the_build_would_make_executable_are_told_with_their_instal
     assert [(one.criterion.id, one.points) for one in told] == [("install", 15), ("listener-executable", 5)]
 
 
+def test_why_a_script_cannot_be_run_is_told_where_the_build_makes_up_for_it():
+    unusable = criterion(
+        "talker-executable",
+        Status.FAIL,
+        0,
+        5,
+        check="executable",
+        message="src/a.py cannot be run: there is no `#!` line at the top; rosrun answers: no",
+        mistake=Mistake(kind="cannot-be-run", name="src/a.py"),
+    )
+    install = criterion(
+        "install", Status.FAIL, 0, 10, check="cmake-install", message="nothing installs src/a.py", hint="do"
+    )
+    (loss,) = arrange(result(criteria=(unusable, install)), rubric()).lost
+    assert loss.criterion.message == (
+        "nothing installs src/a.py; src/a.py cannot be run: there is no `#!` line at the top"
+    )
+    assert loss.criterion.hint == "do; the build then makes a program of src/a.py"
+
+
+def test_files_that_are_missing_are_all_named_in_markdown():
+    paths = {"talker-executable": "src/a.py", "launch": "launch/a.launch"}
+    criteria = tuple(
+        criterion(
+            name,
+            Status.FAIL,
+            0,
+            5,
+            message=f"{path.rpartition('/')[2]} is not in the package; there is other.txt",
+            expected=f"{path}, with a node",
+            hint=f"write {path}",
+            mistake=Mistake(kind="file-missing", name=path),
+        )
+        for name, path in paths.items()
+    )
+    text = render_markdown(result(criteria=criteria), rubric())
+    assert "to fix: 2 files are not in the package: `src/a.py` and `launch/a.launch`" in text
+    for name, path in paths.items():
+        assert f"- `{path}` (`{name}` 0/5): with a node; there is `other.txt`" in text
+    assert "- Hint: write these files" in text
+    assert "The same holds for" not in text
+
+
 def copied(name, status, points, *, charged=False, **fields):
     """A criterion of 5 points that was judged on a copy without a mistake in its indentation."""
     repair = Repair(kind="python-syntax", file="a.py", line=1, message="line 1 of a.py: tabs", fix="spaces")
@@ -203,6 +247,8 @@ def test_repairs_of_one_loss_are_told_together():
         "src/a.py is not executable and src/b.py is not executable: this costs you 5 points (launch)",
     )
     assert repair_words(result(criteria=(free,))) == ()
+    of_no_use = criterion("build", Status.FAIL, 0, 5, repaired=use.model_copy(update={"charged": False}))
+    assert repair_words(result(criteria=(of_no_use,))) == ()
 
 
 def test_criteria_that_earn_other_shares_of_a_repaired_copy_are_told_apart():

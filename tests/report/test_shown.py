@@ -60,6 +60,10 @@ FLOOD = "`/chatter` runs at about 5,500 Hz instead of 10 Hz; the loop does not s
             ],
         ),
         ("git mv Launch launch; then git add it", ["git mv Launch launch", "git add"]),
+        (
+            "mkdir -p scripts && mv src/a.py scripts/a.py if it is",
+            ["mkdir -p scripts && mv src/a.py scripts/a.py"],
+        ),
         ("roslaunch lab1 lab1.launch shows it; roslaunch does not find it", ["roslaunch lab1 lab1.launch"]),
         ("write $(find lab1)/launch/a.launch", ["$(find lab1)/launch/a.launch"]),
         ('publish "hello world %s" % rospy.get_time()', ['"hello world %s" % rospy.get_time()']),

@@ -11,7 +11,7 @@ import re
 
 TEXT_LIMIT = 300
 NAMES_LIMIT = 500
-MODULE_NAMES = {"__file__", "__builtins__", "__annotations__", "WindowsError"}
+MODULE_NAMES = {"__file__", "__builtins__", "__annotations__", "WindowsError", "exit", "quit"}
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
@@ -132,7 +132,10 @@ def misspelt(tree):
         elif node.id not in known and (
             near := spelt_alike(node.id, stored if id(node) in texts else own, attributes)
         ):
-            fix = "write %s instead of %s" % (near, node.id)
+            whole = near == "__name__" and is_guard(node, tree)
+            fix = (
+                "write `if __name__ == '__main__':`" if whole else "write %s instead of %s" % (near, node.id)
+            )
             yield slip(node.lineno, "misspelt", "did you mean %s?" % near, fix=fix, name=node.id)
         elif node.id not in known and (argument := unread_argument(node, tree)):
             message = "the argument of `%s` is called `%s`" % argument
@@ -236,6 +239,12 @@ def spelt_alike(name, own, attributes):
         return "__name__"
     near = difflib.get_close_matches(name[:TEXT_LIMIT], sorted(own), 1, 0.8)
     return next(iter(near or [one for one in sorted(own) if sorted(one) == sorted(name)]), "")
+
+
+def is_guard(node, tree):
+    """Whether it is compared where the script's own part begins."""
+    tests = [n.test for n in tree.body if isinstance(n, ast.If)]
+    return any(isinstance(test, ast.Compare) and test.left is node for test in tests)
 
 
 def unread_argument(node, tree):

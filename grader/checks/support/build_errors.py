@@ -24,7 +24,7 @@ from grader.installable import (
 from grader.model.message_definitions import meant_type
 from grader.model.package import CMAKE, MANIFEST, CMakeCall, Fault, PackageFacts, meant_command
 from grader.model.verdict import FileCitation
-from grader.wording import join_words, numbers_text
+from grader.wording import join_words, numbers_text, there_is
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
 ONE_EDIT = 0.88
@@ -321,7 +321,7 @@ def _missing_files(
     there = [f.path for f in package.files]
     alike = {path: [one for one in there if _is_same_language(one, path)] for path in paths}
     near = {path: found[0] for path in paths if (found := near_names(path, alike[path]))}
-    seen = f"; there is {join_words(dict.fromkeys(near.values()))}" if near else ""
+    seen = f"; {there_is(dict.fromkeys(near.values()))}" if near else ""
     if len(paths) == 1:
         hint = f"add {paths[0]} and push it, or {leave.replace('them', 'it') or f'remove it from {where}'}"
         if near:
@@ -408,6 +408,8 @@ def _unused_argument(found: re.Match[str], _package: PackageFacts, _lines: Seque
 FIXES_MAX = 4
 MADE = (".msg", ".srv", ".action")
 """Files of which the build makes headers."""
+OWN_TARGETS = "${${PROJECT_NAME}_EXPORTED_TARGETS}"
+NO_TARGET = r'dependency target "([^"]+)" of target "([^"]+)" does not exist'
 
 
 def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
@@ -424,22 +426,35 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
             return _missing_package(found, package, lines)
         if any(found[1] in call.args for call in cmake_calls(package, "find_package")):
             # found, and so built beside this package: its messages come too late
-            late = f"nothing makes it wait for the messages of {found[1]}"
-            why = f"{text}: {late}, so a parallel build (-j) sometimes fails"
-            program = next(iter(_programs_without(package, "add_dependencies")), "<program>")
-            return Explained(
-                why, f"write {_call_below(program, 'add_dependencies', '${catkin_EXPORTED_TARGETS}')}"
-            )
+            what, targets = f"the messages of {found[1]}", "${catkin_EXPORTED_TARGETS}"
+            return _unwaited(package, text, what, targets, lines)
         return Explained(f"{text}: there is no such header", "check the #include and find_package(…)")
-    why = f"{text}: nothing makes it wait for its message, so a parallel build (-j) sometimes fails"
+    return _unwaited(package, text, "its message", OWN_TARGETS, lines)
+
+
+def _half_written(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
+    """What a header declares is not there although it is included: the build is just writing it."""
+    made = any(file.path.endswith(MADE) for file in package.files)
+    if found[1] != package.name or not made or not cmake_calls(package, "generate_messages"):
+        return Explained(found.string, FIRST_ERROR_HINT)
+    text = f"{found[1]} is not declared, since the header of its message was not written yet"
+    return _unwaited(package, text, "its message", OWN_TARGETS, lines)
+
+
+def _unwaited(package: PackageFacts, text: str, what: str, targets: str, lines: Sequence[str]) -> Explained:
+    """Return that programs do not wait for a header that the build makes. Any of them may be compiled too early."""
+    warned = re.search(NO_TARGET, " ".join(line.strip() for line in lines))
+    if warned is not None:  # older policies only warn of it
+        one = _missing_dependency(warned, package, lines)
+        return one._replace(why=f"{text}: {one.why}, so a parallel build (-j) sometimes fails")
+    why = f"{text}: nothing makes it wait for {what}, so a parallel build (-j) sometimes fails"
     waiting = _programs_without(package, "add_dependencies")
     fixes = [
-        f"below the add_executable(…) on line {call.line}, write "
-        f"add_dependencies({call.args[0]} ${{${{PROJECT_NAME}}_EXPORTED_TARGETS}})"
+        f"below the add_executable(…) on line {call.line}, write add_dependencies({call.args[0]} {targets})"
         for call in cmake_calls(package, "add_executable")
         if call.args and call.args[0] in waiting
     ]
-    other = f"write {_call_below('<program>', 'add_dependencies', '${${PROJECT_NAME}_EXPORTED_TARGETS}')}"
+    other = f"write {_call_below('<program>', 'add_dependencies', targets)}"
     return Explained(why, "; ".join(fixes[:FIXES_MAX]) or other)
 
 
@@ -583,7 +598,7 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"Parse error\.|Error\(s\) in package", _unreadable),
     (r"does not contain a CMakeLists\.txt", _no_cmake_lists),
     (r"contains non-catkin packages", _not_catkin),
-    (r'dependency target "([^"]+)" of target "([^"]+)" does not exist', _missing_dependency),
+    (NO_TARGET, _missing_dependency),
     (r'dependencies to non-existent target "([^"]+)"', _missing_target),
     (r'link libraries for target "([^"]+)" which is not built', _missing_target),
     (
@@ -601,6 +616,7 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"expected '}' at end of input", _no_brace),
     (r"'([^']+)' was not declared in this scope(?:; did you mean '([^']+)')?", _explain_undeclared),
     (r"'([^']+)::(\w+)' has not been declared", _no_type),
+    (r"'(\w+)' has not been declared", _half_written),
     (r"'([^']+)' is not a member of .*; did you mean '([^']+)'", _no_member),
     (r"has no member named '([^']+)'; did you mean '([^']+)'", _no_member),
     (r"undefined reference to '([^']+)", _explain_unlinked),

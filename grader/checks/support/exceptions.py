@@ -258,6 +258,19 @@ SERVICES = ("Service", "ServiceProxy")
 ACTIONS = ("SimpleActionServer", "SimpleActionClient", "ActionServer", "ActionClient")
 
 
+def evaluated(found: Traceback) -> Meaning | None:
+    """Return that a text is run as Python code, where what was raised comes from inside that text."""
+    own = [frame for frame in found.own_frames if not frame.file.startswith("<")]
+    call = _EVALUATES.search(own[-1].source) if own else None
+    if call is None or found.frames[-1].file not in ("<string>", "<unknown>"):
+        return None
+    why = f"`{call[1]}(…)` takes the text that it is given for Python code"
+    return why, f"leave `{call[1]}(…)` out, and use the text as it is"
+
+
+_EVALUATES = re.compile(r"(?<![\w.])((?:ast\.literal_)?eval|exec)\(")
+
+
 def wrong_class(source: str) -> Meaning | None:
     """Return what is wrong with the type that a line gives a service or an action: one half of it, a value, a text, or
     the place of the name."""

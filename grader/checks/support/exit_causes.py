@@ -14,6 +14,7 @@ from grader.checks.registry import Check
 from grader.checks.support.console_output import Frame, Traceback, tracebacks, unpack_traceback
 from grader.checks.support.exceptions import (
     SLIPS,
+    evaluated,
     explain_exception,
     explain_number_of_values,
     is_text,
@@ -251,7 +252,7 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     """Explain one traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
-    misplaced = wrong_class(found.own_frames[-1].source) if found.own_frames else None
+    misplaced = (evaluated(found) or wrong_class(found.own_frames[-1].source)) if found.own_frames else None
     hiding = hiding_file(found, package)
     slip = hiding or misplaced or _slip(found, package) or _asks_for_input(found, place, package)
     cause, hint = slip or CAUSES.get(

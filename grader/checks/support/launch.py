@@ -35,7 +35,7 @@ from grader.model.verdict import (
     unjudged,
 )
 from grader.untrusted_text import without_colours
-from grader.wording import join_words
+from grader.wording import join_words, there_is
 
 OTHER_ATTRIBUTES = {"package": "pkg", "exec": "type", "executable": "type", "script": "type"}
 """What ROS 2, or plain English, calls them."""
@@ -144,7 +144,7 @@ def _unreadable(
         near = [names[n] for n in near_names(launch, names)]
         stem = PurePosixPath(launch).stem
         near += [p for n, p in names.items() if n == f"{stem}.xml" and p not in near]
-        seen = f"; there is {join_words(dict.fromkeys([*near, *others]))}" if near or others else ""
+        seen = f"; {there_is(dict.fromkeys([*near, *others]))}" if near or others else ""
         seen += f", and {full[0]} starts {join_words(sorted(wanted))}" if len(others) > 1 and full else ""
         seen += f", which starts {join_words(sorted(wanted))}" if full and full == others else ""
         parts = {} if full else _parts_started(started)
@@ -338,7 +338,7 @@ def _nothing_like_it(package: PackageFacts, node: LaunchNode, why: str) -> Slip:
     names = [n for n in _program_names(package) if n != node.type]
     near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
     if near:
-        return _slip(node, f"{why}; there is {join_words(near)}", f'write type="{near[0]}"')
+        return _slip(node, f"{why}; {there_is(near)}", f'write type="{near[0]}"')
     if known := next((pkg for pkg, named in PROGRAMS_OF.items() if node.type in named), None):
         return _slip(node, f"{why}; ROS has one in {known}", f'write pkg="{known}"')
     fix = "type is the script's whole file name, with its ending"

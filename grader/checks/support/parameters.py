@@ -21,7 +21,7 @@ from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchParam, PackageFacts
 from grader.model.verdict import EvidenceCitation, Verdict
-from grader.wording import join_words
+from grader.wording import there_is
 
 SYSTEM = (
     "/rosdistro",
@@ -121,7 +121,7 @@ def describe_missing(found: Mapping[str, Any], name: str) -> str:
     others = without_system_params(found)
     same = [n for n in others if n.rpartition("/")[2] == last]
     near = same or near_names(name, others) or list(others)
-    return f"there is no {name}" + (f"; there is {join_words(near)}" if near else "")
+    return f"there is no {name}" + (f"; {there_is(near)}" if near else "")
 
 
 def name_in_its_place(name: str, found: Iterable[str], names: Iterable[str]) -> str | None:
@@ -241,7 +241,7 @@ def explain_failure(package: PackageFacts, run: Run) -> Ending | None:
         hint = f"write {get_param(deeper[0])}, or a key for each level: {levels}"
         return end._replace(cause=f"{end.cause}: {last} is not there but in {deeper[0]}", hint=hint)
     near = near_names(last, parts - {last})
-    seen = f"; there is {join_words(near)}" if near else ""
+    seen = f"; {there_is(near)}" if near else ""
     hint = "write the name as rosparam list shows it, one key for each level: get_param('details')['name']['first']"
     return end._replace(cause=f"{end.cause}: nothing is named {key[1]} there{seen}", hint=hint)
 

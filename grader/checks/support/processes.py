@@ -135,11 +135,16 @@ def slips_of(package: PackageFacts, run: Run, callerid: str, *kinds: SlipKind) -
 
 def named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tuple[FileCitation, ...]:
     """Return the line of the run's scripts that names this node or topic; nothing where none does, or several do."""
+    found = all_named_at(package, run, kind, name)
+    return found if len(found) == 1 else ()
+
+
+def all_named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tuple[FileCitation, ...]:
+    """Return the lines of the run's scripts that name this node or topic."""
     scripts = {one.start.script for one in lives(run)}
     said = [s for s in package.slips if s.kind == kind and s.file in scripts]
     last = name.rpartition("/")[2]
-    found = {s.place for s in said if s.message.rpartition("/")[2].lstrip("~") == last}
-    return tuple(found) if len(found) == 1 else ()
+    return tuple(dict.fromkeys(s.place for s in said if s.message.rpartition("/")[2].lstrip("~") == last))
 
 
 def early_end(run: Run) -> Life | None:

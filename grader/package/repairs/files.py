@@ -22,7 +22,7 @@ from grader.package.repairs.editing import (
 )
 from grader.package.repairs.names import Wanted, is_near
 from grader.portable import MODES_ON_DISK
-from grader.wording import join_words
+from grader.wording import has_role_of, join_words
 
 SHEBANG = "#!/usr/bin/env python3"
 SHELL = "#!/bin/bash"
@@ -161,8 +161,8 @@ def find_renames(package: PackageFacts, wanted: Wanted) -> dict[str, str]:
 
 
 def _meant_script(package: PackageFacts, wanted: Wanted, name: str, others: set[str]) -> str:
-    """Return the only script that makes the lab's node and has all of the topics of the one of this name; "" if there
-    is none. One that has some of them, such as a handed out one, may be another."""
+    """Return the only script that has all of the topics of the one of this name, and makes the lab's node or is called
+    by another word for it; "" if there is none. One that has some of them, such as a handed out one, may be another."""
     does = [(kind, used.lstrip("/")) for path, kind, used in wanted.does if PurePosixPath(path).name == name]
     topics = {one for one in does if one[0] != "node-name"}
     nodes = {one for one in does if one[0] == "node-name"}
@@ -170,7 +170,9 @@ def _meant_script(package: PackageFacts, wanted: Wanted, name: str, others: set[
     for slip in package.slips:
         if slip.file not in others and PurePosixPath(slip.file).name not in others:
             found.setdefault(slip.file, set()).add((slip.kind, slip.message.lstrip("/")))
-    meant = [path for path, done in found.items() if does and topics <= done and (not nodes or nodes & done)]
+    does_it = {path: done for path, done in found.items() if does and topics <= done}
+    called = [path for path in does_it if topics and has_role_of(path, name)]
+    meant = [path for path, done in does_it.items() if not nodes or nodes & done] or called
     return meant[0] if len(meant) == 1 else ""
 
 

@@ -240,7 +240,7 @@ def reduced(message: str) -> str:
     text = _QUOTED.sub("…", message)
     text = _NAME.sub("…", text)
     text = _NUMBER.sub("N", text)
-    return " ".join(_LIST.sub(r"\g<one>", text).split())
+    return " ".join(_LIST.sub(r"\g<one>", text).replace("there are …", "there is …").split())
 
 
 @dataclass(kw_only=True)

@@ -15,7 +15,7 @@ from tests.report.class_page.made_up import made_up_rows
     [
         ("src/talker.py is not executable", "scripts/my_talker.py is not executable"),
         ("/chatter has 5.02 Hz, not 10 Hz", "/chatter has 4.9 Hz, not 10 Hz"),
-        ("there is no node /talker; there is /tolker", "there is no node /talker; there is /a, /b and /c"),
+        ("there is no node /talker; there is /tolker", "there is no node /talker; there are /a, /b and /c"),
         ("NameError: name 'rospyy' is not defined", "NameError: name 'pub' is not defined"),
         ("src/a.cpp:12: expected ';'", "src/node.cpp:7: expected ')'"),
         ("prints 3 of 8 messages", "prints 0 of 8 messages"),
