@@ -181,12 +181,14 @@ class Later:
                 yield PythonSlip(file=path, line=line, kind=kind, message=text)
 
     def _names(self) -> Iterator[str]:
-        """Names that are not there; an `except` of one is not reached."""
+        """Names that are not there, of which an `except` is not reached, and functions that nothing calls."""
         for slip in self._of("misspelt", "undefined"):
             lines = self._build.file_lines(slip.file) if self._build is not None else []
             caught = slip.line <= len(lines) and lines[slip.line - 1].lstrip().startswith("except")
             if (one := name_slip(slip, self._package)) is not None and not caught:
                 yield one.fix
+        for slip in self._of("never-called"):
+            yield f"call `{slip.name}()`, which nothing in {slip.file} calls"
 
     def _rate(self) -> Iterator[str]:
         hz, numbers = float(str(self._wanted["rate_hz"])), self._of("rate-number")
@@ -229,7 +231,9 @@ class Later:
                 yield f"add a publisher of {kind} on {self._topic}: {other.file} has only the one of {other.message}"
                 return
             yield f"publish on {self._topic} on {_line(published[0])}, not on {published[0].message}"
-        if len(published) > 1 and not lines:
+        own = [one for one in self._of("publisher-type") if one.message == kind.rpartition("/")[2]]
+        named = self._ran and {one.line for one in own} & {one.line for one in published}
+        if len(published) > 1 and not lines and not named:
             names = join_words(f"{one.message} (line {one.line})" for one in published[:NAMES_SHOWN])
             yield f"publish {kind} on {self._topic}: {published[0].file} publishes on {names}"
         types = [one for one in self._of("publisher-type") if one.line in lines or len(published) <= 1]
@@ -292,11 +296,11 @@ class Later:
         text = said[0].message
         if text in {SAID_VALUE, SAID_DATA} and self._lacks_words(template.partition(SECONDS)[0]):
             yield f"publish `{code}` on {_line(said[0])}"
-        if len(self._of("publisher")) > 1:  # it may be another topic's
-            yield f"publish `{code}`"
-            return
         sample = template.replace(SECONDS, "1234567890.25")
-        if not could_say(text, sample):
+        if len(self._of("publisher")) > 1:  # it may be another topic's
+            if not could_say(text, sample):
+                yield f"publish `{code}`"
+        elif not could_say(text, sample):
             words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code
             yield f"publish `{words}` on {_line(said[0])}, not '{in_source(text)}'"
         elif SECONDS in template and self._of("no-clock"):

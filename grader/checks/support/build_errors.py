@@ -210,8 +210,11 @@ def _missing_include(found: re.Match[str], _package: PackageFacts, _lines: Seque
 
 
 def _missing_launch(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    words = f"roslaunch_add_file_check(…) names {found[1]}"
-    return _missing_files([_below(found[1], package)], package, words)
+    path, call = _below(found[1], package), "roslaunch_add_file_check(…)"
+    if posixpath.splitext(path)[1]:
+        return _missing_files([path], package, f"{call} names {path}", leave=f"remove {call}")
+    why = f"{call} names the folder {path}/, which is not in the package"
+    return Explained(why, f"put your launch files into {path}/ and push them, or remove {call}")
 
 
 def _missing_source(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:

@@ -313,6 +313,11 @@ def _unused_import(place: FileCitation, package: PackageFacts) -> str:
     own = [s for s in package.slips if s.file == place.file]
     if any(s.kind in {"undefined", "misspelt"} for s in own):
         return ""
+    unused = {s.line for s in own if s.kind == "unused-import"}
+    lacking = [(s.line, s.message) for s in own if s.kind == "lacking-import"]
+    needed = {module for line, module in lacking if line not in unused}
+    if any(line == place.line and module in needed for line, module in lacking):
+        return ""
     return next((s.fix for s in own if (s.kind, s.line) == ("unused-import", place.line)), "")
 
 

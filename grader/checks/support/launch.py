@@ -137,8 +137,10 @@ def _unreadable(
         stem = PurePosixPath(launch).stem
         near += [p for n, p in names.items() if n == f"{stem}.xml" and p not in near]
         seen = f"; there is {join_words(dict.fromkeys([*near, *others]))}" if near or others else ""
-        seen += f", and {full[0]} starts {join_words(sorted(wanted))}" if len(others) > 1 and full else ""
-        seen += f", which starts {join_words(sorted(wanted))}" if full and full == others else ""
+        if full:
+            which = "which" if full == others else f"and {join_words(full)}"
+            starts = "starts" if len(full) == 1 else "each start"
+            seen += f", {which} {starts} {join_words(sorted(wanted))}"
         parts = {} if full else _parts_started(started)
         seen += (
             f", and {join_words(f'{path} starts {name}' for path, name in parts.items())}" if parts else ""
