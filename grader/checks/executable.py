@@ -20,6 +20,7 @@ from grader.checks.support.scripts import (
     move_hint,
     names_script,
     paths_by_name,
+    script_of_role,
     shebang_obstacles,
     syntax_fault,
 )
@@ -199,8 +200,8 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     movable = [p for p in near if can_be_moved(p, path)]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
     seen = f"; there is {join_words(near)}" if near else ""
-    alike = [p for p in scripts if not near and _has_role_of(p, path)]
-    meant = [*movable, *alike][:1] if movable or len(alike) == 1 else []
+    alike = "" if near else script_of_role(package, path)
+    meant = list(filter(None, [*movable, alike]))[:1]
     seen = f"; there is {meant[0]}" if meant and not near else seen
     hint = add_hint(package, path)
     if meant:
@@ -229,25 +230,6 @@ def _where_named(package: PackageFacts, path: str) -> str:
         if n.type == PurePosixPath(path).name and n.pkg == package.name
     ]
     return f"; write the new name in {join_words(dict.fromkeys(places))} too" if places else ""
-
-
-ROLES = (
-    ("talker", "publisher", "pub", "sender", "emitter"),
-    ("listener", "subscriber", "sub", "receiver"),
-    ("server", "service"),
-)
-"""Words for the same kind of node in the names of scripts."""
-
-
-def _has_role_of(one: str, other: str) -> bool:
-    """Return whether two scripts are called by different words for the same kind of node, "talker" and
-    "publisher". By the same word they are two that a lab asks for."""
-    given, wanted = (PurePosixPath(path).stem.casefold().split("_") for path in (one, other))
-    return any(
-        word in wanted and set(words).intersection(given) - {word} and word not in given
-        for words in ROLES
-        for word in words
-    )
 
 
 def _mode_obstacles(file: SourceFile, remarks: tuple[str, ...]) -> Iterator[Obstacle]:

@@ -132,7 +132,7 @@ def _other_words(
     elif blank and said and all(text_places(missing, lines, glued)):
         hint = f"put a space between the words and the message: '{wanted}'"
     elif said and (mark := _mark_between(said[0], missing[0], params.template)):
-        hint = f"print '{wanted}', without the {mark!r} between the words and the message"
+        hint = f"print '{wanted}', with ' ' in place of {mark!r} between the words and the message"
     share = 1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes)
     all_of = plural(len(probes), "message")
     measured = f"{len(probes)} of {all_of} printed, {len(missing)} of them in other words"
@@ -144,8 +144,7 @@ def _mark_between(said: str, probe: Probe, template: str) -> str:
     """Return what stands between the template's words and the message on a line, "" if it is not just marks."""
     before, _, _ = said.partition(str(probe.value))
     _, words, mark = before.casefold().rpartition(template.partition(VALUE)[0].strip().casefold())
-    mark = mark.strip()
-    return mark if words and mark and not any(c.isalnum() for c in mark) else ""
+    return mark if words and mark.strip() and not any(c.isalnum() for c in mark) else ""
 
 
 def _some_in_other_words(

@@ -47,6 +47,8 @@ from grader.rubric.model import Criterion, Rubric
 from grader.wording import join_words, significant
 
 NAMES_SHOWN = 3
+ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
+"""A line that calls `input()`."""
 OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
@@ -187,8 +189,22 @@ class Later:
             caught = slip.line <= len(lines) and lines[slip.line - 1].lstrip().startswith("except")
             if (one := name_slip(slip, self._package)) is not None and not caught:
                 yield one.fix
+        for file, line in sorted(self._asked()):
+            yield f"write a value in the code where line {line} of {file} asks for input"
         for slip in self._of("never-called"):
             yield f"call `{slip.name}()`, which nothing in {slip.file} calls"
+
+    def _asked(self) -> set[tuple[str, int]]:
+        """Return where the scripts ask for input; nothing where that is known already."""
+        if "input" in f"{self._verdict.message} {self._verdict.hint}":
+            return set()
+        files = [one for one in map(self._package.file, self._paths) if one is not None and one.python_fault]
+        return {(slip.file, slip.line) for slip in self._of("input")} | {
+            (one.path, number)
+            for one in files
+            for number, line in enumerate(self._build.file_lines(one.path) if self._build else (), 1)
+            if ASKS.match(line[:LINE_CHARS])
+        }
 
     def _rate(self) -> Iterator[str]:
         hz, numbers = float(str(self._wanted["rate_hz"])), self._of("rate-number")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from unicodedata import east_asian_width
@@ -96,6 +96,8 @@ def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
 
 
 INSTALL = "cmake-install"
+CANNOT, ANSWERED = "cannot be run", "; rosrun answers"
+"""Words of the messages of such scripts."""
 NOT_STARTED = ("not-executable", "cannot-be-run")
 """The mistakes in a script that the build would make up for if CMakeLists.txt installed it."""
 
@@ -115,7 +117,7 @@ def _fold_one_edit(losses: Sequence[Loss]) -> Iterator[Loss]:
         others = [loss for loss in losses if loss.criterion.id in names]
         if folded is not None and others:
             paths = [scripts[name].name for name in names]
-            criterion = _joined(folded.criterion, paths)
+            criterion = _joined(folded.criterion, paths, [loss.criterion.message for loss in others])
             alike = tuple(c for loss in others for c in (loss.criterion, *loss.alike))
             blocked = tuple(c for loss in (folded, *others) for c in loss.blocked)
             joined = Loss(criterion=criterion, blocked=blocked, alike=(*folded.alike, *alike))
@@ -123,11 +125,16 @@ def _fold_one_edit(losses: Sequence[Loss]) -> Iterator[Loss]:
     yield from losses
 
 
-def _joined(criterion: CriterionResult, paths: Sequence[str]) -> CriterionResult:
-    """Return the criterion of an edit that also makes these scripts executable, with what it does for them."""
+def _joined(criterion: CriterionResult, paths: Sequence[str], messages: Iterable[str]) -> CriterionResult:
+    """Return the criterion of an edit that also makes these scripts executable, with what it does for them and why they
+    cannot be run, as their messages say."""
     if criterion.check == INSTALL:
         told = f"{criterion.hint}; the build then makes {join_words(paths)} executable"
-        return criterion.model_copy(update={"hint": told})
+        reasons: dict[str, list[str]] = {}
+        for path, message in zip(paths, messages, strict=True):
+            reasons.setdefault(message.partition(ANSWERED)[0].removeprefix(f"{path} "), []).append(path)
+        why = [f"{join_words(of)} {reason}" for reason, of in reasons.items() if CANNOT in reason]
+        return criterion.model_copy(update={"hint": told, "message": "; ".join([*why, criterion.message])})
     own = criterion.mistake.name if criterion.mistake else ""
     message = f"{join_words([own, *paths])} are not executable"
     return criterion.model_copy(

@@ -191,6 +191,9 @@ def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     if not slips:
         return None
     slip = min(slips, key=lambda one: kinds.index(one.kind))
+    commented = sorted({s.line for s in own if s.kind == slip.kind == "commented-out" and "`#`" in s.fix})
+    if len(commented) > 1:
+        slip = slip.model_copy(update={"fix": f"remove the `#` from lines {join_words(map(str, commented))}"})
     called = f"call {slip.name}() at the end of the script, below {MAIN}" if slip.name else f"write {MAIN}"
     cause = f"its script ran to the end: {slip.message} ({slip.file}, line {slip.line})"
     return Ending(cause, slip.fix or called, (slip.place,), by_itself=True)
