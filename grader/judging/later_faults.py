@@ -185,14 +185,17 @@ class Later:
     def _names(self) -> Iterator[str]:
         """Names that are not there, of which an `except` is not reached, and functions that nothing calls."""
         for slip in self._of("misspelt", "undefined"):
-            lines = self._build.file_lines(slip.file) if self._build is not None else []
-            caught = slip.line <= len(lines) and lines[slip.line - 1].lstrip().startswith("except")
+            caught = self._text_of(slip).lstrip().startswith("except")
             if (one := name_slip(slip, self._package)) is not None and not caught:
                 yield one.fix
         for file, line in sorted(self._asked()):
             yield f"write a value in the code where line {line} of {file} asks for input"
         for slip in self._of("never-called"):
             yield f"call `{slip.name}()`, which nothing in {slip.file} calls"
+
+    def _text_of(self, slip: PythonSlip) -> str:
+        lines = self._build.file_lines(slip.file) if self._build is not None else ()
+        return lines[slip.line - 1] if slip.line <= len(lines) else ""
 
     def _asked(self) -> set[tuple[str, int]]:
         """Return where the scripts ask for input; nothing where that is known already."""
@@ -219,11 +222,15 @@ class Later:
 
     def _node_name(self) -> Iterator[str]:
         own, names = self._of("node-name"), list(texts_in(self._wanted.get("names")))
+        plain = self._wanted.get("anonymous") == "forbidden"
+        for slip in self._of("commented-out") if plain and not own and not self._ran else ():
+            if slip.name == "init_node" and "anonymous=True" in self._text_of(slip).replace(" ", ""):
+                yield f"remove anonymous=True from {_line(slip)}"
         if self._ran or len(own) != 1 or not names or f"init_node('{names[0]}'" in self._verdict.hint:
             return
         if own[0].message.lstrip("/") not in names:
             yield f"name the node {names[0]} on {_line(own[0])}, not {own[0].message}"
-        if own[0].name == "anonymous" and self._wanted.get("anonymous") == "forbidden":
+        if own[0].name == "anonymous" and plain:
             yield f"remove anonymous=True from {_line(own[0])}"
 
     def _copied(self) -> Iterator[str]:
