@@ -328,8 +328,8 @@ def publishes_twice(tree):
             message, fix = message % (lines[0], lines[1]), fix % lines[1]
         else:
             listed = "lines %s and %d" % (", ".join(map(str, lines[:-1])), lines[-1])
-            message, fix = "the loop publishes %d times in each turn, on %s", "delete all but one of %s"
-            message, fix = message % (len(lines), listed), fix % listed
+            message, fix = "each turn of the loop publishes on %s", "delete all but one of %s"
+            message, fix = message % listed, fix % listed
         yield slip(lines[1], "publish-twice", message, fix=fix)
 
 

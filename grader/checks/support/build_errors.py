@@ -32,6 +32,7 @@ SLIPS_OF_COMPONENTS = ("COMPONENT", "COMPONENETS", "COMPONETS", "COMPONENTES", "
 SLIP = 0.8
 """How alike a name is that is written for one that every machine has: `pospy` for `rospy`."""
 UNKNOWN_COMMAND = "Unknown CMake command"
+BACKSLASH = 'bad character with text "\\"'
 FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error that it prints"
 _QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
 """As compilers and linkers write them."""
@@ -115,7 +116,10 @@ def repair_of_file(fault: Fault) -> str:
     return (fault.fix if fault.unclosed else fault.advice) or "correct that line, then run catkin_make"
 
 
-def _unreadable(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+def _unreadable(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
+    if BACKSLASH in " ".join(word for line in lines for word in line.split()):
+        why = "a line of this call ends with \\, as in a shell: in CMake a call goes on without it"
+        return Explained(why, "delete the \\ at the end of each line of that call")
     return unreadable_file(package) or Explained(found.string, FIRST_ERROR_HINT)
 
 
