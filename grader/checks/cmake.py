@@ -304,8 +304,11 @@ def _lack(
     package: PackageFacts, all_named: Sequence[Installed], script: str, wanted: Sequence[str]
 ) -> Lack | None:
     """Return None where `catkin_install_python` puts the script where `rosrun` looks."""
-    paths = [f.path for f in copies_of(package, script)] or [script]
+    there = [f.path for f in copies_of(package, script)]
+    paths, name = there or [script], PurePosixPath(script).name
     hits = [one for one in all_named if any(names_script(one, path) for path in paths)]
+    if not there and not hits:  # that it is missing is another criterion's
+        hits = [one for one in all_named if PurePosixPath(one.path).name == name]
     by_python = [one for one in hits if one.call.name == PYTHON]
     if any(one.kind == "PROGRAMS" and is_bin(one.destination or "", package) for one in by_python):
         return None
@@ -379,8 +382,10 @@ def _named_elsewhere(package: PackageFacts, one: Installed, path: str) -> Lack:
         why = f"{where}: {shown(one.path)} is in {package.folder_beside}/, beside which {CMAKE} lies"
         return Lack(why, move_into(package.folder_beside), _line(one))
     why = f"{where}: {shown(one.path)} is named, but does not exist; the script is {path}"
-    if one.path.rstrip(",;") == path:
+    if one.path.rstrip(",;\\") == path:
         why = f"{where}: in {shown(one.path)}, the {one.path[-1]} counts as part of the name"
+    if one.path.rstrip("\\") == path:
+        return Lack(why, f"delete each \\ behind {path}: in CMake a line goes on without it", _line(one))
     return Lack(why, f"write {path} in place of {shown(one.path)}", _line(one))
 
 

@@ -20,6 +20,7 @@ from grader.checks.support.scripts import (
     move_hint,
     names_script,
     paths_by_name,
+    script_of_role,
     shebang_obstacles,
     syntax_fault,
 )
@@ -30,7 +31,7 @@ from grader.model.package import CMAKE, Fault, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.submission import chmod_hint
 from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, inconclusive, passed, unjudged
-from grader.wording import has_role_of, join_words, there_is
+from grader.wording import join_words, there_is
 
 # a script without its first line is run by the shell, which knows no `import`
 TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
@@ -199,19 +200,14 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     movable = [p for p in near if can_be_moved(p, path)]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
     seen = f"; {there_is(near)}" if near else ""
-    alike = [p for p in scripts if not near and has_role_of(p, path)]
-    seen = f"; {there_is(alike)}" if alike else seen
-    hint = (
-        f"{move_hint(package, movable[0], path)}{_where_named(package, movable[0])}"
-        if movable
-        else add_hint(package, path)
-    )
-    hint = (
-        f"{hint}, or {move_hint(package, alike[0], path)} if that is meant to be it"
-        if len(alike) == 1
-        else hint
-    )
-    kind: MistakeKind = "file-elsewhere" if movable or len(alike) == 1 else "file-missing"
+    alike = "" if near else script_of_role(package, path)
+    meant = list(filter(None, [*movable, alike]))[:1]
+    seen = f"; there is {meant[0]}" if meant and not near else seen
+    hint = add_hint(package, path)
+    if meant:
+        moved, named = move_hint(package, meant[0], path), _where_named(package, meant[0])
+        hint = f"{moved}{named}" if movable else f"{hint}, or {moved} if that is meant to be it{named}"
+    kind: MistakeKind = "file-elsewhere" if meant else "file-missing"
     if not movable and (elsewhere := package.hints_on(wanted.name)):
         where, _, hint = elsewhere[0].partition(": ")
         seen, kind = f"; {where}", "file-elsewhere"
@@ -219,7 +215,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
         f"{path} is not in the package{seen}",
         measured=f"scripts: {join_words(sorted(scripts))}" if scripts else "no Python script in the package",
         hint=hint,
-        citations=tuple(FileCitation(file=p) for p in near[:3]),
+        citations=tuple(FileCitation(file=p) for p in (near or meant)[:3]),
     ).lost_by(kind, path)
 
 
@@ -227,10 +223,10 @@ def _where_named(package: PackageFacts, path: str) -> str:
     """Return where else the name of a script that is renamed stands, to put behind the command."""
     calls = (one.call for one in installed(package) if names_script(one, path))
     places = [f"{call.file}, line {call.line}" for call in calls]
-    nodes = (node for launch in package.launch_files for node in launch.nodes)
+    nodes = ((launch.path, node) for launch in package.launch_files for node in launch.nodes)
     places += [
-        f"{n.file}, line {n.line}"
-        for n in nodes
+        f"{n.file or file}, line {n.line}"
+        for file, n in nodes
         if n.type == PurePosixPath(path).name and n.pkg == package.name
     ]
     return f"; write the new name in {join_words(dict.fromkeys(places))} too" if places else ""

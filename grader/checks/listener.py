@@ -131,11 +131,20 @@ def _other_words(
         hint = f"print '{wanted}': of the message only its .data, which is the text"
     elif blank and said and all(text_places(missing, lines, glued)):
         hint = f"put a space between the words and the message: '{wanted}'"
+    elif said and (mark := _mark_between(said[0], missing[0], params.template)):
+        hint = f"print '{wanted}', with ' ' in place of {mark!r} between the words and the message"
     share = 1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes)
     all_of = plural(len(probes), "message")
     measured = f"{len(probes)} of {all_of} printed, {len(missing)} of them in other words"
     verdict = failed(message, hint=hint, measured=measured).in_part(share, "what is printed of each message")
     return verdict.about(said="".join(said[:1]))
+
+
+def _mark_between(said: str, probe: Probe, template: str) -> str:
+    """Return what stands between the template's words and the message on a line, "" if it is not just marks."""
+    before, _, _ = said.partition(str(probe.value))
+    _, words, mark = before.casefold().rpartition(template.partition(VALUE)[0].strip().casefold())
+    return mark if words and mark.strip() and not any(c.isalnum() for c in mark) else ""
 
 
 def _some_in_other_words(
@@ -191,7 +200,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     elif verdict is None:
         near = near_names(topic, subscribed)
         other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""
-        hint = f"add {subscriber(topic, '…, callback')}"
+        hint = f"{f'name the topic {topic} in' if near else 'add'} {subscriber(topic, '…, callback')}"
         if copied := copied_topic(package, run, "subscriber"):
             other = f"{other}, on {copied}"
             hint = f"write {topic} on the one of {copied} whose callback is for it"

@@ -80,7 +80,7 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
     if wrong:
         verdict = _wrong_type(package, run, wrong[0], params)
     elif not heard:
-        verdict = no_message(package, run, params.topic, of_node=failed)
+        verdict = no_message(package, run, params.topic, of_node=failed, kind=params.type)
     elif other := next(filter(None, (_other_definition(c, params) for c in heard)), None):
         verdict = other
     else:

@@ -51,6 +51,8 @@ from grader.rubric.model import Criterion, Rubric
 from grader.wording import join_words, significant
 
 NAMES_SHOWN = 3
+ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
+"""A line that calls `input()`."""
 OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
@@ -201,12 +203,31 @@ class Later:
                 yield f"in {file.path}, {syntax_hint(fault)}"
 
     def _names(self) -> Iterator[str]:
-        """Names that are not there; an `except` of one is not reached."""
+        """Names that are not there, of which an `except` is not reached, and functions that nothing calls."""
         for slip in self._of("misspelt", "undefined"):
-            lines = self._build.file_lines(slip.file) if self._build is not None else []
-            caught = slip.line <= len(lines) and lines[slip.line - 1].lstrip().startswith("except")
+            caught = self._text_of(slip).lstrip().startswith("except")
             if (one := name_slip(slip, self._package)) is not None and not caught:
                 yield one.fix
+        for file, line in sorted(self._asked()):
+            yield f"write a value in the code where line {line} of {file} asks for input"
+        for slip in self._of("never-called"):
+            yield f"call `{slip.name}()`, which nothing in {slip.file} calls"
+
+    def _text_of(self, slip: PythonSlip) -> str:
+        lines = self._build.file_lines(slip.file) if self._build is not None else ()
+        return lines[slip.line - 1] if slip.line <= len(lines) else ""
+
+    def _asked(self) -> set[tuple[str, int]]:
+        """Return where the scripts ask for input; nothing where that is known already."""
+        if "input" in f"{self._verdict.message} {self._verdict.hint}":
+            return set()
+        files = [one for one in map(self._package.file, self._paths) if one is not None and one.python_fault]
+        return {(slip.file, slip.line) for slip in self._of("input")} | {
+            (one.path, number)
+            for one in files
+            for number, line in enumerate(self._build.file_lines(one.path) if self._build else (), 1)
+            if ASKS.match(line[:LINE_CHARS])
+        }
 
     def _rate(self) -> Iterator[str]:
         hz, numbers = float(str(self._wanted["rate_hz"])), self._of("rate-number")
@@ -221,11 +242,15 @@ class Later:
 
     def _node_name(self) -> Iterator[str]:
         own, names = self._of("node-name"), list(texts_in(self._wanted.get("names")))
+        plain = self._wanted.get("anonymous") == "forbidden"
+        for slip in self._of("commented-out") if plain and not own and not self._ran else ():
+            if slip.name == "init_node" and "anonymous=True" in self._text_of(slip).replace(" ", ""):
+                yield f"remove anonymous=True from {_line(slip)}"
         if self._ran or len(own) != 1 or not names or f"init_node('{names[0]}'" in self._verdict.hint:
             return
         if own[0].message.lstrip("/") not in names:
             yield f"name the node {names[0]} on {_line(own[0])}, not {own[0].message}"
-        if own[0].name == "anonymous" and self._wanted.get("anonymous") == "forbidden":
+        if own[0].name == "anonymous" and plain:
             yield f"remove anonymous=True from {_line(own[0])}"
 
     def _copied(self) -> Iterator[str]:
@@ -249,7 +274,9 @@ class Later:
                 yield f"add a publisher of {kind} on {self._topic}: {other.file} has only the one of {other.message}"
                 return
             yield f"publish on {self._topic} on {_line(published[0])}, not on {published[0].message}"
-        if len(published) > 1 and not lines:
+        own = [one for one in self._of("publisher-type") if one.message == kind.rpartition("/")[2]]
+        named = self._ran and {one.line for one in own} & {one.line for one in published}
+        if len(published) > 1 and not lines and not named:
             names = join_words(f"{one.message} (line {one.line})" for one in published[:NAMES_SHOWN])
             yield f"publish {kind} on {self._topic}: {published[0].file} publishes on {names}"
         types = [one for one in self._of("publisher-type") if one.line in lines or len(published) <= 1]
@@ -316,11 +343,11 @@ class Later:
         text = said[0].message
         if text in {SAID_VALUE, SAID_DATA} and self._lacks_words(template.partition(SECONDS)[0]):
             yield f"publish `{code}` on {_line(said[0])}"
-        if len(self._of("publisher")) > 1:  # it may be another topic's
-            yield f"publish `{code}`"
-            return
         sample = template.replace(SECONDS, "1234567890.25")
-        if not could_say(text, sample):
+        if len(self._of("publisher")) > 1:  # it may be another topic's
+            if not could_say(text, sample):
+                yield f"publish `{code}`"
+        elif not could_say(text, sample):
             words = in_words(template) if said[0].file.endswith(tuple(SOURCES)) else code
             yield f"publish `{words}` on {_line(said[0])}, not '{in_source(text)}'"
         elif SECONDS in template and self._of("no-clock"):

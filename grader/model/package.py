@@ -290,7 +290,7 @@ class PythonSlip(Record):
     `__main__`. `never-reached`: an endless loop before the first `publish(…)`; `spin-in-loop`: a loop that
     publishes and waits in `spin()`; `loop-left`: a loop that ends in its first turn, or after a number of them;
     `sleep-outside`: a loop whose `sleep()` is outside it; `sleep-twice`: a loop that waits twice in each turn;
-    `publish-twice`: one that publishes the same twice, in lines that follow each other.
+    `publish-twice`: one that publishes on one topic more than once in each turn.
     `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it should only be
     named, that takes another number of values than ROS passes, or that does not exist. `callback-waits`: a topic's
     callback that sleeps, or never ends. `queue-size`: a queue size that is a text, with which rospy sends nothing.
@@ -529,10 +529,13 @@ class PackageFacts(Record):
 
     def launches_of(self, programs: AbstractSet[str]) -> list[str]:
         """Return the launch files that start all of these programs; if there are several, those of the
-        package's own nodes."""
+        package's own nodes, and of these the ones that give no topic another name."""
         found = [one for one in self.launch_files if programs and one.starts(programs) == programs]
         own = [one for one in found if all(node.pkg == self.name for node in one.nodes)]
-        return [one.path for one in own or found]
+        plain = [
+            one for one in own if not any(n.remaps or n.namespace != "/" for n in one.brings or one.nodes)
+        ]
+        return [one.path for one in plain or own or found]
 
     @property
     def has_no_manifest(self) -> bool:

@@ -96,6 +96,8 @@ def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
 
 
 INSTALL = "cmake-install"
+CANNOT = "cannot be run"
+"""Words of the messages of such scripts."""
 NOT_STARTED = ("not-executable", "cannot-be-run")
 """The mistakes in a script that the build would make up for if CMakeLists.txt installed it."""
 
@@ -127,16 +129,15 @@ def _joined(criterion: CriterionResult, scripts: Sequence[CriterionResult]) -> C
     found = [one.mistake for one in scripts if one.mistake]
     paths = [one.name for one in found]
     if criterion.check == INSTALL:
-        why = [one.message.partition("; ")[0] for one in scripts]
-        if all(one.kind == "not-executable" for one in found):
-            why, then = [_without_bit(paths)], f"makes {join_words(paths)} executable"
-        else:
+        reasons: dict[str, list[str]] = {}
+        for path, one in zip(paths, scripts, strict=True):
+            reasons.setdefault(one.message.partition("; ")[0].removeprefix(f"{path} "), []).append(path)
+        why = [f"{join_words(of)} {reason}" for reason, of in reasons.items() if CANNOT in reason]
+        then = f"makes {join_words(paths)} executable"
+        if why:
             then = f"makes {'programs' if len(paths) > 1 else 'a program'} of {join_words(paths)}"
-        told = {
-            "message": "; ".join([criterion.message, *why]),
-            "hint": f"{criterion.hint}; the build then {then}",
-        }
-        return criterion.model_copy(update=told)
+        message, hint = "; ".join([criterion.message, *why]), f"{criterion.hint}; the build then {then}"
+        return criterion.model_copy(update={"message": message, "hint": hint})
     own = criterion.mistake.name if criterion.mistake else ""
     hint = criterion.hint.replace(own, " ".join([own, *paths]))
     return criterion.model_copy(update={"message": _without_bit([own, *paths]), "hint": hint})

@@ -121,6 +121,12 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
     "a message type that is not imported": (
         "node", DIES, TALKER, [slip("undefined", "", name="Twist", fix="define <package>")],
         "; then write `from geometry_msgs.msg import Twist` at the top"),
+    "a question behind it": (
+        "node", DIES, TALKER, [slip("input", "`input()` waits", 6)],
+        f"; then write a value in the code where line 6 of {FILE} asks for input"),
+    "a function that nothing calls": (
+        "node", DIES, TALKER, [slip("never-called", "nothing calls `talk()`", name="talk")],
+        f"; then call `talk()`, which nothing in {FILE} calls"),
     "rate.sleep without brackets behind it": (
         "node", DIES, TALKER, [slip("not-called", "", name="rate.sleep", fix="write `rate.sleep()`")],
         f"; then on line 5 of {FILE}, write `rate.sleep()`"),
@@ -220,6 +226,19 @@ def test_a_text_that_takes_the_place_of_input_is_told_once() -> None:
     )
     assert hint.startswith('write `"hello world %s" % rospy.get_time()` in place of `input()`')
     assert hint.count("hello world") == 1
+
+
+def test_a_question_in_a_script_that_does_not_compile_is_named() -> None:
+    fault = {"file": FILE, "line": 4, "kind": "TabError", "message": "inconsistent use of tabs"}
+    own = [{**one, "python_fault": fault} if one["path"] == FILE else one for one in PACKAGE["files"]]
+    source = "# input()\nwhile True:\n    word = raw_input('?')\n\tprint(word)\n"
+    runs = {
+        "runs": {"talker": DIES, "package": {"attachments": {FILE: source}}},
+        "package": {**PACKAGE, "files": own},
+    }
+    found = {c.id: c.hint for c in judge(rubric(*TALKER), build_runs(runs))}
+    told = f"then write a value in the code where line 3 of {FILE} asks for input"
+    assert any(told in hint for hint in found.values())
 
 
 def test_what_a_machine_lacks_does_not_hide_what_is_the_students() -> None:

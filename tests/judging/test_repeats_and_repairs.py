@@ -68,6 +68,20 @@ def test_one_fault_is_charged_once_and_the_rest_earns_its_share() -> None:
     assert found["executable"].repaired is None
 
 
+def test_a_sleep_without_brackets_is_charged_to_the_rate() -> None:
+    line = "        rate.sleep"
+    sleep = TABS.model_copy(update={"kind": "missing-call", "line": 12, "before": line, "after": f"{line}()"})
+    found = judged(DIED, GOOD_RUN, TABS, sleep)
+    assert {name: (c.status.value, c.points) for name, c in found.items()} == {
+        "rate": ("fail", 0),
+        "chatter": ("partial", 5),
+        "node": ("fail", 0),
+        "executable": ("pass", 10),
+    }
+    assert found["node"].repaired is not None
+    assert found["node"].repaired.repairs == (TABS,)
+
+
 def test_a_name_is_charged_where_the_rubric_asks_for_it() -> None:
     misspelt = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
     found = judged(misspelt, GOOD_RUN, TOPIC)

@@ -538,6 +538,15 @@ CASES = {
         "lines 8 to 11; CMakeLists.txt: in place of lines 4 to 7 write add_message_files(FILES Level.msg)",
     ),
     "own-message-of-another-exercise": Case({**OWN, CMAKELISTS: CMAKE}, []),
+    "own-message-of-another-exercise-beside-one-that-is-made": Case(
+        {**RUN_OWN, "msg/Tilt.msg": "float64 tilt\n", "src/tilt.py": "from lab.msg import Tilt\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")}, [],
+    ),
+    "own-message-beside-one-that-is-made": Case(
+        {**RUN_OWN, "msg/Tilt.msg": "float64 tilt\n", "msg/Level.msg": "Tilt[] level\n",
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")},
+        ["build-line"], "write Tilt.msg after FILES",
+    ),
     "own-message-of-another-exercise-that-the-build-asks-for": Case(
         {**OWN, CMAKELISTS: f"{CMAKE}add_dependencies(talker lab_generate_messages_cpp)\n"}, ["build-line"] * 3,
     ),

@@ -170,6 +170,9 @@ COUNTERS = {
     "sleeps-apart": (f"{LOOP}    r.sleep()\n    p.publish(c)\n    r.sleep()\n", ("sleep-twice", 5, "delete line 5")),
     "same-message-again": (f"{LOOP}    p.publish(c)\n    p.publish(c)\n    r.sleep()\n",
                            ("publish-twice", 4, "delete line 4")),
+    "three-messages": (f"{LOOP}    p.publish(a)\n    b = 1\n    p.publish(b)\n    p.publish(c)\n    r.sleep()\n",
+                       ("publish-twice", 5, "delete all but one of lines 3, 5 and 6")),
+    "two-publishers": (f"{LOOP}    p.publish(c)\n    q.publish(c)\n    r.sleep()\n", None),
     "two-messages": (f"{LOOP}    p.publish(c)\n    r.sleep()\n    p.publish(c)\n    r.sleep()\n", None),
 }  # fmt: skip
 

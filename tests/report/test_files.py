@@ -167,6 +167,21 @@ def test_scripts_that_the_build_would_make_executable_are_told_with_their_instal
         loss.criterion.hint
         == "write src/a.py src/b.py; the build then makes src/a.py and src/b.py executable"
     )
+    assert (
+        loss.criterion.message == message
+    )  # that a bit is missing is no more than what the build makes up for
+    lines = tuple(
+        one.model_copy(
+            update={
+                "message": f"{one.mistake.name} cannot be run: there is no `#!` line; rosrun answers: import",
+                "mistake": one.mistake.model_copy(update={"kind": "cannot-be-run"}),
+            }
+        )
+        for one in BITS
+        if one.mistake
+    )
+    (loss,) = arrange(result(criteria=(*lines, install)), rubric()).lost
+    assert loss.criterion.message == f"{message}; src/a.py and src/b.py cannot be run: there is no `#!` line"
     other = install.model_copy(update={"message": "catkin_install_python(…) does not name src/a.py"})
     told = arrange(result(criteria=(*BITS, other)), rubric()).lost
     assert [(one.criterion.id, one.points) for one in told] == [("install", 15), ("listener-executable", 5)]

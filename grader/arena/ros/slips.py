@@ -309,16 +309,28 @@ def sleeps_twice(tree):
 
 
 def publishes_twice(tree):
-    """Loops in which two lines that follow each other publish the same."""
+    """Loops that publish on one topic more than once in each of their turns, and sleep once at most."""
     for loop in walk(tree):
         body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
-        for at in range(1, len(body)):
-            first, second = body[at - 1], body[at]
-            given = isinstance(first, ast.Expr) and called_name(first.value) == "publish"
-            if given and ast.dump(first) == ast.dump(second):
-                message = "the loop publishes on line %d and the same again on line %d"
-                message %= (first.lineno, second.lineno)
-                yield slip(second.lineno, "publish-twice", message, fix="delete line %d" % second.lineno)
+        plain = [one for one in body if isinstance(one, ast.Expr) and called_name(one.value) == "publish"]
+        by_publisher = {}
+        for one in plain:
+            by_publisher.setdefault(ast.dump(one.value.func), []).append(one)
+        many = [same for same in by_publisher.values() if len(same) > 1]
+        if not many or any(
+            calls_in(n, *WAITS) for n in body[body.index(many[0][0]) : body.index(many[0][-1])]
+        ):
+            continue
+        first, second = many[0][:2]
+        lines = [one.lineno for one in many[0]]
+        if ast.dump(first) == ast.dump(second) and body.index(second) == body.index(first) + 1:
+            message, fix = "the loop publishes on line %d and the same again on line %d", "delete line %d"
+            message, fix = message % (lines[0], lines[1]), fix % lines[1]
+        else:
+            listed = "lines %s and %d" % (", ".join(map(str, lines[:-1])), lines[-1])
+            message, fix = "each turn of the loop publishes on %s", "delete all but one of %s"
+            message, fix = message % listed, fix % listed
+        yield slip(lines[1], "publish-twice", message, fix=fix)
 
 
 def waiting_callbacks(tree):

@@ -32,6 +32,7 @@ SLIPS_OF_COMPONENTS = ("COMPONENT", "COMPONENETS", "COMPONETS", "COMPONENTES", "
 SLIP = 0.8
 """How alike a name is that is written for one that every machine has: `pospy` for `rospy`."""
 UNKNOWN_COMMAND = "Unknown CMake command"
+BACKSLASH = 'bad character with text "\\"'
 FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error that it prints"
 _QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
 """As compilers and linkers write them."""
@@ -115,7 +116,10 @@ def repair_of_file(fault: Fault) -> str:
     return (fault.fix if fault.unclosed else fault.advice) or "correct that line, then run catkin_make"
 
 
-def _unreadable(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+def _unreadable(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
+    if BACKSLASH in " ".join(word for line in lines for word in line.split()):
+        why = "a line of this call ends with \\, as in a shell: in CMake a call goes on without it"
+        return Explained(why, "delete the \\ at the end of each line of that call")
     return unreadable_file(package) or Explained(found.string, FIRST_ERROR_HINT)
 
 
@@ -210,8 +214,11 @@ def _missing_include(found: re.Match[str], _package: PackageFacts, _lines: Seque
 
 
 def _missing_launch(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    words = f"roslaunch_add_file_check(…) names {found[1]}"
-    return _missing_files([_below(found[1], package)], package, words)
+    path, call = _below(found[1], package), "roslaunch_add_file_check(…)"
+    if posixpath.splitext(path)[1]:
+        return _missing_files([path], package, f"{call} names {path}", leave=f"remove {call}")
+    why = f"{call} names the folder {path}/, which is not in the package"
+    return Explained(why, f"put your launch files into {path}/ and push them, or remove {call}")
 
 
 def _missing_source(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:

@@ -471,7 +471,7 @@ def _file(message: str, _source: str, _marked: tuple[int, int] | None) -> Meanin
         )
     return (
         "a path is looked for where the node is started, not beside the script",
-        f"`import os`, and open `{here}`",
+        f"`import os`, and open `{here}` wherever it is opened",
     )
 
 

@@ -176,6 +176,16 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     return Ending(f"it exited with code {code}{words}", RUN_IT)
 
 
+MAKES_NODES = {
+    "init_node": "node-name",
+    "Publisher": "publisher",
+    "Subscriber": "subscriber",
+    "publish": "publishes",
+    "spin": "",
+}
+"""Calls, and the kind of slip that there is where the script has one of them that is not in a comment."""
+
+
 def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     """Explain a script that comes to its end because nothing calls what it defines, or because its loop is left."""
     script = next((f for f in package.files if f.path == life.start.script), None)
@@ -192,9 +202,24 @@ def _not_run(life: Life, package: PackageFacts) -> Ending | None:
     if not slips:
         return None
     slip = min(slips, key=lambda one: kinds.index(one.kind))
+    of_script = [s for s in package.slips if s.file == life.start.script]
+    if slip.kind == "commented-out" and (all_of_them := _in_comments(of_script)):
+        slip = slip.model_copy(update=all_of_them)
     called = f"call {slip.name}() at the end of the script, below {MAIN}" if slip.name else f"write {MAIN}"
     cause = f"its script ran to the end: {slip.message} ({slip.file}, line {slip.line})"
     return Ending(cause, slip.fix or called, (slip.place,), by_itself=True)
+
+
+def _in_comments(slips: Sequence[PythonSlip]) -> dict[str, str]:
+    """Return the message and the fix of all calls that make a script a node and that are only there in comments;
+    nothing of a single one."""
+    kinds = {one.kind for one in slips}
+    gone = (s for s in slips if s.kind == "commented-out" and "`#`" in s.fix)
+    lines = sorted({s.line for s in gone if MAKES_NODES.get(s.name.rpartition(" ")[2], s.kind) not in kinds})
+    listed = f"lines {join_words(map(str, lines))}"
+    if len(lines) < 2:
+        return {}
+    return {"message": f"{listed} are commented out", "fix": f"remove the `#` from {listed}"}
 
 
 def explain_error(package: PackageFacts, run: Run, *, only: Collection[str] | None = None) -> Ending | None:
@@ -314,6 +339,11 @@ def _unused_import(place: FileCitation, package: PackageFacts) -> str:
     own = [s for s in package.slips if s.file == place.file]
     if any(s.kind in {"undefined", "misspelt"} for s in own):
         return ""
+    unused = {s.line for s in own if s.kind == "unused-import"}
+    lacking = [(s.line, s.message) for s in own if s.kind == "lacking-import"]
+    needed = {module for line, module in lacking if line not in unused}
+    if any(line == place.line and module in needed for line, module in lacking):
+        return ""
     return next((s.fix for s in own if (s.kind, s.line) == ("unused-import", place.line)), "")
 
 
@@ -363,6 +393,10 @@ def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | 
     slips = [s for s in package.slips if s.file == place.file]
     if astray := next((s for s in slips if (s.kind, s.name) == ("object", "__init__")), None):
         return astray.message, astray.fix
+    gone = next((s for s in slips if (s.kind, s.name) == ("commented-out", "init_node")), None)
+    if gone is not None and not any(s.kind == "node-name" for s in slips):
+        told = _in_comments(slips) or {"message": f"line {gone.line} is commented out", "fix": gone.fix}
+        return told["message"], told["fix"]
     if never := next((s for s in slips if s.kind == "no-init"), None):
         return never.message, f"call `rospy.init_node(…)`, with the node's name, above line {place.line}"
     below = [s.line for s in slips if s.kind == "node-name" and place.line and s.line > place.line]

@@ -19,6 +19,7 @@ from grader.checks.support.scripts import (
     move_hint,
     paths_by_name,
     programs,
+    script_of_role,
     shebang_obstacles,
 )
 from grader.checks.support.text import INIT, near_names, shown
@@ -27,6 +28,7 @@ from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFact
 from grader.model.submission import chmod_hint
 from grader.model.verdict import (
     FileCitation,
+    MistakeKind,
     Verdict,
     failed,
     inconclusive,
@@ -137,36 +139,51 @@ def _unreadable(
     package: PackageFacts, file: LaunchFile | None, launch: str, wanted: set[str]
 ) -> Verdict | None:
     if file is None:
-        started = {f.path: f.starts(wanted) for f in package.launch_files if f.nodes}
-        full = package.launches_of(wanted)
-        others = [f.path for f in package.launch_files]
-        names = paths_by_name(package)
-        near = [names[n] for n in near_names(launch, names)]
-        stem = PurePosixPath(launch).stem
-        near += [p for n, p in names.items() if n == f"{stem}.xml" and p not in near]
-        seen = f"; {there_is(dict.fromkeys([*near, *others]))}" if near or others else ""
-        seen += f", and {full[0]} starts {join_words(sorted(wanted))}" if len(others) > 1 and full else ""
-        seen += f", which starts {join_words(sorted(wanted))}" if full and full == others else ""
-        parts = {} if full else _parts_started(started)
-        seen += (
-            f", and {join_words(f'{path} starts {name}' for path, name in parts.items())}" if parts else ""
-        )
-        message = f"{launch} is not in the package{seen}"
-        movable = [p for p in near if can_be_moved(p, launch) and (not wanted or started.get(p, wanted))]
-        movable += full[:1] if len(full) == 1 else []
-        path = f"launch/{launch}"
-        hint = move_hint(package, movable[0], path) if movable else add_hint(package, path)
-        if parts and set(parts.values()) == wanted and not movable:
-            hint = f"{hint}, with the <node>s of {join_words(parts)} in it"
-        place = movable[0] if movable else path
-        verdict = failed(message, hint=hint, citations=(FileCitation(file=place),))
-        return verdict.lost_by("file-elsewhere" if movable else "file-missing", path)
+        return _absent(package, launch, wanted)
     if file.fault is None:
         return None
     line = f", line {file.fault.line}" if file.fault.line else ""
     message = f"{file.path}{line} is not well-formed: {file.fault.explanation}"
     hint = file.fault.advice or "close every element, and begin with <launch> and end with </launch>"
     return failed(message, hint=hint, citations=(file.fault.place,))
+
+
+def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
+    """Return that the launch file is not there, and which other one may be meant: one of nearly its name, or one that
+    starts the same programs."""
+    started = {f.path: f.starts(wanted) for f in package.launch_files if f.nodes}
+    full = package.launches_of(wanted)
+    programs = wanted if full else {_program_meant(package, one) for one in wanted}
+    guessed = [] if full else package.launches_of(programs)[:1]
+    others = [f.path for f in package.launch_files]
+    names = paths_by_name(package)
+    near = [names[n] for n in near_names(launch, names)]
+    stem = PurePosixPath(launch).stem
+    near += [p for n, p in names.items() if n == f"{stem}.xml" and p not in near]
+    seen = f"; {there_is(dict.fromkeys([*near, *others]))}" if near or others else ""
+    if starting := full or guessed:
+        which = "which" if starting == others else f"and {join_words(starting)}"
+        seen += f", {which} {'each start' if len(starting) > 1 else 'starts'} {join_words(sorted(programs))}"
+    parts = {} if full else _parts_started(started)
+    if parts:
+        seen += f", and {join_words(f'{path} starts {name}' for path, name in parts.items())}"
+    movable = [p for p in near if can_be_moved(p, launch) and (not wanted or started.get(p, wanted))]
+    movable += full[:1] if len(full) == 1 else []
+    path = f"launch/{launch}"
+    hint = move_hint(package, movable[0], path) if movable else add_hint(package, path)
+    if guessed and not movable:
+        hint = f"{hint}, or {move_hint(package, guessed[0], path)} if that is meant to be it"
+    if parts and set(parts.values()) == wanted and not movable:
+        hint = f"{hint}, with the <node>s of {join_words(parts)} in it"
+    verdict = failed(f"{launch} is not in the package{seen}", hint=hint)
+    kind: MistakeKind = "file-elsewhere" if movable or guessed else "file-missing"
+    return verdict.about(citations=(FileCitation(file=movable[0] if movable else path),)).lost_by(kind, path)
+
+
+def _program_meant(package: PackageFacts, name: str) -> str:
+    """Return the name of the script that may be meant to be this one, if it is missing; else the name itself."""
+    other = "" if has_program(package, name) else script_of_role(package, name)
+    return PurePosixPath(other).name or name
 
 
 def _parts_started(started: Mapping[str, set[str]]) -> dict[str, str]:

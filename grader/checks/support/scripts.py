@@ -86,6 +86,32 @@ def paths_by_name(package: PackageFacts) -> dict[str, str]:
     return {PurePosixPath(path).name: path for path in paths}
 
 
+ROLES = (
+    ("talker", "publisher", "pub", "sender", "emitter"),
+    ("listener", "subscriber", "sub", "receiver"),
+    ("server", "service"),
+)
+"""Words for the same kind of node in the names of scripts."""
+
+
+def _has_role_of(one: str, other: str) -> bool:
+    """Return whether two scripts are called by different words for the same kind of node, "talker" and
+    "publisher". By the same word they are two that a lab asks for."""
+    given, wanted = (PurePosixPath(path).stem.casefold().split("_") for path in (one, other))
+    return any(
+        word in wanted and set(words).intersection(given) - {word} and word not in given
+        for words in ROLES
+        for word in words
+    )
+
+
+def script_of_role(package: PackageFacts, path: str) -> str:
+    """Return the only script whose name has another word for what the name of `path` says that it is; "" if there is
+    none, or several."""
+    alike = [p for n, p in paths_by_name(package).items() if n.endswith(".py") and _has_role_of(p, path)]
+    return alike[0] if len(alike) == 1 else ""
+
+
 def can_be_moved(path: str, wanted: str) -> bool:
     """Return whether one file can be what another was meant to be: of the same kind, or without a suffix."""
     one, other = PurePosixPath(path).suffix, PurePosixPath(wanted).suffix

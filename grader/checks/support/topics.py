@@ -91,9 +91,14 @@ def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:
 
 
 def no_message(
-    package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict] = unjudged
+    package: PackageFacts,
+    run: Run,
+    topic: str,
+    of_node: Callable[..., Verdict] = unjudged,
+    kind: str = "",
 ) -> Verdict:
-    """Return why no message came on a topic. `of_node` makes the verdict where the node itself is the reason."""
+    """Return why no message came on a topic. `of_node` makes the verdict where the node itself is the reason; `kind` is
+    the type that the topic should have."""
     if lost := all_lost(run, topic):
         return lost
     published = published_topics(run)
@@ -111,7 +116,7 @@ def no_message(
         return absent if topic in published else _with_others(absent, published)
     if topic in published:
         return _judge_advertised(package, run, what, of_node)
-    return _not_advertised(package, run, topic, of_node)
+    return _not_advertised(package, run, topic, of_node, kind)
 
 
 def _judge_misnamed(
@@ -143,7 +148,9 @@ def _namespaced_node(package: PackageFacts, run: Run, topic: str) -> LaunchNode 
     return max(nodes, key=lambda n: len(n.namespace), default=None)
 
 
-def _not_advertised(package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict]) -> Verdict:
+def _not_advertised(
+    package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict], kind: str
+) -> Verdict:
     published, what = published_topics(run), f"no message came on {topic}"
     measured = join_words(published) or "no topic"
     if slip := why_unreached(package, run):
@@ -158,9 +165,12 @@ def _not_advertised(package: PackageFacts, run: Run, topic: str, of_node: Callab
         hint = f"write {topic} on the one of {copied} that is for it"
         message = f"{what}; the node publishes on {join_words(published)}, on {copied}"
         return of_node(message, measured=measured, hint=hint)
-    hint += f", or rename {join_words(published, 'or')} if that is meant to be it"
+    meant = [name for name, type_ in published.items() if kind and type_ == plain_type(kind)] or list(
+        published
+    )
+    hint += f", or rename {join_words(meant, 'or')} if that is meant to be it"
     verdict = of_node(f"{what}; the node publishes on {join_words(published)}", measured=measured, hint=hint)
-    return verdict.about(citations=named_at(package, run, "publisher", next(iter(published))))
+    return verdict.about(citations=named_at(package, run, "publisher", meant[0]))
 
 
 def _with_others(absent: Verdict, published: Collection[str]) -> Verdict:

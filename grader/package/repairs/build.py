@@ -89,7 +89,7 @@ def repair_cmake(
         below = (GENERATE, "find_package", "project")
         _add_call(files, "catkin_package()", "catkin_package()", below)
     if _needs_interfaces(files, package, name, scripts):
-        _make_interfaces(files, package, name)
+        _make_interfaces(files, package, name, scripts)
     if not package.folder_beside:  # what it names is right once it lies there itself
         _install(files, package, wanted)
         _correct_paths(files, package)
@@ -343,8 +343,11 @@ def _all_words(files: Files) -> Iterator[Token]:
         yield from command.args
 
 
-def _make_interfaces(files: Files, package: PackageFacts, name: str) -> None:
-    """Find what CMakeLists.txt lacks to make the package's own messages, services and actions, where code uses them."""
+def _make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Collection[str]) -> None:
+    """Find what CMakeLists.txt lacks to make the package's own messages, services and actions, where code uses them.
+
+    One that only other scripts than those that are run would use is not added to those that the file names already.
+    """
     code = [f.path for f in package.files if is_own(f.path) and (f.python or f.path.endswith(CPP))]
     used = _used_kinds(files, package, name, code)
     made = {c: _definitions(package, folder) for c, folder in INTERFACE_FOLDERS.items() if folder in used}
@@ -352,13 +355,22 @@ def _make_interfaces(files: Files, package: PackageFacts, name: str) -> None:
         return
     _correct_types(files, package)
     _generate(files, package)  # from below, so that the lines above stay where they are
+    run = [path for path in code if path in scripts or path.endswith(CPP)]
+    needed = {word for path in run for word in re.findall(r"\w+", files.text(path) or "")}
+    needed |= {
+        word for one in package.interfaces for field in one.fields for word in re.findall(r"\w+", field.type)
+    }
     for call, names in reversed(made.items()):
-        _name_definitions(files, call, names)
+        _name_definitions(files, call, names, needed)
     of_catkin = [
         c for c in _commands(files, "find_package") if [t.value for t in _words(c)][:1] == ["catkin"]
     ]
     named = [token.value for call in of_catkin for token in _words(call)]
-    if of_catkin and GENERATION not in named and not any("$" in word for word in named):
+    if (
+        of_catkin
+        and not {GENERATION, "genmsg"}.intersection(named)
+        and not any("$" in word for word in named)
+    ):
         words = _words(of_catkin[0])
         listed = next((t for t in words if t.value == "COMPONENTS"), None)
         token, new = (listed, GENERATION) if listed else (words[-1], f"COMPONENTS {GENERATION}")
@@ -406,8 +418,9 @@ def _values_of(call: Command, keyword: str) -> list[str]:
     return list(takewhile(lambda word: not word.isupper(), behind))
 
 
-def _name_definitions(files: Files, name: str, made: Sequence[str]) -> None:
-    """Name them all in the call, in place of files that do not exist and have nearly their names, or beside others."""
+def _name_definitions(files: Files, name: str, made: Sequence[str], needed: Collection[str]) -> None:
+    """Name them in the call, in place of files that do not exist and have nearly their names, or beside others if
+    `needed` has their types."""
     if made and not _commands(files, name):
         line, below = f"{name}(FILES {' '.join(made)})", ("find_package", "project")
         _add_call(files, f"{name}(…)", line, below, made)
@@ -417,6 +430,8 @@ def _name_definitions(files: Files, name: str, made: Sequence[str]) -> None:
         if file in named or any("$" in word for word in named):
             continue
         stray = next((word for word in sorted(named - {*made}) if is_near(word, file)), "FILES")
+        if stray == "FILES" and named and PurePosixPath(file).stem not in needed:
+            continue
         token = next((t for one in _commands(files, name) for t in _words(one) if t.value == stray), None)
         if token is not None:
             new, place = (f"FILES {file}", "after") if stray == "FILES" else (file, "instead of")

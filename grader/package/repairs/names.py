@@ -28,6 +28,8 @@ class Wanted(Record):
     launch_files: tuple[str, ...] = ()
     topics: tuple[str, ...] = ()
     nodes: tuple[str, ...] = ()
+    plain: tuple[str, ...] = ()
+    """Nodes that must not be anonymous."""
     params: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     installed: tuple[str, ...] = ()
@@ -43,6 +45,7 @@ class Wanted(Record):
     """Scripts that a scenario starts alone, each with a name that it has to use: of its node, or a topic's."""
 
 
+ANONYMOUS = re.compile(r",\s*anonymous\s*=\s*True\b")
 NAMES_ARE = {
     "node-name": "nodes",
     "node-lives": "nodes",
@@ -136,6 +139,7 @@ def _of_criteria(criteria: Iterable[Criterion]) -> Iterator[tuple[str, Any]]:
         yield from _each("installed" if check == "cmake-install" else "scripts", given.get("scripts"))
         yield from (("scripts", given.get("script")), ("scripts", given.get("path")))
         yield from _each(NAMES_ARE.get(check, ""), given.get("names"))
+        yield from _each("plain" if given.get("anonymous") == "forbidden" else "", given.get("names"))
         if check in PARAMETER_CHECKS:
             yield "params", given.get("name")
             yield from _each("params", given.get("unchanged"))
@@ -208,7 +212,8 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
                 continue  # any of them may be meant, or none
             if right and _resolve(name, node) not in {_bare(w, role) for w in asked}:
                 literal = _literal(name, right, node)
-                _replace_literal(files, file, name, literal, literal if literal.startswith("~") else right)
+                shown = literal if literal.startswith("~") else right
+                _replace_literal(files, file, name, literal, shown, plain=right in wanted.plain)
                 node = literal if role == "node" else node
 
 
@@ -357,8 +362,11 @@ def _literal(name: Name, right: str, node: str) -> str:
     return right if whole else right.lstrip("/")  # relative, so that the node stays in its namespace
 
 
-def _replace_literal(files: Files, file: str, name: Name, value: str, right: str) -> None:
-    """Replace the literal; where an earlier replacement has moved it, it is found by its value."""
+def _replace_literal(
+    files: Files, file: str, name: Name, value: str, right: str, *, plain: bool = False
+) -> None:
+    """Replace the literal; where an earlier replacement has moved it, it is found by its value. A node that is `plain`
+    is not anonymous any more."""
     text = files.text(file)
     if text is None:
         return
@@ -369,7 +377,8 @@ def _replace_literal(files: Files, file: str, name: Name, value: str, right: str
         at = line.find(name.value)
     if at < 0:
         return
-    lines[name.line - 1] = line[:at] + value + line[at + len(name.value) :]
+    line = line[:at] + value + line[at + len(name.value) :]
+    lines[name.line - 1] = ANONYMOUS.sub("", line) if plain and name.role == "node" else line
     kind = KINDS[name.role]
     message = f"line {name.line} of {file}: the {WORDS[kind]} {name.value} should be {right}"
     files.change(kind, file, "\n".join(lines), message)
