@@ -37,6 +37,7 @@ from grader.checks.support.text import (
     shown,
 )
 from grader.checks.support.topics import Sender, cite, losses, no_message, nothing_sent, sent_by
+from grader.evidence.definitions import NOT_FINITE
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -349,7 +350,7 @@ class FieldEqualsParams(Record):
     field: FieldPath
     """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item."""
     value: Any = None
-    """The right value, as in YAML: a number, text, true or false, a list or a map."""
+    """The right value, as in YAML: a number (also `.inf` or `.nan`), text, true or false, a list or a map."""
     values: tuple[Any, ...] = ()
     """In place of `value`: the right values of several messages, in their order. Messages between them do not
     matter."""
@@ -367,7 +368,8 @@ class FieldEqualsParams(Record):
             raise ValueError("give one of value and values")
         if self.values and self.when != "every":
             raise ValueError("when is for value, not for values")
-        if self.tolerance and any(isinstance(one, str) for one in (self.value, *self.values)):
+        texts = [one for one in (self.value, *self.values) if isinstance(one, str)]
+        if self.tolerance and not NOT_FINITE.keys() >= {*texts}:
             raise ValueError("tolerance is for numbers, and text has none: write a number without quotes")
         if self.tolerance and any(isinstance(one, bool) for one in (self.value, *self.values)):
             raise ValueError("tolerance is for numbers, and true and false are none")

@@ -272,6 +272,11 @@ def test_a_rubric_of_the_graders_own_loads_without_a_word(path: Path) -> None:
     assert doubts_of(load_rubric(str(path)), path.name) == []
 
 
+def test_a_field_may_be_asked_to_be_infinite(examples: Path) -> None:
+    path = _spoiled(examples, "tf-broadcaster", "value: 5, tolerance: 0.01", "value: .inf, tolerance: 0.01")
+    assert doubts_of(load_rubric(str(path)), path.name) == []
+
+
 @pytest.mark.parametrize("slip", [slip for slip in LISTED if "fault" in slip], ids=lambda slip: slip["fault"])
 def test_a_slip_of_the_list_is_refused(examples: Path, slip: dict[str, str]) -> None:
     path = _spoiled(examples, slip["lab"], slip["old"], slip["new"])
