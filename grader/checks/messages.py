@@ -37,8 +37,8 @@ from grader.checks.support.text import (
     shown,
 )
 from grader.checks.support.topics import Sender, cite, losses, no_message, nothing_sent, sent_by
-from grader.evidence.definitions import NOT_FINITE
 from grader.evidence.run import Channel, Run
+from grader.model.message_definitions import NOT_FINITE
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
@@ -443,6 +443,9 @@ def _in_order(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> 
     verdict = passed(f"{what} is {params.words}")
     for number, value in enumerate(params.values):
         here = next((n for n in range(at, len(found)) if params.is_at(found[n], value)), None)
+        if here is None and len(found) == len(params.values):  # none is missing: each has its place
+            verdict = _in_another_order(found, params)
+            break
         if here is None:
             before = f" after {value_text(params.values[number - 1])}" if number else ""
             came = (
@@ -463,6 +466,15 @@ def _in_order(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> 
     return verdict.about(
         expected=f"{what} {params.words}", measured=_values(found), citations=(*verdict.citations, cited)
     )
+
+
+def _in_another_order(found: Sequence[Reading], params: FieldEqualsParams) -> Verdict:
+    """As many messages came as are wanted, but not with these values."""
+    pairs = enumerate(zip(found, params.values, strict=True), 1)
+    number, value = next((n, value) for n, (one, value) in pairs if not params.is_at(one, value))
+    came = join_words([_values([one]) for one in found], "then")
+    message = f"{params.field} of {params.topic} is {came}, not {params.words}"
+    return failed(message, hint=f"set {params.field} to {value_text(value)} in message {number}")
 
 
 def _other_value(

@@ -7,7 +7,6 @@ end is refused.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,8 +26,6 @@ NUMBER_BYTES = 32
 TEXT_BYTES = 60
 TEXT_GROWTH = 2
 
-NOT_FINITE = {".inf": math.inf, "+.inf": math.inf, "-.inf": -math.inf, ".nan": math.nan}
-"""As YAML writes them. A rubric's data holds them as text, as JSON has no other form for them."""
 PACKAGE = "recorded"
 PRIMITIVES = {
     "bool": 1,

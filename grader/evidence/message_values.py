@@ -14,14 +14,13 @@ from typing import Any, NamedTuple, TypeGuard
 from grader.evidence.decode import Decoder, Encoder, FindText, definition, full_definition, full_name
 from grader.evidence.definitions import (
     MAX_DEFINITION_BYTES,
-    NOT_FINITE,
     PRIMITIVES,
     Field,
     parse,
     sections_of,
 )
 from grader.installable import noetic_messages
-from grader.model.message_definitions import DIVIDER
+from grader.model.message_definitions import DIVIDER, NOT_FINITE
 from grader.wording import did_you_mean, join_words
 
 ITEMS_MAX = 1_000_000

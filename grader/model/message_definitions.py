@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from difflib import get_close_matches
@@ -12,6 +13,8 @@ from grader.model.package import Fault, Interface, InterfaceField
 FIELDS_MAX = 500
 PARTS = {".msg": ("",), ".srv": ("request", "response"), ".action": ("goal", "result", "feedback")}
 """What a file is divided into by `---`, by its ending."""
+NOT_FINITE = {".inf": math.inf, "+.inf": math.inf, "-.inf": -math.inf, ".nan": math.nan}
+"""As YAML writes them. A rubric's data holds them as text, as JSON has no other form for them."""
 DIVIDER = re.compile(r"^---\s*$", re.MULTILINE)
 RULE = "=" * 80
 """Before the types that a full definition brings along, behind its own."""

@@ -14,8 +14,8 @@ from grader.checks.support.fields import is_number
 from grader.checks.support.processes import odd_name
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.errors import EvidenceError
-from grader.evidence.definitions import NOT_FINITE
 from grader.installable import noetic_messages
+from grader.model.message_definitions import NOT_FINITE
 from grader.ros_packages import ros_packages
 from grader.rubric.fault_words import model_faults
 from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform, Until

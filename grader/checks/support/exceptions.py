@@ -184,6 +184,10 @@ def _no_number(message: str, source: str) -> Meaning | None:
             f"this is the whole message ({kind})",
             "take its field, as in `msg.data`" if data else "take one of its fields",
         )
+    if re.match(
+        r"expected \[\w+\] but got \[std_msgs/\w+\]", message
+    ):  # rospy's own words, of a service's request
+        return "this is the whole message", "take its field, as in `msg.data`"
     if re.search(r" of (?:'str' and '(?:int|float)|'(?:int|float)' and 'str)'", message):
         return "text is compared with a number", "turn the text into a number first, or leave out `str(…)`"
     if wanted := _WANTS_NUMBER.search(message):

@@ -16,8 +16,8 @@ from pydantic import AfterValidator
 
 from grader.checks.support.processes import plain_type
 from grader.checks.support.text import shown
-from grader.evidence.definitions import NOT_FINITE
 from grader.evidence.run import Channel
+from grader.model.message_definitions import NOT_FINITE
 from grader.model.verdict import Verdict, inconclusive, unjudged
 from grader.wording import plural, significant
 
