@@ -29,10 +29,18 @@ from grader.rubric.scenario import Scenario
 from grader.wording import join_words
 
 REPAIRS, BUILD = "repairs", "build"
-NAMES = {"topic-name", "node-name", "parameter-name", "file-name", "package-name", "launch-type"}
+NAMES = {
+    "topic-name",
+    "service-name",
+    "node-name",
+    "parameter-name",
+    "file-name",
+    "package-name",
+    "launch-type",
+}
 OF_BUILDS = {"build-line", "manifest-line"}
 """These explain nothing but the build and the files, unless something is run that the build makes."""
-SEEN_IN_RUNS = {"missing-import", "missing-call", "topic-name", "node-name", "parameter-name"}
+SEEN_IN_RUNS = {"missing-import", "missing-call", "topic-name", "service-name", "node-name", "parameter-name"}
 """These are lost in runs, so no criterion of the files asks for them."""
 DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
 """The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""

@@ -281,6 +281,21 @@ CASES = {
         ["topic-name"], "line 2 of src/a.cpp: the topic /men should be /mean", asking(topics=("/mean",)),
         {"src/a.cpp": 'advertise<std_msgs::Int8>("/mean", 1);'},
     ),
+    "private-service": Case(
+        swapped(TALKER, ("    rate = ", "    rospy.Service('~estimate', Trigger, answer)\n    rate = ")),
+        ["service-name"], "the service ~estimate should be /estimate", asking(servers=("/estimate",)),
+        {TALKER: "rospy.Service('estimate', Trigger, answer)"},
+    ),
+    "service-asked-for": Case(
+        swapped(TALKER, ("\nmain()", "\nrospy.wait_for_service('/estimat')\nrospy.ServiceProxy('/estimat')\nmain()")),
+        ["service-name", "service-name"], "the service /estimat should be /estimate",
+        asking(clients=("/estimate",)), {TALKER: "rospy.ServiceProxy('/estimate')"},
+    ),
+    "service-in-cpp": Case(
+        {"src/a.cpp": 'ros::ServiceServer server = nh.advertiseService("estimat", answer);\n'},
+        ["service-name"], "line 1 of src/a.cpp: the service estimat should be /estimate",
+        asking(servers=("/estimate",)), {"src/a.cpp": 'advertiseService("estimate", answer);'},
+    ),
     "import-capitals": Case(swapped(TALKER, ("import Int8", "import int8")), ["missing-call"], "int8"),
     "class-in-other-letters": Case(swapped(TALKER, ("Int8", "int8")), ["missing-call"], "int8"),
     "class-of-another-name": Case(
@@ -553,6 +568,12 @@ CASES = {
         {**OWN, "msg/Level.msg": "Header header\ngeometry_msgs/Point at\n",
          CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")},
         ["build-line"], "write geometry_msgs after DEPENDENCIES", after={CMAKELISTS: "DEPENDENCIES geometry_msgs std"},
+    ),
+    "own-action-without-its-messages": Case(
+        {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\n---\nint32 n\n---\nint32 n\n",
+         CMAKELISTS: CMAKE.replace("rospy", "message_generation actionlib_msgs rospy").replace(
+             "catkin_p", "add_action_files(FILES Go.action)\ngenerate_messages(DEPENDENCIES std_msgs)\ncatkin_p")},
+        ["build-line"], "write actionlib_msgs after DEPENDENCIES",
     ),
     "own-message-of-no-type": Case(
         {**OWN, "msg/Level.msg": "Float64 level\n",

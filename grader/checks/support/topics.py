@@ -82,6 +82,8 @@ def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:
         return unjudged(f"{what}: there was nothing to run", measured="not started", hint=NO_SCRIPT_HINT)
     if ended := early_end(run):
         end = explain_end(ended, run, package)
+        if end.by_itself and (error := explain_error(package, run)):  # it may have to end, but not to fail
+            return error.verdict(unjudged, f"{what}: {error.cause}", measured="ended")
         message = f"{what}: {ended.name} ended before ({end.cause})"
         return end.verdict(unjudged, message, measured="ended")
     if not run.student_nodes():

@@ -430,6 +430,7 @@ def _generate(files: Files, package: PackageFacts) -> None:
     calls, of_catkin = _commands(files, GENERATE), _commands(files, "catkin_package")
     types = {field.type for one in package.interfaces for field in one.fields}
     needed = {"std_msgs"} if types & {"Header", "Header[]"} else set[str]()
+    needed |= {"actionlib_msgs"} if any(one.path.endswith(".action") for one in package.interfaces) else set()
     needed |= {name.partition("/")[0] for name in types if "/" in name} - {package.name}
     if not calls:
         line = f"{GENERATE}({' '.join(['DEPENDENCIES', *sorted(needed)] if needed else [])})"

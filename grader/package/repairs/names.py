@@ -27,6 +27,10 @@ class Wanted(Record):
     scripts: tuple[str, ...] = ()
     launch_files: tuple[str, ...] = ()
     topics: tuple[str, ...] = ()
+    servers: tuple[str, ...] = ()
+    """Services and actions that the package offers."""
+    clients: tuple[str, ...] = ()
+    """Services and actions that it asks."""
     nodes: tuple[str, ...] = ()
     params: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
@@ -108,7 +112,11 @@ def _of_scenarios(rubric: Rubric, package: str) -> Iterator[tuple[str, Any]]:
             yield from _each("params", param.also)
         for probe in scenario.probes:
             yield from (("topics", probe.topic), ("types", probe.type))
+        yield from (("servers", call.service) for call in scenario.calls)
+        yield from (("clients", one.service or one.action) for one in scenario.serves)
         for step in scenario.steps:
+            yield ("servers", step.call.service if step.call is not None else None)
+            yield ("servers", step.action.name if step.action is not None else None)
             sent, waited = step.published, step.wait
             yield from (("topics", sent.topic), ("types", sent.type)) if sent is not None else ()
             yield ("topics", waited.topic if waited is not None else None)
@@ -129,6 +137,7 @@ def _of_criteria(criteria: Iterable[Criterion]) -> Iterator[tuple[str, Any]]:
         check, given = criterion.check, criterion.parameters
         yield from (("launch_files", given.get("launch")), ("files", given.get("file")))
         yield from (("topics", topic) for topic in _topics_in(given))
+        yield ("clients" if check == "calls" else "servers", given.get("service") or given.get("action"))
         yield ("types", given.get("type") if "topic" in given else None)
         yield from _each("topics", given.get("topics"))
         yield from _each("files", given.get("files"))
@@ -172,15 +181,17 @@ SHORTEST = 3
 KINDS: dict[str, RepairKind] = {
     "publisher": "topic-name",
     "subscriber": "topic-name",
+    "server": "service-name",
+    "client": "service-name",
     "node": "node-name",
     "param": "parameter-name",
     "set-param": "parameter-name",
     "key": "parameter-name",
 }
 TOPIC_ROLES = frozenset({"publisher", "subscriber"})
-ROLES = ("node", "publisher", "subscriber", "param", "set-param")
+ROLES = ("node", "publisher", "subscriber", "server", "client", "param", "set-param")
 NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test")
-WORDS = {"topic-name": "topic", "node-name": "node", "parameter-name": "parameter"}
+WORDS = {"topic-name": "topic", "service-name": "service", "node-name": "node", "parameter-name": "parameter"}
 TAG_LINES_MAX = 20
 _KEY = re.compile(r"^(?P<indent> *)(?P<quote>[\"']?)(?P<key>[A-Za-z_][\w-]*)(?P=quote)(?=\s*:(\s|$))")
 
@@ -190,7 +201,12 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
     node = next((name.value for name in names if name.role == "node"), "") or _name_node(files, file, wanted)
     names = [name for name in names if not _repair_slash(files, file, name, wanted)]
     wanted = wanted.model_copy(update={"params": (*wanted.params, *(f"/{node}/{p}" for p in wanted.private))})
-    asked_of = {"node": wanted.nodes, "publisher": wanted.topics, "subscriber": wanted.topics}
+    asked_of = {
+        "node": wanted.nodes,
+        **dict.fromkeys(TOPIC_ROLES, wanted.topics),
+        "server": wanted.servers,
+        "client": wanted.clients,
+    }
     branches = [f"/{'/'.join(branch)}" for branch in _branches(wanted)]
     names = _repair_dots(files, file, names, branches)
     for role in ROLES:
@@ -281,13 +297,15 @@ def repair_script_keys(files: Files, file: str, names: Sequence[Name], wanted: W
 
 
 CPP = (".c", ".cc", ".cpp", ".cxx", ".h", ".hpp")
-ROLES_OF_CPP: dict[str, Literal["publisher", "subscriber", "node"]] = {
+ROLES_OF_CPP: dict[str, Literal["publisher", "subscriber", "server", "client", "node"]] = {
     "advertise": "publisher",
     "subscribe": "subscriber",
+    "advertiseService": "server",
+    "serviceClient": "client",
     "init": "node",
 }
 _NAMED_IN_CPP = re.compile(
-    r'\b(?P<call>advertise|subscribe|init)\b\s*(?:<[^;()]*>)?\s*\(\s*(?:\w+\s*,\s*\w+\s*,\s*)?"(?P<name>[^"\\]{1,200})"'
+    r'\b(?P<call>advertiseService|serviceClient|advertise|subscribe|init)\b\s*(?:<[^;()]*>)?\s*\(\s*(?:\w+\s*,\s*\w+\s*,\s*)?"(?P<name>[^"\\]{1,200})"'
 )
 
 

@@ -67,7 +67,7 @@ class Name(Record):
     """A text in a script that names something; `start` and `end` are columns of its line, from 0. `keys` are those that
     the script reads of a parameter."""
 
-    role: Literal["publisher", "subscriber", "node", "param", "set-param", "key"]
+    role: Literal["publisher", "subscriber", "server", "client", "node", "param", "set-param", "key"]
     value: str
     line: int
     start: int
