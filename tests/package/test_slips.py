@@ -2,11 +2,29 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from grader.package.python import check_syntax
 
 pytestmark = pytest.mark.usefixtures("without_processes")
+
+
+@pytest.mark.parametrize(
+    ("head", "fix"),
+    [
+        ("def heard(msg):", "hand it over to what calls it: `rospy.Subscriber(…, heard)`"),
+        ("def on_feedback(msg):", "hand it over: `send_goal(…, feedback_cb=on_feedback)`"),
+        ("def heard(msg, pub):", ""),
+    ],
+)
+def test_a_callback_that_is_handed_to_nobody_is_to_be_handed_over(
+    head: str, fix: str, tmp_path: Path
+) -> None:
+    (tmp_path / "a.py").write_text(f"{head}\n    p.publish(1)\nclient.send_goal(1)\n", encoding="utf-8")
+    (slip,) = (s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-called")
+    assert slip.fix == fix
 
 
 def test_slips_are_found_and_named(tmp_path):

@@ -167,11 +167,28 @@ def never_run(tree):
             if calls_in(node, *WORKS) and not node.name.startswith("__"):
                 message, owner = "nothing calls `%s()`" % node.name, of_class.get(id(node), "")
                 owner = owner and (objects.get(owner) or owner + "()") + "."
-                yield slip(node.lineno, "never-called", message, name=owner + node.name)
+                yield slip(
+                    node.lineno,
+                    "never-called",
+                    message,
+                    handed_over(node, tree, owner),
+                    name=owner + node.name,
+                )
         elif isinstance(node, ast.Compare) and getattr(node.left, "id", "") == "__name__":
             word = getattr(node.comparators[0], "value", "__main__")
             if word != "__main__" and isinstance(node.ops[0], (ast.Eq, ast.Is)):
                 yield slip(node.lineno, "main-guard", "`__name__` is never %r" % (word,))
+
+
+def handed_over(function, tree, owner):
+    """Return who has to be told of a callback, which takes one value; "" of another function."""
+    taken = [one.arg for one in function.args.args if one.arg != "self"]
+    if len(taken) != 1 or function.args.defaults or calls_in(function, "init_node"):
+        return ""
+    name = (owner and "self.") + function.name
+    if calls_in(tree, "send_goal") and "feedback" in (function.name + taken[0]).lower():
+        return "hand it over: `send_goal(…, feedback_cb=%s)`" % name
+    return "hand it over to what calls it: `rospy.Subscriber(…, %s)`" % name
 
 
 MAKES = ("Publisher", "Subscriber", "Service")

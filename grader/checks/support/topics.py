@@ -319,7 +319,7 @@ def _commented_out(what: str, slip: PythonSlip, of_node: Callable[..., Verdict])
 
 
 def _reach_hint(slip: PythonSlip) -> str:
-    if slip.kind == "never-called":
+    if slip.kind == "never-called" and not slip.fix:
         return f"call it, or move its lines to where they run: line {slip.line}"
     return slip.fix or f"publish inside the loop `{LOOP}`, not after a loop that never ends"
 
