@@ -70,6 +70,16 @@ def parse_definition(text: str, suffix: str) -> Iterator[InterfaceField]:
         yield field
 
 
+def exchanged_parts(found: Collection[InterfaceField], wanted: Collection[InterfaceField]) -> dict[str, str]:
+    """Return by each part the one in which its fields are, where whole parts have changed places; nothing otherwise."""
+    there = {one.name: one.part for one in found}
+    if len(there) < len(found) or any(one.name not in there for one in wanted):
+        return {}
+    places = list(dict.fromkeys((one.part, there[one.name]) for one in wanted))
+    is_whole = len(places) == len(dict(places)) and {old for old, _ in places} == {new for _, new in places}
+    return dict(places) if is_whole and any(old != new for old, new in places) else {}
+
+
 def refuse_unknown(type_: str) -> None:
     """Raise ValueError where a type has the form of a built-in one, and is none."""
     base = type_.partition("[")[0]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.model.message_definitions import parse_definition
 from grader.model.package import PythonSlip, SlipKind
 from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, advice_on
 from grader.model.submission import chmod_hint
@@ -64,6 +65,14 @@ SERVICE = {**OWN, "srv/Two.srv": "int64 a\n---\n", "src/level.py": "from lab.srv
 SERVICE_CMAKE = CMAKE.replace(
     "rospy)\n", "message_generation rospy)\nadd_service_files(FILES Two.srv)\ngenerate_messages()\n"
 )
+ACTION_CMAKE = CMAKE.replace(
+    "rospy)\n",
+    """message_generation actionlib_msgs rospy)
+add_action_files(FILES Go.action)
+generate_messages(DEPENDENCIES actionlib_msgs std_msgs)
+""",
+)
+GO_FIELDS = tuple(parse_definition("int32 n\n---\nbool there\n---\nint32 left\n", ".action"))
 TEMPLATE = """\
 # add_message_files(
 #   FILES
@@ -571,9 +580,16 @@ CASES = {
     ),
     "own-action-without-its-messages": Case(
         {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\n---\nint32 n\n---\nint32 n\n",
-         CMAKELISTS: CMAKE.replace("rospy", "message_generation actionlib_msgs rospy").replace(
-             "catkin_p", "add_action_files(FILES Go.action)\ngenerate_messages(DEPENDENCIES std_msgs)\ncatkin_p")},
+         CMAKELISTS: ACTION_CMAKE.replace("actionlib_msgs std", "std")},
         ["build-line"], "write actionlib_msgs after DEPENDENCIES",
+    ),
+    "own-action-in-another-order": Case(
+        {"src/go.py": "from lab.msg import GoAction\n",
+         "action/Go.action": "int32 n  # how far\n---\nint32 left\n---\nbool there\n",
+         CMAKELISTS: ACTION_CMAKE},
+        ["build-line"], "result and feedback have changed places",
+        asking(definitions=(("action/Go.action", GO_FIELDS),)),
+        {"action/Go.action": "int32 n  # how far\n---\nbool there\n---\nint32 left\n"},
     ),
     "own-message-of-no-type": Case(
         {**OWN, "msg/Level.msg": "Float64 level\n",

@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 from cmake_parser.ast import Command, Token
 
 from grader.installable import noetic_messages
-from grader.model.message_definitions import meant_type
+from grader.model.message_definitions import DIVIDER, PARTS, exchanged_parts, meant_type
 from grader.model.package import CMAKE, INTERFACE_FOLDERS, MANIFEST, PackageFacts, meant_command
 from grader.model.repair import RepairKind
 from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
@@ -90,6 +90,7 @@ def repair_cmake(
         _add_call(files, "catkin_package()", "catkin_package()", below)
     if _needs_interfaces(files, package, name, scripts):
         _make_interfaces(files, package, name)
+        _exchange_parts(files, package, wanted)
     if not package.folder_beside:  # what it names is right once it lies there itself
         _install(files, package, wanted)
         _correct_paths(files, package)
@@ -365,6 +366,22 @@ def _make_interfaces(files: Files, package: PackageFacts, name: str) -> None:
         changed = _replace_token(_cmake(files), token, f"{token.value} {new}")
         message = f"line {of_catkin[0].line} of {CMAKE}: find_package(catkin …) does not name {GENERATION}"
         files.change("build-line", CMAKE, changed, message, f"write {new} after {token.value}")
+
+
+def _exchange_parts(files: Files, package: PackageFacts, wanted: Wanted) -> None:
+    """Put the parts of a service or an action into their order, where whole parts have changed places."""
+    for path, fields in wanted.definitions:
+        own = next((one for one in package.interfaces if one.path == path and one.fault is None), None)
+        text = files.text(path)
+        places = exchanged_parts(own.fields, fields) if own else {}
+        if not places or text is None:
+            continue
+        order = PARTS[PurePosixPath(path).suffix]
+        parts = [part.strip("\n") for part in DIVIDER.split(text)]
+        changed = "\n---\n".join(parts[order.index(places.get(part, part))] for part in order)
+        moved = join_words(part for part, other in places.items() if part != other)
+        fix = f"the order of the parts is {join_words(order)}, with `---` between them"
+        files.change("build-line", path, f"{changed}\n", f"{path}: {moved} have changed places", fix)
 
 
 def _correct_types(files: Files, package: PackageFacts) -> None:

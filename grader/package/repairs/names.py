@@ -7,7 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import Any, Literal
 
-from grader.model.package import MANIFEST, LaunchFile, LaunchNode, PackageFacts, SlipKind
+from grader.model.message_definitions import parse_definition
+from grader.model.package import MANIFEST, InterfaceField, LaunchFile, LaunchNode, PackageFacts, SlipKind
 from grader.model.record import Record
 from grader.model.repair import RepairKind, as_code
 from grader.package.launch import parse_launch
@@ -31,6 +32,8 @@ class Wanted(Record):
     """Services and actions that the package offers."""
     clients: tuple[str, ...] = ()
     """Services and actions that it asks."""
+    definitions: tuple[tuple[str, tuple[InterfaceField, ...]], ...] = ()
+    """Files of messages, services and actions, with the fields that they have to define."""
     nodes: tuple[str, ...] = ()
     params: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
@@ -83,9 +86,18 @@ def wanted_of(rubric: Rubric, package: str = "") -> Wanted:
     return Wanted(
         package=package,
         started=tuple(started),
+        definitions=tuple(_definitions(criteria)),
         does=tuple(dict.fromkeys(_of_scripts(rubric, criteria))),
         **{field: tuple(names) for field, names in found.items()},
     )
+
+
+def _definitions(criteria: Iterable[Criterion]) -> Iterator[tuple[str, tuple[InterfaceField, ...]]]:
+    for given in (one.parameters for one in criteria if one.check == "definition"):
+        file, text = given["file"], given.get("text")
+        parts = (name.rpartition(".") for name in given.get("fields", ()))
+        named = (InterfaceField(part=part, type="", name=name, line=0) for part, _, name in parts)
+        yield file, tuple(parse_definition(text, PurePosixPath(file).suffix) if text else named)
 
 
 def _of_scripts(rubric: Rubric, criteria: Sequence[Criterion]) -> Iterator[tuple[str, SlipKind, str]]:
