@@ -32,6 +32,7 @@ from grader.judging.cited_lines import (
     cite_name,
     cite_quoted,
     cite_source,
+    cite_unused_argument,
     show_lines,
 )
 from grader.judging.facts import NOT_RUN, Facts, try_facts, views_of
@@ -113,6 +114,7 @@ def judge_all_runs(
         for criterion in rubric.criteria:
             placed = cite_quoted(verdicts[criterion.id], criterion, facts, build)
             placed = cite_source(placed, criterion, facts, build)
+            placed = cite_unused_argument(placed, criterion, facts, build)
             placed = cite_commented_call(placed, facts.package_of(criterion), build)
             placed = cite_find(placed, criterion, facts.package_of(criterion), build)
             shown[criterion.id] = show_lines(cite_name(placed, build), build)

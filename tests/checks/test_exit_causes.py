@@ -104,6 +104,8 @@ from std_msgs.msg import Int8
          "write `str(where.x)` instead of `where`"),
         (6, "n = int(msg)", "TypeError: int() argument must be a string, a bytes-like object or a number, not 'Int8'",
          "take its field, as in `msg.data`"),
+        (6, "scan.ranges[i] = 0.0", "TypeError: 'tuple' object does not support item assignment",
+         "write `scan.ranges = list(scan.ranges)` first"),
         (6, "print(msg.data.x)", "AttributeError: 'Point' object has no attribute 'data'",
          "write `.x` instead of `.data.x`"),
         (6, "answer = ask(msg)", "TypeError: expected [float64] but got [std_msgs/Float64]",

@@ -141,11 +141,27 @@ def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning
         return meaning
     if "'NoneType' object" in message:
         return _none()
+    if message == "'tuple' object does not support item assignment":
+        return _tuple(source)
     if meaning := _no_number(message, source):
         return meaning
     if given := _OPERANDS.search(message):
         return _operands(given[1], given[2], source)
     return None
+
+
+def _tuple(source: str) -> Meaning:
+    """Of `scan.ranges[i] = 0`: what a message has as a list is a tuple once it is received."""
+    tree = _tree(source)
+    target = next(
+        (n.value for n in ast.walk(tree) if isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store)),
+        None,
+    )
+    name = shown(ast.unparse(target)) if target is not None else "values"
+    return (
+        "a list in a message that was received is a tuple, which cannot be changed",
+        f"write `{name} = list({name})` first",
+    )
 
 
 def _nested_index(message: str, source: str) -> Meaning | None:
