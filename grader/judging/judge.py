@@ -21,7 +21,12 @@ from grader.checks.support.parameters import explain_by_unread_parameter
 from grader.checks.support.processes import plain_type
 from grader.checks.support.scripts import SYNTAX, without_git
 from grader.checks.support.text import near_names, texts_in
-from grader.checks.support.topics import SYSTEM_TOPICS, account_for_losses, explain_by_unheard_topic
+from grader.checks.support.topics import (
+    SYSTEM_TOPICS,
+    account_for_losses,
+    explain_by_unheard_topic,
+    explain_by_wrong_value,
+)
 from grader.errors import EvidenceError
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
@@ -183,6 +188,14 @@ def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Ver
     return verdict if hint == verdict.hint else verdict.model_copy(update={"hint": hint})
 
 
+EXPLANATIONS = (
+    explain_by_exception,
+    explain_by_unheard_topic,
+    explain_by_unread_parameter,
+    explain_by_wrong_value,
+)
+
+
 def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
     """Return what the criterion's check says; an exception inside it is not the student's fault and says so."""
     if criterion.check == MANUAL:
@@ -202,7 +215,7 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         )
         if not isinstance(asked, Verdict):
             package, run = facts.package_of(criterion), asked.get("run")
-            for explain in (explain_by_exception, explain_by_unheard_topic, explain_by_unread_parameter):
+            for explain in EXPLANATIONS:
                 found = explain(check, package, run, found)
             found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)

@@ -74,7 +74,7 @@ def slips(tree):
         misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice,
         publishes_twice, callbacks, waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops,
         clock_values, counter_slips, counter_starts, without_effect, assigned_late, hidden_names, subscribed_again,
-        imports, taken_off, unstarted_servers,
+        imports, taken_off, unstarted_servers, wrong_values,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
@@ -570,6 +570,50 @@ def goes_on(handler):
 
 def is_plain(module):
     return module in PLAIN_MODULES or module.endswith((".msg", ".srv", "_msgs"))
+
+
+OF_ANGLES = ("sin", "cos", "tan")
+IN_DEGREES = ("degrees", "rad2deg")
+
+
+def wrong_values(tree):
+    """Comparisons with NaN, angles in degrees of which a sine is taken, and answers of services that are dropped."""
+    made = [n for n in walk(tree) if isinstance(n, ast.Assign) and called_name(n.value) in IN_DEGREES]
+    degrees = {dotted(target) for n in made for target in n.targets}
+    for node in walk(tree):
+        if isinstance(node, ast.Compare) and any(map(is_nan, [node.left, *node.comparators])):
+            name = dotted(node.comparators[0] if is_nan(node.left) else node.left)
+            fix = "write `math.isnan(%s)`" % (name if "..." not in name else "…")
+            yield slip(
+                node.lineno,
+                "wrong-value",
+                "no number is equal to NaN, not even NaN itself",
+                fix=fix,
+                name="nan",
+            )
+        elif called_name(node) in OF_ANGLES and node.args:
+            given = dotted(node.args[0])
+            if given in degrees or called_name(node.args[0]) in IN_DEGREES:
+                message = "`%s` takes radians, and gets degrees" % called_name(node)
+                fix = "leave out `degrees(…)`: the angle is in radians before"
+                yield slip(node.lineno, "wrong-value", message, fix=fix, name="degrees")
+        elif isinstance(node, ast.Expr) and called_name(node.value).endswith("Response"):
+            name = called_name(node.value)
+            fix = "write `return %s(…)`" % name
+            yield slip(
+                node.lineno,
+                "wrong-value",
+                "the `%s` that is made is not returned" % name,
+                fix=fix,
+                name="return",
+            )
+
+
+def is_nan(node):
+    """Return whether it is written as `float('nan')`, `math.nan` or `numpy.nan`."""
+    if called_name(node) == "float" and node.args:
+        return str(getattr(node.args[0], "value", "")).lower() == "nan"
+    return isinstance(node, ast.Attribute) and node.attr.lower() == "nan"
 
 
 def uncalled(node, functions):

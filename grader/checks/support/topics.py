@@ -291,6 +291,27 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
     return next((s for s in package.slips if s.file in scripts and s.kind in kinds), None)
 
 
+SEEN_AS = {"nan": r"\bnan\b", "degrees": r" is wrong in | answers ", "return": r"returns nothing"}
+"""How a value that is none shows in a verdict, by the name of its slip."""
+
+
+def explain_by_wrong_value(
+    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
+) -> Verdict:
+    """Return a lost mark with the line of a script that runs on which the value goes wrong."""
+    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
+    if not unexplained or package is None or not isinstance(run, Run):
+        return verdict
+    scripts = {one.start.script for one in lives(run)}
+    found = (s for s in package.slips if s.kind == "wrong-value" and s.file in scripts)
+    slip = next((s for s in found if re.search(SEEN_AS[s.name], verdict.message)), None)
+    if slip is None:
+        return verdict
+    message = f"{verdict.message}; line {slip.line} of {slip.file}: {slip.message}"
+    update = {"message": message, "hint": slip.fix, "citations": (slip.place, *verdict.citations)}
+    return verdict.model_copy(update={**update, "cause": slip.message})
+
+
 def call_in_comment(package: PackageFacts, run: Run, call: str) -> PythonSlip | None:
     """Return where a script that runs has such a call in a comment: `Subscriber`."""
     scripts = {one.start.script for one in lives(run)}
