@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import re
 from collections.abc import Callable
 from contextlib import suppress
@@ -434,13 +435,30 @@ def _local(message: str, _source: str, _marked: tuple[int, int] | None) -> Meani
     name = _LOCAL.search(message)
     if name is None:
         return None
+    if hasattr(builtins, name[1]):
+        cause = f"`{name[1]}` is a variable of this function, and hides Python's `{name[1]}`"
+        return cause, f"give the variable `{name[1]}` another name"
     cause = (
         f"the function assigns to {name[1]} further down, so it is a variable of its own and has no value yet"
     )
     return cause, f"write `global {name[1]}` as the first line of the function"
 
 
+def _future(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    """Of a frame that is looked up at a time of which tf has not heard yet."""
+    if "into the future" not in message or ".now()" not in source:
+        return None
+    hint = "write `rospy.Time(0)` instead of `rospy.Time.now()`: it stands for the newest transform"
+    return "it asks where the frame is now, and the newest transform is a little older", hint
+
+
 def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    if (action := re.match(r"'(\w+)Action' object has no attribute", message)) and "send_goal" in source:
+        goal = f"{action[1]}Goal"
+        return (
+            f"`{action[1]}Action` is the type of the action, and a goal is a `{goal}`",
+            f"make it with `{goal}(…)`",
+        )
     if message == "'Duration' object has no attribute 'sleep'":
         hint = "make it with `rospy.Rate(…)`, which takes how many times a second the loop runs"
         return "a Duration is a length of time, and only a Rate sleeps", hint
@@ -522,6 +540,7 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
     "TypeError": _type,
     "UnboundLocalError": _local,
     "AttributeError": _attribute,
+    "ExtrapolationException": _future,
     "FileNotFoundError": _file,
     **dict.fromkeys(("PermissionError", "OSError"), _unwritable),
     "CalledProcessError": _command,

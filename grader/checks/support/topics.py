@@ -248,7 +248,7 @@ def refused_type(run: Run, topic: str) -> Verdict | None:
     return failed(message, hint=hint)
 
 
-def unheard(run: Run) -> Verdict | None:
+def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     """Return the verdict where no node of the student's heard what the grader sends, or one misspells its topic."""
     topics = dict.fromkeys(
         e.topic or ""
@@ -265,15 +265,30 @@ def unheard(run: Run) -> Verdict | None:
         return refused
     seen = f"; {nodes_on(run, found[0], 'subscribers')[0]} subscribes to {join_words(found)}" if found else ""
     message = f"the run publishes on {topic}, and no node subscribes to it{seen}"
-    return failed(message, hint=f"add {subscriber(topic, '…, callback')}")
+    remapped = _remap_to(package, run, topic, found[0]) if package is not None and found else ""
+    return failed(message, hint=remapped or f"add {subscriber(topic, '…, callback')}")
+
+
+def _remap_to(package: PackageFacts, run: Run, topic: str, heard: str) -> str:
+    """Return how a launch file's node, which hears a topic of its namespace, is to hear another one; "" for others."""
+    nodes = {node.full_name: node for file in package.launch_files for node in file.brings}
+    node = next((nodes[name] for name in nodes_on(run, heard, "subscribers") if name in nodes), None)
+    if node is None or node.namespace == "/" or not heard.startswith(node.namespace):
+        return ""
+    name = heard.removeprefix(node.namespace)
+    right = f'<remap from="{name}" to="{topic}"/>'
+    wrong = next((one for one in node.renaming if one.tag == "remap" and one.value == topic), None)
+    if wrong is not None:
+        return f"on line {wrong.line} of {wrong.file}, write `{right}`: `from` is the name in the script"
+    return f"write `{right}` into the <node> on line {node.line} of {node.file}"
 
 
 def explain_by_unheard_topic(
-    check: Check, _package: PackageFacts | None, run: object, verdict: Verdict
+    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the topic on which the run publishes and that no node heard, whatever it did instead."""
     unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
-    if not unexplained or not isinstance(run, Run) or early_end(run) or not (found := unheard(run)):
+    if not unexplained or not isinstance(run, Run) or early_end(run) or not (found := unheard(run, package)):
         return verdict
     cited = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
     update = {"message": f"{verdict.message}; {found.message}", "hint": found.hint, "cause": found.message}
