@@ -221,10 +221,16 @@ CASES = {
         "write `global n` as the first line of the function",
         after={TALKER: "def main():\n    global n\n"},
     ),
+    "variable-of-a-callback": Case(
+        swapped(TALKER, ("\ndef main():", "\nfront = None\n\ndef heard(msg):\n    front = msg.data\n\ndef main():"),
+                        ("        rate.s", "        print(front)\n        rate.s")),
+        ["missing-call"], "the function gives a value to a front of its own",
+        after={TALKER: "def heard(msg):\n    global front\n    front = msg.data\n"},
+    ),
     "variables-of-their-own": Case(
         {TALKER: SCRIPT, "src/own.py": "n = 0\ndef f(n):\n    n += 1\ndef g():\n    global n\n    n += 1\n"
          "def h():\n    n = 1\n    n += 1\ndef i():\n    for n in (1,): print(n)\ndef j():\n"
-         "    def f(): return n\n    n = 1\n"},
+         "    def f(): return n\n    n = 1\ndef k():\n    n = 1\n"},
         [],
     ),
     "sleep": Case(swapped(TALKER, ("rate.sleep()", "rate.sleep")), ["missing-call"],
