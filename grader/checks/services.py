@@ -286,7 +286,7 @@ def handler_traceback(run: Run, service: str, since_ns: int) -> Traceback | None
     one = life_of(run, offer.node) if offer else None
     if one is None:
         return None
-    return next(iter(process_tracebacks(run, one.name, after_ns=since_ns)), None)
+    return next(iter(process_tracebacks(run, one.name, after_ns=since_ns, before_ns=one.interrupt_ns)), None)
 
 
 def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> Verdict:

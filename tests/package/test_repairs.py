@@ -73,6 +73,13 @@ generate_messages(DEPENDENCIES actionlib_msgs std_msgs)
 """,
 )
 GO_FIELDS = tuple(parse_definition("int32 n\n---\nbool there\n---\nint32 left\n", ".action"))
+CPP_NODE = """\
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "a");
+  auto sub = ros::NodeHandle().subscribe("scan", 10, callback);
+  return 0;
+}
+"""
 TEMPLATE = """\
 # add_message_files(
 #   FILES
@@ -311,6 +318,20 @@ CASES = {
         ["service-name"], "line 1 of src/a.cpp: the service estimat should be /estimate",
         asking(servers=("/estimate",)), {"src/a.cpp": 'advertiseService("estimate", answer);'},
     ),
+    "no-spin-in-cpp": Case(
+        {"src/a.cpp": CPP_NODE}, ["missing-call"], "src/a.cpp: below line 3 add `ros::spin();`",
+        after={"src/a.cpp": CPP_NODE.replace("  return", "  ros::spin();\n  return")},
+    ),
+    "no-spin-and-no-return-in-cpp": Case(
+        {"src/a.cpp": CPP_NODE.replace("  return 0;\n", "  // ros::spin();\n")}, ["missing-call"], "src/a.cpp",
+        after={"src/a.cpp": "  // ros::spin();\n  ros::spin();\n}\n"},
+    ),
+    "subscriber-dropped-in-cpp": Case(
+        {"src/a.cpp": CPP_NODE.replace("auto sub = ros::NodeHandle()", "nh").replace("  return 0", "  ros::spin()")},
+        ["missing-call"], "line 3 of src/a.cpp: what subscribe(…) returns is dropped, and with it the subscription",
+        after={"src/a.cpp": '  ros::Subscriber sub = nh.subscribe("scan", 10, callback);\n'},
+    ),
+    "loop-in-cpp": Case({"src/a.cpp": CPP_NODE.replace("  return", "  while (true) ros::spinOnce();\n  return")}, []),
     "import-capitals": Case(swapped(TALKER, ("import Int8", "import int8")), ["missing-call"], "int8"),
     "class-in-other-letters": Case(swapped(TALKER, ("Int8", "int8")), ["missing-call"], "int8"),
     "class-of-another-name": Case(
