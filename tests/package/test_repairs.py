@@ -318,6 +318,12 @@ CASES = {
         ["service-name"], "line 1 of src/a.cpp: the service estimat should be /estimate",
         asking(servers=("/estimate",)), {"src/a.cpp": 'advertiseService("estimate", answer);'},
     ),
+    "program-named-otherwise": Case(
+        {"src/mean.cpp": "int main() {}\n",
+         CMAKELISTS: f"{CMAKE}add_executable(mean_node src/mean.cpp)\ntarget_link_libraries(mean_node x)\n"},
+        ["build-line"], "the program is called mean_node, and the lab wants mean", asking(scripts=("mean",)),
+        {CMAKELISTS: "add_executable(mean src/mean.cpp)\ntarget_link_libraries(mean x)\n"},
+    ),
     "no-spin-in-cpp": Case(
         {"src/a.cpp": CPP_NODE}, ["missing-call"], "src/a.cpp: below line 3 add `ros::spin();`",
         after={"src/a.cpp": CPP_NODE.replace("  return", "  ros::spin();\n  return")},

@@ -91,6 +91,7 @@ def repair_cmake(
     if _needs_interfaces(files, package, name, scripts):
         _make_interfaces(files, package, name)
         _exchange_parts(files, package, wanted)
+    _name_programs(files, wanted)
     if not package.folder_beside:  # what it names is right once it lies there itself
         _install(files, package, wanted)
         _correct_paths(files, package)
@@ -382,6 +383,32 @@ def _exchange_parts(files: Files, package: PackageFacts, wanted: Wanted) -> None
         moved = join_words(part for part, other in places.items() if part != other)
         fix = f"the order of the parts is {join_words(order)}, with `---` between them"
         files.change("build-line", path, f"{changed}\n", f"{path}: {moved} have changed places", fix)
+
+
+def _name_programs(files: Files, wanted: Wanted) -> None:
+    """Give the program of a source that has the lab's name this name too."""
+    made = {
+        words[0]: words[1:]
+        for c in _commands(files, "add_executable")
+        if (words := [t.value for t in _words(c)])
+    }
+    if "OUTPUT_NAME" in _cmake(files):
+        return
+    for name in (one for one in wanted.scripts if "." not in one and "/" not in one and one not in made):
+        stems = {
+            target: {PurePosixPath(source).stem for source in sources} for target, sources in made.items()
+        }
+        meant = [
+            t for t, found in stems.items() if t not in wanted.scripts and "$" not in t and name in found
+        ]
+        if len(meant) != 1:
+            continue
+        call = next(c for c in _commands(files, "add_executable") if _words(c)[0].value == meant[0])
+        changed = re.sub(rf"(?<![\w/.-]){re.escape(meant[0])}(?![\w/.-])", name, _cmake(files))
+        message = f"line {call.line} of {CMAKE}: the program is called {meant[0]}, and the lab wants {name}"
+        files.change(
+            "build-line", CMAKE, changed, message, f"write {name} in place of {meant[0]} wherever it is named"
+        )
 
 
 def _correct_types(files: Files, package: PackageFacts) -> None:
