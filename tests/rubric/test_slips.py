@@ -293,6 +293,16 @@ def test_a_number_of_a_request_that_the_run_does_not_have_is_a_warning(examples:
     assert [one.partition(".a: ")[2] for one in doubts_of(load_rubric(str(path)), path.name)] == [told]
 
 
+def test_a_client_may_be_asked_to_cancel_its_goal(examples: Path) -> None:
+    served = "serves: [{action: /dock, type: adder/Dock, delay_s: 12}]"
+    start = "start: [{name: client, script: scripts/add_client.py}]"
+    stuck = f"  stuck:\n    title: Stuck\n    {served}\n    {start}\n    until: {{ended: [client]}}\n"
+    asked = "check: reacts, with: {cause: {topic: /dock/goal}, effect: {topic: /dock/cancel}, within_s: 5}"
+    criterion = f"  - {{id: stuck, title: stuck, points: 0, scenario: stuck, {asked}}}\n"
+    path = _spoiled(examples, "service-client", "\ncriteria:\n", f"{stuck}\ncriteria:\n{criterion}")
+    assert doubts_of(load_rubric(str(path)), path.name) == []
+
+
 def test_a_field_may_be_asked_to_be_infinite(examples: Path) -> None:
     path = _spoiled(examples, "tf-broadcaster", "value: 5, tolerance: 0.01", "value: .inf, tolerance: 0.01")
     assert doubts_of(load_rubric(str(path)), path.name) == []
