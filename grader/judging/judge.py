@@ -181,8 +181,9 @@ def _seen_elsewhere(
 
 
 def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Verdict:
-    """Return a verdict on what is wrong with where the values come from that the criterion asks for."""
-    if verdict.status not in {Status.FAIL, Status.PARTIAL} or verdict.unjudged:
+    """Return a verdict on what is wrong with where the values come from that the criterion asks for; what has another
+    cause needs no values."""
+    if verdict.status not in {Status.FAIL, Status.PARTIAL} or verdict.unjudged or verdict.cause:
         return verdict
     hint = tell_made_up(rubric, criterion, verdict.hint, verdict.measured)
     return verdict if hint == verdict.hint else verdict.model_copy(update={"hint": hint})

@@ -74,6 +74,7 @@ generate_messages(DEPENDENCIES actionlib_msgs std_msgs)
 )
 GO_FIELDS = tuple(parse_definition("int32 n\n---\nbool there\n---\nint32 left\n", ".action"))
 CPP_NODE = """\
+void callback(const Int8& msg) { for (int i = 0; i < 3; ++i) use(msg); }
 int main(int argc, char** argv) {
   ros::init(argc, argv, "a");
   auto sub = ros::NodeHandle().subscribe("scan", 10, callback);
@@ -325,7 +326,7 @@ CASES = {
         {CMAKELISTS: "add_executable(mean src/mean.cpp)\ntarget_link_libraries(mean x)\n"},
     ),
     "no-spin-in-cpp": Case(
-        {"src/a.cpp": CPP_NODE}, ["missing-call"], "src/a.cpp: below line 3 add `ros::spin();`",
+        {"src/a.cpp": CPP_NODE}, ["missing-call"], "src/a.cpp: below line 4 add `ros::spin();`",
         after={"src/a.cpp": CPP_NODE.replace("  return", "  ros::spin();\n  return")},
     ),
     "no-spin-and-no-return-in-cpp": Case(
@@ -334,7 +335,7 @@ CASES = {
     ),
     "subscriber-dropped-in-cpp": Case(
         {"src/a.cpp": CPP_NODE.replace("auto sub = ros::NodeHandle()", "nh").replace("  return 0", "  ros::spin()")},
-        ["missing-call"], "line 3 of src/a.cpp: what subscribe(…) returns is dropped, and with it the subscription",
+        ["missing-call"], "line 4 of src/a.cpp: what subscribe(…) returns is dropped, and with it the subscription",
         after={"src/a.cpp": '  ros::Subscriber sub = nh.subscribe("scan", 10, callback);\n'},
     ),
     "loop-in-cpp": Case({"src/a.cpp": CPP_NODE.replace("  return", "  while (true) ros::spinOnce();\n  return")}, []),

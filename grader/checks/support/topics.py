@@ -107,13 +107,22 @@ def no_message(
             f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all topics"
         )
         return unjudged(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
-    if misnamed := _judge_misnamed(package, run, topic, of_node):
-        return misnamed
+    if found := _judge_uncancelled(run, topic) or _judge_misnamed(package, run, topic, of_node):
+        return found
     if absent := no_node(package, run, what) or _judge_refused(run, topic) or misfit(run):
         return absent if topic in published else _with_others(absent, published)
     if topic in published:
         return _judge_advertised(package, run, what, of_node)
     return _not_advertised(package, run, topic, of_node)
+
+
+def _judge_uncancelled(run: Run, topic: str) -> Verdict | None:
+    """Return the verdict where a goal is sent to the action of this topic, `/dock/cancel`, and not cancelled."""
+    action, _, part = topic.rpartition("/")
+    if part != "cancel" or not any(c.messages for c in run.student_channels(f"{action}/goal")):
+        return None
+    message = f"the goal that is sent to {action} is never cancelled"
+    return failed(message, measured="no message", hint="`client.cancel_goal()` cancels it")
 
 
 def _judge_misnamed(
@@ -178,7 +187,7 @@ def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Calla
     if slip := why_unreached(package, run) or run_slip(package, run, "queue-size"):
         verdict = of_node(f"{message}: {slip.message}", measured="no message", hint=_reach_hint(slip))
         return verdict.about(citations=(slip.place,))
-    if deaf := unheard(run):
+    if deaf := unheard(run, package):
         verdict = of_node(f"{message}: {deaf.message}", measured="no message", hint=deaf.hint)
         return verdict.model_copy(update={"cause": deaf.message})
     if slip := call_in_comment(package, run, "publish"):

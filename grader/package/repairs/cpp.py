@@ -9,7 +9,7 @@ from grader.package.repairs.editing import Files
 SPIN = "ros::spin();"
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _WAITS = re.compile(r"\b(?:subscribe|advertiseService|createTimer)\s*(?:<[^;()]*>)?\s*\(")
-_STAYS = re.compile(r"\b(?:spin|spinOnce|waitForShutdown|ok|while|for)\b")
+_STAYS = re.compile(r"\b(?:spin|spinOnce|waitForShutdown|ok|while)\b|\bfor\s*\(\s*;\s*;")
 _END = re.compile(r"(?P<indent>[ \t]*)(?:return\b[^;\n]*;|(?P<brace>\}))")
 
 
