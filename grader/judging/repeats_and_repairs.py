@@ -46,8 +46,11 @@ DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark",
 """The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 OF_PACKAGES = {MANIFEST, CMAKE}
-GENERATION = re.compile(r"generate_messages|message_generation|add_(message|service|action)_files")
-"""Without these in CMakeLists.txt, a build can succeed that makes nothing of the package's own definitions."""
+GENERATION = re.compile(
+    r"generate_messages|message_generation|add_(message|service|action)_files|add_executable"
+)
+"""Where these are wrong in CMakeLists.txt, a build can succeed that makes nothing of the package's own definitions, or
+another program."""
 NUMBER = re.compile(r"\d+(\.\d+)?")
 
 Runs = dict[str, Run]
@@ -228,7 +231,8 @@ def is_used_by(
     if repair.kind in DONE_BEFORE_RUNS:
         return launches and not known
     if repair.kind in OF_BUILDS:
-        made = GENERATION.search(repair.after) is not None
+        of_file = PurePosixPath(repair.file).suffix in MADE_BY_BUILDS
+        made = of_file or GENERATION.search(repair.after) is not None
         return made or not built or any(start.built for start in scenario.start)
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         return True
