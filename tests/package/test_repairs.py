@@ -311,7 +311,7 @@ CASES = {
     ),
     "service-asked-for": Case(
         swapped(TALKER, ("\nmain()", "\nrospy.wait_for_service('/estimat')\nrospy.ServiceProxy('/estimat')\nmain()")),
-        ["service-name", "service-name"], "the service /estimat should be /estimate",
+        ["service-name"], "the service /estimat should be /estimate",
         asking(clients=("/estimate",)), {TALKER: "rospy.ServiceProxy('/estimate')"},
     ),
     "service-in-cpp": Case(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any, Literal
 
@@ -236,6 +236,10 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
                 continue  # any of them may be meant, or none
             if right and _resolve(name, node) not in {_bare(w, role) for w in asked}:
                 literal = _literal(name, right, node)
+                same = [one for one in dict.fromkeys(given) if one.value == name.value]
+                if role == "client" and len(same) > 1:  # waited for, and called
+                    _replace_all(files, file, dict.fromkeys(same, literal), right)
+                    break
                 _replace_literal(files, file, name, literal, literal if literal.startswith("~") else right)
                 node = literal if role == "node" else node
 
@@ -270,21 +274,26 @@ def _repair_dots(files: Files, file: str, names: Sequence[Name], branches: Seque
         if KINDS[name.role] == "parameter-name" and "." in name.value and whole in branches:
             above = (w for w in (whole, *_above(whole)) if _has_keys(w, name.keys, branches))
             meant[name] = next(above, "")
-    text, wrong = files.text(file), [name for name, right in meant.items() if right]
-    if text is None or not wrong:
+    wrong = [name for name, right in meant.items() if right]
+    if files.text(file) is None or not wrong:
         return list(names)
-    lines = text.split("\n")
-    for name in sorted(wrong, key=lambda one: -one.start):
-        right, line = meant[name], lines[name.line - 1]
-        right = right if name.value.startswith("/") else right.strip("/")
-        lines[name.line - 1] = line[: name.start] + line[name.start :].replace(name.value, right, 1)
-    told = f"line {wrong[0].line} of {file}: the parameter {wrong[0].value} should be {meant[wrong[0]]}"
-    numbers = sorted({name.line for name in wrong})
-    written = [f"write {as_code(lines[n - 1].strip())}" for n in numbers]
-    more = [f"on line {n}, {one}" for n, one in zip(numbers[1:], written[1:], strict=True)]
-    fix = "; ".join([written[0], *more]) if more else ""
-    files.change("parameter-name", file, "\n".join(lines), told, fix)
+    right = {name: meant[name] if name.value.startswith("/") else meant[name].strip("/") for name in wrong}
+    _replace_all(files, file, right, meant[wrong[0]])
     return [name for name in names if name not in wrong]
+
+
+def _replace_all(files: Files, file: str, written: Mapping[Name, str], right: str) -> None:
+    """Replace several literals as one repair, told by the first of them."""
+    lines = (files.text(file) or "").split("\n")
+    for name in sorted(written, key=lambda one: -one.start):
+        line = lines[name.line - 1]
+        lines[name.line - 1] = line[: name.start] + line[name.start :].replace(name.value, written[name], 1)
+    first, numbers = next(iter(written)), sorted({name.line for name in written})
+    each = [f"write {as_code(lines[n - 1].strip())}" for n in numbers]
+    more = [f"on line {n}, {one}" for n, one in zip(numbers[1:], each[1:], strict=True)]
+    kind = KINDS[first.role]
+    told = f"line {first.line} of {file}: the {WORDS[kind]} {first.value} should be {right}"
+    files.change(kind, file, "\n".join(lines), told, "; ".join([each[0], *more]) if more else "")
 
 
 def _above(param: str) -> Iterator[str]:
