@@ -172,25 +172,29 @@ def _fault(
     package: PackageFacts, run: Run, params: CallsParams, wanted: dict[str, Any], left: tuple[Request, ...]
 ) -> Verdict:
     """Some call came: either it is another one, or there are too few."""
-    if left:
-        nearest = min(left, key=lambda one: len(list(_differences(one, wanted, params))))
-        found = join_words(map(str, _differences(nearest, wanted, params)))
-        if swapped := _swapped(nearest, wanted, params):
-            by_name = ", ".join(f"{field}=…" for field in nearest.fields or {})
-            message = f"{params.service} is called with {join_words(swapped)} swapped: {found}"
-            return failed(
-                message, hint=f"pass the request's fields by name, so that none is swapped: ({by_name})"
-            )
-        message = f"{params.service} is called with {found}"
-        return failed(
-            message, hint="pass the request's fields by name, with the values that the handout asks for"
-        )
     came = len(requests(run, params.service))
+    error = explain_error(package, run)
+    if left and (came >= len(params.wanted) or not error):
+        return _other_request(params, wanted, left)
     with_fields = f" with {fields_text(wanted)}" if wanted else ""
     what = f"{params.service} is called {plural(came, 'time')}, but there was no other call{with_fields}"
-    if end := explain_early_end(package, run) or explain_error(package, run):
+    if end := explain_early_end(package, run) or error:
         return end.verdict(failed, f"{what}: {end.cause}")
     return failed(what, hint=f"{plural(len(params.wanted), 'call')} are expected: call it again").once()
+
+
+def _other_request(params: CallsParams, wanted: dict[str, Any], left: tuple[Request, ...]) -> Verdict:
+    """It is called with other values, judged by the call that comes nearest."""
+    nearest = min(left, key=lambda one: len(list(_differences(one, wanted, params))))
+    found = list(_differences(nearest, wanted, params))
+    text = join_words(map(str, found))
+    if swapped := _swapped(nearest, wanted, params):
+        by_name = ", ".join(f"{field}=…" for field in nearest.fields or {})
+        message = f"{params.service} is called with {join_words(swapped)} swapped: {text}"
+        hint = f"pass the request's fields by name, so that none is swapped: ({by_name})"
+        return failed(message, hint=hint)
+    hint = f"set {join_words(one.path for one in found)} of the request to what the handout asks for"
+    return failed(f"{params.service} is called with {text}", hint=hint)
 
 
 def _swapped(one: Request, wanted: dict[str, Any], params: CallsParams) -> list[str]:

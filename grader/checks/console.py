@@ -20,6 +20,7 @@ from grader.checks.support.exit_causes import (
     lifetime_text,
     process_tracebacks,
 )
+from grader.checks.support.fields import unit_slip
 from grader.checks.support.processes import Life, early_end, life, lives, nodes_of, not_started
 from grader.checks.support.text import (
     INIT,
@@ -144,7 +145,8 @@ def _not_printed(
     hint = f"print {params.words} where it happens"
     if other:
         near = f", within {significant(params.tolerance)}" if params.tolerance else ""
-        return failed(f"it prints {shown(other[0].text)!r}, not {params.words}{near}", hint=hint)
+        message = f"it prints {shown(other[0].text)!r}, not {params.words}{near}{_slip(other[0], params)}"
+        return failed(message, hint=hint)
     if one.ended_early and (one.end is None or one.end.exit_code != 0):
         end = explain_end(one, run, package)
         return end.verdict(unjudged, f"it ended before it printed {params.words}: {end.cause}")
@@ -161,6 +163,13 @@ def _not_printed(
         nothing = unjudged(f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True").once()
         return nothing.model_copy(update={"silent": True})
     return failed(f"it never prints {params.words}; it prints {shown(own[0].text)!r}", hint=hint).once()
+
+
+def _slip(line: Line, params: PrintsParams) -> str:
+    """Return in brackets what is odd about a line's numbers if one is in another unit."""
+    found = params.pattern().search(line.text[:LINE_CHARS_MAX])
+    each = zip(found.groups() if found else (), params.numbers, strict=False)
+    return next(filter(None, (unit_slip(float(text), number) for text, number in each)), "")
 
 
 def _other_end(one: Life, params: PrintsParams) -> Verdict | None:

@@ -11,7 +11,14 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.text import shown
-from grader.model.message_definitions import BUILT_IN, FULL_NAMES, PARTS, parse_definition, refuse_unknown
+from grader.model.message_definitions import (
+    BUILT_IN,
+    FULL_NAMES,
+    PARTS,
+    exchanged_parts,
+    parse_definition,
+    refuse_unknown,
+)
 from grader.model.package import Fault, Interface, InterfaceField, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed
@@ -150,6 +157,13 @@ def _faults(
 ) -> Iterator[_Fault]:
     if found.fault is not None:
         yield _unreadable(found, found.fault, wanted)
+        return
+    if exchanged := exchanged_parts(found.fields, wanted):
+        moved = [part for part, other in exchanged.items() if part != other]
+        parts = join_words(PARTS[PurePosixPath(found.path).suffix])
+        line = min(one.line for one in found.fields if one.part in moved)
+        fix = f"the order of the parts is {parts}, with `---` between them"
+        yield _Fault(f"{join_words(moved)} have changed places", line, fix)
         return
     there = {(one.part, one.name): one for one in found.fields}
     asked = {(one.part, one.name) for one in wanted}

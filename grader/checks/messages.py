@@ -38,6 +38,7 @@ from grader.checks.support.text import (
 )
 from grader.checks.support.topics import Sender, cite, losses, no_message, nothing_sent, sent_by
 from grader.evidence.run import Channel, Run
+from grader.model.message_definitions import NOT_FINITE
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
@@ -349,7 +350,7 @@ class FieldEqualsParams(Record):
     field: FieldPath
     """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item."""
     value: Any = None
-    """The right value, as in YAML: a number, text, true or false, a list or a map."""
+    """The right value, as in YAML: a number (also `.inf` or `.nan`), text, true or false, a list or a map."""
     values: tuple[Any, ...] = ()
     """In place of `value`: the right values of several messages, in their order. Messages between them do not
     matter."""
@@ -367,7 +368,8 @@ class FieldEqualsParams(Record):
             raise ValueError("give one of value and values")
         if self.values and self.when != "every":
             raise ValueError("when is for value, not for values")
-        if self.tolerance and any(isinstance(one, str) for one in (self.value, *self.values)):
+        texts = [one for one in (self.value, *self.values) if isinstance(one, str)]
+        if self.tolerance and not NOT_FINITE.keys() >= {*texts}:
             raise ValueError("tolerance is for numbers, and text has none: write a number without quotes")
         if self.tolerance and any(isinstance(one, bool) for one in (self.value, *self.values)):
             raise ValueError("tolerance is for numbers, and true and false are none")
@@ -441,6 +443,9 @@ def _in_order(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> 
     verdict = passed(f"{what} is {params.words}")
     for number, value in enumerate(params.values):
         here = next((n for n in range(at, len(found)) if params.is_at(found[n], value)), None)
+        if here is None and len(found) == len(params.values):  # none is missing: each has its place
+            verdict = _in_another_order(found, params)
+            break
         if here is None:
             before = f" after {value_text(params.values[number - 1])}" if number else ""
             came = (
@@ -461,6 +466,15 @@ def _in_order(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> 
     return verdict.about(
         expected=f"{what} {params.words}", measured=_values(found), citations=(*verdict.citations, cited)
     )
+
+
+def _in_another_order(found: Sequence[Reading], params: FieldEqualsParams) -> Verdict:
+    """As many messages came as are wanted, but not with these values."""
+    pairs = enumerate(zip(found, params.values, strict=True), 1)
+    number, value = next((n, value) for n, (one, value) in pairs if not params.is_at(one, value))
+    came = join_words([_values([one]) for one in found], "then")
+    message = f"{params.field} of {params.topic} is {came}, not {params.words}"
+    return failed(message, hint=f"set {params.field} to {value_text(value)} in message {number}")
 
 
 def _other_value(

@@ -10,7 +10,7 @@ from pydantic import Field
 from grader.checks.registry import Refers, check
 from grader.checks.support.console_output import Traceback
 from grader.checks.support.exit_causes import explain_end, explain_traceback, process_tracebacks
-from grader.checks.support.fields import differences, fields_text
+from grader.checks.support.fields import differences, fields_text, value_text
 from grader.checks.support.processes import GlobalName, TypeName, life_of, plain_type
 from grader.checks.support.text import SERVICE, SPIN, imports, near_names, service_call, shown
 from grader.checks.support.topics import cite, no_node, why_unreached
@@ -154,7 +154,12 @@ def _fault(
     message = (
         f"{params.service}, called with {fields_text(one.request)}, answers {join_words(map(str, found))}"
     )
-    return failed(message, hint=f"try it by hand: rosservice call {params.service} …")
+    return failed(message, hint=f"see what the callback computes: {_by_hand(params.service, one)}")
+
+
+def _by_hand(service: str, one: Exchange) -> str:
+    """Return the command that makes the same call."""
+    return f"rosservice call {service}" + (f' "{value_text(one.request)}"' if one.request else "")
 
 
 def _judge_uncalled(
@@ -281,7 +286,7 @@ def handler_traceback(run: Run, service: str, since_ns: int) -> Traceback | None
     one = life_of(run, offer.node) if offer else None
     if one is None:
         return None
-    return next(iter(process_tracebacks(run, one.name, after_ns=since_ns)), None)
+    return next(iter(process_tracebacks(run, one.name, after_ns=since_ns, before_ns=one.interrupt_ns)), None)
 
 
 def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> Verdict:
@@ -311,7 +316,7 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         end = explain_end(owner, run, package)
         return failed(f"{asked} gives no answer: {owner.name} ended ({end.cause})", hint=end.hint)
     why = shown(one.detail) or "the call was not answered"
-    return failed(f"{asked} gives no answer: {why}", hint=f"try it by hand: rosservice call {service} …")
+    return failed(f"{asked} gives no answer: {why}", hint=f"try it by hand: {_by_hand(service, one)}")
 
 
 def _undivided(package: PackageFacts, kind: str, one: Exchange) -> Verdict | None:

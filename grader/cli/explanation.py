@@ -33,6 +33,7 @@ SLIPS: tuple[tuple[tuple[str, ...], tuple[RepairKind, ...]], ...] = (
     (("manifest", "dependencies"), ("manifest-line", "package-name")),
     (("launch", "opens"), ("launch-syntax", "launch-type", "package-name", "file-name", "executable-bit")),
     (("param",), ("parameter-name", "python-syntax")),
+    (("service", "calls", "action"), ("service-name", "python-syntax", "missing-import", "missing-call")),
     (("node",), ("node-name", "python-syntax", "missing-import", "missing-call")),
     (
         ("topic", "rate", "message", "hears"),

@@ -33,7 +33,7 @@ from grader.report.text import line
 LINE_CHARS = 300
 FIXED = frozenset(
     {"executable-bit", "encoding", "byte-order-mark", "line-ends", "shebang", "file-name", "package-name"}
-    | {"launch-type", "node-name", "topic-name", "parameter-name"}
+    | {"launch-type", "node-name", "topic-name", "service-name", "parameter-name"}
 )
 STYLES = (("diff ", "bold"), ("---", "bold"), ("+++", "bold"), ("@@", "cyan"), ("+", "green"), ("-", "red"))
 

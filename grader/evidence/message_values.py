@@ -12,15 +12,19 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, TypeGuard
 
 from grader.evidence.decode import Decoder, Encoder, FindText, definition, full_definition, full_name
-from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, parse, sections_of
+from grader.evidence.definitions import (
+    MAX_DEFINITION_BYTES,
+    PRIMITIVES,
+    Field,
+    parse,
+    sections_of,
+)
 from grader.installable import noetic_messages
-from grader.model.message_definitions import DIVIDER
+from grader.model.message_definitions import DIVIDER, NOT_FINITE
 from grader.wording import did_you_mean, join_words
 
 ITEMS_MAX = 1_000_000
 NS = 1_000_000_000
-NOT_FINITE = {".inf": math.inf, "+.inf": math.inf, "-.inf": -math.inf, ".nan": math.nan}
-"""As YAML writes them. A rubric's data holds them as text, as JSON has no other form for them."""
 CLOCKS = ("time", "duration")
 ENDS = ("from", "to")
 ACTION_PARTS = {

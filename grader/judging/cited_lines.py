@@ -7,7 +7,7 @@ A verdict and the files that were recorded come in; the verdict goes out with th
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePosixPath
 
 from grader.checks.cmake import NOT_CALLED, below_catkin_package
@@ -195,6 +195,37 @@ def cite_find(verdict: Verdict, criterion: Criterion, package: PackageFacts | No
             cited = tuple(FileCitation(file=file.path, line=n) for n in lines)
             return verdict.model_copy(update={"hint": hint, "citations": cited})
     return verdict
+
+
+def cite_unused_argument(verdict: Verdict, criterion: Criterion, facts: Facts, build: Run) -> Verdict:
+    """Return the verdict; one of a run that gives a launch file an argument cites the `<arg>` that nothing uses."""
+    package, scenario = facts.package_of(criterion), facts.rubric.scenarios.get(criterion.scenario or "")
+    placed = any(isinstance(one, FileCitation) for one in verdict.citations)
+    if not verdict.status.is_lost or verdict.unjudged or placed or package is None or scenario is None:
+        return verdict
+    for start in scenario.start:
+        file = find_launch(package, start.launch or "")
+        for name in (arg.partition(":=")[0] for arg in start.args if file is not None):
+            line = (
+                _unused_argument(name, build.file_lines(file.path)[:LINES_READ]) if file is not None else None
+            )
+            if file is not None and line is not None:
+                message = f"{verdict.message}; nothing in {file.path} uses its argument {name}"
+                hint = "; ".join(
+                    filter(None, (f"write `$(arg {name})` where its value belongs", verdict.hint))
+                )
+                cited = (FileCitation(file=file.path, line=line), *verdict.citations)
+                return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+    return verdict
+
+
+def _unused_argument(name: str, lines: Sequence[str]) -> int | None:
+    """Return the line of an `<arg>` of that name that no other line uses."""
+    word = re.escape(name)
+    used = re.compile(rf"\$\((arg|eval)\b.*\b{word}\b|pass_all_args")
+    given = re.compile(rf"""<arg\b[^>]*\bname\s*=\s*["']{word}["']""")
+    declared = (number for number, text in enumerate(lines, 1) if given.search(text))
+    return None if any(used.search(text) for text in lines) else next(declared, None)
 
 
 def cite_name(verdict: Verdict, build: Run) -> Verdict:

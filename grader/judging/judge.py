@@ -21,7 +21,12 @@ from grader.checks.support.parameters import explain_by_unread_parameter
 from grader.checks.support.processes import plain_type
 from grader.checks.support.scripts import SYNTAX, without_git
 from grader.checks.support.text import near_names, texts_in
-from grader.checks.support.topics import SYSTEM_TOPICS, account_for_losses, explain_by_unheard_topic
+from grader.checks.support.topics import (
+    SYSTEM_TOPICS,
+    account_for_losses,
+    explain_by_unheard_topic,
+    explain_by_wrong_value,
+)
 from grader.errors import EvidenceError
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
@@ -32,6 +37,7 @@ from grader.judging.cited_lines import (
     cite_name,
     cite_quoted,
     cite_source,
+    cite_unused_argument,
     show_lines,
 )
 from grader.judging.facts import NOT_RUN, Facts, try_facts, views_of
@@ -116,6 +122,7 @@ def judge_all_runs(
             placed = cite_quoted(verdicts[criterion.id], criterion, facts, build)
             used = uses.get(criterion.id)
             placed = cite_source(placed, criterion, facts, build, used.repairs if used else ())
+            placed = cite_unused_argument(placed, criterion, facts, build)
             placed = cite_commented_call(placed, facts.package_of(criterion), build)
             placed = cite_find(placed, criterion, facts.package_of(criterion), build)
             shown[criterion.id] = show_lines(cite_name(placed, build), build)
@@ -177,11 +184,20 @@ def _seen_elsewhere(
 
 
 def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Verdict:
-    """Return a verdict on what is wrong with where the values come from that the criterion asks for."""
-    if verdict.status not in {Status.FAIL, Status.PARTIAL} or verdict.unjudged:
+    """Return a verdict on what is wrong with where the values come from that the criterion asks for; what has another
+    cause needs no values."""
+    if verdict.status not in {Status.FAIL, Status.PARTIAL} or verdict.unjudged or verdict.cause:
         return verdict
     hint = tell_made_up(rubric, criterion, verdict.hint, verdict.measured)
     return verdict if hint == verdict.hint else verdict.model_copy(update={"hint": hint})
+
+
+EXPLANATIONS = (
+    explain_by_exception,
+    explain_by_unheard_topic,
+    explain_by_unread_parameter,
+    explain_by_wrong_value,
+)
 
 
 def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
@@ -203,7 +219,7 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         )
         if not isinstance(asked, Verdict):
             package, run = facts.package_of(criterion), asked.get("run")
-            for explain in (explain_by_exception, explain_by_unheard_topic, explain_by_unread_parameter):
+            for explain in EXPLANATIONS:
                 found = explain(check, package, run, found)
             found = explain_by_build(package, facts.runs.get(PACKAGE_RUN), found)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)

@@ -31,10 +31,18 @@ from grader.rubric.scenario import Scenario
 from grader.wording import join_words
 
 REPAIRS, BUILD = "repairs", "build"
-NAMES = {"topic-name", "node-name", "parameter-name", "file-name", "package-name", "launch-type"}
+NAMES = {
+    "topic-name",
+    "service-name",
+    "node-name",
+    "parameter-name",
+    "file-name",
+    "package-name",
+    "launch-type",
+}
 OF_BUILDS = {"build-line", "manifest-line"}
 """These explain nothing but the build and the files, unless something is run that the build makes."""
-SEEN_IN_RUNS = {"missing-import", "missing-call", "topic-name", "node-name", "parameter-name"}
+SEEN_IN_RUNS = {"missing-import", "missing-call", "topic-name", "service-name", "node-name", "parameter-name"}
 """These are lost in runs, so no criterion of the files asks for them."""
 DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
 """The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
@@ -44,8 +52,11 @@ AT_ANY_RATE = {"node-name", "node-lives", "topic-type"}
 """Checks of runs that a loop which does not sleep passes too."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 OF_PACKAGES = {MANIFEST, CMAKE}
-GENERATION = re.compile(r"generate_messages|message_generation|add_(message|service|action)_files")
-"""Without these in CMakeLists.txt, a build can succeed that makes nothing of the package's own definitions."""
+GENERATION = re.compile(
+    r"generate_messages|message_generation|add_(message|service|action)_files|add_executable"
+)
+"""Where these are wrong in CMakeLists.txt, a build can succeed that makes nothing of the package's own definitions, or
+another program."""
 NUMBER = re.compile(r"\d+(\.\d+)?")
 
 Runs = dict[str, Run]
@@ -239,7 +250,8 @@ def is_used_by(
     if repair.kind in DONE_BEFORE_RUNS:
         return launches and not known
     if repair.kind in OF_BUILDS:
-        made = GENERATION.search(repair.after) is not None
+        of_file = PurePosixPath(repair.file).suffix in MADE_BY_BUILDS
+        made = of_file or GENERATION.search(repair.after) is not None
         return made or not built or any(start.built for start in scenario.start)
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         return True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from difflib import get_close_matches
@@ -12,6 +13,8 @@ from grader.model.package import Fault, Interface, InterfaceField
 FIELDS_MAX = 500
 PARTS = {".msg": ("",), ".srv": ("request", "response"), ".action": ("goal", "result", "feedback")}
 """What a file is divided into by `---`, by its ending."""
+NOT_FINITE = {".inf": math.inf, "+.inf": math.inf, "-.inf": -math.inf, ".nan": math.nan}
+"""As YAML writes them. A rubric's data holds them as text, as JSON has no other form for them."""
 DIVIDER = re.compile(r"^---\s*$", re.MULTILINE)
 RULE = "=" * 80
 """Before the types that a full definition brings along, behind its own."""
@@ -65,6 +68,16 @@ def parse_definition(text: str, suffix: str) -> Iterator[InterfaceField]:
     for field in found.fields:
         refuse_unknown(field.type)
         yield field
+
+
+def exchanged_parts(found: Collection[InterfaceField], wanted: Collection[InterfaceField]) -> dict[str, str]:
+    """Return by each part the one in which its fields are, where whole parts have changed places; nothing otherwise."""
+    there = {one.name: one.part for one in found}
+    if len(there) < len(found) or any(one.name not in there for one in wanted):
+        return {}
+    places = list(dict.fromkeys((one.part, there[one.name]) for one in wanted))
+    is_whole = len(places) == len(dict(places)) and {old for old, _ in places} == {new for _, new in places}
+    return dict(places) if is_whole and any(old != new for old, new in places) else {}
 
 
 def refuse_unknown(type_: str) -> None:

@@ -267,7 +267,7 @@ SlipKind = Literal[
     "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
     "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
-    "added-first", "publish-twice",
+    "added-first", "publish-twice", "wrong-value",
 ]  # fmt: skip
 
 
@@ -310,7 +310,9 @@ class PythonSlip(Record):
     in the script uses, or that Python did not find where the files were read. `unregistered`: a `Publisher` or
     `Subscriber` that is taken off its topic. `not-started`: an action server that waits for a `start()` that no
     line calls. `start-value` and `added-first`: no slips, but where a counter, `name`, gets its first number,
-    `message`, and where a loop adds one to it before it publishes.
+    `message`, and where a loop adds one to it before it publishes. `wrong-value`: a value that is none: a comparison
+    with NaN, the sine of an angle in degrees, a service's answer that is made and not returned (`name`: `nan`,
+    `degrees`, `return`).
     """
 
     file: str

@@ -16,7 +16,7 @@ from grader.wording import join_words, plural
 RepairKind = Literal[
     "executable-bit", "encoding", "byte-order-mark", "line-ends", "shebang", "file-name", "python-syntax",
     "manifest-line", "build-line", "launch-syntax", "package-name", "launch-type", "missing-import", "missing-call",
-    "node-name", "topic-name", "parameter-name",
+    "node-name", "topic-name", "service-name", "parameter-name",
 ]  # fmt: skip
 """In the order in which a student would meet them."""
 
@@ -38,6 +38,7 @@ DEFAULT_SHARES: dict[RepairKind, float] = {
     "missing-call": 0.5,
     "node-name": 1.0,
     "topic-name": 1.0,
+    "service-name": 1.0,
     "parameter-name": 1.0,
 }
 """Which share of its points a criterion keeps that passes on a copy with a repair of this kind. The criterion that asks
@@ -60,6 +61,7 @@ BY_HAND: dict[RepairKind, str] = {
     "missing-call": "a name or call that is misspelt, missing, lacks its brackets or has an argument in the wrong form",
     "node-name": "a misspelt node name: rosnode list shows how it is called",
     "topic-name": "a misspelt topic: rostopic list shows how it is called",
+    "service-name": "a misspelt service or action: rosservice list and rostopic list show how it is called",
     "parameter-name": "a misspelt parameter: rosparam list shows how it is called",
 }
 """How a mistake of this kind looks, and how it is repaired."""

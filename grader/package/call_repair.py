@@ -13,7 +13,7 @@ import builtins
 import re
 from collections.abc import Iterator
 from itertools import chain, pairwise
-from typing import NamedTuple, TypeGuard
+from typing import Literal, NamedTuple, TypeGuard
 
 from grader.package.member_repair import with_place
 from grader.package.syntax_repair import Step, edited, is_docstring, last_name, span_of, step_to
@@ -32,10 +32,12 @@ class Argument(NamedTuple):
 
 
 class Unbound(NamedTuple):
-    """A variable that is read where the function has not given it its value; `first` is the function's first line."""
+    """A variable of the file to which a function gives a value of its own: it is read before it has one (`unbound`),
+    or only elsewhere, where it keeps its old one (`kept`). `first` is the function's first line."""
 
     name: str
     first: ast.stmt
+    cause: Literal["unbound", "kept"]
 
 
 def with_values_called(text: str) -> Iterator[Step]:
@@ -147,7 +149,7 @@ def with_globals(text: str) -> Iterator[Step]:
         at = found.first.lineno - 1
         blanks = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
         after = "\n".join([*lines[:at], f"{blanks}global {found.name}", *lines[at:]])
-        for step in step_to("unbound", found.first.lineno, text, after, found.name):
+        for step in step_to(found.cause, found.first.lineno, text, after, found.name):
             yield step
             yield from with_globals(step["text"])
             return
@@ -383,7 +385,8 @@ def _without_quotes(call: ast.Call, name: str, functions: set[str]) -> Iterator[
 
 
 def _unbound_variables(tree: ast.Module) -> Iterator[Unbound]:
-    """Yield variables of the whole file that a function reads, and then gives a value to without a `global`."""
+    """Yield variables of the whole file to which a function gives a value without a `global`, and which it has read
+    before, or never reads while others do."""
     shared = {
         target.id
         for one in tree.body
@@ -400,10 +403,32 @@ def _unbound_variables(tree: ast.Module) -> Iterator[Unbound]:
         own |= {name for n in nodes if isinstance(n, ast.Global | ast.Nonlocal) for name in n.names}
         for name in sorted(shared - own):
             uses = sorted(_reads_and_writes(nodes, name))
-            if uses and not uses[0][1] and any(written for _, written in uses):
+            is_read_first = bool(uses) and not uses[0][1] and any(written for _, written in uses)
+            only_written = bool(uses) and all(at[1] == 1 for at, _ in uses)
+            if is_read_first or (only_written and _is_read_outside(tree, name, function)):
                 first = next((s for s in function.body if not is_docstring(s)), None)
                 if first is not None and first.lineno > function.lineno:
-                    yield Unbound(name, first)
+                    yield Unbound(name, first, "unbound" if is_read_first else "kept")
+
+
+def _is_read_outside(tree: ast.Module, name: str, function: ast.FunctionDef) -> bool:
+    """Return whether the file's own variable is read, and only outside of a function that has one of that name."""
+    inside = {*ast.walk(function)}
+    for one in ast.walk(tree):
+        if isinstance(one, ast.FunctionDef) and one not in inside and _has_its_own(one, name):
+            inside |= {*ast.walk(one)}
+    reads = [
+        n for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id == name and isinstance(n.ctx, ast.Load)
+    ]
+    return any(n not in inside for n in reads) and not any(n in {*ast.walk(function)} for n in reads)
+
+
+def _has_its_own(function: ast.FunctionDef, name: str) -> bool:
+    """Return whether a function takes a variable of that name, or gives it a value without a `global`."""
+    nodes = list(ast.walk(function))
+    given = any(isinstance(n, ast.Name) and n.id == name and not isinstance(n.ctx, ast.Load) for n in nodes)
+    shared = any(isinstance(n, ast.Global) and name in n.names for n in nodes)
+    return any(isinstance(n, ast.arg) and n.arg == name for n in nodes) or (given and not shared)
 
 
 def _reads_and_writes(nodes: set[ast.AST], name: str) -> Iterator[tuple[tuple[int, int], bool]]:

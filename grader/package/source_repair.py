@@ -88,6 +88,8 @@ OF_TWO_FRAMES = {"lookup_transform", "can_transform", "lookupTransform", "canTra
 ROLES = {
     "Publisher": "publisher",
     "Subscriber": "subscriber",
+    **dict.fromkeys(("Service", "SimpleActionServer", "ActionServer"), "server"),
+    **dict.fromkeys(("ServiceProxy", "wait_for_service", "SimpleActionClient", "ActionClient"), "client"),
     "init_node": "node",
     "get_param": "param",
     "has_param": "param",

@@ -23,6 +23,8 @@ class Known(NamedTuple):
     topics: frozenset[str]
     params: frozenset[str]
     words: frozenset[str]
+    quoted: frozenset[str]
+    """Words that the handout has in backticks."""
 
 
 def argument_faults(scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
@@ -31,7 +33,8 @@ def argument_faults(scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterato
     for index, start in as_maps(scenario.get("start")):
         for number, text in as_texts(start.get("args")):
             known = known or _known(rubric)
-            fault = _blanks(text) or _no_colon(text, start) or _fault(text, start, known)
+            fault = _blanks(text) or _no_colon(text, start) or _of_launch(text, start, known)
+            fault = fault or _fault(text, start, known)
             if fault:
                 yield ("start", index, "args", number), fault
 
@@ -51,6 +54,15 @@ def _no_colon(text: str, start: dict[str, Any]) -> str:
     name, mark, value = text.partition("=")
     is_meant = re.fullmatch(r"\w+", name) and (start.get("launch") is not None or name.startswith("_"))
     return f"ROS reads {name}:={value}, with a colon, and not {text}" if mark and is_meant else ""
+
+
+def _of_launch(text: str, start: dict[str, Any], known: Known) -> str:
+    """Return that a launch file's argument is one letter off from a word that the handout has in backticks."""
+    name, mark, value = text.partition(":=")
+    near = next((one for one in sorted(known.quoted) if is_slip(name, one)), "")
+    if not mark or start.get("launch") is None or not near or name in known.words | known.params:
+        return ""
+    return f'nothing else in the rubric names {name} (did you mean "{near}:={value}"?)'
 
 
 def _fault(text: str, start: dict[str, Any], known: Known) -> str:
@@ -106,4 +118,5 @@ def _known(rubric: dict[str, Any]) -> Known:
     words = {word for path, text in texts if PROSE & {*path} for word in re.findall(r"\w+", text)}
     private = {name for path, text in texts if PROSE & {*path} for name in re.findall(r"~(\w+)", text)}
     params = private | {name.rpartition("/")[2] for name in params}
-    return Known(frozenset(topics), frozenset(params), frozenset(words))
+    quoted = re.findall(r"`~?(\w+)`", str(rubric.get("handout") or ""))
+    return Known(frozenset(topics), frozenset(params), frozenset(words), frozenset(quoted))

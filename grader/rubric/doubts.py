@@ -56,11 +56,14 @@ def doubts(data: object) -> Iterator[Fault]:
     yield from _lone_quotes(rubric)
     yield from _same_criteria(criteria)
     yield from _other_rates(criteria, scenarios)
+    yield from _not_private(scenarios, str(rubric.get("handout") or ""))
+    yield from _without_input(criteria, scenarios)
     for index, criterion in criteria:
         at, given = ("criteria", index, "with"), as_map(criterion.get("with"))
         scenario = scenarios.get(str(criterion.get("scenario")), {})
         yield from _other_process(at, given, scenario, scenarios)
         yield from _fewer_answers(at, criterion, scenario)
+        yield from _asked_for_nothing(at, criterion, scenario)
         yield from _cancelled_goal(at, given, scenario)
         yield from _added_up(at, criterion, scenario)
         yield from _set_otherwise(at, criterion, scenario)
@@ -180,6 +183,62 @@ def _fewer_answers(at: KeyPath, criterion: dict[str, Any], scenario: dict[str, A
         calls = f"{criterion.get('scenario')} calls {service} {plural(len(made), 'time')}"
         fault = f"{calls}, and here are {plural(len(expect), 'answer')}: they are compared with the first"
         yield (*at, "expect"), fault
+
+
+def _asked_for_nothing(at: KeyPath, criterion: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield numbers of a request that nothing in the run has, where others of the same field come from the run."""
+    expect = as_map(criterion.get("with")).get("expect")
+    if criterion.get("check") != "calls" or not isinstance(expect, list):
+        return
+    parts = {key: part for key, part in scenario.items() if key != "until"}
+    sent = {number for _, number in _numbers_in((), parts)}
+    for key in dict.fromkeys(key for one in expect for key in as_map(one)):
+        each = [(n, one[key]) for n, one in enumerate(expect) if is_number(as_map(one).get(key))]
+        alone = [(n, value) for n, value in each if value not in sent]
+        if len(alone) == 1 < len(each):
+            (number, value), name = alone[0], criterion.get("scenario")
+            fault = f"nothing in {name} has {value:g}, and it has the other numbers that are asked for"
+            yield (*at, "expect", number, key), fault
+
+
+def _not_private(scenarios: Mapping[str, dict[str, Any]], handout: str) -> Iterator[Fault]:
+    """Yield parameters without a node's name before them that the handout calls private."""
+    for name, scenario in scenarios.items():
+        for at, one in set_in(scenario):
+            param = str(one.get("name"))
+            if param.count("/") == 1 and re.search(rf"~{re.escape(param[1:])}\b", handout):
+                fault = f"the handout has ~{param[1:]}, which is below the node's own name: /<node>{param}"
+                yield ("scenarios", name, *at, "name"), fault
+
+
+SENDS = ("publish", "transform", "play", "call", "action", "type")
+OF_ANSWERS = ("field-equals", "field-bounds", "reacts", "hears", "prints", "transform")
+"""Checks of what a node does with what it hears."""
+
+
+def _without_input(
+    criteria: Sequence[tuple[int, dict[str, Any]]], scenarios: Mapping[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield runs in which the grader sends nothing, where it sends something in every other run of the same
+    processes."""
+    for name, scenario in scenarios.items():
+        others = {
+            n: one for n, one in scenarios.items() if n != name and _processes(one) == _processes(scenario)
+        }
+        judged = any(c.get("scenario") == name and c.get("check") in OF_ANSWERS for _, c in criteria)
+        waits = any("wait" in step for _, step in as_maps(scenario.get("steps")))
+        if others and judged and waits and not _sends(scenario) and all(map(_sends, others.values())):
+            fault = (
+                f"nothing is sent in {name}, and in {join_words(others)} something is: is a step left out?"
+            )
+            yield ("scenarios", name, "steps"), fault
+
+
+def _sends(scenario: dict[str, Any]) -> bool:
+    """Return whether the grader, or a program beside the student's, sends the student's nodes anything."""
+    steps = any(given_steps(scenario, kind) for kind in SENDS)
+    programs = any(start.get("program") for start in starts_of(scenario))
+    return steps or programs or any(scenario.get(key) for key in ("probes", "calls", "serves", "params"))
 
 
 def _cancelled_goal(at: KeyPath, given: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:

@@ -421,7 +421,7 @@ def _unknown_causes(
     for index, criterion, others in _criteria(rubric):
         check, name = checks.get(str(criterion.get("check"))), str(criterion.get("scenario"))
         scenario = scenarios.get(name, {})
-        sent = {*SYSTEM_TOPICS, *_topics_in(scenario)}
+        sent = {*SYSTEM_TOPICS, *_topics_in(scenario), *_of_actions(scenario)}
         open_ = any(start.get("script") is None for start in _starts(scenario)) or "recording" in scenario
         for one in check.references(as_map(criterion.get("with"))) if check else ():
             at = one.path if isinstance(one.value, str) else (*one.path, "topic")
@@ -433,6 +433,14 @@ def _unknown_causes(
                 meant = f' (did you mean "{near}"?)' if near else ""
                 fault = f"nothing in {name} sends on {topic}, and no other criterion names it{meant}"
                 yield ("criteria", index, "with", *at), fault
+
+
+def _of_actions(scenario: dict[str, Any]) -> Iterator[str]:
+    """Yield the topics of the actions that the grader offers or asks: `/dock/goal`, `/dock/cancel`, …"""
+    offered = [one.get("action") for _, one in as_maps(scenario.get("serves"))]
+    asked = [as_map(step.get("action")).get("name") for _, step in as_maps(scenario.get("steps"))]
+    for name in filter(None, (*offered, *asked)):
+        yield from (f"{name}/{part}" for part in ("goal", "cancel", "status", "feedback", "result"))
 
 
 def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:

@@ -98,9 +98,12 @@ def _named_once(data: object, folder: Path) -> Iterator[tuple[KeyPath, str, str]
     programs = {text.rpartition("/")[2] for path, text in texts if path[-1] == "program"}
     names = [(path, text, last) for path, text in texts if (last := _last_word(path, text, rubric))]
     names = [one for one in names if not PROSE & {*one[0]}]
+    actions = {text for path, text in texts if path[-1] == "action"}
     handout = str(rubric.get("handout"))
     words = {word for path, text in texts if not PROSE & {*path} for word in re.findall(r"\w+", text)}
     for path, text, last in names:
+        if text.rpartition("/")[0] in actions:  # `/dock/cancel`
+            continue
         if text in SYSTEM_TOPICS or (folder / text).is_file() or not programs.isdisjoint(text.split("/")):
             continue
         if _count(last, text, texts) == 1:

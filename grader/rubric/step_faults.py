@@ -15,6 +15,7 @@ from grader.checks.support.processes import odd_name
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.errors import EvidenceError
 from grader.installable import noetic_messages
+from grader.model.message_definitions import NOT_FINITE
 from grader.ros_packages import ros_packages
 from grader.rubric.fault_words import model_faults
 from grader.rubric.scenario import STEP_S_MAX, Action, Step, Transform, Until
@@ -34,7 +35,6 @@ NAMED = {
 """The key of a step that is a name of ROS's."""
 ROWS_PER_MESSAGE, ROWS_PER_S = 3, 100
 """A node that writes more than this into a table is none of a lab's."""
-NOT_FINITE = (".inf", "-.inf", ".nan")
 WAITS = ("seconds", "topic", "node")
 MOMENTS = 20
 """At so many messages of a row a value that changes is looked at, the first and the last among them."""
@@ -130,7 +130,7 @@ def _faults_of(at: KeyPath, kind: str, given: dict[str, Any], types: dict[str, s
         yield from _cancelled_late(at, given)
     elif kind == "wait":
         yield from _wait(at, given)
-    elif kind == "set_param" and (given.get("value", "") is None or given.get("value") in NOT_FINITE):
+    elif kind == "set_param" and (given.get("value", "") is None or given.get("value") in tuple(NOT_FINITE)):
         yield (*at, "value"), "is not a value that the parameter server takes"
     elif kind == "transform":
         yield from _transform(at, given)

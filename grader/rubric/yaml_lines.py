@@ -53,7 +53,7 @@ class Form:
     """What a file may hold, and how messages call it.
 
     Times are text of ISO 8601 under the keys of `times`, and faults elsewhere. `.inf`, `-.inf` and `.nan` are text
-    below the keys of `not_finite`, and faults elsewhere. With `written_keys`, a key is what is
+    below all keys of one of `not_finite`, and faults elsewhere. With `written_keys`, a key is what is
     written there, also where YAML reads a number or `no`. A file that `may_be_empty` is an empty map then.
     """
 
@@ -62,12 +62,17 @@ class Form:
     bytes_max: int = 1_000_000
     nodes_max: int = 100_000
     times: frozenset[str] = frozenset()
-    not_finite: frozenset[str] = frozenset()
+    not_finite: tuple[frozenset[str], ...] = ()
     written_keys: bool = False
     may_be_empty: bool = False
 
 
-RUBRIC = Form(times=frozenset({"deadline"}), not_finite=frozenset({"steps"}))
+SENT, WANTED = ("steps", "serves", "calls", "probes"), ("value", "values", "expect", "result")
+"""Keys of what the grader sends in a scenario, and of what a criterion wants to see."""
+RUBRIC = Form(
+    times=frozenset({"deadline"}),
+    not_finite=(*(frozenset({key}) for key in SENT), *(frozenset({"criteria", key}) for key in WANTED)),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -341,7 +346,7 @@ class _Reader:
         return self._refuse(path, f"must be text or a number: put {node.value[:40]} in quotes", node.value)
 
     def _not_finite(self, path: KeyPath, value: float, written: str) -> Value:
-        if self.form.not_finite.isdisjoint(path):
+        if not any(keys.issubset(path) for keys in self.form.not_finite):
             return self._refuse(path, f"must be finite, not {written}")
         return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
 

@@ -14,11 +14,10 @@ from typing import Any
 import yaml
 
 from grader.checks import CHECKS
-from grader.checks.support.exit_causes import explain_by_exception
-from grader.checks.support.parameters import explain_by_unread_parameter
 from grader.checks.support.text import in_language
-from grader.checks.support.topics import account_for_losses, explain_by_unheard_topic
+from grader.checks.support.topics import account_for_losses
 from grader.evidence.run import Run
+from grader.judging.judge import EXPLANATIONS
 from grader.model.message_definitions import parse_interface
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status, Verdict
@@ -107,7 +106,7 @@ def judge_runs(name: str, params: dict[str, Any], runs: dict[str, Run]) -> Verdi
     }
     asked = {fact: facts[fact] for fact in check.facts}
     verdict = account_for_losses(check, asked, check.function(**asked))
-    for explain in (explain_by_exception, explain_by_unheard_topic, explain_by_unread_parameter):
+    for explain in EXPLANATIONS:
         verdict = explain(check, facts["package"], facts["run"], verdict)
     return verdict.model_copy(update={"hint": in_language(verdict.hint, "python")})
 

@@ -22,6 +22,7 @@ from grader.judging.cited_lines import (
     cite_find,
     cite_name,
     cite_source,
+    cite_unused_argument,
     show_lines,
 )
 from grader.judging.facts import Facts, try_facts
@@ -219,6 +220,26 @@ def test_a_package_that_roslaunch_does_not_find_is_shown_where_it_is_named(
     else:
         assert found.citations == (FileCitation(file="launch/a.launch", line=line),)
         assert found.hint.startswith(f"write the package's exact name on line {line}, push elsewhere if")
+
+
+@pytest.mark.parametrize(
+    ("value", "line"), [("5.0", 2), ("$(arg rate)", None), ("$(eval 2 * rate)", None), ("$(arg rates)", 2)]
+)
+def test_an_argument_that_nothing_in_the_launch_file_uses_is_shown(value: str, line: int | None) -> None:
+    text = f'<launch>\n<arg name="rate" default="5.0"/>\n<param name="rate" value="{value}"/>\n</launch>'
+    launch = parse_launch_files({"launch/a.launch": text.encode()}, ["lab1"])
+    package = {"files": [], "launch_files": [one.model_dump() for one in launch]}
+    start = {"title": "t", "start": [{"name": "all", "launch": "a.launch", "args": ["rate:=9"]}]}
+    lab = rubric({**RATE, "scenario": "talker", "requires": []}, scenarios={"talker": start})
+    runs = build_runs({"runs": {"package": {"package": package, "attachments": {"launch/a.launch": text}}}})
+    lost = failed("it is slower", hint="look at it")
+    found = cite_unused_argument(lost, lab.criteria[0], try_facts(lab, runs), runs["package"])
+    if line is None:
+        assert found == lost
+    else:
+        assert found.message == "it is slower; nothing in launch/a.launch uses its argument rate"
+        assert found.hint == "write `$(arg rate)` where its value belongs; look at it"
+        assert found.citations == (FileCitation(file="launch/a.launch", line=line),)
 
 
 @pytest.mark.parametrize(

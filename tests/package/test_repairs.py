@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.model.message_definitions import parse_definition
 from grader.model.package import PythonSlip, SlipKind
 from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS, advice_on
 from grader.model.submission import chmod_hint
@@ -64,6 +65,22 @@ SERVICE = {**OWN, "srv/Two.srv": "int64 a\n---\n", "src/level.py": "from lab.srv
 SERVICE_CMAKE = CMAKE.replace(
     "rospy)\n", "message_generation rospy)\nadd_service_files(FILES Two.srv)\ngenerate_messages()\n"
 )
+ACTION_CMAKE = CMAKE.replace(
+    "rospy)\n",
+    """message_generation actionlib_msgs rospy)
+add_action_files(FILES Go.action)
+generate_messages(DEPENDENCIES actionlib_msgs std_msgs)
+""",
+)
+GO_FIELDS = tuple(parse_definition("int32 n\n---\nbool there\n---\nint32 left\n", ".action"))
+CPP_NODE = """\
+void callback(const Int8& msg) { for (int i = 0; i < 3; ++i) use(msg); }
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "a");
+  auto sub = ros::NodeHandle().subscribe("scan", 10, callback);
+  return 0;
+}
+"""
 TEMPLATE = """\
 # add_message_files(
 #   FILES
@@ -212,10 +229,16 @@ CASES = {
         "write `global n` as the first line of the function",
         after={TALKER: "def main():\n    global n\n"},
     ),
+    "variable-of-a-callback": Case(
+        swapped(TALKER, ("\ndef main():", "\nfront = None\n\ndef heard(msg):\n    front = msg.data\n\ndef main():"),
+                        ("        rate.s", "        print(front)\n        rate.s")),
+        ["missing-call"], "the function gives a value to a front of its own",
+        after={TALKER: "def heard(msg):\n    global front\n    front = msg.data\n"},
+    ),
     "variables-of-their-own": Case(
         {TALKER: SCRIPT, "src/own.py": "n = 0\ndef f(n):\n    n += 1\ndef g():\n    global n\n    n += 1\n"
          "def h():\n    n = 1\n    n += 1\ndef i():\n    for n in (1,): print(n)\ndef j():\n"
-         "    def f(): return n\n    n = 1\n"},
+         "    def f(): return n\n    n = 1\ndef k():\n    n = 1\n"},
         [],
     ),
     "sleep": Case(swapped(TALKER, ("rate.sleep()", "rate.sleep")), ["missing-call"],
@@ -281,6 +304,41 @@ CASES = {
         ["topic-name"], "line 2 of src/a.cpp: the topic /men should be /mean", asking(topics=("/mean",)),
         {"src/a.cpp": 'advertise<std_msgs::Int8>("/mean", 1);'},
     ),
+    "private-service": Case(
+        swapped(TALKER, ("    rate = ", "    rospy.Service('~estimate', Trigger, answer)\n    rate = ")),
+        ["service-name"], "the service ~estimate should be /estimate", asking(servers=("/estimate",)),
+        {TALKER: "rospy.Service('estimate', Trigger, answer)"},
+    ),
+    "service-asked-for": Case(
+        swapped(TALKER, ("\nmain()", "\nrospy.wait_for_service('/estimat')\nrospy.ServiceProxy('/estimat')\nmain()")),
+        ["service-name"], "the service /estimat should be /estimate",
+        asking(clients=("/estimate",)), {TALKER: "rospy.ServiceProxy('/estimate')"},
+    ),
+    "service-in-cpp": Case(
+        {"src/a.cpp": 'ros::ServiceServer server = nh.advertiseService("estimat", answer);\n'},
+        ["service-name"], "line 1 of src/a.cpp: the service estimat should be /estimate",
+        asking(servers=("/estimate",)), {"src/a.cpp": 'advertiseService("estimate", answer);'},
+    ),
+    "program-named-otherwise": Case(
+        {"src/mean.cpp": "int main() {}\n",
+         CMAKELISTS: f"{CMAKE}add_executable(mean_node src/mean.cpp)\ntarget_link_libraries(mean_node x)\n"},
+        ["build-line"], "the program is called mean_node, and the lab wants mean", asking(scripts=("mean",)),
+        {CMAKELISTS: "add_executable(mean src/mean.cpp)\ntarget_link_libraries(mean x)\n"},
+    ),
+    "no-spin-in-cpp": Case(
+        {"src/a.cpp": CPP_NODE}, ["missing-call"], "src/a.cpp: below line 4 add `ros::spin();`",
+        after={"src/a.cpp": CPP_NODE.replace("  return", "  ros::spin();\n  return")},
+    ),
+    "no-spin-and-no-return-in-cpp": Case(
+        {"src/a.cpp": CPP_NODE.replace("  return 0;\n", "  // ros::spin();\n")}, ["missing-call"], "src/a.cpp",
+        after={"src/a.cpp": "  // ros::spin();\n  ros::spin();\n}\n"},
+    ),
+    "subscriber-dropped-in-cpp": Case(
+        {"src/a.cpp": CPP_NODE.replace("auto sub = ros::NodeHandle()", "nh").replace("  return 0", "  ros::spin()")},
+        ["missing-call"], "line 4 of src/a.cpp: what subscribe(…) returns is dropped, and with it the subscription",
+        after={"src/a.cpp": '  ros::Subscriber sub = nh.subscribe("scan", 10, callback);\n'},
+    ),
+    "loop-in-cpp": Case({"src/a.cpp": CPP_NODE.replace("  return", "  while (true) ros::spinOnce();\n  return")}, []),
     "import-capitals": Case(swapped(TALKER, ("import Int8", "import int8")), ["missing-call"], "int8"),
     "class-in-other-letters": Case(swapped(TALKER, ("Int8", "int8")), ["missing-call"], "int8"),
     "class-of-another-name": Case(
@@ -562,6 +620,19 @@ CASES = {
         {**OWN, "msg/Level.msg": "Header header\ngeometry_msgs/Point at\n",
          CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")},
         ["build-line"], "write geometry_msgs after DEPENDENCIES", after={CMAKELISTS: "DEPENDENCIES geometry_msgs std"},
+    ),
+    "own-action-without-its-messages": Case(
+        {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\n---\nint32 n\n---\nint32 n\n",
+         CMAKELISTS: ACTION_CMAKE.replace("actionlib_msgs std", "std")},
+        ["build-line"], "write actionlib_msgs after DEPENDENCIES",
+    ),
+    "own-action-in-another-order": Case(
+        {"src/go.py": "from lab.msg import GoAction\n",
+         "action/Go.action": "int32 n  # how far\n---\nint32 left\n---\nbool there\n",
+         CMAKELISTS: ACTION_CMAKE},
+        ["build-line"], "result and feedback have changed places",
+        asking(definitions=(("action/Go.action", GO_FIELDS),)),
+        {"action/Go.action": "int32 n  # how far\n---\nbool there\n---\nint32 left\n"},
     ),
     "own-message-of-no-type": Case(
         {**OWN, "msg/Level.msg": "Float64 level\n",

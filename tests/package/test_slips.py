@@ -2,11 +2,49 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from grader.package.python import check_syntax
 
 pytestmark = pytest.mark.usefixtures("without_processes")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("if r == float('nan') or r > 2:\n    r = 0\n", ("nan", "write `math.isnan(r)`")),
+        ("ok = math.nan != scan.ranges[i]\n", ("nan", "write `math.isnan(…)`")),
+        (
+            "a = math.degrees(a)\nx = r * math.cos(a)\n",
+            ("degrees", "leave out `degrees(…)`: the angle is in radians before"),
+        ),
+        ("x = math.cos(math.radians(a))\n", None),
+        ("def f(req):\n    AddResponse(sum=1)\n", ("return", "write `return AddResponse(…)`")),
+        ("def f(req):\n    return AddResponse(sum=1)\n", None),
+    ],
+)
+def test_values_that_are_none(text: str, said: tuple[str, str] | None, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    found = [(s.name, s.fix) for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "wrong-value"]
+    assert found == ([said] if said else [])
+
+
+@pytest.mark.parametrize(
+    ("head", "fix"),
+    [
+        ("def heard(msg):", "hand it over to what calls it: `rospy.Subscriber(…, heard)`"),
+        ("def on_feedback(msg):", "hand it over: `send_goal(…, feedback_cb=on_feedback)`"),
+        ("def heard(msg, pub):", ""),
+    ],
+)
+def test_a_callback_that_is_handed_to_nobody_is_to_be_handed_over(
+    head: str, fix: str, tmp_path: Path
+) -> None:
+    (tmp_path / "a.py").write_text(f"{head}\n    p.publish(1)\nclient.send_goal(1)\n", encoding="utf-8")
+    (slip,) = (s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-called")
+    assert slip.fix == fix
 
 
 def test_slips_are_found_and_named(tmp_path):

@@ -272,6 +272,42 @@ def test_a_rubric_of_the_graders_own_loads_without_a_word(path: Path) -> None:
     assert doubts_of(load_rubric(str(path)), path.name) == []
 
 
+def test_a_step_that_is_left_out_of_one_of_several_runs_is_a_warning(examples: Path) -> None:
+    start = "start: [{name: distance, script: scripts/distance.py}]"
+    near = f"  near:\n    title: Near\n    {start}\n    steps: [wait: {{seconds: 1}}]\n"
+    asked = "check: field-equals, with: {topic: /distance, field: data, value: 5}, scenario: near"
+    criterion = f"  - {{id: near, title: near, points: 0, {asked}}}\n"
+    path = _spoiled(examples, "tf-broadcaster", "\ncriteria:\n", f"{near}\ncriteria:\n{criterion}")
+    found = doubts_of(load_rubric(str(path)), path.name)
+    told = "nothing is sent in near, and in distance something is: is a step left out?"
+    assert [one.partition("steps: ")[2] for one in found] == [told]
+
+
+def test_a_number_of_a_request_that_the_run_does_not_have_is_a_warning(examples: Path) -> None:
+    steps = "steps: [publish: {topic: /a, type: std_msgs/Int64, values: [7, 9]}]\n    start: [{name: client"
+    path = _spoiled(examples, "service-client", "start: [{name: client", steps)
+    text = path.read_text(encoding="utf-8")
+    wanted = "expect: [{a: 7, b: -4}, {a: 9}, {a: 8}]}"
+    path.write_text(text.replace("expect: {a: {made_up: a}, b: -4}}", wanted), encoding="utf-8")
+    told = "nothing in adds has 8, and it has the other numbers that are asked for"
+    assert [one.partition(".a: ")[2] for one in doubts_of(load_rubric(str(path)), path.name)] == [told]
+
+
+def test_a_client_may_be_asked_to_cancel_its_goal(examples: Path) -> None:
+    served = "serves: [{action: /dock, type: adder/Dock, delay_s: 12}]"
+    start = "start: [{name: client, script: scripts/add_client.py}]"
+    stuck = f"  stuck:\n    title: Stuck\n    {served}\n    {start}\n    until: {{ended: [client]}}\n"
+    asked = "check: reacts, with: {cause: {topic: /dock/goal}, effect: {topic: /dock/cancel}, within_s: 5}"
+    criterion = f"  - {{id: stuck, title: stuck, points: 0, scenario: stuck, {asked}}}\n"
+    path = _spoiled(examples, "service-client", "\ncriteria:\n", f"{stuck}\ncriteria:\n{criterion}")
+    assert doubts_of(load_rubric(str(path)), path.name) == []
+
+
+def test_a_field_may_be_asked_to_be_infinite(examples: Path) -> None:
+    path = _spoiled(examples, "tf-broadcaster", "value: 5, tolerance: 0.01", "value: .inf, tolerance: 0.01")
+    assert doubts_of(load_rubric(str(path)), path.name) == []
+
+
 @pytest.mark.parametrize("slip", [slip for slip in LISTED if "fault" in slip], ids=lambda slip: slip["fault"])
 def test_a_slip_of_the_list_is_refused(examples: Path, slip: dict[str, str]) -> None:
     path = _spoiled(examples, slip["lab"], slip["old"], slip["new"])

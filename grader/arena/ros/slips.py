@@ -74,7 +74,7 @@ def slips(tree):
         misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice,
         publishes_twice, callbacks, waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops,
         clock_values, counter_slips, counter_starts, without_effect, assigned_late, hidden_names, subscribed_again,
-        imports, taken_off, unstarted_servers,
+        imports, taken_off, unstarted_servers, wrong_values,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
@@ -167,11 +167,28 @@ def never_run(tree):
             if calls_in(node, *WORKS) and not node.name.startswith("__"):
                 message, owner = "nothing calls `%s()`" % node.name, of_class.get(id(node), "")
                 owner = owner and (objects.get(owner) or owner + "()") + "."
-                yield slip(node.lineno, "never-called", message, name=owner + node.name)
+                yield slip(
+                    node.lineno,
+                    "never-called",
+                    message,
+                    handed_over(node, tree, owner),
+                    name=owner + node.name,
+                )
         elif isinstance(node, ast.Compare) and getattr(node.left, "id", "") == "__name__":
             word = getattr(node.comparators[0], "value", "__main__")
             if word != "__main__" and isinstance(node.ops[0], (ast.Eq, ast.Is)):
                 yield slip(node.lineno, "main-guard", "`__name__` is never %r" % (word,))
+
+
+def handed_over(function, tree, owner):
+    """Return who has to be told of a callback, which takes one value; "" of another function."""
+    taken = [one.arg for one in function.args.args if one.arg != "self"]
+    if len(taken) != 1 or function.args.defaults or calls_in(function, "init_node"):
+        return ""
+    name = (owner and "self.") + function.name
+    if calls_in(tree, "send_goal") and "feedback" in (function.name + taken[0]).lower():
+        return "hand it over: `send_goal(…, feedback_cb=%s)`" % name
+    return "hand it over to what calls it: `rospy.Subscriber(…, %s)`" % name
 
 
 MAKES = ("Publisher", "Subscriber", "Service")
@@ -565,6 +582,50 @@ def goes_on(handler):
 
 def is_plain(module):
     return module in PLAIN_MODULES or module.endswith((".msg", ".srv", "_msgs"))
+
+
+OF_ANGLES = ("sin", "cos", "tan")
+IN_DEGREES = ("degrees", "rad2deg")
+
+
+def wrong_values(tree):
+    """Comparisons with NaN, angles in degrees of which a sine is taken, and answers of services that are dropped."""
+    made = [n for n in walk(tree) if isinstance(n, ast.Assign) and called_name(n.value) in IN_DEGREES]
+    degrees = {dotted(target) for n in made for target in n.targets}
+    for node in walk(tree):
+        if isinstance(node, ast.Compare) and any(map(is_nan, [node.left, *node.comparators])):
+            name = dotted(node.comparators[0] if is_nan(node.left) else node.left)
+            fix = "write `math.isnan(%s)`" % (name if "..." not in name else "…")
+            yield slip(
+                node.lineno,
+                "wrong-value",
+                "no number is equal to NaN, not even NaN itself",
+                fix=fix,
+                name="nan",
+            )
+        elif called_name(node) in OF_ANGLES and node.args:
+            given = dotted(node.args[0])
+            if given in degrees or called_name(node.args[0]) in IN_DEGREES:
+                message = "`%s` takes radians, and gets degrees" % called_name(node)
+                fix = "leave out `degrees(…)`: the angle is in radians before"
+                yield slip(node.lineno, "wrong-value", message, fix=fix, name="degrees")
+        elif isinstance(node, ast.Expr) and called_name(node.value).endswith("Response"):
+            name = called_name(node.value)
+            fix = "write `return %s(…)`" % name
+            yield slip(
+                node.lineno,
+                "wrong-value",
+                "the `%s` that is made is not returned" % name,
+                fix=fix,
+                name="return",
+            )
+
+
+def is_nan(node):
+    """Return whether it is written as `float('nan')`, `math.nan` or `numpy.nan`."""
+    if called_name(node) == "float" and node.args:
+        return str(getattr(node.args[0], "value", "")).lower() == "nan"
+    return isinstance(node, ast.Attribute) and node.attr.lower() == "nan"
 
 
 def uncalled(node, functions):

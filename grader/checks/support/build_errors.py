@@ -288,7 +288,9 @@ def _message_of_another(found: re.Match[str], package: PackageFacts, lines: Sequ
         why = f"{message} needs messages that generate_messages(DEPENDENCIES …) does not name"
         return Explained(why, FIRST_ERROR_HINT)
     why = f"{message} has a field of the type {named[2]}/{named[1]}, and generate_messages(…) does not name {named[2]}"
-    return Explained(why, f"write {named[2]} after DEPENDENCIES, and in find_package(…) and package.xml")
+    found_already = any(named[2] in call.args for call in cmake_calls(package, "find_package"))
+    more = "" if found_already else ", and in find_package(…) and package.xml"
+    return Explained(why, f"write {named[2]} after DEPENDENCIES in generate_messages(…){more}")
 
 
 def _before_catkin_package(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import re
 from collections.abc import Callable
 from contextlib import suppress
@@ -141,11 +142,27 @@ def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning
         return meaning
     if "'NoneType' object" in message:
         return _none()
+    if message == "'tuple' object does not support item assignment":
+        return _tuple(source)
     if meaning := _no_number(message, source):
         return meaning
     if given := _OPERANDS.search(message):
         return _operands(given[1], given[2], source)
     return None
+
+
+def _tuple(source: str) -> Meaning:
+    """Of `scan.ranges[i] = 0`: what a message has as a list is a tuple once it is received."""
+    tree = _tree(source)
+    target = next(
+        (n.value for n in ast.walk(tree) if isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store)),
+        None,
+    )
+    name = shown(ast.unparse(target)) if target is not None else "values"
+    return (
+        "a list in a message that was received is a tuple, which cannot be changed",
+        f"write `{name} = list({name})` first",
+    )
 
 
 def _nested_index(message: str, source: str) -> Meaning | None:
@@ -184,6 +201,10 @@ def _no_number(message: str, source: str) -> Meaning | None:
             f"this is the whole message ({kind})",
             "take its field, as in `msg.data`" if data else "take one of its fields",
         )
+    if re.match(
+        r"expected \[\w+\] but got \[std_msgs/\w+\]", message
+    ):  # rospy's own words, of a service's request
+        return "this is the whole message", "take its field, as in `msg.data`"
     if re.search(r" of (?:'str' and '(?:int|float)|'(?:int|float)' and 'str)'", message):
         return "text is compared with a number", "turn the text into a number first, or leave out `str(…)`"
     if wanted := _WANTS_NUMBER.search(message):
@@ -427,13 +448,30 @@ def _local(message: str, _source: str, _marked: tuple[int, int] | None) -> Meani
     name = _LOCAL.search(message)
     if name is None:
         return None
+    if hasattr(builtins, name[1]):
+        cause = f"`{name[1]}` is a variable of this function, and hides Python's `{name[1]}`"
+        return cause, f"give the variable `{name[1]}` another name"
     cause = (
         f"the function assigns to {name[1]} further down, so it is a variable of its own and has no value yet"
     )
     return cause, f"write `global {name[1]}` as the first line of the function"
 
 
+def _future(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    """Of a frame that is looked up at a time of which tf has not heard yet."""
+    if "into the future" not in message or ".now()" not in source:
+        return None
+    hint = "write `rospy.Time(0)` instead of `rospy.Time.now()`: it stands for the newest transform"
+    return "it asks where the frame is now, and the newest transform is a little older", hint
+
+
 def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
+    if (action := re.match(r"'(\w+)Action' object has no attribute", message)) and "send_goal" in source:
+        goal = f"{action[1]}Goal"
+        return (
+            f"`{action[1]}Action` is the type of the action, and a goal is a `{goal}`",
+            f"make it with `{goal}(…)`",
+        )
     if message == "'Duration' object has no attribute 'sleep'":
         hint = "make it with `rospy.Rate(…)`, which takes how many times a second the loop runs"
         return "a Duration is a length of time, and only a Rate sleeps", hint
@@ -515,6 +553,7 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
     "TypeError": _type,
     "UnboundLocalError": _local,
     "AttributeError": _attribute,
+    "ExtrapolationException": _future,
     "FileNotFoundError": _file,
     **dict.fromkeys(("PermissionError", "OSError"), _unwritable),
     "CalledProcessError": _command,

@@ -17,6 +17,7 @@ from pydantic import AfterValidator
 from grader.checks.support.processes import plain_type
 from grader.checks.support.text import shown
 from grader.evidence.run import Channel
+from grader.model.message_definitions import NOT_FINITE
 from grader.model.verdict import Verdict, inconclusive, unjudged
 from grader.wording import plural, significant
 
@@ -123,6 +124,17 @@ def is_within(value: float, low: float | None, high: float | None) -> bool:
 
 
 FLOAT32 = 1e-6
+SLIP = 5e-3
+"""By what share a number in another unit may differ from the one that is meant."""
+UNITS = (
+    (math.degrees(1), "degrees", "radians"),
+    (60, "minutes", "hours"),
+    (3600, "seconds", "hours"),
+    (3.6, "km/h", "m/s"),
+    (100, "centimetres", "metres"),
+    (1000, "millimetres", "metres"),
+)
+"""Pairs of units that are mixed up: how many of the smaller one make the larger one."""
 
 
 class Difference(NamedTuple):
@@ -137,12 +149,15 @@ class Difference(NamedTuple):
 
 def differences(got: object, wanted: object, tolerance: float, path: str = "") -> Iterator[Difference]:
     """Yield each place in which `got` is not as `wanted`; fields that `wanted` leaves out do not matter."""
+    if isinstance(got, float) and isinstance(wanted, str):
+        wanted = NOT_FINITE.get(wanted, wanted)
     if isinstance(wanted, Mapping):
         yield from _in_fields(got, wanted, tolerance, path)
     elif isinstance(wanted, list | tuple):
         yield from _in_items(list(got) if isinstance(got, bytes) else got, wanted, tolerance, path)
     elif not _equal(got, wanted, tolerance):
-        yield Difference(path, f"{value_text(got)}, not {value_text(wanted)}{_kinds(got, wanted)}")
+        why = f"{value_text(got)}, not {value_text(wanted)}{_kinds(got, wanted)}"
+        yield Difference(path, f"{why}{unit_slip(got, wanted)}")
 
 
 def _in_fields(
@@ -185,6 +200,22 @@ def _close(got: float, wanted: float, tolerance: float) -> bool:
     return both_nan or math.isclose(got, wanted, rel_tol=FLOAT32, abs_tol=tolerance)
 
 
+def unit_slip(got: object, wanted: object) -> str:
+    """Return in brackets what is odd about a number that is right but for its unit or its sign; "" for any other."""
+    if not (is_number(got) and is_number(wanted) and got and wanted):
+        return ""
+    if isinstance(got, int) and isinstance(wanted, int):  # numbers of things
+        return ""
+    if math.isclose(got, -wanted, rel_tol=SLIP):
+        return " (the sign is wrong)"
+    for factor, small, large in UNITS:
+        if math.isclose(got, wanted * factor, rel_tol=SLIP):
+            return f" ({significant(factor)} times too large, as {small} in place of {large} are)"
+        if math.isclose(got * factor, wanted, rel_tol=SLIP):
+            return f" ({significant(factor)} times too small, as {large} in place of {small} are)"
+    return ""
+
+
 def has_hole(value: object) -> bool:
     """Return whether a list or map has a key or an item without anything."""
     inside = (
@@ -215,7 +246,7 @@ def value_text(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        return f"'{value}'"
+        return str(NOT_FINITE.get(value, f"'{value}'"))
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{name}: {value_text(one)}" for name, one in value.items()) + "}"
     if isinstance(value, list | tuple):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from grader.checks.support.console_output import Traceback
 from grader.checks.support.exceptions import SLIPS
-from grader.checks.support.scripts import cmake_calls, is_product, path_in_package
+from grader.checks.support.scripts import OF_FILES, cmake_calls, is_product, path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
     PYTHON_2,
@@ -163,7 +163,9 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     whose = "the package's own messages" if maker is package else f"the messages of {maker.name}"
     hint = "first get the build to pass: catkin_make"
     if not cmake_calls(maker, "generate_messages"):
-        hint = "list them in add_message_files(…) or add_service_files(…), and call generate_messages(…)"
+        hint = "call generate_messages(…) above catkin_package(…)"
+        if not cmake_calls(maker, *OF_FILES):
+            hint = "list them in add_message_files(…) or add_service_files(…), and call generate_messages(…)"
     return f"the build makes {whose}", hint
 
 
@@ -277,6 +279,15 @@ def _other_attributes(package: PackageFacts, owner: str, wrong: str, source: str
         return None
     if len(known) == 1 and any(hasattr(kind, wrong) for kind in (str, float, list)):
         return f"it is the whole message ({owner})", f"write `.{known[0]}.{wrong}` instead of `.{wrong}`"
+    return _other_field(owner, known, wrong, source)
+
+
+def _other_field(owner: str, known: tuple[str, ...], wrong: str, source: str) -> tuple[str, str]:
+    """Return what a message has in place of a field that it has not, and that is like none of its own."""
+    inner = re.search(rf"\.{wrong}\.({'|'.join(known)})\b", source)
+    if inner:  # `feedback.feedback.count`: this is the inner part already
+        hint = f"write `.{inner[1]}` instead of `.{wrong}.{inner[1]}`"
+        return f"it is the {owner} already", hint
     if len(known) == 1:
         return f"{owner} has only {known[0]}", _line_with(source, wrong, known[0])
     listed = join_words(known[:ATTRIBUTES_SHOWN]) + (", …" if len(known) > ATTRIBUTES_SHOWN else "")

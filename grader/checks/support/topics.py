@@ -82,6 +82,8 @@ def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:
         return unjudged(f"{what}: there was nothing to run", measured="not started", hint=NO_SCRIPT_HINT)
     if ended := early_end(run):
         end = explain_end(ended, run, package)
+        if end.by_itself and (error := explain_error(package, run)):  # it may have to end, but not to fail
+            return error.verdict(unjudged, f"{what}: {error.cause}", measured="ended")
         message = f"{what}: {ended.name} ended before ({end.cause})"
         return end.verdict(unjudged, message, measured="ended")
     if not run.student_nodes():
@@ -110,13 +112,22 @@ def no_message(
             f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all topics"
         )
         return unjudged(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
-    if misnamed := _judge_misnamed(package, run, topic, of_node):
-        return misnamed
+    if found := _judge_uncancelled(run, topic) or _judge_misnamed(package, run, topic, of_node):
+        return found
     if absent := no_node(package, run, what) or _judge_refused(run, topic) or misfit(run):
         return absent if topic in published else _with_others(absent, published)
     if topic in published:
         return _judge_advertised(package, run, what, of_node)
     return _not_advertised(package, run, topic, of_node, kind)
+
+
+def _judge_uncancelled(run: Run, topic: str) -> Verdict | None:
+    """Return the verdict where a goal is sent to the action of this topic, `/dock/cancel`, and not cancelled."""
+    action, _, part = topic.rpartition("/")
+    if part != "cancel" or not any(c.messages for c in run.student_channels(f"{action}/goal")):
+        return None
+    message = f"the goal that is sent to {action} is never cancelled"
+    return failed(message, measured="no message", hint="`client.cancel_goal()` cancels it")
 
 
 def _judge_misnamed(
@@ -186,7 +197,7 @@ def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Calla
     if slip := why_unreached(package, run) or run_slip(package, run, "queue-size"):
         verdict = of_node(f"{message}: {slip.message}", measured="no message", hint=_reach_hint(slip))
         return verdict.about(citations=(slip.place,))
-    if deaf := unheard(run):
+    if deaf := unheard(run, package):
         verdict = of_node(f"{message}: {deaf.message}", measured="no message", hint=deaf.hint)
         return verdict.model_copy(update={"cause": deaf.message})
     if slip := call_in_comment(package, run, "publish"):
@@ -256,7 +267,7 @@ def refused_type(run: Run, topic: str) -> Verdict | None:
     return failed(message, hint=hint)
 
 
-def unheard(run: Run) -> Verdict | None:
+def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     """Return the verdict where no node of the student's heard what the grader sends, or one misspells its topic."""
     topics = dict.fromkeys(
         e.topic or ""
@@ -273,15 +284,30 @@ def unheard(run: Run) -> Verdict | None:
         return refused
     seen = f"; {nodes_on(run, found[0], 'subscribers')[0]} subscribes to {join_words(found)}" if found else ""
     message = f"the run publishes on {topic}, and no node subscribes to it{seen}"
-    return failed(message, hint=f"add {subscriber(topic, '…, callback')}")
+    remapped = _remap_to(package, run, topic, found[0]) if package is not None and found else ""
+    return failed(message, hint=remapped or f"add {subscriber(topic, '…, callback')}")
+
+
+def _remap_to(package: PackageFacts, run: Run, topic: str, heard: str) -> str:
+    """Return how a launch file's node, which hears a topic of its namespace, is to hear another one; "" for others."""
+    nodes = {node.full_name: node for file in package.launch_files for node in file.brings}
+    node = next((nodes[name] for name in nodes_on(run, heard, "subscribers") if name in nodes), None)
+    if node is None or node.namespace == "/" or not heard.startswith(node.namespace):
+        return ""
+    name = heard.removeprefix(node.namespace)
+    right = f'<remap from="{name}" to="{topic}"/>'
+    wrong = next((one for one in node.renaming if one.tag == "remap" and one.value == topic), None)
+    if wrong is not None:
+        return f"on line {wrong.line} of {wrong.file}, write `{right}`: `from` is the name in the script"
+    return f"write `{right}` into the <node> on line {node.line} of {node.file}"
 
 
 def explain_by_unheard_topic(
-    check: Check, _package: PackageFacts | None, run: object, verdict: Verdict
+    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the topic on which the run publishes and that no node heard, whatever it did instead."""
     unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
-    if not unexplained or not isinstance(run, Run) or early_end(run) or not (found := unheard(run)):
+    if not unexplained or not isinstance(run, Run) or early_end(run) or not (found := unheard(run, package)):
         return verdict
     cited = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
     update = {"message": f"{verdict.message}; {found.message}", "hint": found.hint, "cause": found.message}
@@ -297,6 +323,27 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
     """Return the first slip of one of these kinds in a script that runs."""
     scripts = {one.start.script for one in lives(run)}
     return next((s for s in package.slips if s.file in scripts and s.kind in kinds), None)
+
+
+SEEN_AS = {"nan": r"\bnan\b", "degrees": r" is wrong in | answers ", "return": r"returns nothing"}
+"""How a value that is none shows in a verdict, by the name of its slip."""
+
+
+def explain_by_wrong_value(
+    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
+) -> Verdict:
+    """Return a lost mark with the line of a script that runs on which the value goes wrong."""
+    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
+    if not unexplained or package is None or not isinstance(run, Run):
+        return verdict
+    scripts = {one.start.script for one in lives(run)}
+    found = (s for s in package.slips if s.kind == "wrong-value" and s.file in scripts)
+    slip = next((s for s in found if re.search(SEEN_AS[s.name], verdict.message)), None)
+    if slip is None:
+        return verdict
+    message = f"{verdict.message}; line {slip.line} of {slip.file}: {slip.message}"
+    update = {"message": message, "hint": slip.fix, "citations": (slip.place, *verdict.citations)}
+    return verdict.model_copy(update={**update, "cause": slip.message})
 
 
 def call_in_comment(package: PackageFacts, run: Run, call: str) -> PythonSlip | None:
@@ -327,7 +374,7 @@ def _commented_out(what: str, slip: PythonSlip, of_node: Callable[..., Verdict])
 
 
 def _reach_hint(slip: PythonSlip) -> str:
-    if slip.kind == "never-called":
+    if slip.kind == "never-called" and not slip.fix:
         return f"call it, or move its lines to where they run: line {slip.line}"
     return slip.fix or f"publish inside the loop `{LOOP}`, not after a loop that never ends"
 

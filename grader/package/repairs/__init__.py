@@ -15,6 +15,7 @@ from pathlib import Path, PurePosixPath
 from grader.model.package import MANIFEST, PackageFacts, SourceFile
 from grader.model.repair import DEFAULT_SHARES, KINDS, Repair, RepairKind
 from grader.package.repairs.build import rename_package, repair_cmake
+from grader.package.repairs.cpp import repair_cpp
 from grader.package.repairs.editing import (
     BOM,
     Files,
@@ -79,6 +80,7 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     repair_launch_names(files, repair_launch_files(files, package), files_now, wanted)
     wanted = wanted.model_copy(update={"remapped": (*wanted.remapped, *names_remapped(package))})
     for path in (f.path for f in package.files if f.path.endswith(CPP) and is_own(f.path)):
+        repair_cpp(files, path)
         names[path] = names_in_cpp(files.text(path) or "")
     for script in names:
         repair_script_names(files, script, names[script], wanted)

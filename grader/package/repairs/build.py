@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 from cmake_parser.ast import Command, Token
 
 from grader.installable import noetic_messages
-from grader.model.message_definitions import meant_type
+from grader.model.message_definitions import DIVIDER, PARTS, exchanged_parts, meant_type
 from grader.model.package import CMAKE, INTERFACE_FOLDERS, MANIFEST, PackageFacts, meant_command
 from grader.model.repair import RepairKind
 from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
@@ -90,6 +90,8 @@ def repair_cmake(
         _add_call(files, "catkin_package()", "catkin_package()", below)
     if _needs_interfaces(files, package, name, scripts):
         _make_interfaces(files, package, name, scripts)
+        _exchange_parts(files, package, wanted)
+    _name_programs(files, wanted)
     if not package.folder_beside:  # what it names is right once it lies there itself
         _install(files, package, wanted)
         _correct_paths(files, package)
@@ -379,6 +381,48 @@ def _make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Co
         files.change("build-line", CMAKE, changed, message, f"write {new} after {token.value}")
 
 
+def _exchange_parts(files: Files, package: PackageFacts, wanted: Wanted) -> None:
+    """Put the parts of a service or an action into their order, where whole parts have changed places."""
+    for path, fields in wanted.definitions:
+        own = next((one for one in package.interfaces if one.path == path and one.fault is None), None)
+        text = files.text(path)
+        places = exchanged_parts(own.fields, fields) if own else {}
+        if not places or text is None:
+            continue
+        order = PARTS[PurePosixPath(path).suffix]
+        parts = [part.strip("\n") for part in DIVIDER.split(text)]
+        changed = "\n---\n".join(parts[order.index(places.get(part, part))] for part in order)
+        moved = join_words(part for part, other in places.items() if part != other)
+        fix = f"the order of the parts is {join_words(order)}, with `---` between them"
+        files.change("build-line", path, f"{changed}\n", f"{path}: {moved} have changed places", fix)
+
+
+def _name_programs(files: Files, wanted: Wanted) -> None:
+    """Give the program of a source that has the lab's name this name too."""
+    made = {
+        words[0]: words[1:]
+        for c in _commands(files, "add_executable")
+        if (words := [t.value for t in _words(c)])
+    }
+    if "OUTPUT_NAME" in _cmake(files):
+        return
+    for name in (one for one in wanted.scripts if "." not in one and "/" not in one and one not in made):
+        stems = {
+            target: {PurePosixPath(source).stem for source in sources} for target, sources in made.items()
+        }
+        meant = [
+            t for t, found in stems.items() if t not in wanted.scripts and "$" not in t and name in found
+        ]
+        if len(meant) != 1:
+            continue
+        call = next(c for c in _commands(files, "add_executable") if _words(c)[0].value == meant[0])
+        changed = re.sub(rf"(?<![\w/.-]){re.escape(meant[0])}(?![\w/.-])", name, _cmake(files))
+        message = f"line {call.line} of {CMAKE}: the program is called {meant[0]}, and the lab wants {name}"
+        files.change(
+            "build-line", CMAKE, changed, message, f"write {name} in place of {meant[0]} wherever it is named"
+        )
+
+
 def _correct_types(files: Files, package: PackageFacts) -> None:
     """Give fields of which there is no type the one that is meant."""
     own = {PurePosixPath(one.path).stem for one in package.interfaces}
@@ -445,6 +489,7 @@ def _generate(files: Files, package: PackageFacts) -> None:
     calls, of_catkin = _commands(files, GENERATE), _commands(files, "catkin_package")
     types = {field.type for one in package.interfaces for field in one.fields}
     needed = {"std_msgs"} if types & {"Header", "Header[]"} else set[str]()
+    needed |= {"actionlib_msgs"} if any(one.path.endswith(".action") for one in package.interfaces) else set()
     needed |= {name.partition("/")[0] for name in types if "/" in name} - {package.name}
     if not calls:
         line = f"{GENERATE}({' '.join(['DEPENDENCIES', *sorted(needed)] if needed else [])})"

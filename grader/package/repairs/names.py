@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any, Literal
 
-from grader.model.package import MANIFEST, LaunchFile, LaunchNode, PackageFacts, SlipKind
+from grader.model.message_definitions import parse_definition
+from grader.model.package import MANIFEST, InterfaceField, LaunchFile, LaunchNode, PackageFacts, SlipKind
 from grader.model.record import Record
 from grader.model.repair import RepairKind, as_code
 from grader.package.launch import parse_launch
@@ -27,6 +28,12 @@ class Wanted(Record):
     scripts: tuple[str, ...] = ()
     launch_files: tuple[str, ...] = ()
     topics: tuple[str, ...] = ()
+    servers: tuple[str, ...] = ()
+    """Services and actions that the package offers."""
+    clients: tuple[str, ...] = ()
+    """Services and actions that it asks."""
+    definitions: tuple[tuple[str, tuple[InterfaceField, ...]], ...] = ()
+    """Files of messages, services and actions, with the fields that they have to define."""
     nodes: tuple[str, ...] = ()
     plain: tuple[str, ...] = ()
     """Nodes that must not be anonymous."""
@@ -82,9 +89,18 @@ def wanted_of(rubric: Rubric, package: str = "") -> Wanted:
     return Wanted(
         package=package,
         started=tuple(started),
+        definitions=tuple(_definitions(criteria)),
         does=tuple(dict.fromkeys(_of_scripts(rubric, criteria))),
         **{field: tuple(names) for field, names in found.items()},
     )
+
+
+def _definitions(criteria: Iterable[Criterion]) -> Iterator[tuple[str, tuple[InterfaceField, ...]]]:
+    for given in (one.parameters for one in criteria if one.check == "definition"):
+        file, text = given["file"], given.get("text")
+        parts = (name.rpartition(".") for name in given.get("fields", ()))
+        named = (InterfaceField(part=part, type="", name=name, line=0) for part, _, name in parts)
+        yield file, tuple(parse_definition(text, PurePosixPath(file).suffix) if text else named)
 
 
 def _of_scripts(rubric: Rubric, criteria: Sequence[Criterion]) -> Iterator[tuple[str, SlipKind, str]]:
@@ -111,7 +127,11 @@ def _of_scenarios(rubric: Rubric, package: str) -> Iterator[tuple[str, Any]]:
             yield from _each("params", param.also)
         for probe in scenario.probes:
             yield from (("topics", probe.topic), ("types", probe.type))
+        yield from (("servers", call.service) for call in scenario.calls)
+        yield from (("clients", one.service or one.action) for one in scenario.serves)
         for step in scenario.steps:
+            yield ("servers", step.call.service if step.call is not None else None)
+            yield ("servers", step.action.name if step.action is not None else None)
             sent, waited = step.published, step.wait
             yield from (("topics", sent.topic), ("types", sent.type)) if sent is not None else ()
             yield ("topics", waited.topic if waited is not None else None)
@@ -132,6 +152,7 @@ def _of_criteria(criteria: Iterable[Criterion]) -> Iterator[tuple[str, Any]]:
         check, given = criterion.check, criterion.parameters
         yield from (("launch_files", given.get("launch")), ("files", given.get("file")))
         yield from (("topics", topic) for topic in _topics_in(given))
+        yield ("clients" if check == "calls" else "servers", given.get("service") or given.get("action"))
         yield ("types", given.get("type") if "topic" in given else None)
         yield from _each("topics", given.get("topics"))
         yield from _each("files", given.get("files"))
@@ -176,15 +197,17 @@ SHORTEST = 3
 KINDS: dict[str, RepairKind] = {
     "publisher": "topic-name",
     "subscriber": "topic-name",
+    "server": "service-name",
+    "client": "service-name",
     "node": "node-name",
     "param": "parameter-name",
     "set-param": "parameter-name",
     "key": "parameter-name",
 }
 TOPIC_ROLES = frozenset({"publisher", "subscriber"})
-ROLES = ("node", "publisher", "subscriber", "param", "set-param")
+ROLES = ("node", "publisher", "subscriber", "server", "client", "param", "set-param")
 NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test")
-WORDS = {"topic-name": "topic", "node-name": "node", "parameter-name": "parameter"}
+WORDS = {"topic-name": "topic", "service-name": "service", "node-name": "node", "parameter-name": "parameter"}
 TAG_LINES_MAX = 20
 _KEY = re.compile(r"^(?P<indent> *)(?P<quote>[\"']?)(?P<key>[A-Za-z_][\w-]*)(?P=quote)(?=\s*:(\s|$))")
 
@@ -194,7 +217,12 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
     node = next((name.value for name in names if name.role == "node"), "") or _name_node(files, file, wanted)
     names = [name for name in names if not _repair_slash(files, file, name, wanted)]
     wanted = wanted.model_copy(update={"params": (*wanted.params, *(f"/{node}/{p}" for p in wanted.private))})
-    asked_of = {"node": wanted.nodes, "publisher": wanted.topics, "subscriber": wanted.topics}
+    asked_of = {
+        "node": wanted.nodes,
+        **dict.fromkeys(TOPIC_ROLES, wanted.topics),
+        "server": wanted.servers,
+        "client": wanted.clients,
+    }
     branches = [f"/{'/'.join(branch)}" for branch in _branches(wanted)]
     names = _repair_dots(files, file, names, branches)
     for role in ROLES:
@@ -212,6 +240,10 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
                 continue  # any of them may be meant, or none
             if right and _resolve(name, node) not in {_bare(w, role) for w in asked}:
                 literal = _literal(name, right, node)
+                same = [one for one in dict.fromkeys(given) if one.value == name.value]
+                if role == "client" and len(same) > 1:  # waited for, and called
+                    _replace_all(files, file, dict.fromkeys(same, literal), right)
+                    break
                 shown = literal if literal.startswith("~") else right
                 _replace_literal(files, file, name, literal, shown, plain=right in wanted.plain)
                 node = literal if role == "node" else node
@@ -247,21 +279,26 @@ def _repair_dots(files: Files, file: str, names: Sequence[Name], branches: Seque
         if KINDS[name.role] == "parameter-name" and "." in name.value and whole in branches:
             above = (w for w in (whole, *_above(whole)) if _has_keys(w, name.keys, branches))
             meant[name] = next(above, "")
-    text, wrong = files.text(file), [name for name, right in meant.items() if right]
-    if text is None or not wrong:
+    wrong = [name for name, right in meant.items() if right]
+    if files.text(file) is None or not wrong:
         return list(names)
-    lines = text.split("\n")
-    for name in sorted(wrong, key=lambda one: -one.start):
-        right, line = meant[name], lines[name.line - 1]
-        right = right if name.value.startswith("/") else right.strip("/")
-        lines[name.line - 1] = line[: name.start] + line[name.start :].replace(name.value, right, 1)
-    told = f"line {wrong[0].line} of {file}: the parameter {wrong[0].value} should be {meant[wrong[0]]}"
-    numbers = sorted({name.line for name in wrong})
-    written = [f"write {as_code(lines[n - 1].strip())}" for n in numbers]
-    more = [f"on line {n}, {one}" for n, one in zip(numbers[1:], written[1:], strict=True)]
-    fix = "; ".join([written[0], *more]) if more else ""
-    files.change("parameter-name", file, "\n".join(lines), told, fix)
+    right = {name: meant[name] if name.value.startswith("/") else meant[name].strip("/") for name in wrong}
+    _replace_all(files, file, right, meant[wrong[0]])
     return [name for name in names if name not in wrong]
+
+
+def _replace_all(files: Files, file: str, written: Mapping[Name, str], right: str) -> None:
+    """Replace several literals as one repair, told by the first of them."""
+    lines = (files.text(file) or "").split("\n")
+    for name in sorted(written, key=lambda one: -one.start):
+        line = lines[name.line - 1]
+        lines[name.line - 1] = line[: name.start] + line[name.start :].replace(name.value, written[name], 1)
+    first, numbers = next(iter(written)), sorted({name.line for name in written})
+    each = [f"write {as_code(lines[n - 1].strip())}" for n in numbers]
+    more = [f"on line {n}, {one}" for n, one in zip(numbers[1:], each[1:], strict=True)]
+    kind = KINDS[first.role]
+    told = f"line {first.line} of {file}: the {WORDS[kind]} {first.value} should be {right}"
+    files.change(kind, file, "\n".join(lines), told, "; ".join([each[0], *more]) if more else "")
 
 
 def _above(param: str) -> Iterator[str]:
@@ -286,13 +323,15 @@ def repair_script_keys(files: Files, file: str, names: Sequence[Name], wanted: W
 
 
 CPP = (".c", ".cc", ".cpp", ".cxx", ".h", ".hpp")
-ROLES_OF_CPP: dict[str, Literal["publisher", "subscriber", "node"]] = {
+ROLES_OF_CPP: dict[str, Literal["publisher", "subscriber", "server", "client", "node"]] = {
     "advertise": "publisher",
     "subscribe": "subscriber",
+    "advertiseService": "server",
+    "serviceClient": "client",
     "init": "node",
 }
 _NAMED_IN_CPP = re.compile(
-    r'\b(?P<call>advertise|subscribe|init)\b\s*(?:<[^;()]*>)?\s*\(\s*(?:\w+\s*,\s*\w+\s*,\s*)?"(?P<name>[^"\\]{1,200})"'
+    r'\b(?P<call>advertiseService|serviceClient|advertise|subscribe|init)\b\s*(?:<[^;()]*>)?\s*\(\s*(?:\w+\s*,\s*\w+\s*,\s*)?"(?P<name>[^"\\]{1,200})"'
 )
 
 

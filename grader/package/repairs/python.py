@@ -35,10 +35,10 @@ ATTEMPTS = 3
 Cause = Literal[
     "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
     "old-name", "module", "import", "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument",
-    "unbound", "guard", "start", "main", "spin", "line", "twice", "turned",
+    "unbound", "kept", "guard", "start", "main", "spin", "line", "twice", "turned",
 ]  # fmt: skip
 CALLS = (
-    "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "guard",
+    "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "kept", "guard",
     "start", "main", "spin",
 )  # fmt: skip
 KINDS: dict[str, RepairKind] = {
@@ -67,7 +67,7 @@ class Name(Record):
     """A text in a script that names something; `start` and `end` are columns of its line, from 0. `keys` are those that
     the script reads of a parameter."""
 
-    role: Literal["publisher", "subscriber", "node", "param", "set-param", "key"]
+    role: Literal["publisher", "subscriber", "server", "client", "node", "param", "set-param", "key"]
     value: str
     line: int
     start: int
@@ -214,7 +214,7 @@ def _join_steps(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
             groups
             and groups[-1][0] == step.cause
             and step.cause
-            not in ("token", "indent", "module", "import", "name", "attribute", "argument", "unbound")
+            not in ("token", "indent", "module", "import", "name", "attribute", "argument", "unbound", "kept")
         ):
             groups[-1][1].append(step)
         else:
@@ -330,6 +330,8 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "callback": ("{place}: {calls} is called where the function itself is meant", ""),
     "argument": ("{place}: {word}", ""),
     "unbound": ("{place}: the function assigns to {word}, so it is a variable of its own and has no value yet",
+     "write `global {word}` as the first line of the function"),
+    "kept": ("{place}: the function gives a value to a {word} of its own, and that of the file keeps its old one",
      "write `global {word}` as the first line of the function"),
     "guard": ("{place}: `__name__` is never {word!r}", ""),
     "line": ("{place}: the line `{word}` is missing", ""),
