@@ -283,6 +283,11 @@ _KEY_ALONE = re.compile(r"(?P<key>\s*[A-Za-z_][\w-]*)\s*")
 _OPEN_QUOTE = re.compile(
     r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*): +(?P<value>(?P<quote>["'])(?:(?!(?P=quote)).)*)"""
 )
+_QUOTE_TWICE = re.compile(
+    r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*): +(?:(?P<quote>["'])(?P=quote)(?P<value>[^"']+)(?P=quote)"""
+    r"""|(?P<quote2>["'])(?P<value2>[^"']+)(?P=quote2){2})"""
+)
+_KEY_AND_MORE = re.compile(r"(?P<key>\s*[A-Za-z_][\w-]*)(?P<more>::|[;,.=])")
 _COLON_INSIDE = re.compile(
     r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*): +(?P<value>[^\s"'\[{|>&*!#][^"]*:\s[^"]*)"""
 )
@@ -311,6 +316,10 @@ def _indent(line: str) -> int:
 
 def _slip_of_line(code: str, *, is_above_block: bool) -> tuple[str, str] | None:
     """Return what a line of a map lacks, and the line as it should be."""
+    return _slip_of_key(code, is_above_block=is_above_block) or _slip_of_value(code)
+
+
+def _slip_of_key(code: str, *, is_above_block: bool) -> tuple[str, str] | None:
     if found := _NO_SPACE.fullmatch(code):
         return "has no space after its `:`", f"{found['key'].strip()}: {found['value']}"
     if is_above_block and (found := _KEY_ALONE.fullmatch(code)):
@@ -318,6 +327,15 @@ def _slip_of_line(code: str, *, is_above_block: bool) -> tuple[str, str] | None:
     if ":" not in code and (found := _NO_COLON.fullmatch(code)):
         lacks = "has `=` in place of `:`" if "=" in code else "has no `:` after its name"
         return lacks, f"{found['key'].strip()}: {found['value']}"
+    if is_above_block and (found := _KEY_AND_MORE.fullmatch(code)):
+        return f"has `{found['more']}` in place of `:` after its name", f"{found['key'].strip()}:"
+    return None
+
+
+def _slip_of_value(code: str) -> tuple[str, str] | None:
+    if found := _QUOTE_TWICE.fullmatch(code):
+        quote, value = found["quote"] or found["quote2"], found["value"] or found["value2"]
+        return f"has {quote} twice", f"{found['key'].strip()}: {quote}{value}{quote}"
     if found := _OPEN_QUOTE.fullmatch(code):
         lacks = f"opens {found['quote']} and does not close it"
         return lacks, f"{found['key'].strip()}: {found['value']}{found['quote']}"
