@@ -279,7 +279,7 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
     if meant := _keyword(code):
         code = re.sub(r"^(\s*)\w+", rf"\g<1>{meant[1]}", code)
         yield _together(code, comment, texts)
-    yield from (one for _, one in without_doubled(line))
+    yield from (one for _, one in without_doubled(line) if not _parses(line))
     plain = code.rstrip(" ;")
     yield _together(plain, comment, texts)
     if _BLOCK.match(plain) and not plain.endswith(":"):

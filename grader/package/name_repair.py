@@ -131,11 +131,11 @@ def meant_by(name: str, own: set[str], unused: Collection[str] = ()) -> str:
 
 
 def is_letter_changed(name: str, other: str) -> bool:
-    """Return whether one letter within two longer names is not the same: `teyt` for `text`. By the last one, or by a
-    digit, they are different names."""
-    pairs = [(a, b) for a, b in zip(name[:-1], other[:-1], strict=False) if a != b]
-    same_end = len(name) == len(other) >= NAME_CHARS_MIN and name[-1] == other[-1]
-    return same_end and len(pairs) == 1 and "".join(pairs[0]).isalpha()
+    """Return whether one letter within two longer names is not the same: `teyt` for `text`. By the first or the last
+    one, or by a digit, they are different names."""
+    pairs = [(a, b) for a, b in zip(name, other, strict=False) if a != b]
+    same_ends = len(name) == len(other) >= NAME_CHARS_MIN and (name[0], name[-1]) == (other[0], other[-1])
+    return same_ends and len(pairs) == 1 and "".join(pairs[0]).isalpha()
 
 
 def is_slip(name: str, other: str) -> bool:

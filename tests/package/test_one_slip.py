@@ -251,7 +251,7 @@ SLIPS = {
         ("'I heard %s', msg.data", "msg.data, 'I heard %s'", "the string comes first, then its values"),
         ("I heard %s", "I heard s", "the string has no `%` in it"),
         ("msg.data", "mg.data", "mg is not defined"),
-        ("%s', msg.data)", "%s\", msg.data))", "a quote is opened on this line"),
+        ("%s', msg.data)", '%s", msg.data))', "a quote is opened on this line"),
         ("msg.data", "msg.Data", "`Data` is called `data`"),
         ("msg.data", "msgdata", "the dot is missing in `msgdata`"),
         ("%s', ", "%s'. ", "a comma belongs between `'I heard %s'` and `msg`"),

@@ -600,7 +600,8 @@ def _place(own: Sequence[str], files: Files, script: str) -> str:
 
 
 def _plain(word: str) -> str:
-    return re.sub(r"^\$\{(PROJECT_SOURCE_DIR|CMAKE_CURRENT_SOURCE_DIR)\}/|^\./", "", word.strip('"'))
+    path = re.sub(r"^\$\{(PROJECT_SOURCE_DIR|CMAKE_CURRENT_SOURCE_DIR)\}/|^\./", "", word.strip('"'))
+    return re.sub("/{2,}", "/", path)
 
 
 def _name_scripts(files: Files, own: Sequence[str], paths: Sequence[str]) -> None:

@@ -280,7 +280,8 @@ def repair_script_keys(
     for name in dict.fromkeys(one for one in names if one.role == "key" and one.value not in parts):
         alone = len(re.findall(rf"\b{re.escape(name.value)}\b", files.text(file) or "")) == 1
         is_slip = alone and not re.search(rf"\b{re.escape(name.value)}\b", of_files)
-        near = [part for part in parts if (is_slip or part not in used) and is_near(name.value, part)]
+        near = [part for part in parts if is_near(name.value, part)]
+        near = [part for part in near if part not in used or (is_slip and f"{part}:" in of_files)]
         if len(near) == 1:
             _replace_literal(files, file, name, near[0], near[0])
 
