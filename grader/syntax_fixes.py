@@ -112,14 +112,15 @@ _HABITS = (
            "", ((r"^(\s*(?:while|if|elif)\s+)(?:[notNOT]{2,4}|[a-z]ot|n[a-z]t|no[a-z])(?=\s+[\w(])", r"\1not"),)),
     _Habit(r"^\s*(?!if\b)([a-zA-Z]{1,3})\s+__name__\s*==", "Python writes `if`, not `{0}`",
            "", ((r"^(\s*)[a-zA-Z]{1,3}(?=\s+__name__)", r"\1if"),)),
-    _Habit(r"^\s*(?!def\b)([defDEF]{2,4})\s+\w+\s*\(.*\)\s*:$", "Python writes `def`, not `{0}`",
-           "", ((r"^(\s*)[defDEF]{2,4}(?=\s+\w+\s*\()", r"\1def"),)),
+    _Habit(r"^\s*(?!def\b)([defDEF]{2,4}|[a-z]ef|d[a-z]f|de[a-z])\s+\w+\s*\(.*\)\s*:$",
+           "Python writes `def`, not `{0}`",
+           "", ((r"^(\s*)(?:[defDEF]{2,4}|[a-z]ef|d[a-z]f|de[a-z])(?=\s+\w+\s*\()", r"\1def"),)),
     _Habit(r"^\s*(?:if|elif|while)\b[^=(:]*=[:;]\s*\S", "two values are compared by `==`",
            "", ((r"=[:;](?=\s*\S)", "=="),)),
     _Habit(r"[(,]\s*[a-z_]\w*\s*[:;]\s*[\w.\"]+\s*[,)]", "an argument of a call gets its value by `=`",
            "", ((r"([(,]\s*[a-z_]\w*)\s*[:;]\s*(?=[\w.\"]+\s*[,)])", r"\1="),)),
-    _Habit(r"[\w\"]\.\s+\w+\s*=(?!=).*\)", "a comma belongs between two arguments",
-           "", ((r"(?<=[\w\"])\.\s+(?=\w+\s*=(?!=))", ", "),)),
+    _Habit(r"[\w\")\]]\.\s+\w+\s*=(?!=).*\)", "a comma belongs between two arguments",
+           "", ((r"(?<=[\w\")\]])\.\s+(?=\w+\s*=(?!=))", ", "),)),
     _Habit(r"\w\s*=[^()]*\w,([A-Za-z]\w*)\s*\)$", "a dot belongs before `{0}`", "",
            ((r",([A-Za-z]\w*\s*\))$", r".\1"),)),
     _Habit(r"\w\s*=\s*[\w.]+\s*,\s*[A-Za-z][\w.]*\s*\)", "a value without a name comes after one with a name", "",
@@ -127,6 +128,9 @@ _HABITS = (
     _Habit(rf"^\s*(?!(?:{_RESERVED}|print|exec)\b)[a-z_]\w*\s+(?:rospy\.\w+\(|\"\")(?!.*=\s*=)",
            "`=` is missing between the name and its value", "",
            ((r"^(\s*[a-z_]\w*)\s+(?=rospy\.\w+\(|\"\")", r"\1 = "),)),
+    _Habit(r"^\s*self\.\w+\s+(?:[A-Za-z]\w*[.(]|\"\"|-?\d)(?!.*=\s*=)",
+           "`=` is missing between the name and its value", "",
+           ((r"^(\s*self\.\w+)\s+(?=[A-Za-z]\w*[.(]|\"\"|-?\d)", r"\1 = "),)),
     _Habit(r"^\s*>>>", "`>>>` is printed by Python's prompt", "leave it out", ((r">>>\s?", ""),)),
     _Habit(r"^\s*//", "a comment begins with `#` in Python", "", ((r"//+\s*", "# "),)),
     _Habit(r"^\s*/\*", "a comment begins with `#` in Python",
@@ -226,6 +230,9 @@ def reason_of_line(line: str) -> Reason:
         return Reason(f"Python writes `{meant[1]}`, not `{meant[0]}`")
     if (twice := reason_of_doubled(line)).why:
         return twice
+    for word, right, changed in _with_keyword(code):
+        if _parses(_together(changed, "", texts)):
+            return Reason(f"Python writes `{right}`, not `{word}`")
     if apart := next(_with_separator(code, texts), ""):
         sign = "%" if apart.count("%") > code.count("%") else ","
         return Reason(f"`{sign}` is missing between two values")
@@ -280,6 +287,7 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
         code = re.sub(r"^(\s*)\w+", rf"\g<1>{meant[1]}", code)
         yield _together(code, comment, texts)
     yield from (one for _, one in without_doubled(line) if not _parses(line))
+    yield from (_together(one, comment, texts) for _, _, one in _with_keyword(code) if not _parses(line))
     plain = code.rstrip(" ;")
     yield _together(plain, comment, texts)
     if _BLOCK.match(plain) and not plain.endswith(":"):
@@ -346,6 +354,19 @@ def _keyword(code: str) -> tuple[str, str] | None:
         alike += [one for one in ("try", "else", "finally") if is_one_edit(word.lower(), one)]
     near = alike or get_close_matches(word.lower(), _STATEMENTS, 1, 0.8)
     return (word, near[0]) if near else None
+
+
+def _with_keyword(code: str) -> Iterator[tuple[str, str, str]]:
+    """Yield each word within a line that is nearly a keyword, the keyword, and the line with it."""
+    for found in re.finditer(r"(?<![\w.])[A-Za-z]{1,6}(?![\w.(\[=])", code):
+        word = found[0]
+        near = (one for one in _WITHIN if word.lower() == one or is_one_edit(word.lower(), one))
+        for meant in near if word not in keyword.kwlist else ():
+            yield word, meant, f"{code[: found.start()]}{meant}{code[found.end() :]}"
+
+
+_WITHIN = ("in", "or", "and", "not", "if", "else", "for", "as", "is")
+"""Keywords that stand within a line."""
 
 
 def _with_separator(code: str, texts: list[str]) -> Iterator[str]:
@@ -427,7 +448,7 @@ def _is_call(before: str, inside: str, opener: str) -> bool:
 
 
 _FUNCTION = re.compile(
-    r"(?:(?<![\w.])rospy\.\w+|\.(?:publish|sleep)|\bdef\s+\w+"
+    r"(?:(?<![\w.])(?:rospy|math|time)\.\w+|\.(?:publish|sleep)|\bdef\s+\w+"
     r"|(?<![\w.])(?:print|range|str|int|float|len|abs|round))$"
 )
 """What is only ever called, and the first line of a function."""

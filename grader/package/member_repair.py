@@ -9,7 +9,9 @@ from __future__ import annotations
 import ast
 import builtins
 import io
+import math
 import re
+import time
 import tokenize
 from collections.abc import Collection, Iterator
 from itertools import chain
@@ -65,14 +67,14 @@ class _Names:
     def __init__(self, tree: ast.Module, of_rospy: Collection[str]) -> None:
         self.bound, self.own = bound_in(tree), _of_self(tree)
         self.known = self.bound | set(dir(builtins))
-        self._members = {"rospy": set(of_rospy)}
+        self._members = {"rospy": set(of_rospy), "math": set(dir(math)), "time": set(dir(time))}
         for node in (n for n in ast.walk(tree) if isinstance(n, ast.Attribute)):
             if isinstance(node.value, ast.Name) and node.value.id != "rospy":
                 self._members.setdefault(node.value.id, set(ALL_MEMBERS)).add(node.attr)
 
     def members_of(self, owner: str) -> Collection[str]:
         """Return what may stand behind a name and a dot."""
-        return self._members.get(owner, ALL_MEMBERS)
+        return self.own if owner == "self" else self._members.get(owner, ALL_MEMBERS)
 
     def has_dot(self, first: tokenize.TokenInfo, sign: str, second: str) -> bool:
         """Return whether a dot is meant by the sign between two words."""

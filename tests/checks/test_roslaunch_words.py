@@ -121,6 +121,7 @@ def test_yaml_words_name_the_last_line() -> None:
     [
         ('a:\n  b:"x"  # text\n  c: 1', 'line 2 has no space after its `:`; line 2: write `b: "x"`'),
         ("a = 3", "line 1 has `=` in place of `:`; line 1: write `a: 3`"),
+        ('a; "x y"', 'line 1 has `;` in place of `:`; line 1: write `a: "x y"`'),
         ('a "x y"', 'line 1 has no `:` after its name; line 1: write `a: "x y"`'),
         ("a\n  b: 3", "line 1 has no `:` after its name; line 1: write `a:`"),
         ('a: "x', 'line 1 opens " and does not close it; line 1: write `a: "x"`'),

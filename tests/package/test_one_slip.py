@@ -190,6 +190,7 @@ SLIPS = {
         ("publish(text)", "publish((text)", "`(` is there twice"),
         ("pass", "qass", "qass is not defined"),
         ("try:", "tyr:", "Python writes `try`, not `tyr`"),
+        ("def talk", "deg talk", "Python writes `def`, not `deg`"),
         ("import String", "imort String", "Python writes `import`, not `imort`"),
         ("def talk():", "de talk():", "Python writes `def`, not `de`"),
         ("def talk():", "def talk):", "its opening bracket is missing"),
@@ -324,6 +325,8 @@ if __name__ == '__main__':
         ("anonymous=True", "anonymousTrue", "`=` is missing between `anonymous` and its value"),
         ("anonymous=True", "anonymous==True", "an argument of a call gets its value by `=`"),
         ("print(", "Print(", "Print is not defined"),
+        ("self.rate = rospy", "self.rate rospy", "`=` is missing between the name and its value"),
+        ("self.hear)", "selfhear)", "the dot is missing in `selfhear`"),
         ("import std_msgs.msg", "import stdd_msgs.msg", "uses std_msgs, which is not imported"),
         ("import std_msgs.msg", "import std_msgs.msh", "messages are not imported from std_msgs.msh"),
         ("std_msgs.msg.String", "stdxmsgs.msg.String", "stdxmsgs is not defined"),
@@ -339,6 +342,24 @@ def test_a_slip_in_a_class_is_named_and_undone(old: str, new: str, says: str, tm
     assert says in words
     if says:
         assert plain(TALKER, (folder / TALKER).read_bytes()) == plain(TALKER, CLASS.encode()), words
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "says"),
+    [
+        ("[n for n in (1, 2) if n]", "[n For n in (1, 2) if n]", "Python writes `for`, not `For`"),
+        ("[n for n in (1, 2) if n]", "[n for n ni (1, 2) if n]", "Python writes `in`, not `ni`"),
+        ("[n for n in (1, 2) if n]", "[n for n in (1, 2) f n]", "Python writes `if`, not `f`"),
+        ("rospy.get_time() or 1", "rospy.get_time() ro 1", "Python writes `or`, not `ro`"),
+        ("max((1, 2), default=3)", "max((1, 2). default=3)", "a comma belongs between two arguments"),
+    ],
+)
+def test_a_slip_within_a_value_is_named_and_undone(right: str, wrong: str, says: str, tmp_path: Path) -> None:
+    given = "'hello world %s' % rospy.get_time()"
+    folder = package(tmp_path, {**FILES, TALKER: FILES[TALKER].replace(given, wrong)})
+    found = repair_all(folder, WANTED)
+    assert says in "; ".join(one.message for one in found)
+    assert (folder / TALKER).read_text() == FILES[TALKER].replace(given, right)
 
 
 def test_an_argument_beside_self_stays_one(tmp_path: Path) -> None:

@@ -403,7 +403,8 @@ CASES = {
         "write rospy instead of Rospy", after={CMAKELISTS: "CATKIN_DEPENDS rospy)", XML: MANIFEST}),
     "component-by-a-slip-of-its-name": Case(
         {**RUN_OWN, CMAKELISTS: OWN_CMAKE.replace("message_generation", "messaeg_generation").replace(
-            "catkin_package", "generate_messages()\ncatkin_package")}, ["build-line"], "write message_generation instead of messaeg_generation",
+            "catkin_package", "generate_messages()\ncatkin_package")}, ["build-line"],
+        "write message_generation instead of messaeg_generation",
         after={CMAKELISTS: "COMPONENTS message_generation rospy)"}),
     "script-with-two-slashes": Case(
         {CMAKELISTS: CMAKE + "catkin_install_python(PROGRAMS src//talker.py DESTINATION "

@@ -278,7 +278,9 @@ def _is_within(lines: Sequence[str]) -> bool:
 _GOES_ON = ("|", ">", "{", "[", ",")
 """So ends a line whose value is in the lines below it."""
 _NO_SPACE = re.compile(r"""(?P<key>\s*(?:- )?["']?[A-Za-z_][\w-]*["']?):(?P<value>[^\s:/\\].*)""")
-_NO_COLON = re.compile(r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*)(?:\s*=\s*|\s+)(?P<value>["'\w].*)""")
+_NO_COLON = re.compile(
+    r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*)(?:\s*(?P<sign>[=;,.])\s*|\s+)(?P<value>["'\w].*)"""
+)
 _KEY_ALONE = re.compile(r"(?P<key>\s*[A-Za-z_][\w-]*)\s*")
 _OPEN_QUOTE = re.compile(
     r"""(?P<key>\s*(?:- )?[A-Za-z_][\w-]*): +(?P<value>(?P<quote>["'])(?:(?!(?P=quote)).)*)"""
@@ -325,7 +327,7 @@ def _slip_of_key(code: str, *, is_above_block: bool) -> tuple[str, str] | None:
     if is_above_block and (found := _KEY_ALONE.fullmatch(code)):
         return "has no `:` after its name", f"{found['key'].strip()}:"
     if ":" not in code and (found := _NO_COLON.fullmatch(code)):
-        lacks = "has `=` in place of `:`" if "=" in code else "has no `:` after its name"
+        lacks = f"has `{found['sign']}` in place of `:`" if found["sign"] else "has no `:` after its name"
         return lacks, f"{found['key'].strip()}: {found['value']}"
     if is_above_block and (found := _KEY_AND_MORE.fullmatch(code)):
         return f"has `{found['more']}` in place of `:` after its name", f"{found['key'].strip()}:"
