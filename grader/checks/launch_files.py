@@ -422,6 +422,7 @@ def _misspelt_address(
     for path in _shell_scripts(package, file):
         for number, line in enumerate(build.file_lines(path), start=1):
             words = re.findall(r"[^\s\"'=#]{4,}", line.partition(" #")[0])
+            words = [word for word in words if _plain(word) not in map(_plain, params.urls)]
             if near := get_close_matches(params.urls[0], words, 1, _NEAR_ADDRESS):
                 fix = f"on line {number}, write {params.urls[0]} instead of {shown(near[0])}"
                 return Slip(path, number, f"the address is {shown(near[0])}", fix)
