@@ -1,7 +1,8 @@
 """What is wrong with a line that Python cannot parse, in a student's words, and the line as it should be.
 
 A line and what Python says of it come in; a cause and the corrected line go out. The table knows the habits of
-Python 2, C++ and the shell. Pure, and the standard library only: `source_repair.py` calls it in a child process.
+Python 2, C++ and the shell. Pure, and the standard library only, as is `wording.py`: `source_repair.py` calls it in a
+child process.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import threading
 from collections.abc import Iterator
 from difflib import get_close_matches
 from typing import NamedTuple
+
+from grader.wording import is_one_edit
 
 LINE_CHARS_MAX = 300
 _PARSING = threading.Lock()
@@ -99,27 +102,36 @@ _HABITS = (
            "", ((r"(?<![\w.])(?:r[^\w\s]spy|ro[^\w\s]py|ros[^\w\s]y|rosp[^\w\s.])(?=\.)", "rospy"),)),
     _Habit(r"(?<![\w.])rospy\s*[,;:]\s*[A-Za-z]\w*\s*[(:]", "a dot belongs behind `rospy`",
            "", ((r"(?<![\w.])rospy\s*[,;:]\s*(?=[A-Za-z]\w*\s*[(:])", "rospy."),)),
-    _Habit(r"^\s*from\s+\w+[,;:]\s*\w+\s+import\b", "a dot belongs between the parts of a module's name",
-           "", ((r"^(\s*from\s+\w+)[,;:]\s*(?=\w+\s+import\b)", r"\1."),)),
+    _Habit(r"^\s*from\s+\w+[,;:]\s*\w+\s+\w{5,7}\s", "a dot belongs between the parts of a module's name",
+           "", ((r"^(\s*from\s+\w+)[,;:]\s*(?=\w+\s+\w{5,7}\s)", r"\1."),)),
     _Habit(r"^\s*from\s+[\w.]+\s+(?!import\b)([A-Za-z]{5,7})\s+[\w*]", "Python writes `import`, not `{0}`",
            "", ((r"^(\s*from\s+[\w.]+\s+)[A-Za-z]{5,7}(?=\s+[\w*])", r"\1import"),)),
-    _Habit(r"^\s*(?:while|if|elif)\s+(?!not\b)([notNOT]{2,4})\s+[\w(]", "Python writes `not`, not `{0}`",
-           "", ((r"^(\s*(?:while|if|elif)\s+)[notNOT]{2,4}(?=\s+[\w(])", r"\1not"),)),
+    _Habit(r"^\s*(?!from\b)([A-Za-z]{3,5})\s+[\w.]+\s+import\s", "Python writes `from`, not `{0}`",
+           "", ((r"^(\s*)[A-Za-z]{3,5}(?=\s+[\w.]+\s+import\s)", r"\1from"),)),
+    _Habit(r"^\s*(?:while|if|elif)\s+(?!not\b)([notNOT]{2,4}|[a-z]ot|n[a-z]t|no[a-z])\s+[\w(]",
+           "Python writes `not`, not `{0}`",
+           "", ((r"^(\s*(?:while|if|elif)\s+)(?:[notNOT]{2,4}|[a-z]ot|n[a-z]t|no[a-z])(?=\s+[\w(])", r"\1not"),)),
     _Habit(r"^\s*(?!if\b)([a-zA-Z]{1,3})\s+__name__\s*==", "Python writes `if`, not `{0}`",
            "", ((r"^(\s*)[a-zA-Z]{1,3}(?=\s+__name__)", r"\1if"),)),
-    _Habit(r"^\s*(?!def\b)([defDEF]{2,4})\s+\w+\s*\(.*\)\s*:$", "Python writes `def`, not `{0}`",
-           "", ((r"^(\s*)[defDEF]{2,4}(?=\s+\w+\s*\()", r"\1def"),)),
+    _Habit(r"^\s*(?!def\b)([defDEF]{2,4}|[a-z]ef|d[a-z]f|de[a-z])\s+\w+\s*\(.*\)\s*:$",
+           "Python writes `def`, not `{0}`",
+           "", ((r"^(\s*)(?:[defDEF]{2,4}|[a-z]ef|d[a-z]f|de[a-z])(?=\s+\w+\s*\()", r"\1def"),)),
     _Habit(r"^\s*(?:if|elif|while)\b[^=(:]*=[:;]\s*\S", "two values are compared by `==`",
            "", ((r"=[:;](?=\s*\S)", "=="),)),
     _Habit(r"[(,]\s*[a-z_]\w*\s*[:;]\s*[\w.\"]+\s*[,)]", "an argument of a call gets its value by `=`",
            "", ((r"([(,]\s*[a-z_]\w*)\s*[:;]\s*(?=[\w.\"]+\s*[,)])", r"\1="),)),
-    _Habit(r"\w\.\s+\w+\s*=(?!=)[^=]*\)", "a comma belongs between two arguments",
-           "", ((r"(?<=\w)\.\s+(?=\w+\s*=(?!=))", ", "),)),
+    _Habit(r"[\w\")\]]\.\s+\w+\s*=(?!=).*\)", "a comma belongs between two arguments",
+           "", ((r"(?<=[\w\")\]])\.\s+(?=\w+\s*=(?!=))", ", "),)),
+    _Habit(r"\w\s*=[^()]*\w,([A-Za-z]\w*)\s*\)$", "a dot belongs before `{0}`", "",
+           ((r",([A-Za-z]\w*\s*\))$", r".\1"),)),
     _Habit(r"\w\s*=\s*[\w.]+\s*,\s*[A-Za-z][\w.]*\s*\)", "a value without a name comes after one with a name", "",
            ((r"(\w+\s*=\s*[\w.]+)\s*,\s*([A-Za-z][\w.]*)\s*\)", r"\2, \1)"),)),
     _Habit(rf"^\s*(?!(?:{_RESERVED}|print|exec)\b)[a-z_]\w*\s+(?:rospy\.\w+\(|\"\")(?!.*=\s*=)",
            "`=` is missing between the name and its value", "",
            ((r"^(\s*[a-z_]\w*)\s+(?=rospy\.\w+\(|\"\")", r"\1 = "),)),
+    _Habit(r"^\s*self\.\w+\s+(?:[A-Za-z]\w*[.(]|\"\"|-?\d)(?!.*=\s*=)",
+           "`=` is missing between the name and its value", "",
+           ((r"^(\s*self\.\w+)\s+(?=[A-Za-z]\w*[.(]|\"\"|-?\d)", r"\1 = "),)),
     _Habit(r"^\s*>>>", "`>>>` is printed by Python's prompt", "leave it out", ((r">>>\s?", ""),)),
     _Habit(r"^\s*//", "a comment begins with `#` in Python", "", ((r"//+\s*", "# "),)),
     _Habit(r"^\s*/\*", "a comment begins with `#` in Python",
@@ -217,10 +229,22 @@ def reason_of_line(line: str) -> Reason:
             return Reason(habit.why.replace("{0}", word), habit.fix.replace("{0}", word))
     if meant := _keyword(code):
         return Reason(f"Python writes `{meant[1]}`, not `{meant[0]}`")
+    if (twice := reason_of_doubled(line)).why:
+        return twice
+    for word, right, changed in _with_keyword(code):
+        if _parses(_together(changed, "", texts)):
+            return Reason(f"Python writes `{right}`, not `{word}`")
     if apart := next(_with_separator(code, texts), ""):
         sign = "%" if apart.count("%") > code.count("%") else ","
         return Reason(f"`{sign}` is missing between two values")
     return Reason()
+
+
+def reason_of_doubled(line: str) -> Reason:
+    """Return which sign stands twice in a line that is good Python with it once; nothing where none does."""
+    doubled = without_doubled(line[:LINE_CHARS_MAX])
+    sign = next((sign for sign, one in doubled if _parses(one)), "")
+    return Reason(f"`{sign}` is there twice", "delete one of the two") if sign else Reason()
 
 
 def without_brace(line: str) -> str:
@@ -247,6 +271,9 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
         return
     if message.startswith(COMMENTED_OUT):
         yield without_comment_sign(line)
+    if "triple-quoted" in message:
+        yield re.sub(r"""^(\s*)(["'])\2(?=\w)""", r"\1\2\2\2", line)
+        yield re.sub(r"""(?<=[\w.])(["'])\1(\s*)$""", r"\1\1\1\2", line)
     yield line.translate(PLAIN)
     code, comment, texts = _taken_apart(line.translate(PLAIN))
     code = re.sub("[\u2010-\u2015\u2212]", "-", code)
@@ -260,6 +287,8 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
     if meant := _keyword(code):
         code = re.sub(r"^(\s*)\w+", rf"\g<1>{meant[1]}", code)
         yield _together(code, comment, texts)
+    yield from (one for _, one in without_doubled(line) if not _parses(line))
+    yield from (_together(one, comment, texts) for _, _, one in _with_keyword(code) if not _parses(line))
     plain = code.rstrip(" ;")
     yield _together(plain, comment, texts)
     if _BLOCK.match(plain) and not plain.endswith(":"):
@@ -267,6 +296,28 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
     yield from (_together(one, comment, texts) for one in _with_separator(plain, texts))
     yield from _with_bracket(line, message, column)
     yield from _with_quote(line, message, column)
+
+
+def without_doubled(line: str) -> Iterator[tuple[str, str]]:
+    """Yield each sign that stands twice in a line, and the line with it once: `rospy..spin()`, `''hello'`. One bracket
+    opens behind another one on purpose where more than an argument's end comes behind what it opens."""
+    for found in re.finditer(r"([^\w\s])\1", line):
+        shorter = line[: found.start()] + line[found.end() - 1 :]
+        if found[1] != "(" or _CLOSED_LAST.match(_inner(shorter, found.start())):
+            yield found[1], shorter
+
+
+def _inner(line: str, at: int) -> str:
+    """Return what comes behind the bracket that closes the one at this place; "(" where none does."""
+    code, depth = _TEXT.sub(lambda found: "_" * len(found[0]), line), 0
+    for place in range(at, len(code)):
+        depth += {"(": 1, ")": -1}.get(code[place], 0)
+        if depth == 0:
+            return code[place + 1 :]
+    return "("
+
+
+_CLOSED_LAST = re.compile(r"\s*(?:$|[),:\]])")
 
 
 def without_comment_sign(line: str) -> str:
@@ -300,8 +351,23 @@ def _keyword(code: str) -> tuple[str, str] | None:
     if word in keyword.kwlist or not word:
         return None
     alike = [one for one in _STATEMENTS if sorted(one) == sorted(word.lower())]
+    if code.strip() == f"{word}:":
+        alike += [one for one in ("try", "else", "finally") if is_one_edit(word.lower(), one)]
     near = alike or get_close_matches(word.lower(), _STATEMENTS, 1, 0.8)
     return (word, near[0]) if near else None
+
+
+def _with_keyword(code: str) -> Iterator[tuple[str, str, str]]:
+    """Yield each word within a line that is nearly a keyword, the keyword, and the line with it."""
+    for found in re.finditer(r"(?<![\w.])[A-Za-z]{1,6}(?![\w.(\[=])", code):
+        word = found[0]
+        near = (one for one in _WITHIN if word.lower() == one or is_one_edit(word.lower(), one))
+        for meant in near if word not in keyword.kwlist else ():
+            yield word, meant, f"{code[: found.start()]}{meant}{code[found.end() :]}"
+
+
+_WITHIN = ("in", "or", "and", "not", "if", "else", "for", "as", "is")
+"""Keywords that stand within a line."""
 
 
 def _with_separator(code: str, texts: list[str]) -> Iterator[str]:
@@ -332,13 +398,19 @@ def _with_bracket(line: str, message: str, column: int | None) -> Iterator[str]:
             r"\1(\2):",
             called,
         )
+        called = re.sub(r"(^|[\s(=])([A-Z]\w*)\)\.", r"\1\2().", called)
+        called = (
+            re.sub(r"^(\s+def\s+\w+?)(self(?:,\s*\w+)*)\):$", r"\1(\2):", code)
+            if _METHOD.match(code)
+            else called
+        )
         filled = _GLUED.sub(r"\1(\2)", code)
         opened = _OPENED.sub(lambda found: f"{_log_call(found[1])}(", code, count=1)
         yield from (_together(one, comment, texts) for one in (asked, filled, called, opened) if one != code)
         yield shorter
     wrong = re.search(r"'(.)' does not match opening parenthesis '(.)'", message)
-    opener = line.rfind("{", 0, at) if wrong and wrong[2] == "{" else 0
-    if wrong and opener > 0 and re.match(r"\w", line[opener - 1]):  # `name{` is nothing
+    opener = line.rfind(wrong[2], 0, at) if wrong and wrong[2] in "{[" else 0
+    if wrong and opener > 0 and _is_call(line[:opener], line[opener:at], wrong[2]):
         yield line[:opener] + {")": "(", "]": "["}[wrong[1]] + line[opener + 1 :]
     if wrong and line[at : at + 1] == wrong[1]:
         yield line[:at] + _CLOSING[wrong[2]] + line[at + 1 :]
@@ -363,6 +435,24 @@ _OPENED = re.compile(
 """A call whose `(` is missing: `pub.publish)x)`, `pub.publish"x")`, `pub.publish x)`, `rospy.loginforospy.…)`."""
 _GLUED = re.compile(r"(\.(?:publish|Rate|Duration|sleep|loginfo|logwarn|logerr|get_param))(\w+)\)$")
 """A call whose `(` is missing before its value: `pub.publishtext)`, `rospy.Rate10)`."""
+_METHOD = re.compile(r"\s+def\s+\w+self(?:,\s*\w+)*\):$")
+"""The first line of a method whose `(` is missing."""
+
+
+def _is_call(before: str, inside: str, opener: str) -> bool:
+    """Return whether what stands before a bracket is called: `name{` is nothing, of a function no part is taken, and no
+    part has no name or several."""
+    if opener == "{":
+        return bool(re.search(r"\w$", before))
+    several = inside.strip() == opener or "," in _TEXT.sub('""', inside)
+    return bool(_FUNCTION.search(before)) or (several and bool(re.search(r"\w$", before)))
+
+
+_FUNCTION = re.compile(
+    r"(?:(?<![\w.])(?:rospy|math|time)\.\w+|\.(?:publish|sleep)|\bdef\s+\w+"
+    r"|(?<![\w.])(?:print|range|str|int|float|len|abs|round))$"
+)
+"""What is only ever called, and the first line of a function."""
 _ASKED = re.compile(
     r"(\.(?:get_caller_id|get_name|get_namespace|get_rostime|get_time|is_shutdown|now|to_sec))\)"
 )
@@ -403,7 +493,9 @@ def _with_quote(line: str, message: str, column: int | None) -> Iterator[str]:
     if opened := re.search(r"(?:[(,]|=)\s*(?=[^(),=\s\"'][^(),=\"']*$)", line[:at]):
         yield f"{line[: opened.end()]}{quote}{line[opened.end() :]}"
     for found in re.finditer(other, line[begin:]):
-        yield line[: begin + found.start()] + quote + line[begin + found.end() :]
+        ended = line[: begin + found.start()] + quote + line[begin + found.end() :]
+        yield ended
+        yield from (one for _, one in without_doubled(ended))
     if name := re.match(r"[\w/~]+(?=\s*[,)\]])", line[begin:]):
         yield line[: begin + name.end()] + quote + line[begin + name.end() :]
     for values in (r"(.*%[-\d.]*[a-z][^%]*?)(?= *%( +\w| *\())", r"(.*%[-\d.]*[a-z])(?= *, *\w)"):

@@ -35,7 +35,7 @@ ALLOWED = {
     "untrusted_text": set[str](),
     "wording": set[str](),
     "installable": {"wording"},
-    "syntax_fixes": set[str](),
+    "syntax_fixes": {"wording"},
     "portable": {"errors"},
     "ros_env": {"errors", "model", "portable"},
     "ros_packages": {"errors", "host_programs", "installable", "ros_env", "wording"},

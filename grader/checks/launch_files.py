@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from difflib import get_close_matches
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
@@ -378,6 +379,8 @@ def _page(
                 f": in {where}, the shell takes {blank['name']} for a command, because a space follows it"
             )
             hint = f"write {blank['name']}=… in {where}, without spaces around the `=`"
+        elif slip := _misspelt_address(package, build, file, params):
+            hint = f"{slip.file}: {slip.fix}"
         elif slip := _unread_variable(package, build, file, params):
             message, hint = f"{message}: {slip.why} ({slip.file}, line {slip.line})", slip.fix
         return failed(message, hint=hint, citations=cited)
@@ -392,10 +395,7 @@ def _page(
 
 def _unread_variable(package: PackageFacts, build: Run, file: LaunchFile, params: OpensParams) -> Slip | None:
     """Return the line of a shell script that has the address in a variable, and does not give the program its value."""
-    scripts = [
-        source.path for node in _shells(package, file) if (source := find_script(package, node.type or ""))
-    ]
-    for path in scripts:
+    for path in _shell_scripts(package, file):
         lines = build.file_lines(path)
         assigned = [
             m[1]
@@ -410,6 +410,26 @@ def _unread_variable(package: PackageFacts, build: Run, file: LaunchFile, params
     return None
 
 
+def _shell_scripts(package: PackageFacts, file: LaunchFile) -> list[str]:
+    scripts = (find_script(package, node.type or "") for node in _shells(package, file))
+    return [source.path for source in scripts if source is not None]
+
+
+def _misspelt_address(
+    package: PackageFacts, build: Run, file: LaunchFile, params: OpensParams
+) -> Slip | None:
+    """Return the line of a shell script that has nearly the address that is asked for."""
+    for path in _shell_scripts(package, file):
+        for number, line in enumerate(build.file_lines(path), start=1):
+            words = re.findall(r"[^\s\"'=#]{4,}", line.partition(" #")[0])
+            words = [word for word in words if _plain(word) not in map(_plain, params.urls)]
+            if near := get_close_matches(params.urls[0], words, 1, _NEAR_ADDRESS):
+                fix = f"on line {number}, write {params.urls[0]} instead of {shown(near[0])}"
+                return Slip(path, number, f"the address is {shown(near[0])}", fix)
+    return None
+
+
+_NEAR_ADDRESS = 0.9
 _ASSIGNMENT = re.compile(r"\s*(?:export\s+)?([A-Za-z_]\w*)=[\"']?([^\"'\s]+)")
 
 

@@ -42,7 +42,7 @@ from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, joined, passed, unjudged
-from grader.wording import join_words, plural, there_is
+from grader.wording import is_one_edit, join_words, plural, there_is
 
 
 class LaunchConnectsParams(Record):
@@ -363,7 +363,9 @@ def _find_unnamed(
     for program in params.programs:
         if not nodes_of_program(file, program):
             pkg, _, name = program.partition("/")
-            meant = [n for n in file.brings if n.pkg == pkg and n.type and (n.type in name or name in n.type)]
+            of_package = [n for n in file.brings if n.pkg == pkg and n.type]
+            meant = [n for n in of_package if str(n.type) in name or name in str(n.type)]
+            meant = meant or [n for n in of_package if is_one_edit(str(n.type), name)]
             meant = [n for n in meant if f"{n.pkg}/{n.type}" not in params.programs]
             if len(meant) == 1:
                 return _other_type(file, meant[0], name, params)

@@ -375,10 +375,14 @@ def _asks_for(found: Verdict | CriterionResult, repair: Repair) -> bool:
 
 
 def _names(criterion: Criterion, repair: Repair) -> bool:
-    """Return whether the criterion asks for the name that the repair puts in place."""
+    """Return whether the criterion asks for the name that the repair puts in place; of a parameter's name, for one that
+    has it as a part."""
     before, after = (set(re.findall(r"[\w.~/-]*\w", text)) for text in (repair.before, repair.after))
-    new = {word.rpartition("/")[2] for word in after - before}
-    return any(text.strip("/").rpartition("/")[2] in new for text in texts_in(criterion.parameters))
+    new = {word.rpartition("/")[2].lstrip("~") for word in after - before}
+    texts = texts_in(criterion.parameters)
+    if repair.kind == "parameter-name":
+        return any(text.startswith("/") and new.intersection(text.split("/")) for text in texts)
+    return any(text.strip("/").rpartition("/")[2] in new for text in texts)
 
 
 def _words(text: str) -> set[str]:

@@ -265,15 +265,27 @@ def _text_of_a_number(call: ast.Call) -> Iterator[Argument]:
             yield Argument([edit], "the message takes a number, and `str(…)` makes a string of it")
 
 
+def _names_beside(function: ast.FunctionDef, call: ast.Call) -> set[str]:
+    """Return the names that the block with a call by itself gives a value."""
+    for node in ast.walk(function):
+        block = getattr(node, "body", [])
+        if isinstance(block, list) and any(isinstance(s, ast.Expr) and s.value is call for s in block):
+            given = (target for s in block if isinstance(s, ast.Assign) for target in s.targets)
+            return {target.id for target in given if isinstance(target, ast.Name)}
+    return set()
+
+
 def _published_nothing(tree: ast.Module) -> Iterator[Argument]:
-    """Yield `publish()` where its function gives a value to one name, and does nothing with it."""
+    """Yield `publish()` where its function gives a value to one name and does nothing with it, or its block to one."""
     for function in (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)):
         names = [n for n in ast.walk(function) if isinstance(n, ast.Name)]
         read = {n.id for n in names if isinstance(n.ctx, ast.Load)}
         unread = {n.id for n in names if isinstance(n.ctx, ast.Store)} - read
         calls = [n for n in ast.walk(function) if _called(n) == "publish" and isinstance(n, ast.Call)]
-        if len(unread) == len(calls) == 1 and not calls[0].args and not calls[0].keywords:
-            edit = (calls[0], f"{ast.unparse(calls[0].func)}({unread.pop()})")
+        beside = _names_beside(function, calls[0]) if len(calls) == 1 else set()
+        meant = unread if len(unread) == 1 else beside
+        if len(meant) == len(calls) == 1 and not calls[0].args and not calls[0].keywords:
+            edit = (calls[0], f"{ast.unparse(calls[0].func)}({meant.pop()})")
             yield Argument([edit], "there is nothing to publish in the brackets")
 
 

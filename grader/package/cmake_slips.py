@@ -17,6 +17,8 @@ _BEGIN = "the command's `(` is missing"
 _VARIABLE = "a variable is written `${{{1}}}`"
 # what a line has, what it should have, and the reason ({0}, {1}: the pattern's groups)
 _PATTERNS = (
+    (r"(\()\s*\(", r"\1", "`{0}` is there twice"),
+    (r"(\))\s*\)", r"\1", "`{0}` is there twice"),
     (rf"^(\s*)({_COMMANDS})\s*[{{\[<]", r"\1\2(", "the command's bracket is `(`, and not another one"),
     (rf"^(\s*)({_COMMANDS})(?=[A-Za-z/$])(?!\w*\s*\()", r"\1\2(", _BEGIN),
     (rf"^(\s*)({_COMMANDS})\s*$", r"\1\2(", _BEGIN),

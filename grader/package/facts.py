@@ -214,8 +214,9 @@ def resolve(text: str) -> tuple[str, str, str]:
     program, *rest = text.split(None, 1)
     if not program.startswith("/"):
         return posixpath.basename(program), "", f"`{program}` is not an absolute path"
-    if program not in _ENV:
-        return posixpath.basename(program), posixpath.normpath(program), ""
+    place = f"/{posixpath.normpath(program).lstrip('/')}"  # `//usr//bin/env` is no other file
+    if place not in _ENV:
+        return posixpath.basename(program), place, ""
     return _behind_env(rest[0] if rest else "")
 
 

@@ -9,11 +9,14 @@ from __future__ import annotations
 import ast
 import builtins
 import io
+import math
 import re
+import time
 import tokenize
 from collections.abc import Collection, Iterator
 from itertools import chain
 
+from grader.package.name_repair import bound_in
 from grader.package.syntax_repair import Step, edited, last_name, span_of, step_to
 from grader.wording import is_one_edit
 
@@ -57,43 +60,85 @@ def with_members(text: str, of_rospy: Collection[str]) -> Iterator[Step]:
                 return
 
 
-def _bound(tree: ast.Module) -> set[str]:
-    names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and not isinstance(n.ctx, ast.Load)}
-    names |= {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.ClassDef)}
-    names |= {n.arg for n in ast.walk(tree) if isinstance(n, ast.arg)}
-    imports = (n for n in ast.walk(tree) if isinstance(n, ast.Import | ast.ImportFrom))
-    return names | {(a.asname or a.name).partition(".")[0] for n in imports for a in n.names}
+class _Names:
+    """What the names of a script are: those that it gives a value, those of its objects alone, and what it reads of
+    each by a dot."""
+
+    def __init__(self, tree: ast.Module, of_rospy: Collection[str]) -> None:
+        self.bound, self.own = bound_in(tree), _of_self(tree)
+        self.known = self.bound | set(dir(builtins))
+        self._members = {"rospy": set(of_rospy), "math": set(dir(math)), "time": set(dir(time))}
+        for node in (n for n in ast.walk(tree) if isinstance(n, ast.Attribute)):
+            if isinstance(node.value, ast.Name) and node.value.id != "rospy":
+                self._members.setdefault(node.value.id, set(ALL_MEMBERS)).add(node.attr)
+
+    def members_of(self, owner: str) -> Collection[str]:
+        """Return what may stand behind a name and a dot."""
+        return self.own if owner == "self" else self._members.get(owner, ALL_MEMBERS)
+
+    def has_dot(self, first: tokenize.TokenInfo, sign: str, second: str) -> bool:
+        """Return whether a dot is meant by the sign between two words."""
+        if sign == "," and first.string == "self" and second in self.own:
+            return not re.match(r"\s*def\b", first.line)
+        if (
+            sign == ","
+            and first.string in ("msg", "srv")
+            and second[:1].isupper()
+            and second not in self.known
+        ):
+            return True
+        is_there = first.type == tokenize.NAME and first.string in self.bound | self.own
+        is_member = second in self.members_of(first.string) and second not in self.known
+        return is_there and is_member and sign in (",", ";", ":")
+
+    def has_comma(self, first: tokenize.TokenInfo, second: tokenize.TokenInfo) -> bool:
+        """Return whether a comma is meant by the dot between two words."""
+        is_class = first.string[:1].isupper() and first.string in self.known
+        is_named = second.type == tokenize.NAME and second.string in self.bound - self.own
+        return is_named and (first.type == tokenize.STRING or is_class)
 
 
 def _dots(text: str, of_rospy: Collection[str]) -> Iterator[tuple[Edit, str]]:
     """Yield `rospy,spin()` and `rospyspin()`, for `rospy.spin()`, and `"chatter". String`, for `"chatter", String`."""
-    bound = _bound(ast.parse(text))
-    if "*" in bound:
+    names = _Names(ast.parse(text), of_rospy)
+    if "*" in names.bound:
         return
-    known = bound | set(dir(builtins))
     given = list(tokenize.generate_tokens(io.StringIO(text).readline))
     for first, sign, second in zip(given, given[1:], given[2:], strict=False):
-        members = of_rospy if first.string == "rospy" else ALL_MEMBERS
-        is_own = first.type == tokenize.NAME and first.string in bound and second.string not in known
         place = (sign.start[0] - 1, sign.start[1], sign.end[1])
-        if is_own and sign.string in (",", ";", ":") and second.string in members:
+        if names.has_dot(first, sign.string, second.string):
             yield (place, "."), f"a dot belongs between `{first.string}` and `{second.string}`"
-        if (
-            first.type == tokenize.STRING
-            and "{" in first.string
-            and sign.string == ","
-            and second.string == "format"
-        ):
+        of_text = first.type == tokenize.STRING and "{" in first.string and second.string == "format"
+        if of_text and sign.string == ",":
             yield (place, "."), "a dot belongs between the string and `format`"
-        is_value = first.type == tokenize.STRING or first.string[:1].isupper()
-        if sign.string == "." and is_value and second.type == tokenize.NAME and second.string in bound:
+        if sign.string == "." and names.has_comma(first, second):
             yield (place, ","), f"a comma belongs between `{first.string}` and `{second.string}`"
-    for name in (one for one in given if one.type == tokenize.NAME and one.string not in known):
-        for owner in ("rospy", *sorted(bound - {"rospy"})):
+    for name in (one for one in given if one.type == tokenize.NAME and one.string not in names.known):
+        for owner in ("rospy", *sorted(names.bound - {"rospy"})):
             member = name.string.removeprefix(owner)
-            if member != name.string and member in (of_rospy if owner == "rospy" else ALL_MEMBERS):
+            if member != name.string and member in names.members_of(owner):
                 span = (name.start[0] - 1, name.start[1], name.end[1])
                 yield (span, f"{owner}.{member}"), f"the dot is missing in `{name.string}`"
+
+
+def _of_self(tree: ast.Module) -> set[str]:
+    """Return the attributes and methods that classes of the script have, and no plain name has."""
+    nodes = list(ast.walk(tree))
+    attributes = {n.attr for n in nodes if isinstance(n, ast.Attribute) and last_name(n.value) == "self"}
+    classes = [n for n in nodes if isinstance(n, ast.ClassDef)]
+    methods = {m.name for one in classes for m in one.body if isinstance(m, ast.FunctionDef)}
+    beside = {  # `self, pub = …`, for `self.pub = …`
+        id(n)
+        for one in nodes
+        if isinstance(one, ast.Tuple) and last_name(one.elts[0]) == "self"
+        for n in one.elts
+    }
+    plain = {n.arg for n in nodes if isinstance(n, ast.arg)} | {
+        n.id
+        for n in nodes
+        if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store) and id(n) not in beside
+    }
+    return (attributes | methods) - plain - {getattr(one, "name", "") for one in tree.body}
 
 
 def _misspelt_members(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
@@ -104,17 +149,33 @@ def _misspelt_members(text: str, _names: Collection[str]) -> Iterator[tuple[Edit
         for n in ast.walk(tree)
         if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)
     }
+    own = {one.name: _members_of(one) for one in tree.body if isinstance(one, ast.ClassDef) and not one.bases}
+    inside = {
+        id(n): name for one in tree.body if (name := getattr(one, "name", "")) in own for n in ast.walk(one)
+    }
     stored = {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
     messages = _messages_of_std(tree)
     for node in (n for n in ast.walk(tree) if isinstance(n, ast.Attribute)):
         members: tuple[str, ...] = MEMBERS["message"] if id(node.value) in messages else ()
         of_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-        members = OF_TEXTS if of_text else MEMBERS.get(kinds.get(ast.unparse(node.value), ""), members)
+        owner = ast.unparse(node.value)
+        kind = inside.get(id(node), "") if owner == "self" else kinds.get(owner, owner.removesuffix("()"))
+        members = OF_TEXTS if of_text else own.get(kind) or MEMBERS.get(kind, members)
         right = _near(node.attr, members) if node.attr not in {*members, *stored} else ""
         span = span_of(lines, node)
         if right and span is not None:
             line, _, end = span
             yield ((line, end - len(node.attr), end), right), f"`{node.attr}` is called `{right}`"
+
+
+def _members_of(one: ast.ClassDef) -> tuple[str, ...]:
+    """Return what the objects of a class have."""
+    nodes = list(ast.walk(one))
+    stored = [n.attr for n in nodes if isinstance(n, ast.Attribute) and not isinstance(n.ctx, ast.Load)]
+    named = [
+        n.id for s in one.body for n in ast.walk(s) if isinstance(s, ast.Assign) and isinstance(n, ast.Name)
+    ]
+    return (*(s.name for s in one.body if isinstance(s, ast.FunctionDef)), *stored, *named)
 
 
 def _messages_of_std(tree: ast.Module) -> set[int]:
@@ -146,17 +207,31 @@ def _misspelt_keywords(text: str, _names: Collection[str]) -> Iterator[tuple[Edi
                     ((at, *found.span()), right),
                     f"there is no argument `{one.arg}`: it is called `{right}`",
                 )
+        compared = [n for n in call.args if isinstance(n, ast.Compare) and isinstance(n.ops[0], ast.Eq)]
+        for left in (n.left for n in compared if last_name(n.left) in keywords):
+            span = span_of(lines, left)
+            sign = lines[span[0]].find("==", span[2]) if span is not None else -1
+            if span is not None and sign >= 0:
+                yield ((span[0], sign, sign + 2), "="), "an argument of a call gets its value by `=`"
         for name in (n for n in call.args if isinstance(n, ast.Name)):
-            found = re.fullmatch(r"(queue_size)_?(\d+)", name.id) if keywords else None
+            glued = r"(queue_size|anonymous|latch)_?(\d+|True|False)"
+            found = re.fullmatch(glued, name.id) if keywords else None
             span = span_of(lines, name) if found else None
             if found and span is not None:
                 yield (span, f"{found[1]}={found[2]}"), f"`=` is missing between `{found[1]}` and its value"
 
 
 def _lost_values(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
-    """Yield `rate : rospy.Rate(10)`, which says what type a name has, and gives it no value."""
-    lines = text.split("\n")
-    for node in (n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.AnnAssign) and n.value is None):
+    """Yield `rate : rospy.Rate(10)` and `rate == rospy.Rate(10)`, which give a name no value."""
+    tree, lines = ast.parse(text), text.split("\n")
+    stored = {ast.unparse(n) for n in ast.walk(tree) if isinstance(getattr(n, "ctx", None), ast.Store)}
+    for one in (n.value for n in ast.walk(tree) if isinstance(n, ast.Expr)):
+        left = one.left if isinstance(one, ast.Compare) and isinstance(one.ops[0], ast.Eq) else None
+        span = span_of(lines, left) if left is not None and ast.unparse(left) not in stored else None
+        sign = lines[span[0]].find("==", span[2]) if span is not None else -1
+        if span is not None and sign >= 0:
+            yield ((span[0], sign, sign + 2), "="), "a name gets its value by `=`, and not by `==`"
+    for node in (n for n in ast.walk(tree) if isinstance(n, ast.AnnAssign) and n.value is None):
         span, kind = span_of(lines, node.target), node.annotation
         is_value = isinstance(kind, ast.Call | ast.BinOp) or (
             isinstance(kind, ast.Constant) and kind.value is not None
@@ -176,6 +251,9 @@ def _lost_places(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str
         line, start, end = span
         if isinstance(node.op, ast.BitAnd) and "%" in left.value and (at := lines[line].find("&", end)) >= 0:
             yield ((line, at, at + 1), "%"), "`%` belongs between a string and its values, and not `&`"
+        doubled = lines[line][start:end].replace("%%", "%")
+        if isinstance(node.op, ast.Mod) and re.fullmatch(r"[^%]*%%[sdf][^%]*", left.value):
+            yield (span, doubled), "`%%` is a plain `%`, and no place for a value"
         if (
             isinstance(node.op, ast.Mod)
             and "%" not in left.value

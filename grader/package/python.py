@@ -23,6 +23,7 @@ from grader.syntax_fixes import (
     MERGE_MARKER,
     OUT_OF_BLOCK,
     Reason,
+    reason_of_doubled,
     reason_of_line,
     without_texts,
 )
@@ -43,13 +44,22 @@ _VAGUE = (
     "multiple exception",
     "expression cannot contain assignment",
     "expected 'except'",
-    *("invalid syntax", "expected ':'", "invalid decimal", "unexpected EOF", "cannot assign", "can't assign"),
+    *(
+        "Function parameters cannot be parenthesized",
+        "invalid syntax",
+        "expected ':'",
+        "invalid decimal",
+        "unexpected EOF",
+        "cannot assign",
+        "can't assign",
+    ),
     "Did you mean to use 'from",
 )
 """Messages that say less than the line itself."""
 _EMPTY_BLOCK = re.compile(r"expected an indented block after .* on line (\d+)")
 _EXCEPT = re.compile(r"\s*(except|finally)\b")
 _NEXT_BLOCK = re.compile(r"\s*(?:@|(?:def|async def|class|if __name__)\b)")
+_NEVER_ENDED = re.compile("never closed|EOL while|unterminated (f-)?string")
 _UNCLOSED = re.compile(r"'([(\[{])' was never closed")
 _OUT_OF_BLOCK = "this line is further out than the lines around it, which belong to one block"
 _COPIED = "copied from a PDF or a web page"
@@ -277,6 +287,8 @@ def reason_of(
         return _character(message, text)
     if of_block := _reason_of_block(message, text, mixed=mixed):
         return of_block
+    if _NEVER_ENDED.search(message) and (twice := reason_of_doubled(text)).why:
+        return twice
     reason = reason_of_line(text) if vague else Reason()
     if vague and opened is not None and not reason.why:
         reason = _never_closed(opened)

@@ -322,7 +322,8 @@ def _with_line_moved(lines: list[str], at: int) -> Iterator[str]:
 def _with_lines_turned(lines: list[str], at: int) -> Iterator[str]:
     """Yield the text with the line exchanged with the one above it, or with the one below it."""
     for first in (at - 1, at):
-        if 0 <= first < len(lines) - 1 and lines[first].strip() and lines[first + 1].strip():
+        pair = lines[first : first + 2] if first >= 0 else []
+        if len(pair) > 1 and all(one.strip() and not re.match(r"(def|class)\b", one) for one in pair):
             yield "\n".join([*lines[:first], lines[first + 1], lines[first], *lines[first + 2 :]])
 
 

@@ -17,6 +17,8 @@ from grader.syntax_fixes import Reason
 TYPOGRAPHIC = re.compile("[\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u2033\u00ab\u00bb]")
 
 NO_END = r"Premature end of data in tag (\S+) line (\d+)"
+_NO_NAME = "unparsable"
+"""What libxml2 calls a tag without a name."""
 _MISMATCH = r"tag mismatch: (\S+) line (\d+) and ([^\s,]+)"
 _NO_QUOTE = (r"Unescaped '<' not allowed in attr", r"AttValue: ['\"] expected")
 # libxml2's message and what it means ({0}, {1}: the pattern's groups, {root}: the root tag)
@@ -64,6 +66,7 @@ _LAST_LINE = 65_535
 COMMENT = re.compile(r"<!--(.*?)-->", re.DOTALL)
 _SLIPS_CHARS_MAX = 20_000
 _SLIPS_LINES_MAX = 300
+_FURTHER_CHARS = 4
 _OF_TEXT = ("param", "rosparam", "arg")
 
 
@@ -257,14 +260,20 @@ def find_slip(text: str, root: str) -> LineSlip | None:
     mismatch = re.search(_MISMATCH, message)
     if error is None or (mismatch and _is_closed_wrongly(mismatch[1], mismatch[3], root)):
         return None
-    at, further = error.position[0], None
-    for slip in _slips_near(at, message, text, root):
+    at, further = error.position, None
+    for slip in _slips_near(at[0], message, text, root):
         element, later = _tried(slip.text)
         if element is not None and not _strange_things(element, root):
             return slip
-        if later is not None and later.position[0] > at and further is None and slip.is_within:
+        if later is not None and _is_later(later.position, at) and further is None and slip.is_within:
             further = slip
     return further
+
+
+def _is_later(one: tuple[int, int], other: tuple[int, int]) -> bool:
+    """Return whether a parser came further: to a later line, or on the same one so much further that what it passed is
+    more than the slip itself."""
+    return one[0] > other[0] or (one[0] == other[0] and one[1] > other[1] + _FURTHER_CHARS)
 
 
 def find_strange(text: str, root: str) -> LineSlip | None:
@@ -298,12 +307,21 @@ def _slips_near(at: int, message: str, text: str, root: str) -> Iterator[LineSli
     """Yield the slips of the lines that the parser named and of those beside them."""
     lines = text.split("\n")
     mismatch = re.search(_MISMATCH, message)
-    begun = re.compile(rf"\s*[^\w\s<>]?{re.escape(mismatch[3])}\b[^<]*>" if mismatch else r"(?!)")
+    opened, closed = (mismatch[1], mismatch[3]) if mismatch else ("", "")
+    begun = re.compile(
+        rf"\s*[^\w\s<]?(?:{re.escape(closed)}\b[^<]*|/{re.escape(opened)}\s*)>" if mismatch else r"(?!)"
+    )
     told = [at, *map(int, re.findall(r"line (\d+)", message))]
     told += [n for n, line in enumerate(lines, 1) if begun.match(line)]
+    if re.search("omment|hyphen|'--'", message):
+        told += [n for n, line in enumerate(lines, 1) if "<!--" in line and "-->" not in line]
     named = [number for number in told if 0 < number <= len(lines)]
     above = [max((n for n in range(1, number) if lines[n - 1].strip()), default=0) for number in named]
     near = [number for number in dict.fromkeys((*named, *above)) if number]
+    if closed == _NO_NAME:
+        for number in (n for n, line in enumerate(lines, 1) if "</>" in line):
+            line = lines[number - 1].replace("</>", f"</{opened}>", 1)
+            yield changed_line(lines, number, line, "the name of the closing tag is missing")
     for number in near:
         yield from _slips_in(lines, number, root)
     yield from _declarations(lines, root)

@@ -66,7 +66,7 @@ def _edits(text: str, fault: Fault, root: str) -> Iterator[str]:
     elif unclosed := re.search(NO_END, message):
         yield from _closed(lines, unclosed[1], int(unclosed[2]) - 1, root)
     elif re.search(r"hyphen|must not contain '--'", message):
-        yield COMMENT.sub(lambda found: f"<!--{re.sub(r'-(?=-)|-$', '- ', found[1])}-->", text)
+        yield COMMENT.sub(_without_hyphens, text)
     elif "EntityRef" in message:
         yield re.sub(r"&(?!#?\w+;)", "&amp;", text)
     elif "Extra content at the end" in message and (first := first_tag(text, root)) is not None:
@@ -77,6 +77,12 @@ def _edits(text: str, fault: Fault, root: str) -> Iterator[str]:
     last = at + 1 == len(lines) or lines[at + 1].lstrip().startswith("<")
     for line in (_quoted(lines[at]), *_ended(lines[at], last=last)):
         yield "\n".join([*lines[:at], line, *lines[at + 1 :]])
+
+
+def _without_hyphens(comment: re.Match[str]) -> str:
+    """Return a comment without `--` in it; as it is where it goes on into another one."""
+    inner = re.sub(r"-(?=-)|-$", "- ", comment[1])
+    return comment[0] if "<!--" in comment[1] else f"<!--{inner}-->"
 
 
 def _matching(lines: list[str], opened: str, line: int, closed: str, root: str) -> Iterator[str]:

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from difflib import get_close_matches
 from typing import NamedTuple
 
+from grader.wording import is_one_edit
+
 TAGS: dict[str, tuple[str, ...]] = {
     "package": (
         *("package", "name", "version", "description", "author", "maintainer", "license", "url", "export"),
@@ -66,6 +68,14 @@ def slips_of(line: str, root: str) -> Iterator[Slip]:
 
 
 _PATTERNS = (
+    (r"([<>=@])\1", r"\1", "`{0}` is there twice"),
+    (r"<(/)/+(?=NAMES)", r"<\1", "`{0}` is there twice"),
+    (r"/(/)>", r"\1>", "`{0}` is there twice"),
+    (r"(=\s*([\"'])[^\"'<>]+)\2(?=\2)", r"\1", "a quote is there twice"),
+    (r"(=\s*)([\"'])(?=\2[^\"'<>\s/?])", r"\1", "a quote is there twice"),
+    (r"^(\s*)<?(?:[^\w\s]|_){1,6}(?=(?:(?!-->|<).)*-->\s*$)", r"\1<!--", "a comment begins with `<!--`"),
+    (r"^(\s*<!--(?:(?!--).)*?)\s*[-_<>=.]{1,4}\s*$", r"\1 -->", "a comment ends with `-->`"),
+    (r"-{3,}(?=>)|(?<=<!)-{3,}", "--", "a comment is written between `<!--` and `-->`"),
     (r"\\>", "/>", "the tag ends with `/>`, and not with `\\>`"),
     (r"<\\(NAMES)>", r"</\1>", "a closing tag begins with `</`, and not with `<\\`"),
     (r"(?<=\s)([\w-]+)\s*[:;](?=\s*[\"'])", r"\1=", "`=` belongs between `{0}` and its value"),
@@ -76,9 +86,12 @@ _PATTERNS = (
     (r"</(NAMES)\b(?!\s*>)[^\w\s>-]?", r"</\1>", "the `>` of `</{0}>` is missing"),
     (rf"<(NAMES)({_QUOTED}*)[^\w\s>/]?([^<>=]*</\1>)", r"<\1\2>\3", "the `>` of `<{0}>` is missing"),
     (r"(?<!<)[^\w\s<>/]?/(NAMES)\s*>", r"</\1>", "the `<` of `</{0}>` is missing"),
-    (rf"^(\s*)[^\w\s<>]?(NAMES)(?=(?:{_QUOTED}*|\s[^<>]*)\s*/?>)", r"\1<\2", "the `<` of the tag is missing"),
+    (r">/(NAMES)\s*>", r"</\1>", "a closing tag begins with `</`, and not with `>/`"),
+    (rf"^(\s*)[^\w\s<]?(NAMES)(?=(?:{_QUOTED}*|\s[^<>]*)\s*/?>)", r"\1<\2", "the `<` of the tag is missing"),
     (r"(<(NAMES)\b[^<>]*>[^<>]+)<\2>", r"\1</\2>", "the `/` of the closing tag is missing"),
     (r"^(\s*)<(NAMES)>\s*$", r"\1</\2>", "the `/` of the closing tag is missing"),
+    (r"(<(NAMES)\b[^<>]*>[^<>]*)</>", r"\1</\2>", "the name of the closing tag is missing"),
+    (r"<>([^<>]*</(NAMES)>)", r"<\2>\1", "the name of the tag is missing"),
 )  # fmt: skip
 """What a line has, what it should have, and the reason ({0}, {1}: the pattern's groups)."""
 
@@ -103,5 +116,5 @@ def _meant(word: str, names: tuple[str, ...] | list[str]) -> str:
     """Return the one of the names that is meant by a word; "" where none is."""
     lower = word.lower()
     same = [one for one in names if sorted(one) == sorted(lower)]
-    near = get_close_matches(lower, names, 1, _ALIKE)
+    near = [one for one in names if is_one_edit(lower, one)] or get_close_matches(lower, names, 1, _ALIKE)
     return next(iter([*same, *near]), "")

@@ -98,6 +98,17 @@ SLIPS = {
         ("lab</name>", "lab</name<", "the `>` of `</name>` is missing"),
         ("<name>lab</name>\n", "<name>lab</name>\n  <name>lab</name>\n", "delete line 3"),
         ('format="2"', 'format="20"', "there is no such format"),
+        ('format="2"', 'format=="2"', "`=` is there twice"),
+        ('format="2"', 'format="2""', "a quote is there twice"),
+        ('format="2"', 'format=""2"', "a quote is there twice"),
+        ("<name>", "<<name>", "`<` is there twice"),
+        ("<name>", ">name>", "the `<` of the tag is missing"),
+        ("<buildtool_depend>", "<buildtool_depend>>", "`>` is there twice"),
+        ("lab</name>", "lab<//name>", "`/` is there twice"),
+        ("lab</name>", "lab>/name>", "a closing tag begins with `</`"),
+        ("lab</name>", "lab</>", "the name of the closing tag is missing"),
+        ("<name>lab", "<>lab", "the name of the tag is missing"),
+        ("<depend>rospy", "<depend>rosy", "there is no package rosy"),
         ("0.0.0", "0.00", "this is not a version"),
         ("email=", "email:", "`=` belongs between `email` and its value"),
         ("email=", "emal=", "`<maintainer>` has no attribute `emal`"),
@@ -117,12 +128,19 @@ SLIPS = {
         ('name="talker"/>', 'name="talker"/<', "a tag ends with `>`, and not with `<`"),
         ('name="talker"/>', "name=\"talker'/>", "a value ends with the quote with which it begins"),
         ('name="talker"/>', 'name:"talker"/>', "`=` belongs between `name` and its value"),
+        ('name="talker"/>', 'name="talker"//>', "`/` is there twice"),
+        ('name="talker"/>', 'name=="talker"" />', "`=` is there twice"),
+        ('<node pkg="lab" type="t', '<node pkh="lab" type="t', "`<node>` has no attribute `pkh`"),
+        ("</launch>", "</>", "the name of the closing tag is missing"),
     ],
     CMAKELISTS: [
         ("(VERSION", "(VERION", "it is VERSION"),
         ("(VERSION 3.0.2", "(3.0.2", "write VERSION before 3.0.2"),
         ("3.0.2", "30.2", "there is no version 30.2 of CMake"),
         ("project(lab)", "projectlab)", "the command's `(` is missing"),
+        ("project(lab)", "project((lab)", "`(` is there twice"),
+        ("project(lab)", "project(lab))", "`)` is there twice"),
+        ("rospy\n)", "rospy\n))", "`)` is there twice"),
         ("project(lab)", "project{lab)", "the command's bracket is `(`"),
         ("project(lab)", "project(lab}", "is closed by `)`"),
         ("project(lab)", "project()", "project(…) has no name"),
@@ -150,6 +168,29 @@ SLIPS = {
         ("std_msgs.msg", "std_msgs.mg", "messages are not imported from std_msgs.mg"),
         ("std_msgs.msg", "std_msgsmsg", "messages are not imported from std_msgsmsg"),
         ("std_msgs.msg", "std_msgs,msg", "a dot belongs between the parts of a module's name"),
+        ("std_msgs.msg", "std_msgs..msg", "`.` is there twice"),
+        ("std_msgs.msg import", "std_msgs,msg impprt", "a dot belongs between the parts of a module's name"),
+        ("from std", "fsom std", "Python writes `from`, not `fsom`"),
+        ("import String", "import Strimg", "Strimg is not defined"),
+        ("def talk()", "def talk(()", "`(` is there twice"),
+        ("def talk()", "def talk[)", "a `[` is closed by `)`"),
+        ("String, queue", "String,, queue", "`,` is there twice"),
+        ("'chatter'", "''chatter'", "`'` is there twice"),
+        ("'chatter'", "'chatter''", "`'` is there twice"),
+        ("queue_size=10", "queue_size==10", "an argument of a call gets its value by `=`"),
+        ("pub = ", "pub == ", "a name gets its value by `=`, and not by `==`"),
+        ("rospy.Rate(10)", "rospy.Rate[10)", "a `[` is closed by `)`"),
+        ("rospy.Rate", "rosby.Rate", "rosby is not defined"),
+        ("while not", "while npt", "Python writes `not`, not `npt`"),
+        ("is_shutdown():", "is_shutdown()::", "`:` is there twice"),
+        ("' % rospy", "' %% rospy", "`%` is there twice"),
+        ("world %s", "world %%s", "`%%` is a plain `%`"),
+        ("rospy.get_time()", "rospy.get_time(()", "`(` is there twice"),
+        ("publish(text)", "publish(teyt)", "teyt is not defined"),
+        ("publish(text)", "publish((text)", "`(` is there twice"),
+        ("pass", "qass", "qass is not defined"),
+        ("try:", "tyr:", "Python writes `try`, not `tyr`"),
+        ("def talk", "deg talk", "Python writes `def`, not `deg`"),
         ("import String", "imort String", "Python writes `import`, not `imort`"),
         ("def talk():", "de talk():", "Python writes `def`, not `de`"),
         ("def talk():", "def talk):", "its opening bracket is missing"),
@@ -211,6 +252,7 @@ SLIPS = {
         ("'I heard %s', msg.data", "msg.data, 'I heard %s'", "the string comes first, then its values"),
         ("I heard %s", "I heard s", "the string has no `%` in it"),
         ("msg.data", "mg.data", "mg is not defined"),
+        ("%s', msg.data)", '%s", msg.data))', "a quote is opened on this line"),
         ("msg.data", "msg.Data", "`Data` is called `data`"),
         ("msg.data", "msgdata", "the dot is missing in `msgdata`"),
         ("%s', ", "%s'. ", "a comma belongs between `'I heard %s'` and `msg`"),
@@ -234,6 +276,130 @@ def test_one_slip_is_named_and_undone(file: str, slip: tuple[str, str, str], tmp
     assert found, new
     assert says in words
     assert plain(file, (folder / file).read_bytes()) == plain(file, FILES[file].encode()), words
+
+
+CLASS = """\
+#!/usr/bin/env python3
+import rospy
+import std_msgs.msg
+
+
+class Talker():
+    def __init__(self):
+        self.pub = rospy.Publisher('chatter', std_msgs.msg.String, queue_size=10)
+        rospy.init_node('talker', anonymous=True)
+        self.rate = rospy.Rate(10)
+        rospy.Subscriber('chatter', std_msgs.msg.String, self.hear)
+
+    def hear(self, message):
+        print('heard %s' % message.data)
+
+    def main_loop(self):
+        while not rospy.is_shutdown():
+            self.pub.publish('hello world %s' % rospy.get_time())
+            self.rate.sleep()
+
+
+if __name__ == '__main__':
+    talker = Talker()
+    talker.main_loop()
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("self.pub =", "self,pub =", "a dot belongs between `self` and `pub`"),
+        ("self.rate.sleep", "self.arte.sleep", "`arte` is called `rate`"),
+        ("self.rate.sleep", "self.rate,sleep", "a dot belongs between `rate` and `sleep`"),
+        ("self.hear)", "self,hear)", "a dot belongs between `self` and `hear`"),
+        ("self.hear)", "selg.hear)", "selg is not defined"),
+        ("message.data", "mesage.data", "mesage is not defined"),
+        ("message.data", "message,data", ""),
+        ("hear(self, ", "hear(Self, ", ""),
+        ("main_loop(self)", "main_loop(Self)", "is called `self`, and not `Self`"),
+        ("main_loop(self)", "main_loopself)", "its opening bracket is missing"),
+        ("talker.main_loop", "talker.main_lop", "`main_lop` is called `main_loop`"),
+        ("talker = Talker", "talker == Talker", "a name gets its value by `=`"),
+        ("rospy.Publisher", "Rospy.Publisher", "Rospy is not defined"),
+        ("anonymous=True", "anonymousTrue", "`=` is missing between `anonymous` and its value"),
+        ("anonymous=True", "anonymous==True", "an argument of a call gets its value by `=`"),
+        ("print(", "Print(", "Print is not defined"),
+        ("self.rate = rospy", "self.rate rospy", "`=` is missing between the name and its value"),
+        ("self.hear)", "selfhear)", "the dot is missing in `selfhear`"),
+        ("import std_msgs.msg", "import stdd_msgs.msg", "uses std_msgs, which is not imported"),
+        ("import std_msgs.msg", "import std_msgs.msh", "messages are not imported from std_msgs.msh"),
+        ("std_msgs.msg.String", "stdxmsgs.msg.String", "stdxmsgs is not defined"),
+        ("std_msgs.msg.String", "std_msgs.msg.Sting", "there is no std_msgs.msg.Sting"),
+        ("std_msgs.msg.String", "std_msgs.mgs.String", "there is no std_msgs.mgs"),
+        ("std_msgs.msg.String", "std_msgs.msg,String", "a dot belongs between `msg` and `String`"),
+    ],
+)
+def test_a_slip_in_a_class_is_named_and_undone(old: str, new: str, says: str, tmp_path: Path) -> None:
+    folder = package(tmp_path, {**FILES, TALKER: CLASS.replace(old, new, 1)})
+    found = repair_all(folder, WANTED)
+    words = "; ".join(f"{one.message}: {one.fix}" for one in found)
+    assert says in words
+    if says:
+        assert plain(TALKER, (folder / TALKER).read_bytes()) == plain(TALKER, CLASS.encode()), words
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "says"),
+    [
+        ("[n for n in (1, 2) if n]", "[n For n in (1, 2) if n]", "Python writes `for`, not `For`"),
+        ("[n for n in (1, 2) if n]", "[n for n ni (1, 2) if n]", "Python writes `in`, not `ni`"),
+        ("[n for n in (1, 2) if n]", "[n for n in (1, 2) f n]", "Python writes `if`, not `f`"),
+        ("rospy.get_time() or 1", "rospy.get_time() ro 1", "Python writes `or`, not `ro`"),
+        ("max((1, 2), default=3)", "max((1, 2). default=3)", "a comma belongs between two arguments"),
+    ],
+)
+def test_a_slip_within_a_value_is_named_and_undone(right: str, wrong: str, says: str, tmp_path: Path) -> None:
+    given = "'hello world %s' % rospy.get_time()"
+    folder = package(tmp_path, {**FILES, TALKER: FILES[TALKER].replace(given, wrong)})
+    found = repair_all(folder, WANTED)
+    assert says in "; ".join(one.message for one in found)
+    assert (folder / TALKER).read_text() == FILES[TALKER].replace(given, right)
+
+
+def test_an_argument_beside_self_stays_one(tmp_path: Path) -> None:
+    text = CLASS.replace("self.hear)", "lambda msg: self.say(self, msg))").replace(
+        "def hear(self, message):", "def say(self, hear, message=None):"
+    )
+    assert repair_all(package(tmp_path, {**FILES, TALKER: text}), WANTED) == ()
+
+
+def test_brackets_within_a_value_are_not_there_twice(tmp_path: Path) -> None:
+    text = FILES[TALKER].replace("'hello world %s' % rospy.get_time()", "str((rospy.get_time() + 1) * 2")
+    folder = package(tmp_path, {**FILES, TALKER: text})
+    repair_all(folder, WANTED)
+    assert "text = str((rospy.get_time() + 1) * 2)\n" in (folder / TALKER).read_text()
+
+
+COMMENTED = FILES[XML].replace(
+    "  <version>", "  <!-- First the version -->\n  <!-- Then all else -->\n  <version>"
+)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("version -->", "version ->"),
+        ("version -->", "version _->"),
+        ("version -->", "version --->"),
+        ("version -->", "version --<"),
+        ("else -->", "else -"),
+        ("<!-- First", "<-- First"),
+        ("<!-- First", "<!_- First"),
+        ("<!-- Then", "<!!-- Then"),
+        ("<!-- Then", "!-- Then"),
+    ],
+)
+def test_a_slip_of_a_comment_is_undone(old: str, new: str, tmp_path: Path) -> None:
+    folder = package(tmp_path, {**FILES, XML: COMMENTED.replace(old, new)})
+    found = repair_all(folder, WANTED)
+    assert [one.file for one in found] == [XML]
+    assert plain(XML, (folder / XML).read_bytes()) == plain(XML, COMMENTED.encode())
 
 
 def test_the_correct_package_has_no_slip(tmp_path: Path) -> None:

@@ -439,6 +439,34 @@ CASES = {
                          after={TALKER: "['name']"}),
     "key-beside-the-right-one": Case(swapped(TALKER, ("publish(1)", "publish(all['Name'] + all['name'])"),
                                              ("    rate =", "    all = rospy.get_param('details')\n    rate =")), []),
+    "key-that-no-file-has": Case(
+        {"config/my.yaml": 'details:\n  name: "Ada"\n',
+         **swapped(TALKER, ("publish(1)", "publish(all['namme'] + all['name'])"),
+                   ("    rate =", "    all = rospy.get_param('details')\n    rate ="))},
+        ["parameter-name"], "the parameter namme should be name", after={TALKER: "all['name'] + all['name']"},
+    ),
+    "key-of-a-file": Case(
+        {"config/my.yaml": 'details:\n  name: "Ada"\n  names: 3\n',
+         **swapped(TALKER, ("publish(1)", "publish(all['names'] + all['name'])"),
+                   ("    rate =", "    all = rospy.get_param('details')\n    rate ="))}, []),
+    "key-with-two-colons": Case(
+        {"config/my.yaml": 'details:\n  name:: "Ada"\n'}, ["parameter-name"], "the key name: should be name",
+        wanted=asking(files=("config/my.yaml",)), after={"config/my.yaml": '  name: "Ada"\n'}),
+    "own-package-misspelt": Case(
+        {**OWN, **swapped(TALKER, ("import Int8\n", "import Int8\nfrom alb.msg import Level\n")), CMAKELISTS: OWN_CMAKE,
+         XML: MANIFEST.replace("rospy</depend>", "rospy</depend><build_depend>message_generation</build_depend>")},
+        ["build-line", "missing-import"], "there is no package alb", after={TALKER: "from lab.msg import Level"}),
+    "exported-by-a-slip-of-its-name": Case(
+        {CMAKELISTS: CMAKE.replace("catkin_package()", "catkin_package(CATKIN_DEPENDS Rospy)")}, ["build-line"],
+        "write rospy instead of Rospy", after={CMAKELISTS: "CATKIN_DEPENDS rospy)", XML: MANIFEST}),
+    "component-by-a-slip-of-its-name": Case(
+        {**RUN_OWN, CMAKELISTS: OWN_CMAKE.replace("message_generation", "messaeg_generation").replace(
+            "catkin_package", "generate_messages()\ncatkin_package")}, ["build-line"],
+        "write message_generation instead of messaeg_generation",
+        after={CMAKELISTS: "COMPONENTS message_generation rospy)"}),
+    "script-with-two-slashes": Case(
+        {CMAKELISTS: CMAKE + "catkin_install_python(PROGRAMS src//talker.py DESTINATION "
+         "${CATKIN_PACKAGE_BIN_DESTINATION})\n"}, [], wanted=asking(installed=(TALKER,))),
     "find": Case(swapped(LAUNCHED, ("</launch>", '  <rosparam file="$(find labb)/a.yaml"/>\n</launch>')),
                  ["package-name"], "$(find labb) should be $(find lab)", after={LAUNCHED: "$(find lab)/a.yaml"}),
     "find-of-another": Case(swapped(LAUNCHED, ("</launch>", '<rosparam file="$(find rospy)/a.yaml"/>\n</launch>')), []),

@@ -93,7 +93,11 @@ def explain_number_of_values(message: str) -> Meaning | None:
     return f"there are {len(fields)} fields: {join_words(fields)}", f"give each of them a value: `{named}`"
 
 
-def _index(_message: str, source: str, marked: tuple[int, int] | None) -> Meaning:
+def _index(message: str, source: str, marked: tuple[int, int] | None) -> Meaning:
+    place = re.search(r"(?:Replacement index (\d+) out|^tuple index out) of range", message)
+    if place and re.search(r"\{\d*[^{}]*\}.*\.format\(", source):
+        fix = "give `format(…)` as many values as the text has `{}` in it"
+        return "the text has more `{}` in it than `format(…)` has values", fix
     found = _subscript(source, marked)
     if found is None:
         return (
@@ -314,6 +318,11 @@ def wrong_class(source: str) -> Meaning | None:
 
 def _init_node(message: str, source: str) -> Meaning | None:
     """Of `init_node(…)` without a name, or with one that is not text."""
+    if re.search(r"\b(?:Rate\.)?__init__\(\) missing 1 required positional argument: 'hz'$", message):
+        return (
+            "`Rate(…)` is not told how often",
+            "write how many times a second the loop has to run in its brackets",
+        )
     if message == "init_node() missing 1 required positional argument: 'name'":
         return "a node needs a name", "write the node's name in the brackets, as a string"
     called = next(iter(_calls(source, "init_node")), None)

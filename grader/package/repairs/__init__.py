@@ -86,7 +86,7 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
         repair_script_names(files, script, names[script], wanted)
     repair_yaml_names(files, package, names, wanted)
     for script in names:
-        repair_script_keys(files, script, names[script], wanted)
+        repair_script_keys(files, package, script, names[script], wanted)
     return tuple(sorted(files.repairs, key=lambda repair: KINDS.index(repair.kind)))
 
 

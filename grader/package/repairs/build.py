@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 
 from cmake_parser.ast import Command, Token
 
-from grader.installable import noetic_messages
+from grader.installable import known_packages, noetic_messages
 from grader.model.message_definitions import DIVIDER, PARTS, exchanged_parts, meant_type
 from grader.model.package import CMAKE, INTERFACE_FOLDERS, MANIFEST, PackageFacts, meant_command
 from grader.model.repair import RepairKind
@@ -18,9 +18,9 @@ from grader.package.cmake_slips import find_slip, is_open
 from grader.package.manifest import parse_manifest
 from grader.package.repairs.editing import Files, naming_files, rename_word
 from grader.package.repairs.files import is_own
-from grader.package.repairs.manifest import declare_for_running
+from grader.package.repairs.manifest import OF_ROS, declare_for_running
 from grader.package.repairs.names import CPP, Wanted, is_near
-from grader.wording import join_words, lines_text
+from grader.wording import is_one_edit, join_words, lines_text
 
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 INSTALL = "catkin_install_python"
@@ -322,11 +322,28 @@ def _declare_exported(files: Files) -> None:
     """Declare in `package.xml` what `catkin_package(CATKIN_DEPENDS …)` names, as catkin asks for."""
     for call in _commands(files, "catkin_package"):
         for name in _values_of(call, "CATKIN_DEPENDS"):
-            if re.fullmatch(r"\w+", name):
+            meant = [one for one in _declared(files) if is_one_edit(name, one) or name.lower() == one]
+            token = next(t for t in _words(call) if t.value == name)
+            known = {*_declared(files), *known_packages(), *noetic_messages(), *OF_ROS}
+            if name not in known and len(meant) == 1:
+                message = (
+                    f"line {call.line} of {CMAKE}: catkin_package(…) names {name}, which is called {meant[0]}"
+                )
+                fix = f"write {meant[0]} instead of {name}"
+                files.change(
+                    "build-line", CMAKE, _replace_token(_cmake(files), token, meant[0]), message, fix
+                )
+            elif re.fullmatch(r"\w+", name):
                 message = (
                     f"line {call.line} of {CMAKE}: catkin_package(…) names {name}, and {MANIFEST} does not"
                 )
                 declare_for_running(files, name, message)
+
+
+def _declared(files: Files) -> set[str]:
+    """Return the packages that `package.xml` names."""
+    manifest, _ = parse_manifest((files.text(MANIFEST) or "").encode())
+    return {one.name for one in manifest.dependencies} if manifest is not None else set()
 
 
 # ---- messages, services and actions of the package's own
@@ -374,6 +391,12 @@ def _make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Co
         and not any("$" in word for word in named)
     ):
         words = _words(of_catkin[0])
+        near = next((token for token in words if is_one_edit(token.value, GENERATION)), None)
+        if near is not None:
+            message = f"line {of_catkin[0].line} of {CMAKE}: there is no package {near.value}"
+            fix = f"write {GENERATION} instead of {near.value}"
+            files.change("build-line", CMAKE, _replace_token(_cmake(files), near, GENERATION), message, fix)
+            return
         listed = next((t for t in words if t.value == "COMPONENTS"), None)
         token, new = (listed, GENERATION) if listed else (words[-1], f"COMPONENTS {GENERATION}")
         changed = _replace_token(_cmake(files), token, f"{token.value} {new}")
@@ -637,7 +660,8 @@ def _place(own: Sequence[str], files: Files, script: str) -> str:
 
 
 def _plain(word: str) -> str:
-    return re.sub(r"^\$\{(PROJECT_SOURCE_DIR|CMAKE_CURRENT_SOURCE_DIR)\}/|^\./", "", word.strip('"'))
+    path = re.sub(r"^\$\{(PROJECT_SOURCE_DIR|CMAKE_CURRENT_SOURCE_DIR)\}/|^\./", "", word.strip('"'))
+    return re.sub("/{2,}", "/", path)
 
 
 def _name_scripts(files: Files, own: Sequence[str], paths: Sequence[str]) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 
+from grader.installable import known_packages, noetic_messages
 from grader.model.package import MANIFEST, PackageFacts
 from grader.package.manifest import parse_manifest, required_tags
 from grader.package.repairs.editing import Files, repair_xml
 from grader.package.repairs.names import Wanted, is_near
 from grader.package.xml import parse_xml
+from grader.wording import is_one_edit
 
 FORMAT_1 = r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>"
 VALUES = (
@@ -23,6 +25,10 @@ VALUES = (
 """What a tag of a manifest says that catkin refuses, what is written for it, and the reason."""
 RUN_NEEDS = re.compile(r"<(?:depend|run_depend|exec_depend|build_export_depend)>\s*([\w-]+)\s*<")
 ALL_NEEDS = re.compile(r"<(build_depend|depend|run_depend|exec_depend)>\s*([\w-]+)\s*<")
+
+
+OF_ROS = {"rospy", "roscpp", "catkin", "message_generation", "message_runtime", "tf", "tf2"}
+"""Packages that every ROS has, besides those with messages."""
 
 
 def repair_manifest(files: Files, package: PackageFacts, wanted: Wanted) -> str:
@@ -88,7 +94,24 @@ def _add_buildtool(files: Files) -> None:
         _insert(files, "<buildtool_depend>catkin</buildtool_depend>", message)
 
 
+def _spell_dependency(files: Files, name: str) -> None:
+    """Write the name of a package in place of a slip of it, which no package has."""
+    text = files.text(MANIFEST) or ""
+    plain = _blank_comments(text)
+    for found in re.finditer(r"<(\w*depend)\b[^<>]*>\s*([\w-]+)\s*</\1>", plain) if _parses(text) else ():
+        given = found[2]
+        is_slip = given != name and (is_one_edit(given, name) or given.lower() == name)
+        if is_slip and given not in {*known_packages(), *noetic_messages(), *OF_ROS}:
+            line = text.count("\n", 0, found.start(2)) + 1
+            changed = f"{text[: found.start(2)]}{name}{text[found.end(2) :]}"
+            message = f"line {line} of {MANIFEST}: there is no package {given}"
+            files.change("manifest-line", MANIFEST, changed, message)
+            _spell_dependency(files, name)
+            return
+
+
 def _add_dependency(files: Files, name: str) -> None:
+    _spell_dependency(files, name)
     text = files.text(MANIFEST) or ""
     given = {match[2] for match in ALL_NEEDS.finditer(_blank_comments(text))}
     if name in given or not _parses(text):
@@ -101,6 +124,7 @@ def _add_dependency(files: Files, name: str) -> None:
 
 def declare_for_running(files: Files, name: str, message: str) -> None:
     """Declare a package that is needed at run time, unless the manifest does."""
+    _spell_dependency(files, name)
     text = _blank_comments(files.text(MANIFEST) or "")
     if name not in RUN_NEEDS.findall(text):
         tag = "run_depend" if re.search(FORMAT_1, text) else "exec_depend"

@@ -209,7 +209,7 @@ ROLES = ("node", "publisher", "subscriber", "server", "client", "param", "set-pa
 NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test")
 WORDS = {"topic-name": "topic", "service-name": "service", "node-name": "node", "parameter-name": "parameter"}
 TAG_LINES_MAX = 20
-_KEY = re.compile(r"^(?P<indent> *)(?P<quote>[\"']?)(?P<key>[A-Za-z_][\w-]*)(?P=quote)(?=\s*:(\s|$))")
+_KEY = re.compile(r"^(?P<indent> *)(?P<quote>[\"']?)(?P<key>[A-Za-z_][\w-]*:?)(?P=quote)(?=\s*:(\s|$))")
 
 
 def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: Wanted) -> None:
@@ -311,17 +311,24 @@ def _has_keys(param: str, keys: Sequence[str], branches: Sequence[str]) -> bool:
     return all(f"{param}/{key}" in branches for key in keys)
 
 
-def repair_script_keys(files: Files, file: str, names: Sequence[Name], wanted: Wanted) -> None:
+def repair_script_keys(
+    files: Files, package: PackageFacts, file: str, names: Sequence[Name], wanted: Wanted
+) -> None:
     """Find the keys in `details['name']['First']` that differ from a part of the lab's parameters by capitals or a
-    letter, where the script has no other key for that part."""
+    letter, where the script has no other key for that part, or no file and no other line of it has that key."""
     parts = dict.fromkeys(part for branch in _branches(wanted) for part in branch)
     used = {name.value for name in names}
+    of_files = "\n".join(files.text(one.path) or "" for one in package.files if one.path.endswith(YAML))
     for name in dict.fromkeys(one for one in names if one.role == "key" and one.value not in parts):
-        near = [part for part in parts if part not in used and is_near(name.value, part)]
+        alone = len(re.findall(rf"\b{re.escape(name.value)}\b", files.text(file) or "")) == 1
+        is_slip = alone and not re.search(rf"\b{re.escape(name.value)}\b", of_files)
+        near = [part for part in parts if is_near(name.value, part)]
+        near = [part for part in near if part not in used or (is_slip and f"{part}:" in of_files)]
         if len(near) == 1:
             _replace_literal(files, file, name, near[0], near[0])
 
 
+YAML = (".yaml", ".yml")
 CPP = (".c", ".cc", ".cpp", ".cxx", ".h", ".hpp")
 ROLES_OF_CPP: dict[str, Literal["publisher", "subscriber", "server", "client", "node"]] = {
     "advertise": "publisher",

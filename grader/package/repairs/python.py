@@ -87,6 +87,7 @@ def repair_python(
     """Find what keeps the sources from running, and return the names that they use once they do."""
     _delete_imports(files, scripts, package)
     _delete_manifests(files, scripts, package)
+    _spell_package(files, scripts, package)
     texts = {script: text for script in scripts if (text := files.text(script))}
     names: dict[str, tuple[Name, ...]] = {}
     for entry in _examine(texts, types):
@@ -142,6 +143,22 @@ def _delete_manifests(files: Files, scripts: Sequence[str], package: PackageFact
                 f"line {number} of {file}: there is no package {loaded[1]}, and catkin needs no such line"
             )
             files.change("missing-import", file, _emptied(lines, number), message, f"delete line {number}")
+
+
+def _spell_package(files: Files, scripts: Sequence[str], package: PackageFacts) -> None:
+    """Write the package's own name in place of a slip of it, where its messages and services are imported."""
+    own = [one.name for one in (package, *package.also) if one.interfaces]
+    for file in scripts:
+        lines = (files.text(file) or "").split("\n")
+        for number, line in enumerate(lines, start=1):
+            found = re.match(r"\s*(?:from|import)\s+(\w+)\.(?:msg|srv|action)\b", line)
+            name = found[1] if found else ""
+            meant = [one for one in own if is_one_edit(name, one) or name.lower() == one.lower()]
+            if found and len(meant) == 1 and name not in {*own, *known_packages()}:
+                changed = line[: found.start(1)] + meant[0] + line[found.end(1) :]
+                lines[number - 1] = changed
+                message = f"line {number} of {file}: there is no package {name}"
+                files.change("missing-import", file, "\n".join(lines), message)
 
 
 LOADED = re.compile(r"""(?:import roslib\s*;\s*)?roslib\.load_manifest\(["']([\w-]+)["']\)\s*(?:#.*)?""")

@@ -1,0 +1,169 @@
+"""Repairs of names in a script that nothing gives a value, and that are nearly the same as one that has one.
+
+The text of a script that parses comes in, and the steps go out that repair it, as in `source_repair.py`. It runs in a
+child process: the standard library only, and nothing is executed.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+from collections.abc import Collection, Iterator
+from difflib import get_close_matches
+
+from grader.package.syntax_repair import Step, edited, span_of, step_to
+from grader.wording import is_one_edit
+
+OF_PYTHON = {
+    "abs",
+    "float",
+    "format",
+    "input",
+    "int",
+    "len",
+    "max",
+    "min",
+    "print",
+    "range",
+    "round",
+    "sorted",
+    "str",
+    "sum",
+}
+"""Functions of Python that are called in any script."""
+OBVIOUS_NAMES = {
+    **dict.fromkeys(("true", "TRUE"), "True"),
+    **dict.fromkeys(("false", "FALSE"), "False"),
+    **dict.fromkeys(("null", "NULL", "none", "nil", "nullptr"), "None"),
+    **dict.fromkeys(("_name_", "__name", "_name", "name__"), "__name__"),
+}
+NAME_CHARS_MIN = 4
+"""Of shorter names, a letter that is not the same is the larger part."""
+SHORT_NAME_CHARS_MIN = 2
+"""Names of one letter are different names."""
+
+
+def bound_in(tree: ast.Module) -> set[str]:
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+            found.add(node.id)
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.arg):
+            found.add(node.arg)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            found.update((a.asname or a.name).partition(".")[0] for a in node.names)
+        elif isinstance(node, ast.ExceptHandler | ast.MatchAs | ast.MatchStar):
+            found.add(node.name or "")
+    return found
+
+
+def with_self(text: str) -> Iterator[Step]:
+    """`def stop(Self):` of a method that uses `self`."""
+    tree, lines = ast.parse(text), text.split("\n")
+    methods = (m for one in ast.walk(tree) if isinstance(one, ast.ClassDef) for m in one.body)
+    for method in (m for m in methods if isinstance(m, ast.FunctionDef) and m.args.args):
+        first, used = method.args.args[0], {n.id for n in ast.walk(method) if isinstance(n, ast.Name)}
+        span = span_of(lines, first)  # type: ignore[arg-type] # an argument has a place too
+        is_slip = is_one_edit(first.arg, "self") and "self" in used and first.arg not in used
+        if is_slip and span is not None:
+            yield from step_to(
+                "argument", first.lineno, text, edited(text, [(*span, "self")]), OF_SELF % first.arg
+            )
+            return
+
+
+OF_SELF = "a method's own object is called `self`, and not `%s`"
+
+
+def with_names(text: str) -> Iterator[Step]:
+    """`true`, `rospu` and `Sting`: a name that nothing in the file has, and one alone is nearly the same."""
+    tree, lines = ast.parse(text), text.split("\n")
+    bound = bound_in(tree)
+    if "*" in bound or any(isinstance(n, ast.Try) and _catches_names(n) for n in ast.walk(tree)):
+        return
+    shared = {name for one in tree.body for name in _bound_by(one)}
+    known = bound | set(dir(builtins)) | {"__file__"}
+    loaded = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+    blocks = (
+        inner
+        for one in tree.body
+        if not isinstance(one, ast.Import | ast.ImportFrom)
+        for inner in (one.body if isinstance(one, ast.ClassDef) else [one])
+    )
+    for block in blocks:
+        own = shared | (bound_in(ast.Module([block], [])) if isinstance(block, ast.FunctionDef) else set())
+        missing = [n for n in ast.walk(block) if isinstance(n, ast.Name) and n.id not in known]
+        stated = (n.value for n in ast.walk(block) if isinstance(n, ast.Expr))
+        alone = {n.id for n in stated if isinstance(n, ast.Name) and is_one_edit(n.id.lower(), "pass")}
+        for name in dict.fromkeys(n.id for n in missing):
+            guards = name == "name" and any(_is_guard(one) for one in tree.body)
+            meant = OBVIOUS_NAMES.get(name) or (guards and "__name__") or meant_by(name, own, own - loaded)
+            meant = (
+                meant
+                or (name in alone and "pass")
+                or next((one for one in OF_PYTHON if is_slip(name, one)), "")
+            )
+            spans = [span for n in missing if n.id == name and (span := span_of(lines, n))]
+            if meant and spans:
+                after = edited(text, [(*span, meant) for span in spans])
+                for step in step_to("name", spans[0][0] + 1, text, after, name):
+                    text, lines = step["text"], step["text"].split("\n")
+                    yield step
+                    yield from with_names(text)
+                    return
+
+
+def _is_guard(node: ast.stmt) -> bool:
+    """Return whether a statement begins the script's own part, `if name == 'main':` too."""
+    test = node.test if isinstance(node, ast.If) else None
+    word = test.comparators[0] if isinstance(test, ast.Compare) else None
+    return isinstance(word, ast.Constant) and str(word.value).strip("_ ").lower() == "main"
+
+
+def meant_by(name: str, own: set[str], unused: Collection[str] = ()) -> str:
+    """Return the one name of the script's own that is meant by one that has no value; "" where there is not one. Of the
+    `unused`, one that is nearly the same is meant before all others."""
+    always = ("__name__", "True", "False", "None", *({"self", "rospy", "sys"} & own))
+    if sure := [one for one in always if is_one_edit(name, one)]:
+        return sure[0]
+    inner = [one for one in own if is_letter_changed(name, one)]
+    slips = [one for one in unused if len(one) > SHORT_NAME_CHARS_MIN and is_one_edit(name, one)]
+    if len(slips) == 1:
+        return slips[0]
+    if len(inner) == 1:
+        return inner[0]
+    longer = [one for one in own if len(one) >= NAME_CHARS_MIN]
+    near = get_close_matches(name, longer, 2, 0.8) if len(name) >= NAME_CHARS_MIN else []
+    if len(near) == 1 or len(name) < SHORT_NAME_CHARS_MIN:
+        return near[0] if near else ""
+    slips = [one for one in own if len(one) >= SHORT_NAME_CHARS_MIN and is_slip(name, one)]
+    return slips[0] if len(slips) == 1 else ""
+
+
+def is_letter_changed(name: str, other: str) -> bool:
+    """Return whether one letter within two longer names is not the same: `teyt` for `text`. By the first or the last
+    one, or by a digit, they are different names."""
+    pairs = [(a, b) for a, b in zip(name, other, strict=False) if a != b]
+    same_ends = len(name) == len(other) >= NAME_CHARS_MIN and (name[0], name[-1]) == (other[0], other[-1])
+    return same_ends and len(pairs) == 1 and "".join(pairs[0]).isalpha()
+
+
+def is_slip(name: str, other: str) -> bool:
+    """Return whether two short names differ by capitals, by a letter that is missing, or by two that are exchanged; by
+    another letter they are different names."""
+    one, two = name.lower(), other.lower()
+    return one == two or (is_one_edit(one, two) and (len(one) != len(two) or sorted(one) == sorted(two)))
+
+
+def _bound_by(statement: ast.stmt) -> set[str]:
+    """Return the names that a statement of the script gives a value to, none of those within functions and classes."""
+    if isinstance(statement, ast.FunctionDef | ast.ClassDef):
+        return {statement.name}
+    return bound_in(ast.Module([statement], []))
+
+
+def _catches_names(block: ast.Try) -> bool:
+    kinds = [ast.unparse(handler.type) if handler.type else "" for handler in block.handlers]
+    return any("NameError" in kind for kind in kinds)
