@@ -99,10 +99,12 @@ def with_names(text: str) -> Iterator[Step]:
         alone = {n.id for n in stated if isinstance(n, ast.Name) and is_one_edit(n.id.lower(), "pass")}
         for name in dict.fromkeys(n.id for n in missing):
             guards = name == "name" and any(_is_guard(one) for one in tree.body)
-            meant = OBVIOUS_NAMES.get(name) or (guards and "__name__") or meant_by(name, own, own - loaded)
+            meant = (
+                OBVIOUS_NAMES.get(name) or ("__name__" if guards else "") or meant_by(name, own, own - loaded)
+            )
             meant = (
                 meant
-                or (name in alone and "pass")
+                or ("pass" if name in alone else "")
                 or next((one for one in OF_PYTHON if is_slip(name, one)), "")
             )
             spans = [span for n in missing if n.id == name and (span := span_of(lines, n))]
