@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from grader.checks.executable import ExecutableParams, executable
 from grader.checks.registry import LaunchName, ProgramName, check
-from grader.checks.support.launch import (
+from grader.checks.support.launch import died, nodes_up, not_run, quoted, refusal, why_died, why_not_up
+from grader.checks.support.launch_slips import (
     Slip,
-    died,
     find_launch,
     has_program,
     illegal_name,
@@ -19,14 +19,8 @@ from grader.checks.support.launch import (
     node_slip,
     nodes_of_program,
     nodes_of_script,
-    nodes_up,
-    not_run,
-    quoted,
     read_launch,
-    refusal,
     refusals,
-    why_died,
-    why_not_up,
 )
 from grader.checks.support.scripts import RIGHT_SHEBANG, add_hint, find_script, programs
 from grader.checks.support.text import near_names, shown

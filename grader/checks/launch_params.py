@@ -14,18 +14,15 @@ from grader.checks.support.launch import (
     BAD_FILE,
     NO_FILE,
     Absence,
-    Slip,
     finished,
-    nodes_of_script,
     nodes_up,
     not_run,
     quoted,
-    read_launch,
     refusal,
-    refusals,
     why_died,
     why_not_up,
 )
+from grader.checks.support.launch_slips import Slip, nodes_of_script, read_launch, refusals
 from grader.checks.support.parameters import (
     absolute_name,
     describe_missing,

@@ -14,25 +14,27 @@ from grader.checks.launch_params import params_in_place, params_misplaced
 from grader.checks.registry import DependencyName, LaunchName, ProgramName, check
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.launch import (
-    Slip,
     finished,
     is_exact,
     node_slips,
-    nodes_of_program,
-    nodes_of_script,
     nodes_up,
     not_executable,
     not_run,
     not_started,
-    own_script,
     quoted,
-    read_launch,
     refusal,
-    refusals,
     why_died,
     why_not_up,
 )
 from grader.checks.support.launch_names import RENAMES, find_renaming, names_in_scripts
+from grader.checks.support.launch_slips import (
+    Slip,
+    nodes_of_program,
+    nodes_of_script,
+    own_script,
+    read_launch,
+    refusals,
+)
 from grader.checks.support.processes import GlobalName, early_end
 from grader.checks.support.scripts import shebang_obstacles
 from grader.checks.support.text import SPIN, near_names

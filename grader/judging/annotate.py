@@ -13,7 +13,8 @@ from typing import NamedTuple, TypeVar
 
 from grader.checks.messages import code_of
 from grader.checks.support.exit_causes import syntax_hint
-from grader.checks.support.launch import node_slip, not_executable, own_script
+from grader.checks.support.launch import not_executable
+from grader.checks.support.launch_slips import node_slip, own_script
 from grader.checks.support.scripts import BACKUPS, PYTHON, SYNTAX, installed, is_product, names_script
 from grader.checks.support.text import RATE_SLOT, VALUE_SLOT, in_language
 from grader.judging.facts import SOURCES, Facts, language_of

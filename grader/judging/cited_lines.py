@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePosixPath
 
 from grader.checks.cmake import NOT_CALLED, below_catkin_package
-from grader.checks.support.launch import find_launch
+from grader.checks.support.launch_slips import find_launch
 from grader.checks.support.scripts import (
     SourceLine,
     commented_call,

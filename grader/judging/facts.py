@@ -15,7 +15,7 @@ from grader.checks.build import run_hint
 from grader.checks.registry import Check, Evidence
 from grader.checks.support.build_errors import unreadable_file
 from grader.checks.support.exit_causes import syntax_hint
-from grader.checks.support.launch import own_script, read_launch
+from grader.checks.support.launch_slips import own_script, read_launch
 from grader.checks.support.processes import failed_program
 from grader.checks.support.scripts import SYNTAX, find_script, programs, syntax_fault
 from grader.checks.support.text import Language, texts_in

@@ -1,34 +1,26 @@
-"""A launch file and its nodes: what its text says, what roslaunch printed, and why a node is not there."""
+"""The nodes of a launch file in a run: what roslaunch printed, and why a node is not there."""
 
 from __future__ import annotations
 
-import posixpath
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.support.exit_causes import explain_traceback, process_tracebacks, syntax_hint
+from grader.checks.support.launch_slips import PROGRAMS_OF, at_its_lines, node_slip, own_script, owner_of
 from grader.checks.support.processes import lives, observed_until_ns
 from grader.checks.support.scripts import (
-    add_hint,
-    can_be_moved,
-    cmake_calls,
-    find_script,
-    is_elsewhere,
-    move_hint,
     paths_by_name,
     programs,
-    script_of_role,
     shebang_obstacles,
 )
 from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
-from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFacts, SourceFile
+from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.submission import chmod_hint
 from grader.model.verdict import (
     FileCitation,
-    MistakeKind,
     Verdict,
     failed,
     inconclusive,
@@ -37,14 +29,10 @@ from grader.model.verdict import (
     unjudged,
 )
 from grader.untrusted_text import without_colours
-from grader.wording import join_words, there_is
+from grader.wording import join_words
 
-OTHER_ATTRIBUTES = {"package": "pkg", "exec": "type", "executable": "type", "script": "type"}
-"""What ROS 2, or plain English, calls them."""
 NOT_EXECUTED = (2, 126, 127)
 """Exit codes of `env` and of a shell that find no such program, or cannot read what it is given."""
-UNRESOLVED = "$("
-ATTRIBUTES = ("pkg", "type", "name")
 _ERRORS = (
     "ERROR: cannot launch", "RLException", "Invalid ", "ERROR:", "process has died", "roslaunch:",
     "Resource not found",
@@ -91,160 +79,11 @@ _REFUSALS = (
 )  # fmt: skip
 
 
-class Slip(NamedTuple):
-    """What is wrong with a line of a launch file, and what to write. `of_manifest`: the manifest's name is at fault;
-    `refused`: roslaunch starts nothing at all; `lacks`: the program that is not there."""
-
-    file: str
-    line: int
-    why: str
-    fix: str
-    of_manifest: bool = False
-    refused: bool = False
-    lacks: str = ""
-
-    def verdict(self, said: str = "") -> Verdict:
-        """Return the verdict with what roslaunch said (`said`) at the end."""
-        cited = (FileCitation(file=self.file, line=self.line),)
-        message = f"{self.file}, line {self.line}: {self.why}{said}"
-        return (unjudged if self.of_manifest else failed)(message, hint=self.fix, citations=cited)
-
-
-PROGRAMS_OF = {
-    "rospy_tutorials": ("listener.py", "talker.py", "listener", "talker"),
-    "turtlesim": ("turtlesim_node", "turtle_teleop_key", "draw_square", "mimic"),
-}
-"""What tutorials start of ROS's own packages."""
-
-
-def find_launch(package: PackageFacts, name: str) -> LaunchFile | None:
-    """Return the launch file of that name in any folder, one in `launch/` first."""
-    found = [f for f in package.launch_files if PurePosixPath(f.path).name == name]
-    return min(found, key=lambda f: (PurePosixPath(f.path).parts[0] != "launch", f.path), default=None)
-
-
-def read_launch(package: PackageFacts, name: str, wanted: Iterable[str] = ()) -> LaunchFile | Verdict:
-    """Return the launch file of that name, or the verdict if it is missing, not well-formed, or has another root.
-
-    `wanted` are the programs that it has to start: another file that starts them may be what was meant.
-    """
-    file = find_launch(package, name)
-    verdict = _unreadable(package, file, name, {PurePosixPath(one).name for one in wanted})
-    if file is None or verdict is not None:
-        return (verdict or failed(f"{name} cannot be read")).about(measured="no launch file that can be read")
-    return file
-
-
-def _unreadable(
-    package: PackageFacts, file: LaunchFile | None, launch: str, wanted: set[str]
-) -> Verdict | None:
-    if file is None:
-        return _absent(package, launch, wanted)
-    if file.fault is None:
-        return None
-    line = f", line {file.fault.line}" if file.fault.line else ""
-    message = f"{file.path}{line} is not well-formed: {file.fault.explanation}"
-    hint = file.fault.advice or "close every element, and begin with <launch> and end with </launch>"
-    return failed(message, hint=hint, citations=(file.fault.place,))
-
-
-def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
-    """Return that the launch file is not there, and which other one may be meant: one of nearly its name, or one that
-    starts the same programs."""
-    started = {f.path: f.starts(wanted) for f in package.launch_files if f.nodes}
-    full = package.launches_of(wanted)
-    programs = wanted if full else {_program_meant(package, one) for one in wanted}
-    guessed = [] if full else package.launches_of(programs)[:1]
-    others = [f.path for f in package.launch_files]
-    names = paths_by_name(package)
-    near = [names[n] for n in near_names(launch, names)]
-    stem = PurePosixPath(launch).stem
-    near += [p for n, p in names.items() if n == f"{stem}.xml" and p not in near]
-    seen = f"; {there_is(dict.fromkeys([*near, *others]))}" if near or others else ""
-    if starting := full or guessed:
-        which = "which" if starting == others else f"and {join_words(starting)}"
-        seen += f", {which} {'each start' if len(starting) > 1 else 'starts'} {join_words(sorted(programs))}"
-    parts = {} if full else _parts_started(started)
-    if parts:
-        seen += f", and {join_words(f'{path} starts {name}' for path, name in parts.items())}"
-    movable = [p for p in near if can_be_moved(p, launch) and (not wanted or started.get(p, wanted))]
-    movable += full[:1] if len(full) == 1 else []
-    path = f"launch/{launch}"
-    hint = move_hint(package, movable[0], path) if movable else add_hint(package, path)
-    if guessed and not movable:
-        hint = f"{hint}, or {move_hint(package, guessed[0], path)} if that is meant to be it"
-    if parts and set(parts.values()) == wanted and not movable:
-        hint = f"{hint}, with the <node>s of {join_words(parts)} in it"
-    verdict = failed(f"{launch} is not in the package{seen}", hint=hint)
-    kind: MistakeKind = "file-elsewhere" if movable or guessed else "file-missing"
-    return verdict.about(citations=(FileCitation(file=movable[0] if movable else path),)).lost_by(kind, path)
-
-
-def _program_meant(package: PackageFacts, name: str) -> str:
-    """Return the name of the script that may be meant to be this one, if it is missing; else the name itself."""
-    other = "" if has_program(package, name) else script_of_role(package, name)
-    return PurePosixPath(other).name or name
-
-
-def _parts_started(started: Mapping[str, set[str]]) -> dict[str, str]:
-    """Return the launch files that start one of the programs each, no two of them the same one, and that program."""
-    alone = [(path, next(iter(names))) for path, names in started.items() if len(names) == 1]
-    names = [name for _, name in alone]
-    return {path: name for path, name in alone if names.count(name) == 1}
-
-
 def not_run(run: Run) -> Verdict | None:
     """Nothing was started at all."""
     if lives(run) or run.graph:
         return None
     return inconclusive("roslaunch was not run", hint="grade again")
-
-
-def has_program(package: PackageFacts, name: str) -> bool:
-    """Return whether there is a file of that name, or a program that CMake builds under it."""
-    if "/" not in name and find_script(package, name) is not None:
-        return True
-    return any(one.is_called(name) and not is_elsewhere(one, package) for one in programs(package))
-
-
-def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip | None:
-    """Return why a node cannot start by what the file says of it. Names with `$(…)` are roslaunch's to resolve.
-
-    `said` is what roslaunch said: a package that it does not find is a slip, any other is not this package's.
-    """
-    missing = [a for a in ATTRIBUTES if not (getattr(node, a) or "").strip()]
-    if missing:
-        known = {
-            name: OTHER_ATTRIBUTES[name] for name in node.unknown if OTHER_ATTRIBUTES.get(name) in missing
-        }
-        slips = {name: meant[0] for name in node.unknown if (meant := near_names(name, missing))} | known
-        told = "".join(f"; it has no attribute {name}" for name in slips)
-        fix = "; ".join(f"write {right}= instead of {name}=" for name, right in slips.items())
-        stem = PurePosixPath(node.type or "<file>.py").stem
-        own = {"pkg": package.name, "type": f"{node.name or '<file>'}.py", "name": stem}
-        add = " ".join(f'{name}="{own[name]}"' for name in missing)
-        why = f"<node> has no {join_words(missing)}{told}"
-        return _slip(node, why, fix or f"add {add} to the <node>")._replace(refused=True)
-    pkg, name = str(node.pkg), str(node.type)
-    if path := next((a for a in ("pkg", "type") if "$(find" in str(getattr(node, a))), None):
-        return _slip(
-            node,
-            f"{path} is a path",
-            f'write pkg="{package.name}" and type="<file>.py": names only, without folders',
-        )
-    if UNRESOLVED in pkg + name:
-        return None
-    if owner := _owner(package, node):
-        there = has_program(owner, name)
-        return None if there else _no_program(owner, node, (package, *package.also))._replace(lacks=name)
-    if near_names(package.name, [pkg]) or f"[{pkg}/{name}]" in said or _folder(package) == pkg:
-        fix = f'write pkg="{package.name}"'
-        then = "" if has_program(package, name) else _no_program(package, node, (package,)).fix
-        fix += f" and {then.removeprefix('write ')}" if then.startswith("write type=") else ""
-        slip = _slip(node, f"there is no {name} in a package {pkg}", fix)
-        # Where the launch file has the name of the folder or of project(…), the manifest is at fault.
-        return slip._replace(of_manifest=pkg in {_folder(package), *_projects(package)}, lacks=name)
-    return None
 
 
 def node_slips(package: PackageFacts, file: LaunchFile, run: Run) -> Verdict | None:
@@ -256,140 +95,11 @@ def node_slips(package: PackageFacts, file: LaunchFile, run: Run) -> Verdict | N
         for node in file.nodes
         if (slip := node_slip(package, node.model_copy(update={"file": file.path}), said))
     ]
-    verdict = joined([_at_its_lines(slip, found).verdict() for slip in found])
+    verdict = joined([at_its_lines(slip, found).verdict() for slip in found])
     if verdict is None:
         return None
     message = verdict.message.replace(f"; {file.path}, ", "; ")
     return verdict.model_copy(update={"message": f"{message}{quoted(run)}"})
-
-
-def _at_its_lines(slip: Slip, slips: Sequence[Slip]) -> Slip:
-    """Return the slip with a fix that names its line where there are others, and all lines of the same fix."""
-    lines = [str(one.line) for one in slips if one.fix == slip.fix]
-    if len(slips) < 2:
-        return slip
-    return slip._replace(fix=f"on line{'s' if len(lines) > 1 else ''} {join_words(lines)}, {slip.fix}")
-
-
-def later_fixes(file: LaunchFile, script: str) -> Iterator[str]:
-    """Yield what lets the file start a script that is meant in it: an `if` or `unless` that leaves its node out, and
-    its whole name as `type`."""
-    name = PurePosixPath(script).name
-    stem = PurePosixPath(name).stem
-    off = [(kind, line, said) for kind, line, said in file.switched_off if PurePosixPath(kind).stem == stem][
-        :1
-    ]
-    for _, line, said in off:
-        other = ", or give its <arg> the other default" if "$(arg" in said else ""
-        yield f"remove {said} from line {line}{other}"
-    named = [(kind, f"in the <node> below line {line}") for kind, line, _ in off]
-    named += [(node.type, f"on line {node.line}") for node in file.brings if node.type == stem]
-    yield from (f'write type="{name}" {place}, not type="{kind}"' for kind, place in named if kind != name)
-
-
-def illegal_name(node: LaunchNode) -> Slip | None:
-    """Return a name at which roslaunch only warns, and which other tools stumble over."""
-    name = node.name or ""
-    if not name or UNRESOLVED in name or re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
-        return None  # that a name is missing is said elsewhere
-    why = f'name="{name}" is not a legal name in ROS, and other tools fail on it'
-    return _slip(node, why, "begin it with a letter, and use letters, digits and _ only")
-
-
-def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
-    """Yield what makes roslaunch start nothing at all."""
-    for fault in file.include_faults:
-        yield Slip(fault.file or file.path, fault.line or 1, fault.message, fault.advice)
-    seen: dict[str, LaunchNode] = {}
-    for node in file.brings:
-        slip = node_slip(package, node)
-        if slip is not None and slip.refused:
-            yield slip
-        elif "/" in (node.name or ""):
-            fix = f'write name="{PurePosixPath(str(node.name)).name}"; a namespace goes into ns="…"'
-            yield _slip(node, f'name="{node.name}" has a slash in it, which roslaunch refuses', fix)
-        elif node.full_name in seen and not node.uncertain:
-            why = f"a second node is named {node.full_name}, like that on line {seen[node.full_name].line}"
-            yield _slip(node, why, "give each <node> its own name: roslaunch refuses the file")
-        if not node.uncertain:
-            seen.setdefault(node.full_name, node)
-
-
-def nodes_of_script(package: PackageFacts, file: LaunchFile, script: str) -> tuple[LaunchNode, ...]:
-    """Return the nodes that run this script of the package, or may run it as far as can be seen."""
-    name = PurePosixPath(script).name
-    return tuple(n for n in file.brings if _may_be(n.pkg, package.name) and _may_be(n.type, name))
-
-
-def nodes_of_program(file: LaunchFile, program: str) -> tuple[LaunchNode, ...]:
-    """Return the nodes that run `package/program`; a Python program's `.py` may be there or not."""
-    pkg, _, name = program.partition("/")
-    names = {name, name.removesuffix(".py"), f"{name}.py"}
-    return tuple(n for n in file.brings if _may_be(n.pkg, pkg) and any(_may_be(n.type, one) for one in names))
-
-
-def _may_be(written: str | None, name: str) -> bool:
-    return written == name or (UNRESOLVED in (written or "") and "$(find" not in (written or ""))
-
-
-def _no_program(package: PackageFacts, node: LaunchNode, of_lab: Sequence[PackageFacts]) -> Slip:
-    """`package` is the one that the node names, `of_lab` are all that the lab asks for."""
-    name = str(node.type)
-    why = f"there is no {name} in the package{f' {package.name}' if len(of_lab) > 1 else ''}"
-    if other := next((one for one in of_lab if has_program(one, name)), None):
-        return _slip(node, f"{why}; it is in {other.name}", f'write pkg="{other.name}"')
-    plain = PurePosixPath(name).name
-    if plain != name and has_program(package, plain):
-        return _slip(node, f"{why}: type is the file's name without its folder", f'write type="{plain}"')
-    if found := find_script(package, f"{plain}.py"):
-        return _slip(node, f'{why}: type="{name}" lacks the .py of {found.path}', f'write type="{plain}.py"')
-    if made := next((one for one in programs(package) if name in {one.target, one.name}), None):
-        return _named_otherwise(package, node, made, why)
-    return _nothing_like_it(package, node, why)
-
-
-def _nothing_like_it(package: PackageFacts, node: LaunchNode, why: str) -> Slip:
-    """The package has a program of nearly that name, or ROS has one, or the script was never written."""
-    plain = PurePosixPath(str(node.type)).name
-    suffix = PurePosixPath(plain).suffix
-    names = [n for n in _program_names(package) if n != node.type]
-    near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
-    if near:
-        return _slip(node, f"{why}; {there_is(near)}", f'write type="{near[0]}"')
-    if known := next((pkg for pkg, named in PROGRAMS_OF.items() if node.type in named), None):
-        return _slip(node, f"{why}; ROS has one in {known}", f'write pkg="{known}"')
-    fix = "type is the script's whole file name, with its ending"
-    return _slip(node, why, f"write the script {plain}, or the name of one that is there" if suffix else fix)
-
-
-def _named_otherwise(package: PackageFacts, node: LaunchNode, made: Executable, why: str) -> Slip:
-    """CMake gives the target's program another name, or puts it where nothing looks for it."""
-    call = made.named or made.call
-    where = f"{call.file}, line {call.line},"
-    if is_elsewhere(made, package):
-        why = f"{why}: {where} puts it into {shown(made.folder)}, where roslaunch does not look"
-        return _slip(node, why, f"remove RUNTIME_OUTPUT_DIRECTORY from line {call.line} of {call.file}")
-    why = f"{why}: {where} names the program of the target {made.target} {shown(made.name)}"
-    return _slip(node, why, f'write type="{made.name}"')
-
-
-def _program_names(package: PackageFacts) -> list[str]:
-    """Files that may be meant as programs."""
-    return [PurePosixPath(f.path).name for f in package.files if f.python or f.shebang or f.executable]
-
-
-def _folder(package: PackageFacts) -> str:
-    """The folder's name where it is not the package's."""
-    name = PurePosixPath(package.path).name
-    return name if name != package.name else ""
-
-
-def _projects(package: PackageFacts) -> set[str]:
-    return {call.args[0] for call in cmake_calls(package, "project") if call.args}
-
-
-def _slip(node: LaunchNode, why: str, fix: str) -> Slip:
-    return Slip(node.file, node.line, why, fix)
 
 
 class Absence(NamedTuple):
@@ -536,22 +246,6 @@ def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
     )
 
 
-def own_script(package: PackageFacts, node: LaunchNode) -> SourceFile | None:
-    """Return the file of the package that the node runs; one of another of the lab's packages by its path from here."""
-    owner = _owner(package, node)
-    script = find_script(owner, str(node.type)) if owner is not None else None
-    if script is None or owner is None or owner is package:
-        return script
-    path = posixpath.normpath(f"{package.way_to(owner)}/{script.path}")
-    fault = script.python_fault and script.python_fault.model_copy(update={"file": path})
-    return script.model_copy(update={"path": path, "python_fault": fault})
-
-
-def _owner(package: PackageFacts, node: LaunchNode) -> PackageFacts | None:
-    """Return the lab's package that the node is of; None for one of ROS's."""
-    return next((one for one in (package, *package.also) if one.name == node.pkg), None)
-
-
 def not_executable(*scripts: SourceFile) -> Absence:
     """Return the absence of nodes whose scripts are not executable."""
     paths = tuple(dict.fromkeys(script.path for script in scripts))
@@ -583,7 +277,7 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         or any(PurePosixPath(f.file).name == PurePosixPath(script.path).name for f in t.frames)
     ]
     if found:
-        owner = _owner(package, node) or package
+        owner = owner_of(package, node) or package
         end = explain_traceback(found[-1], owner)
         cited = tuple(one.below(package.way_to(owner)) for one in end.citations)
         return Absence(f"it died: {end.cause}", end.hint, True, cited, end.of_machine)
@@ -618,7 +312,7 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
         return None
     if (script := own_script(package, node)) and script.executable is False:
         return not_executable(script)
-    owner = _owner(package, node)
+    owner = owner_of(package, node)
     if owner is not None and any(one.is_called(str(node.type)) for one in programs(owner)):
         why = f"CMakeLists.txt makes the program {node.type}, but the build did not make it"
         return Absence(why, "first get the build to pass: catkin_make", of_script=True, unbuilt=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from grader.checks.support.launch import nodes_up, own_script
+from grader.checks.support.launch import nodes_up
+from grader.checks.support.launch_slips import own_script
 from grader.evidence.run import Run
 from grader.model.package import LaunchLine, LaunchNode, PackageFacts, PythonSlip
 from grader.model.verdict import FileCitation

@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 
 from grader.model.package import MANIFEST, PackageFacts, SourceFile
 from grader.model.repair import DEFAULT_SHARES, KINDS, Repair, RepairKind
-from grader.package.repairs.build import rename_package, repair_cmake
+from grader.package.repairs.cmakelists import rename_package, repair_cmake
 from grader.package.repairs.cpp import repair_cpp
 from grader.package.repairs.editing import (
     BOM,

@@ -1,0 +1,92 @@
+"""The calls in `CMakeLists.txt` as repairs see them: found by name, and added where they belong."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from itertools import takewhile
+
+from cmake_parser.ast import Command, Token
+
+from grader.model.package import CMAKE, PackageFacts
+from grader.package.cmake_parse import commands_of
+from grader.package.repairs.editing import Files
+from grader.wording import lines_text
+
+CALL_LINES_MAX = 30
+
+
+def cmake_text(files: Files) -> str:
+    return files.text(CMAKE) or ""
+
+
+def all_calls(files: Files) -> list[Command]:
+    return commands_of(cmake_text(files).encode()) or []
+
+
+def calls_of(files: Files, *names: str) -> list[Command]:
+    return [c for c in all_calls(files) if c.identifier.lower() in names]
+
+
+def words_of(command: Command) -> list[Token]:
+    return [token for token in command.args if token.kind != "COMMENT"]
+
+
+def has_call(files: Files, package: PackageFacts, name: str) -> bool:
+    told = package.cmake.calls if package.cmake is not None else ()
+    return bool(calls_of(files, name)) or any(call.name == name for call in told)
+
+
+def replace_token(text: str, token: Token, new: str) -> str:
+    return text[: token.span.start] + new + text[token.span.stop :]
+
+
+def all_words(files: Files) -> Iterator[Token]:
+    for command in commands_of(cmake_text(files).encode()) or []:
+        yield from command.args
+
+
+def values_behind(call: Command, keyword: str) -> list[str]:
+    words = [token.value for token in words_of(call)]
+    behind = words[words.index(keyword) + 1 :] if keyword in words else []
+    return list(takewhile(lambda word: not word.isupper(), behind))
+
+
+def add_call(files: Files, what: str, line: str, below: Sequence[str], names: Sequence[str] = ()) -> None:
+    """Take the call out of its comment, write it in place of a comment that has not the `names`, or write it below the
+    first of these commands that is there; without one, at the end of the file, and project(…) at its beginning."""
+    text = cmake_text(files)
+    lines = text.split("\n")
+    name, _, first = line.partition("(")
+    commented = find_commented(
+        text, rf"{name}\s*\(" + (r"\s*catkin\b" if first.startswith("catkin ") else "")
+    )
+    fix = ""
+    if commented is not None:
+        at, call = commented
+        places = lines_text(at, at + len(call) - 1)
+        fix, new = f"remove the `#` on {places}", call
+        if not set(names) <= set(re.findall(r"[^\s()]+", "\n".join(call))):
+            fix, new = f"in place of {places} write {line}", [line]
+        changed = "\n".join([*lines[:at], *new, *lines[at + len(call) :]])
+    else:
+        above = next((found[0] for name in below if (found := calls_of(files, name))), None)
+        end = 0 if name == "project" else len(lines)
+        at = text.count("\n", 0, above.span.stop) + 1 if above is not None else end
+        changed = "\n".join([*lines[:at], line, *lines[at:]])
+    files.change("build-line", CMAKE, changed, f"{CMAKE} does not call {what}", fix)
+
+
+def find_commented(text: str, pattern: str) -> tuple[int, list[str]] | None:
+    """Return the first such call that is commented out, up to its closing bracket: its first line, from 0, and its
+    lines without `#`."""
+    lines = text.split("\n")
+    for first, line in enumerate(lines):
+        if not re.match(rf"\s*#+\s?{pattern}", line, re.IGNORECASE):
+            continue
+        call: list[str] = []
+        for line_of_call in lines[first : first + CALL_LINES_MAX]:
+            call.append(re.sub(r"^(\s*)#+ ?", r"\1", line_of_call, count=1))
+            if commands_of("\n".join(call).encode()):
+                return first, call
+    return None

@@ -1,0 +1,351 @@
+"""Lines of `CMakeLists.txt` without which nothing builds, or which the lab asks for, and the package's name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from itertools import takewhile
+from pathlib import PurePosixPath
+
+from cmake_parser.ast import Token
+
+from grader.installable import known_packages, noetic_messages
+from grader.model.package import CMAKE, MANIFEST, PackageFacts, meant_command
+from grader.model.repair import RepairKind
+from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
+from grader.package.cmake_slips import find_slip, is_open
+from grader.package.manifest import parse_manifest
+from grader.package.repairs.cmake_calls import (
+    add_call,
+    all_calls,
+    calls_of,
+    cmake_text,
+    has_call,
+    replace_token,
+    values_behind,
+    words_of,
+)
+from grader.package.repairs.editing import Files, naming_files, rename_word
+from grader.package.repairs.interfaces import GENERATE, exchange_parts, make_interfaces, needs_interfaces
+from grader.package.repairs.manifest import OF_ROS, declare_for_running
+from grader.package.repairs.names import Wanted, is_near
+from grader.package.repairs.programs import (
+    INSTALL,
+    correct_paths,
+    install_scripts,
+    link_programs,
+    name_programs,
+)
+from grader.wording import is_one_edit, join_words
+
+OF_WORKSPACE = "catkin_workspace"
+
+
+# ---- the name
+
+
+def rename_package(files: Files, package: PackageFacts, wanted: Wanted) -> None:
+    """Find a name in the manifest in place of which the lab's is meant; whatever else has it follows."""
+    text = files.text(MANIFEST)
+    manifest, _ = parse_manifest(text.encode()) if text is not None else (None, None)
+    if text is None or manifest is None or not _is_meant(files, package, manifest.name, wanted.package):
+        return
+    old, new = manifest.name, wanted.package
+    message = f"line {manifest.name_line} of {MANIFEST}: the package is called {old}, not {new}"
+    fix = f'write {new} instead of {old} in {MANIFEST}, in project(…) and in every pkg="…"'
+    files.change("package-name", MANIFEST, rename_word(text, old, new), message, fix)
+    for file in naming_files(files.folder):
+        other = files.text(file)
+        if file != MANIFEST and other is not None:
+            files.put(file, rename_word(other, old, new))
+
+
+def _is_meant(files: Files, package: PackageFacts, name: str, wanted: str) -> bool:
+    """Return whether the name is nearly the lab's, or the package has another one elsewhere: CMakeLists.txt the lab's,
+    or all launch files the lab's or the folder's."""
+    projects = [words[0].value for command in calls_of(files, "project") if (words := words_of(command))]
+    launched = {node.pkg for launch in package.launch_files for node in launch.nodes}
+    others = {wanted, PurePosixPath(package.path).name} - {name}
+    called = projects == [wanted] or (bool(launched & others) and name not in launched)
+    return is_near(name, wanted) or (name != wanted and called)
+
+
+# ---- CMakeLists.txt
+
+
+def repair_cmake(
+    files: Files, package: PackageFacts, name: str, wanted: Wanted, scripts: Collection[str]
+) -> None:
+    """Find what `CMakeLists.txt` lacks. `name` is the package's name in the manifest, `scripts` are those that are
+    run."""
+    if files.text(CMAKE) is None:
+        return
+    _correct_line(files)
+    _close_bracket(files)
+    if commands_of(cmake_text(files).encode()) is None or _is_of_workspace(files):
+        return
+    _spell_commands(files)
+    _spell_keywords(files)
+    _correct_version(files)
+    needs = " ".join(wanted.dependencies or ("rospy", "std_msgs"))
+    if not has_call(files, package, "project"):
+        add_call(files, "project(…)", f"project({name or wanted.package})", ("cmake_minimum_required",))
+    _move_project(files)
+    _spell_catkin(files)
+    if not _calls_catkin(files, package):
+        line = f"find_package(catkin REQUIRED COMPONENTS {needs})"
+        add_call(files, "find_package(catkin …)", line, ("project",))
+    if not has_call(files, package, "catkin_package"):
+        below = (GENERATE, "find_package", "project")
+        add_call(files, "catkin_package()", "catkin_package()", below)
+    if needs_interfaces(files, package, name, scripts):
+        make_interfaces(files, package, name, scripts)
+        exchange_parts(files, package, wanted)
+    name_programs(files, wanted)
+    if not package.folder_beside:  # what it names is right once it lies there itself
+        install_scripts(files, package, wanted)
+        correct_paths(files, package)
+    link_programs(files)
+    _correct_include(files)
+    _declare_exported(files)
+    _name_project(files, package, name, wanted.package)
+
+
+def _is_of_workspace(files: Files) -> bool:
+    """Return whether the file is what `catkin_init_workspace` makes: the package needs one of its own."""
+    return bool(calls_of(files, OF_WORKSPACE)) and not calls_of(files, "catkin_package")
+
+
+def _calls_catkin(files: Files, package: PackageFacts) -> bool:
+    told = package.cmake.calls if package.cmake is not None else ()
+    written = [[t.value for t in words_of(c)] for c in calls_of(files, "find_package")]
+    known = [list(c.args) for c in told if c.name == "find_package"]
+    return any(words[:1] == ["catkin"] for words in (*written, *known))
+
+
+def _spell_catkin(files: Files) -> None:
+    """Write the name of catkin as the first word of find_package(…): in place of a slip of it, or in front of what is
+    there in its place."""
+    for command in calls_of(files, "find_package"):
+        words = words_of(command)
+        first = words[0] if words else None
+        if first is None or first.value == "catkin":
+            continue
+        behind = next((word for word in words[1:] if word.value == "catkin"), None)
+        text = cmake_text(files)
+        if first.value in ("REQUIRED", "COMPONENTS"):
+            text = replace_token(text, behind, "") if behind is not None else text
+            text, fix = (
+                replace_token(text, first, f"catkin {first.value}"),
+                f"write catkin before {first.value}",
+            )
+        elif is_near(first.value, "catkin"):
+            text, fix = replace_token(text, first, "catkin"), f"write catkin instead of {first.value}"
+        else:
+            continue
+        message = f"line {command.line} of {CMAKE}: find_package(…) names {first.value}, and not catkin"
+        files.change("build-line", CMAKE, text, message, fix)
+        return
+
+
+KEYWORDS = {
+    "cmake_minimum_required": ("VERSION",),
+    "find_package": ("REQUIRED", "COMPONENTS"),
+    "add_message_files": ("FILES",),
+    "add_service_files": ("FILES",),
+    "add_action_files": ("FILES",),
+    "generate_messages": ("DEPENDENCIES",),
+    INSTALL: ("PROGRAMS", "DESTINATION"),
+}
+"""Words of these calls that have to be in capitals and spelt so."""
+FIRST = {"cmake_minimum_required": "VERSION", INSTALL: "PROGRAMS"}
+"""The words without which these calls mean nothing, and that come first."""
+
+
+def _spell_keywords(files: Files) -> None:
+    """Spell the keywords of calls right, and write those that have to be the first word."""
+    for name, keywords in KEYWORDS.items():
+        for at in range(len(calls_of(files, name))):
+            for keyword in keywords:
+                words = words_of(calls_of(files, name)[at])
+                stray = next(
+                    (w for w in words if is_near(w.value, keyword) and w.value not in keywords), None
+                )
+                if stray is not None and keyword not in [w.value for w in words]:
+                    message = f"line {stray.line} of {CMAKE}: {name}(…) has no keyword {stray.value}: it is {keyword}"
+                    changed = replace_token(cmake_text(files), stray, keyword)
+                    files.change("build-line", CMAKE, changed, message)
+            _put_first(files, name, words_of(calls_of(files, name)[at]))
+
+
+def _put_first(files: Files, name: str, words: Sequence[Token]) -> None:
+    right = FIRST.get(name, "")
+    values = [word.value for word in words]
+    if not right or not words or values[0] == right or "$" in values[0] or values[0].upper() == right:
+        return
+    text = cmake_text(files)
+    behind = words[values.index(right)] if right in values else None
+    text = replace_token(text, behind, "") if behind is not None else text
+    message = f"line {words[0].line} of {CMAKE}: {name}(…) does not begin with {right}"
+    fix = f"write {right} before {values[0]}"
+    files.change("build-line", CMAKE, replace_token(text, words[0], f"{right} {values[0]}"), message, fix)
+
+
+def _correct_version(files: Files) -> None:
+    """Give cmake_minimum_required(VERSION …) a version that there is."""
+    for command in calls_of(files, "cmake_minimum_required"):
+        words = words_of(command)
+        given = words[1] if len(words) > 1 else None
+        if [word.value for word in words] == ["VERSION"]:
+            message = f"line {command.line} of {CMAKE}: {command.identifier}(…) has no version"
+            files.change(
+                "build-line", CMAKE, replace_token(cmake_text(files), words[0], "VERSION 3.0.2"), message
+            )
+            return
+        right = re.fullmatch(r"[23](\.\d+){1,3}(\.\.\.[\d.]+)?", given.value) if given is not None else None
+        if given is not None and right is None and "$" not in given.value:
+            message = f"line {given.line} of {CMAKE}: there is no version {given.value} of CMake"
+            files.change("build-line", CMAKE, replace_token(cmake_text(files), given, "3.0.2"), message)
+
+
+def _correct_line(files: Files) -> None:
+    """Correct the one line with which the file cannot be read, or a variable is not closed."""
+    text = cmake_text(files)
+    fault = parse_tree_of(text.encode(), CMAKE)[1]
+    words = [token for command in all_calls(files) for token in words_of(command)]
+    line = fault.line if fault is not None else next((t.line for t in words if is_open(t.value)), None)
+    slip = find_slip(text, line or 0) if join_half_comment(text) is None else None
+    if slip is not None:
+        message = f"line {slip.number} of {CMAKE}: {slip.why}"
+        files.change("build-line", CMAKE, slip.text, message, slip.fix)
+
+
+def _close_bracket(files: Files) -> None:
+    """Take a call wholly out of its comment, begin one whose first line is missing, or close a bracket: where its call
+    ends, else at the end of the last line that is not a comment, or on a line of its own."""
+    text = cmake_text(files)
+    if commands_of(text.encode()) is not None:
+        return
+    if half := join_half_comment(text):
+        files.change(
+            "build-line", CMAKE, half.text, f"line {half.line} of {CMAKE}: {half.cause}: {half.fix}", half.fix
+        )
+        return
+    lines = text.rstrip().split("\n")
+    fault = parse_tree_of(text.encode(), CMAKE)[1]
+    if fault is not None and (place := _PLACE.fullmatch(fault.fix)):
+        number, begins = int(place["above"] or place["end"]), place["head"]
+        changed = [*lines[: number - 1], begins or f"{lines[number - 1]})", *lines[number - bool(begins) :]]
+        if commands_of("\n".join(changed).encode()) is not None:
+            message = f"line {fault.line} of {CMAKE}: {fault.cause}"
+            files.change("build-line", CMAKE, "\n".join([*changed, ""]), message)
+            return
+    last = max((i for i, line in enumerate(lines) if line.split("#", maxsplit=1)[0].strip()), default=0)
+    for added in ([lines[last] + ")"], [lines[last], ")"]):
+        changed = [*lines[:last], *added, *lines[last + 1 :], ""]
+        if commands_of("\n".join(changed).encode()) is not None:
+            message = f"line {last + 1} of {CMAKE}: an opening bracket is never closed"
+            files.change("build-line", CMAKE, "\n".join(changed), message)
+            return
+
+
+_PLACE = re.compile(
+    r"write `\)` at the end of line (?P<end>\d+)|above line (?P<above>\d+), write `(?P<head>.+)`"
+)
+"""Where a bracket is to be closed, or a call to be begun."""
+
+
+def _spell_commands(files: Files) -> None:
+    """Spell commands right that have nearly the name of a known one, unless the file defines them."""
+    defined = {words[0].value.lower() for c in calls_of(files, "function", "macro") if (words := words_of(c))}
+    for command in reversed(all_calls(files)):
+        name = command.identifier
+        right = "" if name.lower() in defined else meant_command(name.lower())
+        if right:
+            text, start = cmake_text(files), command.span.start
+            start = text.index(name, start)
+            message = f"line {command.line} of {CMAKE}: there is no command {name}; it is called {right}"
+            files.change("build-line", CMAKE, text[:start] + right + text[start + len(name) :], message)
+
+
+def _correct_include(files: Files) -> None:
+    """`INCLUDE_DIRS include`, which `catkin_create_pkg` writes in a comment, in a package without such a folder."""
+    for call in calls_of(files, "catkin_package"):
+        words = words_of(call)
+        at = next((i for i, t in enumerate(words) if t.value == "INCLUDE_DIRS"), len(words))
+        given = list(takewhile(lambda token: not token.value.isupper(), words[at + 1 :]))
+        absent = [t for t in given if "$" not in t.value and not (files.folder / t.value.strip('"')).is_dir()]
+        if not absent:
+            continue
+        text = cmake_text(files)
+        taken = [words[at], *absent] if absent == given else absent
+        for token in reversed(taken):
+            text = replace_token(text, token, "")
+        listed = " ".join(t.value for t in absent)
+        folders = join_words(f"the folder {t.value.strip('/')}/" for t in absent)
+        message = (
+            f"line {call.line} of {CMAKE}: catkin_package(…) names {folders}, which is not in the package"
+        )
+        fix = f"remove INCLUDE_DIRS {listed}" if absent == given else f"remove {listed} from INCLUDE_DIRS"
+        files.change("build-line", CMAKE, text, message, fix)
+        return
+
+
+def _declare_exported(files: Files) -> None:
+    """Declare in `package.xml` what `catkin_package(CATKIN_DEPENDS …)` names, as catkin asks for."""
+    for call in calls_of(files, "catkin_package"):
+        for name in values_behind(call, "CATKIN_DEPENDS"):
+            meant = [one for one in _declared(files) if is_one_edit(name, one) or name.lower() == one]
+            token = next(t for t in words_of(call) if t.value == name)
+            known = {*_declared(files), *known_packages(), *noetic_messages(), *OF_ROS}
+            if name not in known and len(meant) == 1:
+                message = (
+                    f"line {call.line} of {CMAKE}: catkin_package(…) names {name}, which is called {meant[0]}"
+                )
+                fix = f"write {meant[0]} instead of {name}"
+                files.change(
+                    "build-line", CMAKE, replace_token(cmake_text(files), token, meant[0]), message, fix
+                )
+            elif re.fullmatch(r"\w+", name):
+                message = (
+                    f"line {call.line} of {CMAKE}: catkin_package(…) names {name}, and {MANIFEST} does not"
+                )
+                declare_for_running(files, name, message)
+
+
+def _declared(files: Files) -> set[str]:
+    """Return the packages that `package.xml` names."""
+    manifest, _ = parse_manifest((files.text(MANIFEST) or "").encode())
+    return {one.name for one in manifest.dependencies} if manifest is not None else set()
+
+
+def _move_project(files: Files) -> None:
+    """Call project(…) above catkin_package(…), which asks for the project's name."""
+    project, of_catkin = calls_of(files, "project"), calls_of(files, "catkin_package")
+    if not project or not of_catkin or project[0].line < of_catkin[0].line:
+        return
+    call = project[0]
+    first = next((c for c in calls_of(files, "find_package", "catkin_package")), call).span.start
+    text, span = cmake_text(files), call.span
+    changed = f"{text[:first]}{text[span]}\n{text[first : span.start].rstrip()}\n{text[span.stop :].lstrip()}"
+    message = f"line {call.line} of {CMAKE}: project(…) is called after catkin_package(…)"
+    above = text.count("\n", 0, first) + 1
+    files.change("build-line", CMAKE, changed, message, f"move it above line {above}")
+
+
+def _name_project(files: Files, package: PackageFacts, name: str, wanted: str) -> None:
+    """Name the project. A manifest in whose name the lab's is meant gets that name later."""
+    right = wanted if _is_meant(files, package, name, wanted) else name
+    for command in calls_of(files, "project")[:1]:
+        words = words_of(command)
+        if not words:
+            text, at = cmake_text(files), command.span.stop - 1
+            message = f"line {command.line} of {CMAKE}: project(…) has no name"
+            files.change("build-line", CMAKE, f"{text[:at]}{name}{text[at:]}", message)
+        if words and words[0].value.strip('"') not in (name, right) and "$" not in words[0].value:
+            given = words[0].value
+            message = f"line {command.line} of {CMAKE}: project({given}) is not the package's name, {name}"
+            kind: RepairKind = "package-name" if is_near(given, name) else "build-line"
+            both = f"write project({wanted}) here, and <name>{wanted}</name> in {MANIFEST}"
+            fix = both if wanted and wanted != right else ""
+            files.change(kind, CMAKE, replace_token(cmake_text(files), words[0], name), message, fix)

@@ -1,0 +1,182 @@
+"""What makes a package's messages, services and actions: the calls in `CMakeLists.txt`, and the definitions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Sequence
+from pathlib import PurePosixPath
+
+from grader.installable import noetic_messages
+from grader.model.message_definitions import DIVIDER, PARTS, exchanged_parts, meant_type
+from grader.model.package import CMAKE, INTERFACE_FOLDERS, PackageFacts
+from grader.package.repairs.cmake_calls import (
+    add_call,
+    all_words,
+    calls_of,
+    cmake_text,
+    replace_token,
+    values_behind,
+    words_of,
+)
+from grader.package.repairs.editing import Files
+from grader.package.repairs.files import is_own
+from grader.package.repairs.names import CPP, Wanted, is_near
+from grader.wording import is_one_edit, join_words
+
+OF_GENERATION = re.compile(r"_generate_messages|_gen(cpp|py)$")
+"""Targets that generate_messages(…) makes."""
+
+
+GENERATE, GENERATION = "generate_messages", "message_generation"
+
+
+def needs_interfaces(files: Files, package: PackageFacts, name: str, scripts: Collection[str]) -> bool:
+    """Return whether what is run uses the package's own definitions, or the build asks for what is made of them. Those
+    of another exercise in the same package keep nothing from running."""
+    asked = any(word.kind != "COMMENT" and OF_GENERATION.search(word.value) for word in all_words(files))
+    run = [f.path for f in package.files if is_own(f.path) and (f.path in scripts or f.path.endswith(CPP))]
+    return asked or bool(calls_of(files, GENERATE)) or bool(_used_kinds(files, package, name, run))
+
+
+def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Collection[str]) -> None:
+    """Find what CMakeLists.txt lacks to make the package's own messages, services and actions, where code uses them.
+
+    One that only other scripts than those that are run would use is not added to those that the file names already.
+    """
+    code = [f.path for f in package.files if is_own(f.path) and (f.python or f.path.endswith(CPP))]
+    used = _used_kinds(files, package, name, code)
+    made = {c: _definitions(package, folder) for c, folder in INTERFACE_FOLDERS.items() if folder in used}
+    if not any(made.values()):
+        return
+    _correct_types(files, package)
+    _generate(files, package)  # from below, so that the lines above stay where they are
+    run = [path for path in code if path in scripts or path.endswith(CPP)]
+    needed = {word for path in run for word in re.findall(r"\w+", files.text(path) or "")}
+    needed |= {
+        word for one in package.interfaces for field in one.fields for word in re.findall(r"\w+", field.type)
+    }
+    for call, names in reversed(made.items()):
+        _name_definitions(files, call, names, needed)
+    of_catkin = [
+        c for c in calls_of(files, "find_package") if [t.value for t in words_of(c)][:1] == ["catkin"]
+    ]
+    named = [token.value for call in of_catkin for token in words_of(call)]
+    if (
+        of_catkin
+        and not {GENERATION, "genmsg"}.intersection(named)
+        and not any("$" in word for word in named)
+    ):
+        words = words_of(of_catkin[0])
+        near = next((token for token in words if is_one_edit(token.value, GENERATION)), None)
+        if near is not None:
+            message = f"line {of_catkin[0].line} of {CMAKE}: there is no package {near.value}"
+            fix = f"write {GENERATION} instead of {near.value}"
+            files.change(
+                "build-line", CMAKE, replace_token(cmake_text(files), near, GENERATION), message, fix
+            )
+            return
+        listed = next((t for t in words if t.value == "COMPONENTS"), None)
+        token, new = (listed, GENERATION) if listed else (words[-1], f"COMPONENTS {GENERATION}")
+        changed = replace_token(cmake_text(files), token, f"{token.value} {new}")
+        message = f"line {of_catkin[0].line} of {CMAKE}: find_package(catkin …) does not name {GENERATION}"
+        files.change("build-line", CMAKE, changed, message, f"write {new} after {token.value}")
+
+
+def exchange_parts(files: Files, package: PackageFacts, wanted: Wanted) -> None:
+    """Put the parts of a service or an action into their order, where whole parts have changed places."""
+    for path, fields in wanted.definitions:
+        own = next((one for one in package.interfaces if one.path == path and one.fault is None), None)
+        text = files.text(path)
+        places = exchanged_parts(own.fields, fields) if own else {}
+        if not places or text is None:
+            continue
+        order = PARTS[PurePosixPath(path).suffix]
+        parts = [part.strip("\n") for part in DIVIDER.split(text)]
+        changed = "\n---\n".join(parts[order.index(places.get(part, part))] for part in order)
+        moved = join_words(part for part, other in places.items() if part != other)
+        fix = f"the order of the parts is {join_words(order)}, with `---` between them"
+        files.change("build-line", path, f"{changed}\n", f"{path}: {moved} have changed places", fix)
+
+
+def _correct_types(files: Files, package: PackageFacts) -> None:
+    """Give fields of which there is no type the one that is meant."""
+    own = {PurePosixPath(one.path).stem for one in package.interfaces}
+    for one in package.interfaces:
+        for field in one.fields:
+            right, lines = (
+                meant_type(field.type, own, noetic_messages()),
+                (files.text(one.path) or "").split("\n"),
+            )
+            if right != field.type and field.line <= len(lines):
+                lines[field.line - 1] = lines[field.line - 1].replace(field.type, right, 1)
+                message = f"line {field.line} of {one.path}: there is no field type `{field.type}`"
+                files.change("build-line", one.path, "\n".join(lines), message)
+
+
+def _definitions(package: PackageFacts, folder: str) -> list[str]:
+    paths = (PurePosixPath(file.path) for file in package.files)
+    return sorted(p.name for p in paths if str(p.parent) == folder and p.suffix == f".{folder}")
+
+
+def _used_kinds(files: Files, package: PackageFacts, name: str, sources: Iterable[str]) -> set[str]:
+    """Return of which folders of definitions these sources import, or include, what is made of them: itself, or in a
+    field of another definition. Which one a header of C++ is made of is not asked."""
+    made = re.compile(rf"\b{re.escape(name)}(?:\.(msg|srv)\b|/\w+\.h\b)")
+    found = {one[1] for path in sources for one in made.finditer(files.text(path) or "")}
+    paths = [PurePosixPath(one.path) for one in package.interfaces]
+    folders = {path.stem: path.parent.name for path in paths}
+    fields = {field.type.partition("[")[0] for one in package.interfaces for field in one.fields}
+    inner = {folders.get(kind.removeprefix(f"{name}/"), "") for kind in fields} if found else set[str]()
+    used = set(INTERFACE_FOLDERS.values()) if None in found else found | inner
+    return used | ({"action"} if "msg" in used else set())
+
+
+def _name_definitions(files: Files, name: str, made: Sequence[str], needed: Collection[str]) -> None:
+    """Name them in the call, in place of files that do not exist and have nearly their names, or beside others if
+    `needed` has their types."""
+    if made and not calls_of(files, name):
+        line, below = f"{name}(FILES {' '.join(made)})", ("find_package", "project")
+        add_call(files, f"{name}(…)", line, below, made)
+    for file in made:
+        call = calls_of(files, name)[0]
+        named = {word for one in calls_of(files, name) for word in values_behind(one, "FILES")}
+        if file in named or any("$" in word for word in named):
+            continue
+        stray = next((word for word in sorted(named - {*made}) if is_near(word, file)), "FILES")
+        if stray == "FILES" and named and PurePosixPath(file).stem not in needed:
+            continue
+        token = next((t for one in calls_of(files, name) for t in words_of(one) if t.value == stray), None)
+        if token is not None:
+            new, place = (f"FILES {file}", "after") if stray == "FILES" else (file, "instead of")
+            message = f"line {call.line} of {CMAKE}: {name}(…) does not name {file}"
+            changed = replace_token(cmake_text(files), token, new)
+            files.change("build-line", CMAKE, changed, message, f"write {file} {place} {stray}")
+
+
+def _generate(files: Files, package: PackageFacts) -> None:
+    """Call generate_messages(…) where nothing does, with the packages whose types are used, above catkin_package(…)."""
+    calls, of_catkin = calls_of(files, GENERATE), calls_of(files, "catkin_package")
+    types = {field.type for one in package.interfaces for field in one.fields}
+    needed = {"std_msgs"} if types & {"Header", "Header[]"} else set[str]()
+    needed |= {"actionlib_msgs"} if any(one.path.endswith(".action") for one in package.interfaces) else set()
+    needed |= {name.partition("/")[0] for name in types if "/" in name} - {package.name}
+    if not calls:
+        line = f"{GENERATE}({' '.join(['DEPENDENCIES', *sorted(needed)] if needed else [])})"
+        add_call(files, f"{GENERATE}(…)", line, (*INTERFACE_FOLDERS, "find_package"), sorted(needed))
+        return
+    if of_catkin and calls[0].line > of_catkin[0].line:
+        text, call, at = cmake_text(files), calls[0].span, of_catkin[0].span.start
+        changed = f"{text[:at]}{text[call]}\n\n{text[at : call.start].rstrip()}\n{text[call.stop :].lstrip()}"
+        message = f"line {calls[0].line} of {CMAKE}: {GENERATE}(…) is called after catkin_package(…)"
+        fix = f"move {GENERATE}(…), from line {calls[0].line}, above catkin_package(…)"
+        files.change("build-line", CMAKE, changed, message, fix)
+    call = calls_of(files, GENERATE)[0]
+    missing = sorted(needed - {token.value for token in words_of(call)})
+    if missing and not any("$" in token.value for token in words_of(call)):
+        text, listed = cmake_text(files), " ".join(missing)
+        token = next((t for t in words_of(call) if t.value == "DEPENDENCIES"), None)
+        at = token.span.stop if token else text.index("(", call.span.start) + 1
+        added = f" {listed}" if token else f"DEPENDENCIES {listed}"
+        message = f"line {call.line} of {CMAKE}: {GENERATE}(…) does not name {join_words(missing)}"
+        fix = f"write {listed} after DEPENDENCIES" if token else f"write {GENERATE}({added})"
+        files.change("build-line", CMAKE, text[:at] + added + text[at:], message, fix)

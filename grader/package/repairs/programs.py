@@ -1,0 +1,193 @@
+"""What a build installs and links: scripts, launch files and C++ programs that `CMakeLists.txt` names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from pathlib import PurePosixPath
+
+from cmake_parser.ast import Command, Token
+
+from grader.model.package import CMAKE, PackageFacts
+from grader.package.repairs.cmake_calls import calls_of, cmake_text, find_commented, replace_token, words_of
+from grader.package.repairs.editing import Files
+from grader.package.repairs.files import is_own
+from grader.package.repairs.names import CPP, Wanted, is_near
+from grader.wording import join_words
+
+BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
+
+
+INSTALL = "catkin_install_python"
+
+
+def link_programs(files: Files) -> None:
+    """Link ROS to programs that nothing is linked to. A program without ROS is none the worse for it."""
+    linked = {words[0].value for c in calls_of(files, "target_link_libraries") if (words := words_of(c))}
+    for call in calls_of(files, "add_executable"):
+        words = words_of(call)
+        if words and words[0].value not in linked and "IMPORTED" not in [t.value for t in words]:
+            text, line = cmake_text(files), f"target_link_libraries({words[0].value} ${{catkin_LIBRARIES}})"
+            at = call.span.stop
+            message = f"line {call.line} of {CMAKE}: nothing is linked to the program {words[0].value}"
+            files.change("build-line", CMAKE, f"{text[:at]}\n{line}{text[at:]}", message)
+
+
+def name_programs(files: Files, wanted: Wanted) -> None:
+    """Give the program of a source that has the lab's name this name too."""
+    made = {
+        words[0]: words[1:]
+        for c in calls_of(files, "add_executable")
+        if (words := [t.value for t in words_of(c)])
+    }
+    if "OUTPUT_NAME" in cmake_text(files):
+        return
+    for name in (one for one in wanted.scripts if "." not in one and "/" not in one and one not in made):
+        stems = {
+            target: {PurePosixPath(source).stem for source in sources} for target, sources in made.items()
+        }
+        meant = [
+            t for t, found in stems.items() if t not in wanted.scripts and "$" not in t and name in found
+        ]
+        if len(meant) != 1:
+            continue
+        call = next(c for c in calls_of(files, "add_executable") if words_of(c)[0].value == meant[0])
+        changed = re.sub(rf"(?<![\w/.-]){re.escape(meant[0])}(?![\w/.-])", name, cmake_text(files))
+        message = f"line {call.line} of {CMAKE}: the program is called {meant[0]}, and the lab wants {name}"
+        files.change(
+            "build-line", CMAKE, changed, message, f"write {name} in place of {meant[0]} wherever it is named"
+        )
+
+
+def install_scripts(files: Files, package: PackageFacts, wanted: Wanted) -> None:
+    own = [f.path for f in package.files if is_own(f.path)]
+    there = {path for path in (_place(own, files, script) for script in wanted.installed) if path}
+    calls = calls_of(files, INSTALL)
+    named = {_plain(t.value) for c in calls for t in words_of(c)}
+    if any("$" in name and not name.upper().startswith("${CATKIN_") for name in named):
+        return  # which scripts a variable holds is for CMake to say
+    missing = sorted(there - named)
+    if missing and not calls:
+        line = f"{INSTALL}(PROGRAMS {' '.join(missing)}\n  DESTINATION {BIN}\n)"
+        at, call = find_commented(cmake_text(files), rf"{INSTALL}\s*\(") or (0, [])
+        if all(path in "\n".join(call) for path in missing):
+            lines = cmake_text(files).split("\n")
+            changed = "\n".join([*lines[:at], *call, *lines[at + len(call) :]])
+        else:
+            changed = f"{cmake_text(files).rstrip()}\n\n{line}\n"
+        fix = f"write {' '.join(line.split())}"
+        files.change("build-line", CMAKE, changed, f"{CMAKE} does not install {join_words(missing)}", fix)
+        return
+    _name_scripts(files, own, missing)
+    _correct_destination(files, there)
+
+
+def correct_paths(files: Files, package: PackageFacts) -> None:
+    """Of files that a call names and that lie elsewhere in the package, each by its name alone: where they lie."""
+    own = [f.path for f in package.files if is_own(f.path)]
+    for call in reversed(calls_of(files, INSTALL, "add_executable", "add_library")):  # places above stay
+        moved: list[tuple[Token, str]] = []
+        for token in words_of(call):
+            path = PurePosixPath(_plain(token.value))
+            copies = [one for one in own if PurePosixPath(one).name == path.name]
+            is_file = path.suffix in (".py", *CPP) and "$" not in str(path)
+            if is_file and len(copies) == 1 and not (files.folder / path).exists():
+                moved.append((token, copies[0]))
+        text = cmake_text(files)
+        for token, right in reversed(moved):
+            text = replace_token(text, token, right)
+        named, there = join_words(t.value for t, _ in moved), join_words(right for _, right in moved)
+        message = f"line {call.line} of {CMAKE}: {call.identifier}(…) names {named}, which the package has as {there}"
+        fix = " and ".join(f"write {right} instead of {token.value}" for token, right in moved)
+        files.change("build-line", CMAKE, text, message, fix)
+
+
+def _place(own: Sequence[str], files: Files, script: str) -> str:
+    """Return where the script lies; "" where it is not there."""
+    name = PurePosixPath(script).name
+    copies = [p for p in own if PurePosixPath(p).name == name]
+    renamed = [
+        r.after for r in files.repairs if r.kind == "file-name" and PurePosixPath(r.after).name == name
+    ]
+    return script if script in (*copies, *renamed) else next(iter([*copies, *renamed]), "")
+
+
+def _plain(word: str) -> str:
+    path = re.sub(r"^\$\{(PROJECT_SOURCE_DIR|CMAKE_CURRENT_SOURCE_DIR)\}/|^\./", "", word.strip('"'))
+    return re.sub("/{2,}", "/", path)
+
+
+def _name_scripts(files: Files, own: Sequence[str], paths: Sequence[str]) -> None:
+    """In place of files that do not exist and have nearly their names, or beside the others."""
+    unnamed = [path for path in paths if not _replace_stray(files, own, path)]
+    call = next((c for c in calls_of(files, INSTALL) if _installs_programs(c)), None)
+    if not unnamed:
+        return
+    text, listed = cmake_text(files), " ".join(unnamed)
+    if call is None:
+        line = f"{INSTALL}(PROGRAMS {listed} DESTINATION {BIN})"
+        message = f"{CMAKE} does not install {join_words(unnamed)} where rosrun looks"
+        files.change("build-line", CMAKE, f"{text.rstrip()}\n\n{line}\n", message, f"write {line}")
+        return
+    words = words_of(call)
+    programs = next(t for t in words if t.value == "PROGRAMS")
+    message = f"line {call.line} of {CMAKE}: {INSTALL}(…) does not name {join_words(unnamed)}"
+    behind = words[words.index(programs) + 1 :][:1]
+    known = {"DESTINATION", *own}
+    stray = next((t for t in behind if "$" not in t.value and _plain(t.value) not in known), None)
+    fix = f"write {listed} in place of {stray.value}" if stray else f"write {listed} after PROGRAMS"
+    changed = replace_token(text, stray or programs, listed if stray else f"PROGRAMS {listed}")
+    files.change("build-line", CMAKE, changed, message, fix)
+
+
+def _replace_stray(files: Files, own: Sequence[str], path: str) -> bool:
+    name = PurePosixPath(path).name
+    for call in calls_of(files, INSTALL):
+        for token in words_of(call):
+            given = _plain(token.value)
+            same = re.sub(r"[\\/]", "", given) == path.replace("/", "")
+            if given not in own and (same or _is_about(PurePosixPath(given).name, name)):
+                message = f"line {call.line} of {CMAKE}: {token.value} does not exist; the script is {path}"
+                fix = f"write {path} instead of {token.value}"
+                files.change("build-line", CMAKE, replace_token(cmake_text(files), token, path), message, fix)
+                return True
+    return False
+
+
+def _installs_programs(call: Command) -> bool:
+    """Return whether the call installs programs where rosrun looks, or gives no place."""
+    words = [token.value for token in words_of(call)]
+    given = words[words.index("DESTINATION") + 1 :][:1] if "DESTINATION" in words else []
+    return "PROGRAMS" in words and given in ([], [BIN])
+
+
+def _is_about(given: str, name: str) -> bool:
+    return given == name or is_near(given, name) or f"{given}.py" == name
+
+
+def _correct_destination(files: Files, scripts: Collection[str]) -> None:
+    """Of a call that names one of the scripts: another of catkin's places, or a slip in this one's name."""
+    for call in calls_of(files, INSTALL):
+        words = words_of(call)
+        at = next((i for i, t in enumerate(words) if t.value == "DESTINATION"), len(words))
+        given = words[at + 1] if at + 1 < len(words) else None
+        names_one = any(_plain(t.value) in scripts for t in words)
+        place = next((w for w in words if "CATKIN_PACKAGE_BIN_DESTINATION" in w.value.upper()), None)
+        if names_one and at in (len(words), len(words) - 1) and "PROGRAMS" in [t.value for t in words]:
+            text, last = cmake_text(files), words[-1].span.stop
+            lacks = "DESTINATION" if at == len(words) else "place behind DESTINATION"
+            message = f"line {call.line} of {CMAKE}: {call.identifier}(…) has no {lacks}"
+            if place is not None:
+                text = replace_token(text, words[at], "") if at < len(words) else text
+                changed = replace_token(text, place, f"DESTINATION {BIN}")
+            elif at < len(words):
+                changed = f"{text[:last]} {BIN}{text[last:]}"
+            else:
+                changed = f"{text[:last]}\n  DESTINATION {BIN}{text[last:]}"
+            files.change("build-line", CMAKE, changed, message)
+            return
+        if given and names_one and given.value != BIN and "CATKIN_" in given.value.upper():
+            message = f"line {call.line} of {CMAKE}: {given.value} is not where rosrun looks"
+            fix = f"write DESTINATION {BIN}"
+            files.change("build-line", CMAKE, replace_token(cmake_text(files), given, BIN), message, fix)
+            return
