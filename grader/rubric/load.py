@@ -18,14 +18,14 @@ from grader.model.result import RubricOrigin
 from grader.model.version import RUBRIC, UPDATE, Versioned
 from grader.rubric.consistency import cross_faults, swallowed_keys
 from grader.rubric.course import load_course, split_name
-from grader.rubric.doubts import doubts
 from grader.rubric.fault_words import model_faults
 from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics_folder
 from grader.rubric.made_up import draw_values, faults_of_sample, made_up_faults, sample_data, with_values
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.own_checks import Beside, known_checks, read_instructor, run_checks_file
 from grader.rubric.scenario import Scenario
-from grader.rubric.spelling import doubtful_names, misspelt_names
+from grader.rubric.spelling import names_seen_once, misspelt_names
+from grader.rubric.validation_warnings import warnings
 from grader.rubric.yaml_lines import Fault, KeyPath, Source, Value, as_map, read_source
 
 PIN = "#sha256:"
@@ -197,11 +197,11 @@ def read_beside_rubric(rubric: LoadedRubric) -> dict[str, bytes]:
     return read_instructor(source.data, rubric.path.parent).files
 
 
-def doubts_of(loaded: LoadedRubric, name: str) -> list[str]:
+def warnings_of(loaded: LoadedRubric, name: str) -> list[str]:
     """Return what may be a slip in the rubric of that file, each as `name:line: key.path: why`."""
     source = read_source(loaded.path, name)
-    found = [*doubtful_names(source.data, loaded.path.parent), *doubts(source.data)]
-    return [source.fault(*doubt) for doubt in sorted(found, key=lambda doubt: source.line(doubt[0]))]
+    found = [*names_seen_once(source.data, loaded.path.parent), *warnings(source.data)]
+    return [source.fault(*one) for one in sorted(found, key=lambda one: source.line(one[0]))]
 
 
 def refuse_newer(source: Source, known: Versioned) -> None:

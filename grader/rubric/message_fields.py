@@ -26,7 +26,7 @@ from grader.model.message_definitions import (
 )
 from grader.model.package import InterfaceField
 from grader.ros_packages import ros_packages
-from grader.rubric.standins import set_in, topics_of_programs
+from grader.rubric.simulators import set_in, topics_of_programs
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import closest, did_you_mean, is_one_edit, join_words
 

@@ -16,7 +16,7 @@ from grader.checks.support.fields import Reading, is_number
 from grader.rubric.durations import Asked, late_faults, longest_s, often_faults, within_faults
 from grader.rubric.message_fields import PATH_PARTS
 from grader.rubric.scenario import Scenario, Until
-from grader.rubric.standins import FIELD_M, robot_of
+from grader.rubric.simulators import FIELD_M, robot_of
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
 from grader.wording import plural

@@ -20,8 +20,8 @@ from grader.rubric.frames import frame_faults
 from grader.rubric.message_fields import field_faults, services_in
 from grader.rubric.reachable import reach_faults
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
+from grader.rubric.simulators import PROGRAMS, asked_faults, only_publisher, parameter_faults
 from grader.rubric.spelling import texts_in
-from grader.rubric.standins import PROGRAMS, asked_faults, only_publisher, parameter_faults
 from grader.rubric.started import started_faults
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in

@@ -43,7 +43,7 @@ def _blank_ends(data: object) -> Iterator[Fault]:
             yield path, f'has a blank before or after it: write "{text.strip()}"'
 
 
-def doubtful_names(data: object, folder: Path) -> Iterator[Fault]:
+def names_seen_once(data: object, folder: Path) -> Iterator[Fault]:
     """Yield the names that one line alone has, and no file in the rubric's folder. Such a name may be right, or a slip
     that no other line shows."""
     for path, text, near in _named_once(data, folder):

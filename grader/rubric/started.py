@@ -9,7 +9,7 @@ from typing import Any
 
 from grader.checks.registry import Check
 from grader.rubric.scenario import ROSTEST_ENDING
-from grader.rubric.standins import PROGRAMS, asked_topics
+from grader.rubric.simulators import PROGRAMS, asked_topics
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, packages_in
 from grader.wording import join_words
 

@@ -20,9 +20,9 @@ import yaml
 from grader.errors import RubricError
 from grader.ros_packages import STANDINS
 from grader.rubric.find import rubrics_folder
-from grader.rubric.load import doubts_of, load_rubric
-from grader.rubric.standins import FIELD_M, ROBOTS
-from grader.rubric.standins import PROGRAMS as PROGRAMS_KNOWN
+from grader.rubric.load import load_rubric, warnings_of
+from grader.rubric.simulators import FIELD_M, ROBOTS
+from grader.rubric.simulators import PROGRAMS as PROGRAMS_KNOWN
 from tests.rubric.samples import faults
 
 SLIPS = Path(__file__).with_name("slips.yaml")
@@ -261,15 +261,17 @@ def test_a_slip_is_refused(examples: Path, name: str, old: str, new: str, fault:
 LISTED = yaml.safe_load(SLIPS.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("slip", [slip for slip in LISTED if "doubt" in slip], ids=lambda slip: slip["doubt"])
+@pytest.mark.parametrize(
+    "slip", [slip for slip in LISTED if "warning" in slip], ids=lambda slip: slip["warning"]
+)
 def test_what_may_be_a_slip_is_a_warning(examples: Path, slip: dict[str, str]) -> None:
     path = _spoiled(examples, slip["lab"], slip["old"], slip["new"])
-    assert doubts_of(load_rubric(str(path)), path.name) == [f"spoiled.yaml:{slip['doubt']}"]
+    assert warnings_of(load_rubric(str(path)), path.name) == [f"spoiled.yaml:{slip['warning']}"]
 
 
 @pytest.mark.parametrize("path", sorted(rubrics_folder().rglob("*.yaml")), ids=lambda path: path.stem)
 def test_a_rubric_of_the_graders_own_loads_without_a_word(path: Path) -> None:
-    assert doubts_of(load_rubric(str(path)), path.name) == []
+    assert warnings_of(load_rubric(str(path)), path.name) == []
 
 
 def test_a_step_that_is_left_out_of_one_of_several_runs_is_a_warning(examples: Path) -> None:
@@ -278,7 +280,7 @@ def test_a_step_that_is_left_out_of_one_of_several_runs_is_a_warning(examples: P
     asked = "check: field-equals, with: {topic: /distance, field: data, value: 5}, scenario: near"
     criterion = f"  - {{id: near, title: near, points: 0, {asked}}}\n"
     path = _spoiled(examples, "tf-broadcaster", "\ncriteria:\n", f"{near}\ncriteria:\n{criterion}")
-    found = doubts_of(load_rubric(str(path)), path.name)
+    found = warnings_of(load_rubric(str(path)), path.name)
     told = "nothing is sent in near, and in distance something is: is a step left out?"
     assert [one.partition("steps: ")[2] for one in found] == [told]
 
@@ -290,7 +292,7 @@ def test_a_number_of_a_request_that_the_run_does_not_have_is_a_warning(examples:
     wanted = "expect: [{a: 7, b: -4}, {a: 9}, {a: 8}]}"
     path.write_text(text.replace("expect: {a: {made_up: a}, b: -4}}", wanted), encoding="utf-8")
     told = "nothing in adds has 8, and it has the other numbers that are asked for"
-    assert [one.partition(".a: ")[2] for one in doubts_of(load_rubric(str(path)), path.name)] == [told]
+    assert [one.partition(".a: ")[2] for one in warnings_of(load_rubric(str(path)), path.name)] == [told]
 
 
 def test_a_client_may_be_asked_to_cancel_its_goal(examples: Path) -> None:
@@ -300,12 +302,12 @@ def test_a_client_may_be_asked_to_cancel_its_goal(examples: Path) -> None:
     asked = "check: reacts, with: {cause: {topic: /dock/goal}, effect: {topic: /dock/cancel}, within_s: 5}"
     criterion = f"  - {{id: stuck, title: stuck, points: 0, scenario: stuck, {asked}}}\n"
     path = _spoiled(examples, "service-client", "\ncriteria:\n", f"{stuck}\ncriteria:\n{criterion}")
-    assert doubts_of(load_rubric(str(path)), path.name) == []
+    assert warnings_of(load_rubric(str(path)), path.name) == []
 
 
 def test_a_field_may_be_asked_to_be_infinite(examples: Path) -> None:
     path = _spoiled(examples, "tf-broadcaster", "value: 5, tolerance: 0.01", "value: .inf, tolerance: 0.01")
-    assert doubts_of(load_rubric(str(path)), path.name) == []
+    assert warnings_of(load_rubric(str(path)), path.name) == []
 
 
 @pytest.mark.parametrize("slip", [slip for slip in LISTED if "fault" in slip], ids=lambda slip: slip["fault"])

@@ -102,7 +102,7 @@ def validate_rubrics(*, files: Annotated[Sequence[str], Argument("FILE", "rubric
     """
     with loading():
         from grader.cli.output import say
-        from grader.rubric.load import doubts_of, load_rubric
+        from grader.rubric.load import load_rubric, warnings_of
         from grader.wording import number
     faults, hint = [], ""
     for file in files:
@@ -115,8 +115,8 @@ def validate_rubrics(*, files: Annotated[Sequence[str], Argument("FILE", "rubric
             rubric, points = loaded.rubric, number(loaded.rubric.max_points)
             say(f"{file}: ok, {rubric.id}, {len(rubric.criteria)} criteria, {points} points")
             say(f"  digest {loaded.digest}")
-            for doubt in doubts_of(loaded, file):
-                say(f"  warning: {doubt}")
+            for warning in warnings_of(loaded, file):
+                say(f"  warning: {warning}")
     if faults:
         raise RubricError(faults, hint=hint)
     return ExitCode.PASSED

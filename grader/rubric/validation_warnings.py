@@ -13,8 +13,8 @@ from typing import Any
 
 from grader.checks.support.fields import is_number
 from grader.rubric.message_fields import POSES, VELOCITIES, services_in
+from grader.rubric.simulators import set_in, topics_of_programs
 from grader.rubric.spelling import texts_in
-from grader.rubric.standins import set_in, topics_of_programs
 from grader.rubric.started import starts_of
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
@@ -45,7 +45,7 @@ EXPECTED = ("value", "values", "numbers", "rate_hz", "result", "expect", "goal",
 """Keys of what a criterion asks for, as numbers."""
 
 
-def doubts(data: object) -> Iterator[Fault]:
+def warnings(data: object) -> Iterator[Fault]:
     """Yield what may be a slip."""
     rubric = as_map(data)
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
