@@ -16,6 +16,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -26,6 +27,7 @@ _MODULE = "import sys; sys.path[:] = filter(None, sys.path); from {} import main
 HOST_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 HOST_ENV = {"PATH": HOST_PATH, "LANG": "C.UTF-8"}
 RESOLVE_S = 5
+GIT_S = 5
 LOCALHOST, LOCALHOST_HINT = "localhost", "echo '127.0.0.1 localhost' >> /etc/hosts"
 """Without a sandbox, which has a file of its own, roslaunch asks the machine for its address, and ends without one."""
 
@@ -101,3 +103,20 @@ def resolves(name: str) -> bool:
 def find_host_program(name: str) -> str | None:
     """Return the absolute path of a program of this machine, such as `bwrap`; None where it is not installed."""
     return shutil.which(name, path=HOST_PATH)
+
+
+def git_user() -> str:
+    """What git calls the person; empty where it does not."""
+    with suppress(OSError, subprocess.SubprocessError, UnicodeDecodeError):
+        done = subprocess.run(
+            [find_user_program("git") or "/usr/bin/git", "config", "user.name"],
+            env=with_absolute_paths(os.environ),
+            cwd="/",
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=GIT_S,
+            check=False,
+        )
+        return done.stdout.strip()
+    return ""

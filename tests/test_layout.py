@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
@@ -252,3 +253,32 @@ def _calls(path: Path) -> Iterator[str]:
     for node in _nodes(path):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             yield node.func.id
+
+
+WITHOUT_EXTRAS = """
+import importlib, pkgutil, sys
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in sys.argv[1:]:
+            raise ModuleNotFoundError(name=name)
+sys.meta_path.insert(0, Hidden())
+import grader
+for module in pkgutil.walk_packages(grader.__path__, "grader."):
+    if not any(part in module.name for part in (".arena.ros", ".standins", "__main__")):
+        try:
+            importlib.import_module(module.name)
+        except ModuleNotFoundError:
+            print(module.name)
+"""
+OF_EXTRAS = ("cryptography", "copydetect", "dask", "distributed", "flask", "fsspec", "waitress")
+
+
+def test_what_an_extra_brings_is_imported_by_its_own_modules_alone() -> None:
+    """So `grader batch` runs where only the grader itself is installed."""
+    command = [sys.executable, "-c", WITHOUT_EXTRAS, *OF_EXTRAS]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    found = done.stdout.split()
+    assert found
+    assert {name.rpartition(".")[0] for name in found} <= {
+        "grader.classes.cluster", "grader.classes.review", "grader.classes.similarity",
+    }  # fmt: skip

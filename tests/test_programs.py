@@ -78,7 +78,7 @@ STARTS = {
         "'/'",
         "the signature and the sums beside a result, which a student's CI job may have written",
     ),
-    "classes/review/serve.py:git_user": Start("with_absolute_paths(os.environ)", "'/'", "nothing"),
+    "host_programs.py:git_user": Start("with_absolute_paths(os.environ)", "'/'", "nothing"),
 }
 REPLACED = {
     "arena/ros/namespaces.py:<module>": "becomes the program of the probe: arena/sandbox.py",

@@ -335,7 +335,7 @@ def _drafts(course: CourseFile, marks: Sequence[LabMarks], *, drafts: bool) -> I
 def reviewer(named: str | None) -> str:
     """Return who reviews: the name given, else git's. Raises UsageError for what is not a name."""
     from grader.classes.review.cards import Wrong, author_of  # noqa: PLC0415 - only `grader review` has its library
-    from grader.classes.review.serve import git_user  # noqa: PLC0415
+    from grader.host_programs import git_user  # noqa: PLC0415
 
     try:
         return author_of(git_user() if named is None else named)

@@ -23,12 +23,12 @@ from grader.classes.feedback.send import (
     faults,
     open_selection,
 )
-from grader.classes.review.serve import git_user
 from grader.classes.review.session import ReviewSession, open_session
 from grader.classes.review.student_requests import RequestRow, fetch, rows_of, waiting, write_requests
 from grader.classes.roster.entries import parse_time
 from grader.cli.output import say, say_beside, say_document, say_json
 from grader.errors import ExitCode, NotSent, UsageError
+from grader.host_programs import git_user
 from grader.model.result import AUTHOR_CHARS
 from grader.portable import cores
 from grader.report.view import hidden_ids

@@ -24,7 +24,7 @@ from grader.rubric.made_up import draw_values, faults_of_sample, made_up_faults,
 from grader.rubric.model import Criterion, Rubric
 from grader.rubric.own_checks import Beside, known_checks, read_instructor, run_checks_file
 from grader.rubric.scenario import Scenario
-from grader.rubric.spelling import names_seen_once, misspelt_names
+from grader.rubric.spelling import misspelt_names, names_seen_once
 from grader.rubric.validation_warnings import warnings
 from grader.rubric.yaml_lines import Fault, KeyPath, Source, Value, as_map, read_source
 

@@ -18,6 +18,7 @@ import pytest
 
 from grader.classes.review import serve
 from grader.cli.main import run
+from grader.host_programs import git_user
 from tests.review.a_class import overrides_of, points_of
 from tests.review.running import WAIT_S, Server, Tab
 
@@ -206,4 +207,4 @@ def test_the_author_is_whom_git_calls(tmp_path, monkeypatch, there, name) -> Non
     monkeypatch.chdir(tmp_path)
     if there:
         (tmp_path / "config").write_text("[user]\n\tname = Kim Lee\n")
-    assert serve.git_user() == name
+    assert git_user() == name

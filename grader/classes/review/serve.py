@@ -6,7 +6,6 @@ import errno
 import os
 import secrets
 import socket
-import subprocess
 import sys
 import threading
 import webbrowser
@@ -23,11 +22,9 @@ from grader.classes.review.guard import BODY_BYTES, TOKEN_BYTES
 from grader.classes.review.session import ReviewSession
 from grader.errors import HostError, UsageError
 from grader.files import temporary_folder
-from grader.host_programs import find_user_program, with_absolute_paths
 
 HOST = "127.0.0.1"
 THREADS = 6
-GIT_S = 5
 
 
 def serve(
@@ -120,20 +117,3 @@ def _open(page: Path) -> None:
 def _has_screen() -> bool:
     screens = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
     return sys.platform == "darwin" or any(os.environ.get(name) for name in screens)
-
-
-def git_user() -> str:
-    """What git calls the person; empty where it does not."""
-    with suppress(OSError, subprocess.SubprocessError, UnicodeDecodeError):
-        done = subprocess.run(
-            [find_user_program("git") or "/usr/bin/git", "config", "user.name"],
-            env=with_absolute_paths(os.environ),
-            cwd="/",
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=GIT_S,
-            check=False,
-        )
-        return done.stdout.strip()
-    return ""
