@@ -251,7 +251,8 @@ def is_used_by(
         return launches and not known
     if repair.kind in OF_BUILDS:
         of_file = PurePosixPath(repair.file).suffix in MADE_BY_BUILDS
-        made = of_file or GENERATION.search(repair.after) is not None
+        changed = {*repair.after.split("\n")} - {*repair.before.split("\n")}
+        made = of_file or any(map(GENERATION.search, changed))
         return made or not built or any(start.built for start in scenario.start)
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         return True
