@@ -230,8 +230,6 @@ NAMES = [
     ("turtle-square", "publisher: square", "publisher: sqare", "75: criteria[2].with.publisher", "sqare", "square"),
     ("turtle-square", "with: {name: /square/side", "with: {name: /sqare/side", "111: criteria[6].with.name",
      "/sqare/side", "/square/side"),
-    ("turtle-square", "topic: /square/status", "topic: /square/statu", "121: criteria[7].with.topic",
-     "/square/statu", "status"),
     ("cpp-and-python", "script: average", "script: averge", "22: scenarios.tests.start[0].script", "averge", "average"),
     ("own-message", "names: [sensor]", "names: [senor]", "31: criteria[2].with.names[0]", "senor", "sensor"),
     ("own-message", "frame_id: thermometer", "frame_id: thermomter", "37: criteria[5].with.frame_id", "thermomter",
