@@ -84,17 +84,11 @@ def choose_repairs(
         return (), ()
     # of a script that the build makes a program of, neither its bit nor its first line is used
     made = {c.mistake.name for c in criteria if c.mistake is not None and is_unmade(c)}
-    made |= {
-        one.before for one in chosen if one.kind == "file-name" and one.before in programs_of_build(facts)
-    }
-    before = [
-        one
-        for one in counting
-        if one.kind in DONE_BEFORE_RUNS
-        and one.file not in made
-        and not is_first_line_added(one, rubric, chosen)
-    ]
-    return (*before, *chosen), tuple(scenarios)
+    made |= programs_of_build(facts) & {one.before for one in chosen if one.kind == "file-name"}
+    before = (one for one in counting if one.kind in DONE_BEFORE_RUNS and one.file not in made)
+    return (*(one for one in before if not is_first_line_added(one, rubric, chosen)), *chosen), tuple(
+        scenarios
+    )
 
 
 def _find_in_all(submission: Submission, facts: PackageFacts, rubric: Rubric) -> list[Repair]:

@@ -21,7 +21,7 @@ from grader.checks.support.scripts import PYTHON, installed, names_script
 from grader.checks.support.text import texts_in
 from grader.evidence.events import CATKIN_MAKE, PACKAGE_RUN
 from grader.evidence.run import Run
-from grader.judging.copy_lines import with_lines_as_handed_in
+from grader.judging.as_handed_in import repairs_as_handed_in, with_lines_as_handed_in, with_names_as_handed_in
 from grader.model.package import CMAKE, MANIFEST, PackageFacts
 from grader.model.repair import Repair, advice_on, messages_of, place_of
 from grader.model.result import CriterionResult, Repaired
@@ -156,8 +156,8 @@ def apply_repaired_copy(
             continue
         verdict, copy = first[criterion.id], on_copy[criterion.id]
         share = min(rubric.share_of(one.kind) for one in needed) if criterion.points else 1.0
-        told = _as_handed_in(charged or needed, repairs)
-        placed = _with_old_names(copy, repairs)
+        told = repairs_as_handed_in(charged or needed, repairs)
+        placed = with_names_as_handed_in(copy, repairs)
         verdicts[criterion.id] = (
             _charge(verdict, copy, told, cited_lines(placed.citations))
             if charged
@@ -165,33 +165,6 @@ def apply_repaired_copy(
         )
         uses[criterion.id] = Repaired(repairs=told, share=share, charged=bool(charged))
     return verdicts, uses
-
-
-def _as_handed_in(needed: Sequence[Repair], repairs: Sequence[Repair]) -> tuple[Repair, ...]:
-    """Return the repairs with the names that their files have in the package as it is: on the copy, a file may have
-    got its right name first."""
-    names = _old_names(repairs)
-    return tuple(_renamed(one, names.get(one.file, one.file)) for one in needed)
-
-
-def _renamed(repair: Repair, file: str) -> Repair:
-    return repair.model_copy(update={"file": file, "message": repair.message.replace(repair.file, file)})
-
-
-def _old_names(repairs: Iterable[Repair]) -> dict[str, str]:
-    return {one.after: one.before for one in repairs if one.kind == "file-name"}
-
-
-def _with_old_names(copy: Verdict, repairs: Iterable[Repair]) -> Verdict:
-    """Return a verdict on the copy that cites files by the names that they have in the package as it is."""
-    names = _old_names(repairs)
-    cited = tuple(
-        one.model_copy(update={"file": names.get(one.file, one.file)})
-        if isinstance(one, FileCitation)
-        else one
-        for one in copy.citations
-    )
-    return copy.model_copy(update={"citations": cited})
 
 
 def concerns(

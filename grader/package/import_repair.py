@@ -73,7 +73,7 @@ def with_modules(text: str, types: list[str]) -> Iterator[Step]:
 
 
 def _is_near_one(name: str, known: Collection[str]) -> bool:
-    """Return whether it is one of the classes, or a slip in one, which `_with_classes` puts right."""
+    """Return whether it is one of the classes, or a slip in one, which `with_classes` puts right."""
     return name in known or any(
         is_one_edit(name.lower(), one.lower()) or name.lower() == one.lower() for one in known
     )
@@ -97,9 +97,9 @@ def with_classes(text: str, types: list[str]) -> Iterator[Step]:
         for alias in (one for one in node.names if one.name not in known and one.asname is None):
             used = [n for n in uses if n.id == alias.name]
             other_letters = [name for name in sorted(unbound) if name.lower() == alias.name.lower()]
-            near = get_close_matches(alias.name, unbound, 1, 0.8)
-            near = near or [one for one in sorted(unbound) if is_one_edit(alias.name, one)]
-            right = other_letters or near if not used else []
+            alike = get_close_matches(alias.name, unbound, 1, 0.8)
+            alike = alike or [one for one in sorted(unbound) if is_one_edit(alias.name, one)]
+            right = other_letters or alike if not used else []
             # of other packages not all classes are known: Pose may be there beside Pose2D
             near = get_close_matches(alias.name, of_lab, 1, 0.75) if package == "std_msgs" else []
             meant = next(iter(right or near), same.get(alias.name.lower(), ""))

@@ -14,22 +14,9 @@ from difflib import get_close_matches
 from grader.package.syntax_repair import Step, edited, span_of, step_to
 from grader.wording import is_one_edit
 
-OF_PYTHON = {
-    "abs",
-    "float",
-    "format",
-    "input",
-    "int",
-    "len",
-    "max",
-    "min",
-    "print",
-    "range",
-    "round",
-    "sorted",
-    "str",
-    "sum",
-}
+OF_PYTHON = (
+    "abs", "float", "format", "input", "int", "len", "max", "min", "print", "range", "round", "sorted", "str", "sum",
+)  # fmt: skip
 """Functions of Python that are called in any script."""
 OBVIOUS_NAMES = {
     **dict.fromkeys(("true", "TRUE"), "True"),
@@ -99,14 +86,9 @@ def with_names(text: str) -> Iterator[Step]:
         alone = {n.id for n in stated if isinstance(n, ast.Name) and is_one_edit(n.id.lower(), "pass")}
         for name in dict.fromkeys(n.id for n in missing):
             guards = name == "name" and any(_is_guard(one) for one in tree.body)
-            meant = (
-                OBVIOUS_NAMES.get(name) or ("__name__" if guards else "") or meant_by(name, own, own - loaded)
-            )
-            meant = (
-                meant
-                or ("pass" if name in alone else "")
-                or next((one for one in OF_PYTHON if is_slip(name, one)), "")
-            )
+            of_python = next((one for one in OF_PYTHON if is_slip(name, one)), "")
+            meant = OBVIOUS_NAMES.get(name) or ("__name__" if guards else "")
+            meant = meant or meant_by(name, own, own - loaded) or ("pass" if name in alone else of_python)
             spans = [span for n in missing if n.id == name and (span := span_of(lines, n))]
             if meant and spans:
                 after = edited(text, [(*span, meant) for span in spans])

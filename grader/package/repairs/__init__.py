@@ -28,6 +28,7 @@ from grader.package.repairs.editing import (
     write_data,
 )
 from grader.package.repairs.files import find_renames, is_own, rename_files, repair_files, to_utf8
+from grader.package.repairs.launch_files import repair_launch_files, repair_launch_names
 from grader.package.repairs.manifest import repair_manifest
 from grader.package.repairs.names import (
     CPP,
@@ -35,8 +36,6 @@ from grader.package.repairs.names import (
     is_near,
     names_in_cpp,
     names_remapped,
-    repair_launch_files,
-    repair_launch_names,
     repair_script_keys,
     repair_script_names,
     repair_yaml_names,

@@ -42,7 +42,7 @@ def replace_token(text: str, token: Token, new: str) -> str:
 
 
 def all_words(files: Files) -> Iterator[Token]:
-    for command in commands_of(cmake_text(files).encode()) or []:
+    for command in all_calls(files):
         yield from command.args
 
 

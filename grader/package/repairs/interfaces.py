@@ -25,8 +25,6 @@ from grader.wording import is_one_edit, join_words
 
 OF_GENERATION = re.compile(r"_generate_messages|_gen(cpp|py)$")
 """Targets that generate_messages(…) makes."""
-
-
 GENERATE, GENERATION = "generate_messages", "message_generation"
 
 

@@ -16,8 +16,6 @@ from grader.package.repairs.names import CPP, Wanted, is_near
 from grader.wording import join_words
 
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
-
-
 INSTALL = "catkin_install_python"
 
 

@@ -1,6 +1,7 @@
-"""Verdicts on the repaired copy, with the lines that its files have in the package as it was handed in. Pure.
+"""Verdicts on the repaired copy, with the lines and names that its files have in the package as handed in. Pure.
 
-A repair may add lines or take some out, and the checks count the lines of what ran. Students look into their own files.
+A repair may add lines, take some out or rename a file, and the checks speak of what ran. Students look into their own
+files.
 """
 
 from __future__ import annotations
@@ -51,6 +52,29 @@ def text_as_handed_in(text: str, repairs: Sequence[Repair], alone: str = "") -> 
         return found[0][:start] + numbers + found[0][start + len(found["numbers"]) :]
 
     return LINES.sub(counted, text) if moving else text
+
+
+def repairs_as_handed_in(needed: Iterable[Repair], repairs: Iterable[Repair]) -> tuple[Repair, ...]:
+    """Return the repairs with the names that their files have in the package as it is: on the copy, a file may have
+    got its right name first."""
+    names = {new: old for old, new in _renamed(repairs).items()}
+    old = ((one, names.get(one.file, one.file)) for one in needed)
+    return tuple(
+        one.model_copy(update={"file": file, "message": one.message.replace(one.file, file)})
+        for one, file in old
+    )
+
+
+def with_names_as_handed_in(copy: Verdict, repairs: Iterable[Repair]) -> Verdict:
+    """Return a verdict on the copy that cites files by the names that they have in the package as it is."""
+    names = {new: old for old, new in _renamed(repairs).items()}
+    cited = tuple(
+        one.model_copy(update={"file": names.get(one.file, one.file)})
+        if isinstance(one, FileCitation)
+        else one
+        for one in copy.citations
+    )
+    return copy.model_copy(update={"citations": cited})
 
 
 def _renamed(repairs: Iterable[Repair]) -> dict[str, str]:

@@ -1,6 +1,6 @@
 import pytest
 
-from grader.judging.copy_lines import with_lines_as_handed_in
+from grader.judging.as_handed_in import with_lines_as_handed_in
 from grader.model.repair import Repair
 from grader.model.verdict import FileCitation, failed
 

@@ -1,0 +1,148 @@
+"""Repairs of launch files: XML that is not well-formed, and attributes that name nearly what is meant."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import PurePosixPath
+
+from grader.model.package import MANIFEST, LaunchFile, LaunchNode, PackageFacts
+from grader.model.repair import RepairKind
+from grader.package.launch import parse_launch
+from grader.package.manifest import parse_manifest
+from grader.package.repairs.editing import Files, repair_xml
+from grader.package.repairs.names import Wanted, is_near
+
+TAG_LINES_MAX = 20
+NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test")
+
+
+def repair_launch_files(files: Files, package: PackageFacts) -> PackageFacts:
+    """Find the edits that make launch files well-formed, and return the package as it is with them."""
+    launches = [
+        parse_launch((files.text(launch.path) or "").encode(), launch.path)
+        if (launch.fault is None or launch.fault.kind == "XMLSyntaxError")
+        and repair_xml(files, launch.path, "launch", "launch-syntax")
+        else launch
+        for launch in package.launch_files
+    ]
+    return package.model_copy(update={"launch_files": tuple(launches)})
+
+
+def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str], wanted: Wanted) -> None:
+    """Find attributes of launch files that name a script without its `.py`, another package, or a node or parameter
+    nearly as the lab does. `names` are the files of the package once they are renamed."""
+    given = package.manifest.name if package.manifest is not None else wanted.package
+    own = _own_name(files, given)
+    ours = {own, given, PurePosixPath(package.path).name}
+    scripts = {name for path in names if not (name := PurePosixPath(path).name).endswith(NO_SCRIPTS)}
+    programs = scripts | _programs(package)
+    nodes = [(launch, node) for launch in package.launch_files for node in launch.nodes]
+    for launch, node in nodes:
+        _complete_node(files, launch.path, node, own, scripts)
+    for launch, node in nodes:
+        pkg, kind = node.pkg or "", node.type or ""
+        if pkg != own and (is_near(pkg, own) or (pkg in ours and {kind, f"{kind}.py"} & scripts)):
+            _set_attribute(files, launch.path, node.line, ("pkg", pkg, own), kind="package-name")
+    for launch in package.launch_files:
+        _repair_find(files, launch.path, own)
+    for launch, node in nodes:
+        kind = node.type or ""
+        if kind and kind not in programs and (node.pkg in ours or is_near(node.pkg or "", own)):
+            near = (
+                [f"{kind}.py"]
+                if f"{kind}.py" in scripts
+                else [s for s in sorted(scripts) if is_near(kind, s)]
+            )
+            for right in near[:1]:
+                _set_attribute(files, launch.path, node.line, ("type", kind, right), kind="launch-type")
+    _repair_nodes(files, package, wanted)
+    for launch in package.launch_files:
+        _repair_params(files, launch, wanted)
+
+
+def _complete_node(files: Files, file: str, node: LaunchNode, own: str, scripts: set[str]) -> None:
+    """Give a node of the package's own the one attribute that it lacks, where the other two say which it is."""
+    there = {"pkg": node.pkg, "type": node.type, "name": node.name}
+    lacking = [attribute for attribute, value in there.items() if not value]
+    kind, lines = node.type or f"{node.name}.py", (files.text(file) or "").split("\n")
+    if len(lacking) != 1 or kind not in scripts or not 0 < node.line <= len(lines):
+        return
+    value = {"pkg": own, "type": kind, "name": PurePosixPath(kind).stem}[lacking[0]]
+    is_empty = re.search(rf"\s{lacking[0]}\s*=", lines[node.line - 1])
+    after = re.sub(r"<node\b", f'<node {lacking[0]}="{value}"', lines[node.line - 1], count=1)
+    if not is_empty and after != lines[node.line - 1]:
+        lines[node.line - 1] = after
+        files.change(
+            "launch-syntax", file, "\n".join(lines), f"line {node.line} of {file}: <node> has no {lacking[0]}"
+        )
+
+
+def _repair_find(files: Files, file: str, own: str) -> None:
+    """Replace what is nearly the package's name in each `$(find …)` of a launch file."""
+    text = files.text(file) or ""
+    for place in re.finditer(r"\$\(find +([\w-]+) *\)", text):
+        if is_near(found := place[1], own):
+            after = re.sub(rf"(\$\(find +){re.escape(found)}(?= *\))", rf"\g<1>{own}", files.text(file) or "")
+            line = text[: place.start()].count("\n") + 1
+            files.change(
+                "package-name", file, after, f"line {line} of {file}: $(find {found}) should be $(find {own})"
+            )
+
+
+def _own_name(files: Files, given: str) -> str:
+    """Return the package's name once its manifest is repaired."""
+    manifest, _ = parse_manifest((files.text(MANIFEST) or "").encode())
+    return manifest.name if manifest is not None else given
+
+
+def _repair_params(files: Files, launch: LaunchFile, wanted: Wanted) -> None:
+    there = {param.name for param in launch.params}
+    for param in launch.params:
+        right = next((w for w in wanted.params if w not in there and is_near(param.name, w)), "")
+        if right and param.file == launch.path and param.name not in wanted.params:
+            old, new = param.name.rpartition("/")[2], right.rpartition("/")[2]
+            _set_attribute(files, launch.path, param.line, ("name", old, new), kind="parameter-name")
+
+
+def _programs(package: PackageFacts) -> set[str]:
+    return {one.name for one in package.cmake.executables} if package.cmake is not None else set()
+
+
+def _repair_nodes(files: Files, package: PackageFacts, wanted: Wanted) -> None:
+    """Give each of the lab's names to one node of a launch file: roslaunch refuses two of the same name."""
+    names = [name.strip("/") for name in wanted.nodes]
+    for launch in package.launch_files:
+        taken = {node.name for node in launch.nodes}
+        for node in launch.nodes:
+            name = node.name or ""
+            right = next((one for one in names if one not in taken and is_near(name, one)), "")
+            if right and name not in names:
+                _set_attribute(files, launch.path, node.line, ("name", name, right), kind="node-name")
+                taken.add(right)
+
+
+def _set_attribute(
+    files: Files, file: str, line: int, change: tuple[str, str, str], *, kind: RepairKind
+) -> None:
+    """Replace the attribute's value where it next stands, from the tag's line on; a package's name in all the file."""
+    attribute, old, new = change
+    text = files.text(file)
+    if text is None or line < 1:
+        return
+    lines = text.split("\n")
+    pattern = re.compile(
+        rf"(?P<head>\b{attribute}\s*=\s*(?P<quote>[\"'])\s*){re.escape(old)}(?=\s*(?P=quote))"
+    )
+    for number in range(line - 1, min(len(lines), line - 1 + TAG_LINES_MAX)):
+        changed = pattern.sub(lambda m: m["head"] + new, lines[number], count=1)
+        if changed != lines[number]:
+            lines[number] = changed
+            if kind == "package-name":
+                lines = [pattern.sub(lambda m: m["head"] + new, one) for one in lines]
+            message = f'line {number + 1} of {file}: {attribute}="{old}" should be {attribute}="{new}"'
+            fix = f'write pkg="{new}" instead of pkg="{old}"' if kind == "package-name" else ""
+            files.change(kind, file, "\n".join(lines), message, fix)
+            return
+        if number >= line and "<" in lines[number].replace("<!--", ""):
+            return
