@@ -14,6 +14,8 @@ from grader.checks.support.counters import (
     Step,
     WrapParams,
     Wrong,
+    added_early,
+    cite_early,
     cite_slip,
     counts,
     first_values,
@@ -102,22 +104,17 @@ def _cite_start(
     """Return a lost verdict with the line that gives the counter its value, or adds one before it is published."""
     if verdict.status is not Status.FAIL:
         return verdict
+    early = added_early(first, run, package, params.start)
+    if early is not None:
+        return cite_early(verdict, early)
     value = first.values[0]
     starts = slips_of(package, run, first.callerid, "start-value")
-    added = slips_of(package, run, first.callerid, "added-first")
     wrong = [one for one in starts if int(one.message) == value]
-    early = [
-        one for one in added if {s.message for s in starts if s.name == one.name} == {str(int(value) - 1)}
-    ]
-    if len(early) == 1 and value - params.start == 1:
-        slip, what = early[0], f"adds one to `{early[0].name}` before the first value is published"
-        hint = f"move line {slip.line} of {slip.file} below publish(…)"
-    elif len(wrong) == 1 and not added:
-        slip, what = wrong[0], f"sets `{wrong[0].name}` to {wrong[0].message}"
-        hint = f"on line {slip.line} of {slip.file}, set `{slip.name}` to {params.start}"
-    else:
+    if len(wrong) != 1 or slips_of(package, run, first.callerid, "added-first"):
         return verdict
-    message = f"{verdict.message}; line {slip.line} of {slip.file} {what}"
+    slip = wrong[0]
+    message = f"{verdict.message}; line {slip.line} of {slip.file} sets `{slip.name}` to {slip.message}"
+    hint = f"on line {slip.line} of {slip.file}, set `{slip.name}` to {params.start}"
     return verdict.model_copy(update={"message": message, "hint": hint, "citations": (slip.place,)})
 
 
@@ -221,7 +218,11 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     if count is None:
         return _nothing(package, run, params.topic).about(expected=expected)
     verdict, seen = judge_wraps(count, run, package, params)
-    verdict = cite_slip(verdict, count, run, package, "compared", "reset-early")
+    early = added_early(count, run, package, low)
+    if early is not None and verdict.status.is_lost and seen and seen.after == low + 1:
+        verdict = cite_early(verdict, early)
+    else:
+        verdict = cite_slip(verdict, count, run, package, "compared", "reset-early")
     turn = f"{significant(seen.before)}→{significant(seen.after)}" if seen else "no reset"
     lowest, highest = significant(min(count.values)), significant(max(count.values))
     measured = f"{plural(len(count.values), 'value')}, {lowest} to {highest}, {turn}"

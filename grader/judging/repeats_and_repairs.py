@@ -266,7 +266,12 @@ def _is_next(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> bool:
     files = {repair.file for repair in repairs}
     found = {(c.file, c.line) for c in one.citations if isinstance(c, FileCitation) and c.file in files}
     again = {(c.file, c.line) for c in copy.citations if isinstance(c, FileCitation)}
-    read_now = {(repair.file, repair.line) for repair in repairs if repair.kind in OF_SYNTAX}
+    read_now = {
+        (repair.file, repair.line + further)
+        for repair in repairs
+        if repair.kind in OF_SYNTAX and repair.line is not None
+        for further in range(len(repair.before.split("\n")))
+    }
     return (
         found != set() and not copy.unjudged and not found & again - read_now and _is_other_fault(one, copy)
     )

@@ -135,7 +135,8 @@ def _where_and_how(repair: Repair) -> tuple[str, str]:
     if repair.fix != "; ".join(added):
         below = len(new) > 1 and new[0] == repair.before and repair.line is not None
         named = re.match(
-            r"(delete|start|indent|write|make|remove the `#` of|in place of) lines? \d", repair.fix
+            r"(delete|replace the tabs: start|start|indent|write|make|remove the `#` of|in place of) lines? \d",
+            repair.fix,
         )
         if below and not named:
             return repair.file, f"below line {repair.line}, {repair.fix}"

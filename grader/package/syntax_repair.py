@@ -362,8 +362,9 @@ def _with_global_first(text: str, number: int) -> Iterator[tuple[str, str]]:
 
 
 def _expand_tabs(line: str, width: int) -> str:
+    """Return a line of code without tabs before it. To Python, the indentation of any other line means nothing."""
     code = line.lstrip(" \t")
-    return line[: len(line) - len(code)].expandtabs(width) + code
+    return line if code.strip()[:1] in {"", "#"} else line[: len(line) - len(code)].expandtabs(width) + code
 
 
 def with_line(lines: list[str], at: int, line: str) -> str:

@@ -20,7 +20,15 @@ from grader.model.result import (
     Note,
 )
 from grader.model.verdict import Status
-from grader.report.view import Loss, ReportView, hidden_ids, missing_file, not_graded, points_of
+from grader.report.view import (
+    Loss,
+    ReportView,
+    hidden_ids,
+    missing_file,
+    not_graded,
+    points_of,
+    without_bit,
+)
 from grader.rubric.made_up import as_text
 from grader.rubric.model import Rubric
 from grader.wording import join_words, number, plural
@@ -62,8 +70,12 @@ def repair_words(result: GradingResult) -> tuple[str, ...]:
             judged.setdefault(repair, []).append(criterion)
     together: dict[tuple[str, ...], list[Repair]] = {}
     for repair, criteria in judged.items():
-        together.setdefault(tuple(c.id for c in criteria), []).append(repair)
-    said = (_repair_words(repairs, judged[repairs[0]]) for repairs in together.values())
+        costing = [c.id for c in criteria if c.repaired and c.repaired.charged and c.missing]
+        together.setdefault(tuple(costing or (c.id for c in criteria)), []).append(repair)
+    said = (
+        _repair_words(repairs, list({c.id: c for one in repairs for c in judged[one]}.values()))
+        for repairs in together.values()
+    )
     return tuple(words for words in said if words)
 
 
@@ -73,10 +85,7 @@ def _repair_words(repairs: list[Repair], criteria: list[CriterionResult]) -> str
     cost = sum(c.missing for c in charged)
     if not cost and not any(c.counts and c.points for c in others):
         return ""
-    wrong = [
-        one.message if one.file in one.message else f"{one.message} ({place_of(one)})" for one in repairs
-    ]
-    words = f"{join_words(wrong)}: this costs you {plural(cost, 'point')}"
+    words = f"{join_words(_faults(repairs))}: this costs you {plural(cost, 'point')}"
     words += f" ({', '.join(c.id for c in charged)})" if charged else ""
     shares = {c.repaired.share for c in others if c.repaired}
     for share in sorted(shares, reverse=True):
@@ -85,6 +94,16 @@ def _repair_words(repairs: list[Repair], criteria: list[CriterionResult]) -> str
         were = "was" if len(names) == 1 else "were"
         words += f"; {join_words(names)} {were} judged with this repaired{earned}"
     return words if words.startswith(repairs[0].file) else f"{words[:1].upper()}{words[1:]}"
+
+
+def _faults(repairs: list[Repair]) -> list[str]:
+    """Return what is wrong, once for all files with the same fault: `src/a.py and src/b.py are not executable`."""
+    bits = [one.file for one in repairs if one.kind == "executable-bit"]
+    others = [one for one in repairs if one.kind != "executable-bit"]
+    said = [without_bit(bits)] if bits else []
+    return said + [
+        one.message if one.file in one.message else f"{one.message} ({place_of(one)})" for one in others
+    ]
 
 
 def judged_repaired(result: GradingResult) -> dict[str, list[str]]:

@@ -140,10 +140,11 @@ def _joined(criterion: CriterionResult, scripts: Sequence[CriterionResult]) -> C
         return criterion.model_copy(update={"message": message, "hint": hint})
     own = criterion.mistake.name if criterion.mistake else ""
     hint = criterion.hint.replace(own, " ".join([own, *paths]))
-    return criterion.model_copy(update={"message": _without_bit([own, *paths]), "hint": hint})
+    return criterion.model_copy(update={"message": without_bit([own, *paths]), "hint": hint})
 
 
-def _without_bit(paths: Sequence[str]) -> str:
+def without_bit(paths: Sequence[str]) -> str:
+    """`src/a.py and src/b.py are not executable`."""
     return f"{join_words(paths)} {'are' if len(paths) > 1 else 'is'} not executable"
 
 

@@ -283,6 +283,11 @@ def test_where_a_counter_goes_back_is_known(tmp_path, code, found):
     [
         ("n = 0\nwhile True:\n    n += 1\n    pub.publish(n)", [("start-value", 1, "0"), ("added-first", 3, "")]),
         ("n = 1\nwhile True:\n    pub.publish(n)\n    n += 1", [("start-value", 1, "1")]),
+        ("n = 0\nwhile True:\n    text.publish('hi')\n    n += 1\n    pub.publish(n)",
+         [("start-value", 1, "0"), ("added-first", 4, "")]),
+        ("n = 0\nwhile True:\n    msg.data = n\n    n += 1\n    pub.publish(msg)", [("start-value", 1, "0")]),
+        ("n = 0\nwhile True:\n    if n < 127:\n        n += 1\n    else:\n        n = 0\n    pub.publish(n)",
+         [("start-value", 1, "0"), ("added-first", 3, "")]),
         ("n = 1\nwhile True:\n    pub.publish(n)\n    n += 1\n    if n > 9:\n        n = 0", [("start-value", 1, "1")]),
         ("def f():\n    if n > 9:\n        n = 0\n    n += 1", []),
         ("n = 1\nm = 2\npub.publish(n)", []),
@@ -294,6 +299,21 @@ def test_where_a_counter_begins_is_known(tmp_path, code, found):
     (tmp_path / "a.py").write_text(code + "\n")
     slips = check_syntax(tmp_path, ["a.py"]).slips
     assert [(s.kind, s.line, s.message) for s in slips if s.kind in {"start-value", "added-first"}] == found
+
+
+def test_what_is_added_too_early_is_moved_below_the_line_that_publishes_it(tmp_path):
+    choice = (
+        "n = 0\nwhile True:\n    if n < 127:\n        n += 1\n    else:\n        n = 0\n    pub.publish(n)\n"
+    )
+    (tmp_path / "a.py").write_text(choice)
+    (tmp_path / "b.py").write_text(
+        "n = 0\nwhile True:\n    n += 1\n    m.data = n\n    say(m)\n    pub.publish(\n        m)\n"
+    )
+    slips = check_syntax(tmp_path, ["a.py", "b.py"]).slips
+    assert [s.fix for s in slips if s.kind == "added-first"] == [
+        "move lines 3 to 6 below line 7",
+        "move line 3 below line 7",
+    ]
 
 
 def test_what_is_left_of_a_file_that_does_not_parse(tmp_path):

@@ -259,11 +259,27 @@ def test_repairs_of_one_loss_are_told_together():
     lost = criterion("launch", Status.FAIL, 0, 5, repaired=use)
     free = criterion("advice", Status.FAIL, 0, 0, repaired=use.model_copy(update={"repairs": (bits[0],)}))
     assert repair_words(result(criteria=(lost,))) == (
-        "src/a.py is not executable and src/b.py is not executable: this costs you 5 points (launch)",
+        "src/a.py and src/b.py are not executable: this costs you 5 points (launch)",
     )
     assert repair_words(result(criteria=(free,))) == ()
     of_no_use = criterion("build", Status.FAIL, 0, 5, repaired=use.model_copy(update={"charged": False}))
     assert repair_words(result(criteria=(of_no_use,))) == ()
+
+
+def test_two_faults_that_cost_the_same_criterion_are_told_in_one_sentence():
+    bit = Repair(kind="executable-bit", file="src/a.py", message="src/a.py is not executable", fix="")
+    tabs = Repair(kind="python-syntax", file="src/a.py", line=7, message="line 7 of src/a.py: tabs", fix="")
+    both = Repaired(repairs=(bit, tabs), share=0.5, charged=True)
+    one = both.model_copy(update={"repairs": (tabs,), "charged": False})
+    criteria = (
+        criterion("executable", Status.FAIL, 0, 5, repaired=both),
+        criterion("rate", Status.PARTIAL, 5, 10, repaired=one),
+    )
+    (words,) = repair_words(result(criteria=criteria))
+    assert words == (
+        "src/a.py is not executable and line 7 of src/a.py: tabs: this costs you 5 points (executable); "
+        "rate was judged with this repaired, for 50% of the points"
+    )
 
 
 def test_criteria_that_earn_other_shares_of_a_repaired_copy_are_told_apart():

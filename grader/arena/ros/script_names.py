@@ -1,7 +1,7 @@
-"""Finds the names, counters and texts in a student's Python that its run depends on, for `slips.py`.
+"""Finds the names and texts in a student's Python that its run depends on, for `slips.py`.
 
-Names that are not there when they are read; where a script names its node and its topics, where its counters are set,
-and what it publishes and prints. Nothing is executed. Python 3.8, standard library only.
+Names that are not there when they are read; where a script names its node and its topics, and what it publishes and
+prints. Nothing is executed. Python 3.8, standard library only.
 """
 
 import ast
@@ -31,6 +31,18 @@ def is_call(node, *names):
 def calls_in(node, *names):
     """Return all such calls in a node, itself included."""
     return [n for n in getattr(node, "all_nodes", None) or ast.walk(node) if is_call(n, *names)]
+
+
+def turns(tree):
+    """Yield each node with its function, and whether a loop in there does it again and again."""
+    left = [(tree, None, False)]
+    while left:
+        node, function, again = left.pop()
+        yield node, (function, again)
+        for child in ast.iter_child_nodes(node):
+            own = isinstance(child, (ast.FunctionDef, ast.Lambda))
+            looped = again or isinstance(node, (ast.While, ast.For))
+            left.append((child, child if own else function, looped and not own))
 
 
 def functions_in(tree):
@@ -445,156 +457,6 @@ def known_elsewhere(node, tree):
                 return where, "keep it there in another variable, which is `global` or belongs to `self`"
             return where, "below line %d, write `global %s`" % (one.lineno, name)
     return "", ""
-
-
-# ---- counters
-
-
-def in_brackets(counter, rest):
-    """Return how `counter + 1 % 128` is meant; "" where it is something else that a number behind a `%` is added to."""
-    if not isinstance(counter, (ast.Name, ast.Attribute)) or None in (whole(rest.left), whole(rest.right)):
-        return ""
-    return "write `(%s + %d) %% %d`" % (dotted(counter), whole(rest.left), whole(rest.right))
-
-
-def resets(tree):
-    """Where a counter goes back: the number that it is set to in an `if` that asks for it, and the number in that `if`,
-    or behind a `%`.
-    """
-    added = {
-        id(n.right): n.left for n in walk(tree) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)
-    }
-    for node in walk(tree):
-        value, done, asked, fix = None, (), [], ""
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
-            asked = [node.right]
-            fix = in_brackets(added.get(id(node)), node)
-        elif isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Mod):
-            asked = [node.value]
-        elif isinstance(node, ast.If):
-            done = [(one.targets[0], one.value) for one in node.body if isinstance(one, ast.Assign)]
-        elif isinstance(node, ast.Assign) and isinstance(node.value, ast.IfExp):
-            done = [(node.targets[0], node.value.body), (node.targets[0], node.value.orelse)]
-        if done:
-            test = list(ast.walk(node.test if isinstance(node, ast.If) else node.value.test))
-            names = {ast.dump(part) for part in test if isinstance(part, (ast.Name, ast.Attribute))}
-            values = [value for name, value in done if ast.dump(name).replace("Store()", "Load()") in names]
-            value = next((value for value in values if whole(value) is not None), None)
-            asked = test if value is not None else []
-        for part in asked:
-            if whole(part) is not None:
-                yield slip(part.lineno, "reset-limit", "%d" % whole(part), fix=fix)
-        if value is not None:
-            yield slip(value.lineno, "reset-value", "%d" % whole(value))
-
-
-def whole(node):
-    """Return a whole number as it is written, without a sign."""
-    number = isinstance(node, ast.Constant) and type(node.value) is int and node.value < 1 << 31
-    return node.value if number else None
-
-
-def is_increment(node, target, value):
-    """Whether a name is given what it was before, and something more: `n += 1`, `n = (n + 1) % 128`."""
-    if isinstance(node, ast.AugAssign):
-        return isinstance(node.op, ast.Add) and isinstance(value, ast.Constant)
-    return any(dotted(part) == dotted(target) for part in ast.walk(value) if isinstance(part, type(target)))
-
-
-def counter_slips(tree):
-    """Counters that a loop sets in each of its turns, those that it resets before it adds one, and those that it does
-    not count: `n =+ 1`, or the line below the loop.
-    """
-    yield from uncounted(tree)
-    for loop in walk(tree):
-        body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
-        inside = [n for one in body for n in ast.walk(one)]
-        sent = [i for i, one in enumerate(body) if calls_in(one, "publish")]
-        added = {dotted(t): n for n in inside for t in increments(n)} if sent else {}
-        for name, node in added.items():
-            set_at = [i for i, one in enumerate(body) if name in (dotted(t) for t in constants_in([one]))]
-            reset_at = [i for i, one in enumerate(body) if isinstance(one, ast.If) and name in reset_in(one)]
-            if set_at:
-                one = body[set_at[0]]
-                message = "this sets `%s` again each time around the loop" % name
-                fix = "move line %d above the loop on line %d" % (one.lineno, loop.lineno)
-                yield slip(one.lineno, "set-in-loop", message, fix=fix, name=name)
-            elif reset_at and node in body:
-                first = next((i for i in sent if name in names_in(body[i])), sent[0])
-                turn = [(i - first) % len(body) for i in (reset_at[0], body.index(node))]
-                if turn[0] < turn[1]:
-                    line = body[reset_at[0]].lineno
-                    message = "the counter is reset before line %d adds one, and that sum is published"
-                    fix = "move line %d above the `if` on line %d" % (node.lineno, line)
-                    yield slip(line, "reset-early", message % node.lineno, fix=fix, name=name)
-
-
-def counter_starts(tree):
-    """Where a counter gets its first number, and where a loop adds one before it publishes: no slips."""
-    loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For))]
-    later = {id(n) for loop in loops for n in ast.walk(loop) if n is not loop}
-    for node in walk(tree):
-        if isinstance(node, ast.If):
-            later |= {
-                id(one) for one in node.body if {dotted(t) for t in constants_in([one])} & reset_in(node)
-            }
-    changed = [n for n in walk(tree) if isinstance(n, (ast.Assign, ast.AugAssign))]
-    counted = {dotted(t) for n in changed for t in increments(n)}
-    for node in changed:
-        value = whole(node.value) if isinstance(node, ast.Assign) else None
-        if value is not None and id(node) not in later and dotted(node.targets[0]) in counted:
-            yield slip(node.lineno, "start-value", "%d" % value, name=dotted(node.targets[0]))
-    for loop in loops:
-        sent = [i for i, one in enumerate(loop.body) if any(is_call(n, "publish") for n in ast.walk(one))]
-        for at, one in enumerate(loop.body):
-            for name in (dotted(t) for t in increments(one)):
-                if sent and at < sent[0]:
-                    yield slip(one.lineno, "added-first", "", name=name)
-
-
-def uncounted(tree):
-    for node in walk(tree):
-        value = node.value if isinstance(node, ast.Assign) else None
-        if isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.UAdd):
-            name = dotted(node.targets[0])
-            message, fix = "`%s =+ …` sets it, and adds nothing" % name, "write `%s += …`" % name
-            yield slip(node.lineno, "no-effect", message, fix=fix, name=name)
-        body = getattr(node, "body", None)
-        for at, loop in enumerate(body[:-1] if isinstance(body, list) else ()):
-            after = body[at + 1]
-            ends = not isinstance(loop, ast.While) or any(isinstance(n, ast.Break) for n in ast.walk(loop))
-            sent = [names_in(n) for n in calls_in(loop, "publish")]
-            for name in () if ends else (dotted(t) for t in increments(after)):
-                if any(name in names for names in sent):
-                    message = "`%s` is counted below the loop on line %d, which does not end before the node"
-                    last = after
-                    for one in body[at + 2 :]:
-                        last = one if name in names_in(one) else last
-                    lines = "line %d" % after.lineno if last is after else "lines %d to %d"
-                    lines = lines if last is after else lines % (after.lineno, last.end_lineno)
-                    fix = "indent %s like the lines of that loop" % lines
-                    yield slip(after.lineno, "no-effect", message % (name, loop.lineno), fix=fix, name=name)
-
-
-def increments(node):
-    targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
-    value = getattr(node, "value", None)
-    return [t for t in targets if value is not None and t is not None and is_increment(node, t, value)]
-
-
-def constants_in(statements):
-    return [
-        n.targets[0] for n in statements if isinstance(n, ast.Assign) and isinstance(n.value, ast.Constant)
-    ]
-
-
-def reset_in(node):
-    """Return the names that an `if` asks for and gives a fixed value."""
-    return {dotted(t) for t in constants_in(node.body)} & names_in(node.test)
-
-
-def names_in(node):
-    return {dotted(n) for n in ast.walk(node) if isinstance(n, (ast.Name, ast.Attribute))}
 
 
 # ---- texts that are published and printed

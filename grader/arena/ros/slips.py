@@ -1,7 +1,8 @@
 """Finds what compiles in a student's Python and is not meant: `slips` of a syntax tree, for `syntax.py`.
 
 Statements without an effect, loops that never end or never wait, callbacks that do not fit; besides, the rates that a
-script asks for. Names and texts are for `script_names.py`. Nothing is executed. Python 3.8, standard library only.
+script asks for. Names and texts are for `script_names.py`, counters and clocks for `script_counters.py`. Nothing is
+executed. Python 3.8, standard library only.
 """
 
 import ast
@@ -11,23 +12,30 @@ import sys
 
 # `-I` leaves this folder out
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
+from script_counters import (
+    PLAIN_MODULES,
+    clock_values,
+    counter_slips,
+    counter_starts,
+    counts,
+    knows_time,
+    resets,
+    sends_no_time,
+)  # fmt: skip
 from script_names import (
     argument,
     assigned_late,
     called_name,
     calls_in,
-    counter_slips,
-    counter_starts,
     dotted,
     functions_in,
     graph_names,
     is_call,
-    is_increment,
     misspelt,
-    resets,
     said_texts,
     slip,
     text_of,
+    turns,
     walk,
 )  # fmt: skip
 from script_objects import (
@@ -42,19 +50,6 @@ from script_objects import (
 
 SLIPS_LIMIT = 100
 """Of a file."""
-CLOCKS = {
-    "get_time", "get_rostime", "now", "time", "time_ns", "monotonic", "monotonic_ns", "perf_counter",
-    "perf_counter_ns", "process_time", "clock", "clock_gettime", "utcnow", "today", "localtime", "gmtime",
-    "ctime", "asctime", "strftime", "times", "stamp", "header", "eval", "exec", "getattr", "__import__",
-    "import_module", "system", "popen", "Popen", "run", "check_output", "current_real",
-    "current_expected", "last_real", "last_expected", "last_time", "remaining", "wait_for_message",
-    "get_param", "get_param_cached", "Subscriber", "Timer", "vars", "globals", "__dict__", "modules",
-}  # fmt: skip
-"""Names by which a script may come to know the time, or something that it cannot be seen to be."""
-PLAIN_MODULES = {
-    "__future__", "itertools", "math", "numpy", "os", "random", "roslib", "rospy", "signal", "string",
-    "sys", "threading", "time",
-}  # fmt: skip
 
 
 def slips(tree):
@@ -406,136 +401,6 @@ def read_parameter(node):
     return text_of(node.args[0]) if is_call(node, "get_param") and node.args else ""
 
 
-def counts(tree):
-    return any(
-        (isinstance(n, (ast.AugAssign, ast.BinOp)) and isinstance(n.op, ast.Add))
-        or (isinstance(n, ast.Call) and getattr(n.func, "id", "") in ("next", "range", "count"))
-        or is_call(n, "count")
-        for n in walk(tree)
-    )
-
-
-def knows_time(tree):
-    """Whether a script may read a clock: by name, or in a module that is not the standard one."""
-    for node in walk(tree):
-        if isinstance(node, ast.Import):
-            if not all(is_plain(alias.name) and alias.asname is None for alias in node.names):
-                return True
-        elif isinstance(node, ast.ImportFrom):
-            names = {alias.name for alias in node.names}
-            if node.level or not is_plain(node.module or "") or names & (CLOCKS | {"*"}):
-                return True
-        elif (isinstance(node, ast.Attribute) and node.attr in CLOCKS) or (
-            isinstance(node, ast.Name) and node.id in CLOCKS - {"time"}
-        ):
-            return True
-    return False
-
-
-PLAIN_CALLS = {
-    "str", "int", "float", "repr", "round", "format", "next", "count", "iter", "len", "String", "join",
-}  # fmt: skip
-
-
-CLOCK_METHODS = {"to_sec", "to_nsec"}
-
-
-def sends_no_time(tree):
-    """Return what is to be said where what is published comes from counting alone, though the script may read a clock
-    for something else, or for the value that it counts on from; "" otherwise."""
-    source = Source(tree)
-    found = source.reached([arg for n in calls_in(tree, "publish") for arg in n.args])
-    if found.clock or found.unknown or not found.counts:
-        return ""
-    if source.reached(source.starts).clock:
-        return "the script reads the clock once, and counts on from there"
-    return "the script counts, and reads no clock for what it publishes"
-
-
-def clock_values(tree):
-    """Topics whose values are read from a clock in each turn, and not counted."""
-    source = Source(tree)
-    for node in calls_in(tree, "publish"):
-        makers = source.bound.get(dotted(node.func.value), [])
-        named = [
-            m.args[0] for m in makers if isinstance(m, ast.Call) and m.args and called_name(m) == "Publisher"
-        ]
-        found = source.reached(node.args)
-        name = text_of(named[0]) if len(named) == 1 else ""
-        if name and found.clock and not found.counts and not found.unknown:
-            yield slip(node.lineno, "clock-value", name)
-
-
-class Source:
-    """Where values come from. `bound` has what names are given; what a counter starts with is in `starts` instead."""
-
-    def __init__(self, tree):
-        self.bound, self.starts = {}, []
-        self.functions = functions_in(tree)
-        places = dict(turns(tree))
-        given = []
-        for node in walk(tree):
-            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
-            value = getattr(node, "iter", None) or getattr(node, "value", None)
-            given += [(node, t, value) for t in targets if value is not None and t is not None]
-        self.counted = {dotted(t) for n, t, value in given if is_increment(n, t, value)}
-        added = {dotted(t): places[n] for n, t, value in given if is_increment(n, t, value)}
-        for node, target, value in given:
-            function, again = places[node]
-            name, begins = dotted(target), not again and isinstance(node, ast.Assign)
-            where = added.get(name)
-            once = (
-                function is None or getattr(function, "name", "") == "__init__" or where == (function, True)
-            )
-            if begins and where and once:
-                self.starts.append(value)
-            elif begins and called_name(value) == "count":
-                self.starts += value.args
-                self.bound.setdefault(name, []).append(value.func)
-            else:
-                part = target
-                while part is not None and dotted(part) != "self":
-                    self.bound.setdefault(dotted(part), []).append(value)
-                    part = getattr(part, "value", None)  # `msg.data = …` is a part of `msg`
-
-    def reached(self, values):
-        """Return what the values are made of."""
-        found, left, seen = Reached(), list(values), set()
-        while left:
-            for node in ast.walk(left.pop()):
-                name = dotted(node.func if isinstance(node, ast.Call) else node)
-                last = called_name(node) or name
-                if name.rpartition(".")[2] in CLOCKS and name != "time":
-                    found.clock = True
-                elif isinstance(node, ast.Call) and last not in CLOCK_METHODS and not last[:1].isupper():
-                    found.unknown = found.unknown or (last not in PLAIN_CALLS and name not in self.functions)
-                counting = isinstance(node, ast.Call) and last in ("next", "count", "len", "range")
-                found.counts = found.counts or counting or name in self.counted
-                if name and name not in seen:
-                    seen.add(name)
-                    left += self.bound.get(name, [])
-                    left += [self.functions[name]] if name in self.functions else []
-        return found
-
-
-class Reached:
-    """Whether a clock, something that counts, or a call of unknown doings is among what a value is made of."""
-
-    clock = counts = unknown = False
-
-
-def turns(tree):
-    """Yield each node with its function, and whether a loop in there does it again and again."""
-    left = [(tree, None, False)]
-    while left:
-        node, function, again = left.pop()
-        yield node, (function, again)
-        for child in ast.iter_child_nodes(node):
-            own = isinstance(child, (ast.FunctionDef, ast.Lambda))
-            looped = again or isinstance(node, (ast.While, ast.For))
-            left.append((child, child if own else function, looped and not own))
-
-
 SWALLOWS = {"KeyboardInterrupt", "ROSInterruptException", "ROSException", "Exception", "BaseException"}
 ENDS = (ast.Break, ast.Return, ast.Raise)
 
@@ -578,10 +443,6 @@ def goes_on(handler):
     catches = any(kind is None or dotted(kind).rpartition(".")[2] in SWALLOWS for kind in kinds)
     left = (n for n in ast.walk(handler) if isinstance(n, ENDS) or called_name(n) in ("exit", "_exit"))
     return catches and next(left, None) is None
-
-
-def is_plain(module):
-    return module in PLAIN_MODULES or module.endswith((".msg", ".srv", "_msgs"))
 
 
 OF_ANGLES = ("sin", "cos", "tan")

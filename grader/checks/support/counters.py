@@ -268,6 +268,25 @@ def cite_slip(verdict: Verdict, count: Count, run: Run, package: PackageFacts, *
     return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
 
 
+def added_early(first: Count, run: Run, package: PackageFacts, start: int) -> PythonSlip | None:
+    """Return the line by which a counter that is set to the right number publishes one more first; None where no line
+    is known, or several are."""
+    starts = slips_of(package, run, first.callerid, "start-value")
+    added = slips_of(package, run, first.callerid, "added-first")
+    early = [one for one in added if {s.message for s in starts if s.name == one.name} == {str(start)}]
+    return early[0] if len(early) == 1 and first.values[0] == start + 1 else None
+
+
+def cite_early(verdict: Verdict, slip: PythonSlip) -> Verdict:
+    """Return the verdict of a counter that begins, or goes on after its wrap, one too high, with the line."""
+    message = (
+        f"{verdict.message}; line {slip.line} of {slip.file} adds one to `{slip.name}` before it is published"
+    )
+    return verdict.model_copy(
+        update={"message": message, "hint": f"in {slip.file}, {slip.fix}", "citations": (slip.place,)}
+    )
+
+
 class Turns(NamedTuple):
     """`every` step down, those of them that are `good`, and all `bad` steps: also those past the maximum."""
 

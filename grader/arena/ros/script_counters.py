@@ -1,0 +1,318 @@
+"""Finds the counters in a student's Python, and the clocks that it reads, for `slips.py`.
+
+Where a counter begins, counts and goes back, and whether the values that a script publishes come from counting or from
+a clock. Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+
+from script_names import called_name, calls_in, dotted, functions_in, is_call, slip, text_of, turns, walk
+
+CLOCKS = {
+    "get_time", "get_rostime", "now", "time", "time_ns", "monotonic", "monotonic_ns", "perf_counter",
+    "perf_counter_ns", "process_time", "clock", "clock_gettime", "utcnow", "today", "localtime", "gmtime",
+    "ctime", "asctime", "strftime", "times", "stamp", "header", "eval", "exec", "getattr", "__import__",
+    "import_module", "system", "popen", "Popen", "run", "check_output", "current_real",
+    "current_expected", "last_real", "last_expected", "last_time", "remaining", "wait_for_message",
+    "get_param", "get_param_cached", "Subscriber", "Timer", "vars", "globals", "__dict__", "modules",
+}  # fmt: skip
+"""Names by which a script may come to know the time, or something that it cannot be seen to be."""
+PLAIN_MODULES = {
+    "__future__", "itertools", "math", "numpy", "os", "random", "roslib", "rospy", "signal", "string",
+    "sys", "threading", "time",
+}  # fmt: skip
+
+
+# ---- counters
+
+
+def in_brackets(counter, rest):
+    """Return how `counter + 1 % 128` is meant; "" where it is something else that a number behind a `%` is added to."""
+    if not isinstance(counter, (ast.Name, ast.Attribute)) or None in (whole(rest.left), whole(rest.right)):
+        return ""
+    return "write `(%s + %d) %% %d`" % (dotted(counter), whole(rest.left), whole(rest.right))
+
+
+def resets(tree):
+    """Where a counter goes back: the number that it is set to in an `if` that asks for it, and the number in that `if`,
+    or behind a `%`.
+    """
+    added = {
+        id(n.right): n.left for n in walk(tree) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)
+    }
+    for node in walk(tree):
+        value, done, asked, fix = None, (), [], ""
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
+            asked = [node.right]
+            fix = in_brackets(added.get(id(node)), node)
+        elif isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Mod):
+            asked = [node.value]
+        elif isinstance(node, ast.If):
+            done = [(one.targets[0], one.value) for one in node.body if isinstance(one, ast.Assign)]
+        elif isinstance(node, ast.Assign) and isinstance(node.value, ast.IfExp):
+            done = [(node.targets[0], node.value.body), (node.targets[0], node.value.orelse)]
+        if done:
+            test = list(ast.walk(node.test if isinstance(node, ast.If) else node.value.test))
+            names = {ast.dump(part) for part in test if isinstance(part, (ast.Name, ast.Attribute))}
+            values = [value for name, value in done if ast.dump(name).replace("Store()", "Load()") in names]
+            value = next((value for value in values if whole(value) is not None), None)
+            asked = test if value is not None else []
+        for part in asked:
+            if whole(part) is not None:
+                yield slip(part.lineno, "reset-limit", "%d" % whole(part), fix=fix)
+        if value is not None:
+            yield slip(value.lineno, "reset-value", "%d" % whole(value))
+
+
+def whole(node):
+    """Return a whole number as it is written, without a sign."""
+    number = isinstance(node, ast.Constant) and type(node.value) is int and node.value < 1 << 31
+    return node.value if number else None
+
+
+def is_increment(node, target, value):
+    """Whether a name is given what it was before, and something more: `n += 1`, `n = (n + 1) % 128`."""
+    if isinstance(node, ast.AugAssign):
+        return isinstance(node.op, ast.Add) and isinstance(value, ast.Constant)
+    return any(dotted(part) == dotted(target) for part in ast.walk(value) if isinstance(part, type(target)))
+
+
+def counter_slips(tree):
+    """Counters that a loop sets in each of its turns, those that it resets before it adds one, and those that it does
+    not count: `n =+ 1`, or the line below the loop.
+    """
+    yield from uncounted(tree)
+    for loop in walk(tree):
+        body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
+        inside = [n for one in body for n in ast.walk(one)]
+        sent = [i for i, one in enumerate(body) if calls_in(one, "publish")]
+        added = {dotted(t): n for n in inside for t in increments(n)} if sent else {}
+        for name, node in added.items():
+            set_at = [i for i, one in enumerate(body) if name in (dotted(t) for t in constants_in([one]))]
+            reset_at = [i for i, one in enumerate(body) if isinstance(one, ast.If) and name in reset_in(one)]
+            if set_at:
+                one = body[set_at[0]]
+                message = "this sets `%s` again each time around the loop" % name
+                fix = "move line %d above the loop on line %d" % (one.lineno, loop.lineno)
+                yield slip(one.lineno, "set-in-loop", message, fix=fix, name=name)
+            elif reset_at and node in body:
+                first = next((i for i in sent if name in names_in(body[i])), sent[0])
+                turn = [(i - first) % len(body) for i in (reset_at[0], body.index(node))]
+                if turn[0] < turn[1]:
+                    line = body[reset_at[0]].lineno
+                    message = "the counter is reset before line %d adds one, and that sum is published"
+                    fix = "move line %d above the `if` on line %d" % (node.lineno, line)
+                    yield slip(line, "reset-early", message % node.lineno, fix=fix, name=name)
+
+
+def counter_starts(tree):
+    """Where a counter gets its first number, and where a loop adds one before it publishes: no slips."""
+    loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For))]
+    later = {id(n) for loop in loops for n in ast.walk(loop) if n is not loop}
+    for node in walk(tree):
+        if isinstance(node, ast.If):
+            later |= {
+                id(one) for one in node.body if {dotted(t) for t in constants_in([one])} & reset_in(node)
+            }
+    changed = [n for n in walk(tree) if isinstance(n, (ast.Assign, ast.AugAssign))]
+    counted = {dotted(t) for n in changed for t in increments(n)}
+    for node in changed:
+        value = whole(node.value) if isinstance(node, ast.Assign) else None
+        if value is not None and id(node) not in later and dotted(node.targets[0]) in counted:
+            yield slip(node.lineno, "start-value", "%d" % value, name=dotted(node.targets[0]))
+    for loop in loops:
+        yield from added_first(loop.body)
+
+
+def added_first(body):
+    """Where a loop adds one to a counter above the line that publishes it, or makes a message of it."""
+    sent = [i for i, one in enumerate(body) if calls_in(one, "publish")]
+    for at, one in enumerate(body):
+        nodes = ast.walk(one) if isinstance(one, ast.If) else [one]
+        for name in dict.fromkeys(dotted(t) for node in nodes for t in increments(node)):
+            used = [i for i, other in enumerate(body) if i != at and puts_in_message(other, name)]
+            first = (used or sent or [at])[0]
+            below = [body[i] for i in sent if i >= first]
+            if at < first and below:
+                last = one.end_lineno
+                lines = "line %d" % last if one.lineno == last else "lines %d to %d" % (one.lineno, last)
+                fix = "move %s below line %d" % (lines, below[0].end_lineno)
+                yield slip(one.lineno, "added-first", "", fix=fix, name=name)
+
+
+def puts_in_message(node, name):
+    """Whether a statement publishes what a counter stands at, or keeps it elsewhere: `msg.data = n`."""
+    if any(name in names_in(call) for call in calls_in(node, "publish")):
+        return True
+    kept = isinstance(node, ast.Assign) and name not in {dotted(t) for t in node.targets}
+    return kept and name in names_in(node.value)
+
+
+def uncounted(tree):
+    for node in walk(tree):
+        value = node.value if isinstance(node, ast.Assign) else None
+        if isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.UAdd):
+            name = dotted(node.targets[0])
+            message, fix = "`%s =+ …` sets it, and adds nothing" % name, "write `%s += …`" % name
+            yield slip(node.lineno, "no-effect", message, fix=fix, name=name)
+        body = getattr(node, "body", None)
+        for at, loop in enumerate(body[:-1] if isinstance(body, list) else ()):
+            after = body[at + 1]
+            ends = not isinstance(loop, ast.While) or any(isinstance(n, ast.Break) for n in ast.walk(loop))
+            sent = [names_in(n) for n in calls_in(loop, "publish")]
+            for name in () if ends else (dotted(t) for t in increments(after)):
+                if any(name in names for names in sent):
+                    message = "`%s` is counted below the loop on line %d, which does not end before the node"
+                    last = after
+                    for one in body[at + 2 :]:
+                        last = one if name in names_in(one) else last
+                    lines = "line %d" % after.lineno if last is after else "lines %d to %d"
+                    lines = lines if last is after else lines % (after.lineno, last.end_lineno)
+                    fix = "indent %s like the lines of that loop" % lines
+                    yield slip(after.lineno, "no-effect", message % (name, loop.lineno), fix=fix, name=name)
+
+
+def increments(node):
+    targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+    value = getattr(node, "value", None)
+    return [t for t in targets if value is not None and t is not None and is_increment(node, t, value)]
+
+
+def constants_in(statements):
+    return [
+        n.targets[0] for n in statements if isinstance(n, ast.Assign) and isinstance(n.value, ast.Constant)
+    ]
+
+
+def reset_in(node):
+    """Return the names that an `if` asks for and gives a fixed value."""
+    return {dotted(t) for t in constants_in(node.body)} & names_in(node.test)
+
+
+def names_in(node):
+    return {dotted(n) for n in ast.walk(node) if isinstance(n, (ast.Name, ast.Attribute))}
+
+
+# ---- clocks
+
+
+def counts(tree):
+    return any(
+        (isinstance(n, (ast.AugAssign, ast.BinOp)) and isinstance(n.op, ast.Add))
+        or (isinstance(n, ast.Call) and getattr(n.func, "id", "") in ("next", "range", "count"))
+        or is_call(n, "count")
+        for n in walk(tree)
+    )
+
+
+def knows_time(tree):
+    """Whether a script may read a clock: by name, or in a module that is not the standard one."""
+    for node in walk(tree):
+        if isinstance(node, ast.Import):
+            if not all(is_plain(alias.name) and alias.asname is None for alias in node.names):
+                return True
+        elif isinstance(node, ast.ImportFrom):
+            names = {alias.name for alias in node.names}
+            if node.level or not is_plain(node.module or "") or names & (CLOCKS | {"*"}):
+                return True
+        elif (isinstance(node, ast.Attribute) and node.attr in CLOCKS) or (
+            isinstance(node, ast.Name) and node.id in CLOCKS - {"time"}
+        ):
+            return True
+    return False
+
+
+PLAIN_CALLS = {
+    "str", "int", "float", "repr", "round", "format", "next", "count", "iter", "len", "String", "join",
+}  # fmt: skip
+
+
+CLOCK_METHODS = {"to_sec", "to_nsec"}
+
+
+def sends_no_time(tree):
+    """Return what is to be said where what is published comes from counting alone, though the script may read a clock
+    for something else, or for the value that it counts on from; "" otherwise."""
+    source = Source(tree)
+    found = source.reached([arg for n in calls_in(tree, "publish") for arg in n.args])
+    if found.clock or found.unknown or not found.counts:
+        return ""
+    if source.reached(source.starts).clock:
+        return "the script reads the clock once, and counts on from there"
+    return "the script counts, and reads no clock for what it publishes"
+
+
+def clock_values(tree):
+    """Topics whose values are read from a clock in each turn, and not counted."""
+    source = Source(tree)
+    for node in calls_in(tree, "publish"):
+        makers = source.bound.get(dotted(node.func.value), [])
+        named = [
+            m.args[0] for m in makers if isinstance(m, ast.Call) and m.args and called_name(m) == "Publisher"
+        ]
+        found = source.reached(node.args)
+        name = text_of(named[0]) if len(named) == 1 else ""
+        if name and found.clock and not found.counts and not found.unknown:
+            yield slip(node.lineno, "clock-value", name)
+
+
+class Source:
+    """Where values come from. `bound` has what names are given; what a counter starts with is in `starts` instead."""
+
+    def __init__(self, tree):
+        self.bound, self.starts = {}, []
+        self.functions = functions_in(tree)
+        places = dict(turns(tree))
+        given = []
+        for node in walk(tree):
+            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+            value = getattr(node, "iter", None) or getattr(node, "value", None)
+            given += [(node, t, value) for t in targets if value is not None and t is not None]
+        self.counted = {dotted(t) for n, t, value in given if is_increment(n, t, value)}
+        added = {dotted(t): places[n] for n, t, value in given if is_increment(n, t, value)}
+        for node, target, value in given:
+            function, again = places[node]
+            name, begins = dotted(target), not again and isinstance(node, ast.Assign)
+            where = added.get(name)
+            once = (
+                function is None or getattr(function, "name", "") == "__init__" or where == (function, True)
+            )
+            if begins and where and once:
+                self.starts.append(value)
+            elif begins and called_name(value) == "count":
+                self.starts += value.args
+                self.bound.setdefault(name, []).append(value.func)
+            else:
+                part = target
+                while part is not None and dotted(part) != "self":
+                    self.bound.setdefault(dotted(part), []).append(value)
+                    part = getattr(part, "value", None)  # `msg.data = …` is a part of `msg`
+
+    def reached(self, values):
+        """Return what the values are made of."""
+        found, left, seen = Reached(), list(values), set()
+        while left:
+            for node in ast.walk(left.pop()):
+                name = dotted(node.func if isinstance(node, ast.Call) else node)
+                last = called_name(node) or name
+                if name.rpartition(".")[2] in CLOCKS and name != "time":
+                    found.clock = True
+                elif isinstance(node, ast.Call) and last not in CLOCK_METHODS and not last[:1].isupper():
+                    found.unknown = found.unknown or (last not in PLAIN_CALLS and name not in self.functions)
+                counting = isinstance(node, ast.Call) and last in ("next", "count", "len", "range")
+                found.counts = found.counts or counting or name in self.counted
+                if name and name not in seen:
+                    seen.add(name)
+                    left += self.bound.get(name, [])
+                    left += [self.functions[name]] if name in self.functions else []
+        return found
+
+
+class Reached:
+    """Whether a clock, something that counts, or a call of unknown doings is among what a value is made of."""
+
+    clock = counts = unknown = False
+
+
+def is_plain(module):
+    return module in PLAIN_MODULES or module.endswith((".msg", ".srv", "_msgs"))
