@@ -327,9 +327,10 @@ def _wrong_value(
             hint = f"lines {lines} give the same name: write {join_words(missing)} for the others"
         cited = tuple(FileCitation(file=p.file, line=p.line) for p in again)
         return failed(message, hint=hint, citations=cited)
-    name = next(name for name, value in wanted.items() if not _fits(before[place + name], value))
-    read = [p for p in file.params if p.name in {place + one for one in wanted}]
-    cited = tuple(FileCitation(file=p.file, line=p.line) for p in read)
+    others = [name for name, value in wanted.items() if not _fits(before[place + name], value)]
+    name = others[0]
+    read = {p.name.removeprefix(place): p for p in file.params if p.name in {place + one for one in others}}
+    cited = tuple(FileCitation(file=p.file, line=p.line) for p in read.values())
     found, value = before[place + name], wanted[name]
     if isinstance(found, str) and found.strip() == str(value):
         message = f'{place}{name} is the text "{found}", which the node does not read as a number'
@@ -340,7 +341,12 @@ def _wrong_value(
     message = (
         f"{place}{name} is {_value_text(found)}, not {_value_text(value)}: {join_words(wanted)} are {seen}"
     )
-    return failed(message, hint=f"{join_words(wanted)} have to be {right}", citations=cited)
+    hint = f"{join_words(wanted)} have to be {right}"
+    if len(read) == len(others) and all(p.value != str(wanted[key]) for key, p in read.items()):
+        hint = "; ".join(
+            f'on line {p.line}, write value="{wanted[key]}" for {key}' for key, p in read.items()
+        )
+    return failed(message, hint=hint, citations=cited)
 
 
 def _elsewhere(before: Mapping[str, Any], node: str, wanted: Wanted) -> Verdict:

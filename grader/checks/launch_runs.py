@@ -315,9 +315,13 @@ def _right_parts(
         for name, found in nodes.items()
         if found and all(nodes_up(run, one) and why_died(package, run, one) is None for one in found)
     ]
-    if not up:
-        return 0.0, ""
     connected = params.topic is not None and any(connections(run, params.topic))
+    if not up:
+        misnamed = [one for name, pkg in params.nodes.items() for one in _misnamed(file, name, pkg)]
+        if not (connected and len(misnamed) == len(params.nodes) > 0):
+            return 0.0, ""
+        pair = join_words(name for one in misnamed for name in nodes_up(run, one))
+        return 0.5, f"{pair} are connected"
     shares, right = [len(up) / len(nodes)], _came_up(up, connected=connected)
     shares += [float(connected)] if params.topic else []
     if params.programs and params.params:
@@ -359,9 +363,8 @@ def _find_unnamed(
         return missing.model_copy(update={"unjudged": missing.unjudged or not found})
     if twins := _twins(file, params):
         return twins
-    for name, pkg in params.nodes.items():
-        if verdict := _wrong_name(file, name, pkg) or _find_swap(file, name, params):
-            return verdict
+    if wrong := _wrong_names(file, params):
+        return wrong
     for program in params.programs:
         if not nodes_of_program(file, program):
             pkg, _, name = program.partition("/")
@@ -404,6 +407,30 @@ def _twins(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
         hint = f'on line {lines[0]}, write ns="{lacking[0].rpartition("/")[0].strip("/")}"'
         return failed(f"{message}, and roslaunch starts nothing", hint=hint, citations=cited)
     return None
+
+
+def _misnamed(file: LaunchFile, name: str, pkg: str) -> list[LaunchNode]:
+    """Return the node that runs the program of that name under another one, where there is one and no more."""
+    last = name.rpartition("/")[2]
+    found = [
+        n for n in file.brings if n.pkg == pkg and PurePosixPath(n.type or "").stem == last and is_exact(n)
+    ]
+    return found if len(found) == 1 and not _nodes_named(file, name) else []
+
+
+def _wrong_names(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
+    """Return all nodes that only have another name than the lab asks for, or else the first that is lost otherwise."""
+    slips = []
+    misnamed = ((name, node) for name, pkg in params.nodes.items() for node in _misnamed(file, name, pkg))
+    for wanted, node in misnamed:
+        why = f"the node of {node.type} is called {node.full_name}, not /{wanted.lstrip('/')}"
+        if node.namespace == "/":
+            fix = f'on line {node.line}, write name="{wanted.lstrip("/")}"'
+            slips.append(Slip(node.file, node.line, why, fix).verdict())
+    others = (
+        _wrong_name(file, name, pkg) or _find_swap(file, name, params) for name, pkg in params.nodes.items()
+    )
+    return joined(slips) or next(filter(None, others), None)
 
 
 def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:

@@ -14,6 +14,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from graphlib import TopologicalSorter
 from pathlib import PurePosixPath
+from types import MappingProxyType
 
 from pydantic import ValidationError
 
@@ -129,7 +130,7 @@ def apply_repaired_copy(
     repairs: tuple[Repair, ...],
     *,
     built: bool,
-    launched: Collection[str],
+    launched: Launched,
 ) -> tuple[dict[str, Verdict], dict[str, Repaired]]:
     """Return the verdicts with what the copy shows, and for each criterion that it changes the repairs behind it.
 
@@ -174,7 +175,7 @@ def concerns(
     found: Mapping[str, Verdict] | Mapping[str, CriterionResult],
     *,
     built: bool,
-    launched: Collection[str],
+    launched: Launched,
 ) -> bool:
     """Return whether the criterion may depend on what was repaired: its run or build uses it, or it, or what blocks it,
     cites the file. What the files of the build lack stays lost, though: the criteria of these files ask for just that.
@@ -205,23 +206,42 @@ def is_unmade(found: Verdict | CriterionResult) -> bool:
     return found.mistake is not None and found.mistake.kind == "not-made"
 
 
-def launched_in(package: PackageFacts | None) -> frozenset[str]:
-    """Return the names of the programs that launch files start: what they run is not a module of another script."""
+Launched = Mapping[str, Collection[str]]
+"""The names of launch files, each with those of the programs that it starts."""
+
+
+def launched_in(package: PackageFacts | None) -> Launched:
+    """Return which programs each launch file starts. One that can also run something else (what it includes, a command,
+    what only roslaunch works out) starts `ANY`."""
     packages = (package, *package.also) if package is not None else ()
-    files = (file for one in packages for file in one.launch_files)
-    return frozenset(node.type for file in files for node in file.nodes if node.type)
+    found: dict[str, set[str]] = {}
+    for file in (file for one in packages for file in one.launch_files):
+        types = {node.type or "$(" for node in (*file.nodes, *file.brings)}
+        unclear = file.fault is not None or any("$(" in one for one in types) or len(file.includes) > 0
+        unclear = unclear or any(param.value is None for param in file.params)
+        found.setdefault(PurePosixPath(file.path).name, set()).update({ANY} if unclear else types)
+    return found
+
+
+ANY = "*"
+"""Stands for all programs, where a launch file may start any."""
 
 
 def is_used_by(
-    scenario: Scenario, repair: Repair, rubric: Rubric, *, built: bool, launched: Collection[str] = ()
+    scenario: Scenario,
+    repair: Repair,
+    rubric: Rubric,
+    *,
+    built: bool,
+    launched: Launched = MappingProxyType({}),
 ) -> bool:
-    """Return whether the scenario runs the repaired file, as far as the rubric says. A launch file may run any, and a
-    script may import what is not in `launched`."""
+    """Return whether the scenario runs the repaired file, as far as the rubric says and as is known of what it has
+    `launched`. A launch file that is not may run any, and a script may import what no launch file starts."""
     name = PurePosixPath(repair.after if repair.kind == "file-name" else repair.file).name
     launches = any(start.launch for start in scenario.start)
     known = any(name in _started_files(one) for one in rubric.scenarios.values())
     if repair.kind in DONE_BEFORE_RUNS:
-        return launches and not known
+        return not known and _may_launch(scenario, name, launched)
     if repair.kind in OF_BUILDS:
         of_file = PurePosixPath(repair.file).suffix in MADE_BY_BUILDS
         changed = {*repair.after.split("\n")} - {*repair.before.split("\n")}
@@ -233,7 +253,13 @@ def is_used_by(
         return True
     if name.endswith((".launch", ".launch.xml")):
         return launches and not known
-    return repair.kind != "launch-type" and (launches or not (known or name in launched))
+    a_program = any(name in programs for programs in launched.values())
+    return repair.kind != "launch-type" and (launches or not (known or a_program))
+
+
+def _may_launch(scenario: Scenario, program: str, launched: Launched) -> bool:
+    files = [PurePosixPath(start.launch).name for start in scenario.start if start.launch]
+    return any(file not in launched or {ANY, program} & {*launched[file]} for file in files)
 
 
 def is_first_line_added(repair: Repair, rubric: Rubric, repairs: Iterable[Repair] = ()) -> bool:

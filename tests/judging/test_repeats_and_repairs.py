@@ -12,13 +12,14 @@ import pytest
 from grader.evidence.run import Run
 from grader.judging import judge
 from grader.judging.judge import judge_all_runs
-from grader.judging.repeats_and_repairs import drop_unrepeated_losses, is_used_by
+from grader.judging.repeats_and_repairs import drop_unrepeated_losses, is_used_by, launched_in
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, failed
 from grader.package.launch import parse_launch_files
 from tests.judging.rubrics import ALL, EXECUTABLE, GOOD_RUN, NODE, PACKAGE, RATE, SCENARIO, SCRIPT, rubric
 from tests.support.timeline import build_runs
+from tests.support.timeline_facts import complete_facts
 
 DIED = {"processes": [{"name": "talker", "exit_s": 0.3, "exit_code": 1}], "outcome": "ended"}
 TABS = Repair(
@@ -432,13 +433,36 @@ def test_a_repair_concerns_the_runs_that_use_its_file(file: str, runs: set[str])
     assert {s for s, one in asked.scenarios.items() if is_used_by(one, name, asked, built=True)} == runs
 
 
+@pytest.mark.parametrize(
+    ("starts", "uses"),
+    [
+        ('<node pkg="lab1" type="other.sh" name="n"/>', True),
+        ('<node pkg="lab1" type="talker.py" name="n"/>', False),
+        ('<node pkg="lab1" type="$(eval p)" name="n"/>', True),
+        ('<param name="p" command="$(find lab1)/launch/other.sh"/>', True),
+        ('<include file="$(find other)/all.launch"/>', True),
+        ("<node", True),
+    ],
+)
+def test_the_bit_of_a_script_concerns_the_launch_files_that_may_start_it(starts: str, uses: bool) -> None:
+    launched = {**SCENARIO, "start": [{"name": "all", "launch": "lab.launch"}]}
+    asked = rubric(*ALL, scenarios={"talker": SCENARIO, "lab": launched})
+    bit = Repair(kind="executable-bit", file="launch/other.sh", message="m", fix="chmod +x launch/other.sh")
+    text = f"<launch>{starts}</launch>".encode()
+    files = [f.model_dump() for f in parse_launch_files({"launch/lab.launch": text}, ["lab1"])]
+    known = launched_in(complete_facts({**PACKAGE, "name": "lab1", "launch_files": files}))
+    assert is_used_by(asked.scenarios["lab"], bit, asked, built=True, launched=known) == uses
+    assert is_used_by(asked.scenarios["lab"], bit, asked, built=True)
+    assert not is_used_by(asked.scenarios["talker"], bit, asked, built=True, launched=known)
+
+
 def test_what_a_launch_file_starts_is_no_module_of_another_script() -> None:
     launched = {**SCENARIO, "start": [{"name": "all", "launch": "lab.launch"}]}
     asked = rubric(*ALL, scenarios={"talker": SCENARIO, "lab": launched})
     repair = Repair(
         kind="python-syntax", file="src/other.py", line=1, before="a", after="b", message="m", fix="b"
     )
-    for names, runs in (((), {"talker", "lab"}), (("other.py",), {"lab"})):
+    for names, runs in (({}, {"talker", "lab"}), ({"lab.launch": {"other.py"}}, {"lab"})):
         used = {
             name
             for name, one in asked.scenarios.items()
