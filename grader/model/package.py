@@ -267,7 +267,7 @@ SlipKind = Literal[
     "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
     "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
-    "added-first", "publish-twice", "wrong-value",
+    "added-first", "publish-twice", "wrong-value", "sets-parameter",
 ]  # fmt: skip
 
 
@@ -302,7 +302,7 @@ class PythonSlip(Record):
     a script with topics, or that does more than define names, never calls `init_node`. `publishes` and `prints`: no
     slips, but a text that is published or printed, with `{}` for a value in it and `{data}` for that of a message.
     `node-name`, `publisher` and `subscriber`: no slips, but where the script names its node, or a topic; `name` is
-    the variable that gets the publisher, or `anonymous`. `publisher-type` and `subscriber-type`: the message type
+    the variable that gets the publisher, or `anonymous`. `sets-parameter`: no slip, but where it sets one. `publisher-type` and `subscriber-type`: the message type
     on that line. `argument-text`: no slip, but where an argument of the command line is kept as a text; `fix` is
     the line with a number in its place. `defined-twice`: a callback that a second function of its name hides, or a
     call of an imported name that a class hides. `subscribed-again`: a `Subscriber(…)` that a loop makes in each

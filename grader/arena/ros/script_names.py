@@ -85,13 +85,15 @@ def slip(line, kind, message, fix="", name=""):
 
 # ---- where ROS is told a name
 
-NAMED = {"init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber"}
+NAMED = {
+    "init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber", "set_param": "sets-parameter",
+}  # fmt: skip
 """Calls whose first argument is a name, and the kind of slip that tells where."""
 
 
 def graph_names(tree):
-    """Where a script names its node, and the topics that it publishes and subscribes to, as written; and the types that
-    it publishes."""
+    """Where a script names its node, the topics that it publishes and subscribes to, and the parameters that it sets, as
+    written; and the types that it publishes."""
     owners = {id(n.value): dotted(n.targets[0]) for n in walk(tree) if isinstance(n, ast.Assign)}
     for node in walk(tree):
         kind = NAMED.get(called_name(node))
@@ -102,7 +104,7 @@ def graph_names(tree):
         names, name = argument(node, 0, "name"), published_type(node)
         if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
             yield slip(names[0].lineno, kind, names[0].value, name=owner)
-        if names and name.isidentifier() and kind != "node-name":
+        if names and name.isidentifier() and kind in ("publisher", "subscriber"):
             yield slip(names[0].lineno, kind + "-type", name)
 
 

@@ -169,6 +169,37 @@ class Given(NamedTuple):
     in_file: bool
 
 
+def text_of(build: Run, file: str) -> str:
+    """Return the text of a parameter file of the package, found by its name."""
+    base = PurePosixPath(file).name
+    data = next((d for path, d in build.attachments.items() if PurePosixPath(path).name == base), b"")
+    return data.decode("utf-8", "replace")
+
+
+def keys_of(build: Run, path: str) -> tuple[Key, ...]:
+    """Return the keys of a parameter file of the package."""
+    return yaml_keys(text_of(build, path))
+
+
+def lines_of(keys: tuple[Key, ...]) -> dict[str, list[int]]:
+    """Return the lines in which each name of a file is given."""
+    lines: dict[str, list[int]] = {}
+    for key in keys:
+        lines.setdefault(key.path, []).append(key.line)
+    return lines
+
+
+def duplicate_advice(path: str, keys: tuple[Key, ...]) -> str:
+    """Return the advice where a name is given twice: YAML keeps only the last, and says nothing."""
+    twice = next(((name, at) for name, at in lines_of(keys).items() if len(at) > 1), None)
+    if twice is None:
+        return ""
+    name, lines = twice
+    return (
+        f"{path} gives {name} on line {lines[0]} and again on line {lines[-1]}, and only the last one counts"
+    )
+
+
 def params_given(run: Run) -> dict[str, Given]:
     """Return what the grader set before anything started, by name."""
     events = [e for _, e in run.actors if e.action == "param"]
