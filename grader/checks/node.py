@@ -17,25 +17,26 @@ from grader.checks.support.exit_causes import (
 from grader.checks.support.processes import (
     Anonymous,
     Life,
-    all_named_at,
     are_noted,
     base_name,
     fell_silent,
     is_flood,
     is_named,
+    is_other_name,
     life,
     lives,
     name_hint,
     nodes_of,
     not_started,
+    slips_that_name,
     wanted_names,
     was_talking,
     wrong_name,
 )
-from grader.checks.support.text import INIT, LOOP, both
+from grader.checks.support.text import ANONYMOUS, INIT, LOOP, both
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
-from grader.model.package import PackageFacts
+from grader.model.package import PackageFacts, PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, seconds
@@ -161,14 +162,29 @@ def _judge_misnamed(
     if not params.names or _fitting(nodes, params):
         return None
     given = params.names, nodes, params.anonymous
-    cited = all_named_at(package, run, "node-name", base_name(nodes[0])) if nodes else ()
+    slips = slips_that_name(package, run, "node-name", base_name(nodes[0])) if nodes else []
+    cited = tuple(dict.fromkeys(one.place for one in slips))
     if len({one.file for one in cited}) > 1:
         cited = ()
     hint = name_hint(*given)
+    if any(one.fix for one in slips):  # the name stands in a variable, or is passed on
+        elsewhere = is_other_name(*given[:2])
+        hint, cited = (_rename_hint(slips[0], nodes, params), cited) if elsewhere else (hint, ())
     if len(cited) > 1:
         lines = join_words(str(one.line) for one in cited)
         hint = f"{hint}, on lines {lines} alike: a second call with other arguments ends the node"
     return failed(wrong_name(*given), hint=hint, citations=cited)
+
+
+def _rename_hint(slip: PythonSlip, nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) -> str:
+    """Return how to give the node another name where `init_node` gets it from elsewhere."""
+    name = params.names[0].lstrip("/")
+    hint = f"on line {slip.line} of {slip.file}, write `{slip.fix.format(repr(name))}`"
+    numbered = any(base_name(node) != node for node in nodes)
+    if params.anonymous == "required" and not numbered:
+        return f"{hint}; then add {ANONYMOUS} to `init_node(…)`"
+    spare = params.anonymous == "forbidden" and numbered
+    return f"{hint}; then remove {ANONYMOUS} from `init_node(…)`" if spare else hint
 
 
 def _up_ns(one: Life, run: Run, nodes: tuple[str, ...]) -> int:

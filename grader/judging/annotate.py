@@ -7,6 +7,7 @@ wants of it, and with advice on what no criterion asks for, but stops a student 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple, TypeVar
@@ -139,6 +140,15 @@ def with_lab_names(told: Told, names: Mapping[str, str]) -> Told:
     for old, new in names.items():
         hint = hint.replace(old, new)
     return told if hint == told.hint else told.model_copy(update={"hint": hint})
+
+
+def with_own_name(result: CriterionResult, rubric: Rubric, package: PackageFacts) -> CriterionResult:
+    """Return the result with the name that the package has as handed in, in the commands that show what was seen."""
+    if package.name is None or package.name == rubric.package or rubric.package not in result.reproduce:
+        return result
+    named = rf"(\b(?:rosrun|roslaunch|roscd|rospack find) ){re.escape(rubric.package)}\b"
+    shown = re.sub(named, lambda found: f"{found[1]}{package.name}", result.reproduce)
+    return result.model_copy(update={"reproduce": shown})
 
 
 def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:

@@ -30,7 +30,14 @@ from grader.checks.support.topics import (
 from grader.errors import EvidenceError
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
-from grader.judging.annotate import add_advice, choose_hint_language, fill_slots, lab_names, with_lab_names
+from grader.judging.annotate import (
+    add_advice,
+    choose_hint_language,
+    fill_slots,
+    lab_names,
+    with_lab_names,
+    with_own_name,
+)
 from grader.judging.cited_lines import (
     cite_commented_call,
     cite_find,
@@ -135,6 +142,7 @@ def judge_all_runs(
     package = facts.package
     if package is not None:
         results = tuple(name_unchanged_files(result, rubric, package, handed_out) for result in results)
+        results = tuple(with_own_name(result, rubric, package) for result in results)
         results = add_advice(results, package, rubric)
     late = {i for i, v in shown.items() if v.status is Status.INCONCLUSIVE and not v.of_machine}
     undecided = frozenset(c.scenario for c in rubric.criteria if c.id in late and c.scenario)

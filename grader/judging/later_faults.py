@@ -244,14 +244,14 @@ class Later:
             return
         if own[0].message.lstrip("/") not in names:
             yield f"name the node {names[0]} on {_line(own[0])}, not {own[0].message}"
-        if own[0].name == "anonymous" and plain:
+        if own[0].name == "anonymous" and plain and not own[0].fix:
             yield f"remove anonymous=True from {_line(own[0])}"
 
     def _copied(self) -> Iterator[str]:
         started = [one.script for one in self._rubric.scenarios[self._criterion.scenario or ""].start]
         twice = {PurePosixPath(one).name for one in started if one and started.count(one) > 1}
         for slip in self._of("node-name"):
-            if PurePosixPath(slip.file).name in twice and not slip.name:
+            if PurePosixPath(slip.file).name in twice and not slip.name and not slip.fix:
                 yield f"write anonymous=True on {_line(slip)}, since two of it run at once"
 
     def _topics_of_others(self) -> set[str]:

@@ -166,8 +166,9 @@ _COMMAND = rf"""
 _CODE = re.compile(
     rf"""
       `(?P<marked>[^`]+)`
+    | (?P<quoted>(?<![\w`])'(?=[^'`\n]*\ )[^'`\n]{{1,200}}'(?![\w`]))  # what somebody wrote or printed
     | (?P<found>
-        <(?P<tag>[A-Za-z]\w*)[^<>`]{{0,200}}>[\w@.-]+</(?P=tag)>  # an element
+        <(?P<tag>[A-Za-z]\w*)[^<>`]{{0,200}}>[\w@.\ -]+</(?P=tag)>  # an element
       | </?[A-Za-z](?:"[^"`]{{0,200}}"|[^<>"`])*>(?!')         # a tag
       | (?<![\w./-]){_COMMAND}(?:\ &&\ {_COMMAND})*(?![\w-])  # a command, several in one line
       | (?<![\w-])--[a-z][\w-]*
@@ -203,7 +204,7 @@ def code_parts(text: str) -> Iterator[tuple[str, bool]]:
     for found in _CODE.finditer(text):
         if found.start() > end:
             yield text[end : found.start()], False
-        yield found["marked"] or found["found"], True
+        yield found["quoted"] or found["marked"] or found["found"], not found["quoted"]
         end = found.end()
     if end < len(text):
         yield text[end:], False

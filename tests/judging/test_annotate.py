@@ -15,7 +15,7 @@ from grader.checks.support.text import LOOP, in_language, init, publisher, set_p
 from grader.evidence.run import Run
 from grader.integrations.bundle import Bundle, add_lab
 from grader.judging import judge
-from grader.judging.annotate import add_advice, choose_hint_language, fill_slots
+from grader.judging.annotate import add_advice, choose_hint_language, fill_slots, with_own_name
 from grader.judging.cited_lines import (
     LINE_CHARS,
     cite_commented_call,
@@ -47,6 +47,17 @@ NODES = '<launch>\n<node pkg="lab1" type="talker" name="a"/>\n<node pkg="lab1" t
 def facts(folder, **files: str) -> PackageFacts:
     tree = {"package.xml": MANIFEST, "CMakeLists.txt": CMAKE, **files}
     return read_package(make_package(folder / "lab1", tree, executable={"src/plain.py": False}))
+
+
+def test_commands_have_the_name_that_the_package_has_as_handed_in(tmp_path: Path) -> None:
+    renamed = facts(tmp_path).model_copy(update={"name": "my_lab"})
+    shown = criterion().model_copy(
+        update={"reproduce": "`rosrun lab1 talker.py` beside `roslaunch lab1 lab1.launch`"}
+    )
+    asked = rubric(*ALL)
+    told = with_own_name(shown, asked, renamed).reproduce
+    assert told == "`rosrun my_lab talker.py` beside `roslaunch my_lab lab1.launch`"
+    assert with_own_name(shown, asked, facts(tmp_path)) == shown
 
 
 def criterion(

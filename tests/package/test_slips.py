@@ -316,6 +316,28 @@ def test_what_is_added_too_early_is_moved_below_the_line_that_publishes_it(tmp_p
     ]
 
 
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("rospy.init_node('a')", [(1, "a", "")]),
+        ("name = 'a'\nrospy.init_node(name)", [(1, "a", "name = {}")]),
+        ("class N:\n    def __init__(self):\n        self.name = 'a'\n        rospy.init_node(self.name)",
+         [(3, "a", "self.name = {}")]),
+        ("class N:\n    def __init__(self, name):\n        rospy.init_node(name)\nN(name='a')", [(4, "a", "name={}")]),
+        ("class N:\n    def __init__(self, name):\n        rospy.init_node(name)\nN('a')", [(4, "a", "N({})")]),
+        ("def run(rate, name):\n    rospy.init_node(name)\nrun(5, 'a')", [(3, "a", "{}")]),
+        ("class Publisher:\n  def __init__(self, n):\n    rospy.init_node(n)\nPublisher(n='a')", [(4, "a", "n={}")]),
+        ("name = 'a'\nname = 'b'\nrospy.init_node(name)", []),
+        ("def run(name):\n    rospy.init_node(name)\nrun('a')\nrun('b')", []),
+        ("rospy.init_node(sys.argv[1])", []),
+    ],
+)  # fmt: skip
+def test_where_a_node_gets_its_name_from_is_known(tmp_path, text, found):
+    (tmp_path / "a.py").write_text(text + "\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [(s.line, s.message, s.fix) for s in slips if s.kind == "node-name"] == found
+
+
 def test_what_is_left_of_a_file_that_does_not_parse(tmp_path):
     conflict = (
         "import rospy\n<<<<<<< HEAD\npub = rospy.Publisher('mine', String)\n=======\n"

@@ -68,6 +68,11 @@ FLOOD = "`/chatter` runs at about 5,500 Hz instead of 10 Hz; the loop does not s
         ("write $(find lab1)/launch/a.launch", ["$(find lab1)/launch/a.launch"]),
         ('publish "hello world %s" % rospy.get_time()', ['"hello world %s" % rospy.get_time()']),
         ("write <name>lab1</name> in package.xml", ["<name>lab1</name>", "package.xml"]),
+        ("a message reads 'at world(2026) of <x>', not 'the time is <seconds>'", []),
+        (
+            '<maintainer email="a@b.uk">Your Name</maintainer>',
+            ['<maintainer email="a@b.uk">Your Name</maintainer>'],
+        ),
         ("5 of 10, and/or 3/4, e.g. ada@york.ac.uk: it's 'hello world <seconds>'", []),
         ("the test(s) of the first node; 2.5 s, i.e. late", []),
     ],

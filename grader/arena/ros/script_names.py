@@ -92,20 +92,50 @@ NAMED = {
 
 
 def graph_names(tree):
-    """Where a script names its node, the topics that it publishes and subscribes to, and the parameters that it sets, as
-    written; and the types that it publishes."""
+    """Where a script names its node, its topics and the parameters that it sets, as written; and the types that it
+    publishes."""
     owners = {id(n.value): dotted(n.targets[0]) for n in walk(tree) if isinstance(n, ast.Assign)}
+    own = {n.name for n in walk(tree) if isinstance(n, ast.ClassDef)}
     for node in walk(tree):
         kind = NAMED.get(called_name(node))
-        if not kind:
+        if not kind or dotted(node.func) in own:
             continue
         anonymous = [k for k in node.keywords if k.arg == "anonymous" and getattr(k.value, "value", True)]
         owner = owners.get(id(node), "") or ("anonymous" if anonymous else "")
         names, name = argument(node, 0, "name"), published_type(node)
-        if names and isinstance(names[0], ast.Constant) and isinstance(names[0].value, str):
-            yield slip(names[0].lineno, kind, names[0].value, name=owner)
+        if names and text_of(names[0]):
+            yield slip(names[0].lineno, kind, text_of(names[0]), name=owner)
+        elif names and kind == "node-name":
+            for text, written in text_behind(names[0], tree):
+                yield slip(text.lineno, kind, text_of(text), fix=written, name=owner)
         if names and name.isidentifier() and kind in ("publisher", "subscriber"):
             yield slip(names[0].lineno, kind + "-type", name)
+
+
+def text_behind(node, tree):
+    """Yield the text that a variable is given once, or that an argument gets in the only call of its function, and how
+    it is written there, with `{}` in its place: `self.name = {}`, `name={}`."""
+    name = dotted(node)
+    assigned = [n.value for n in walk(tree) if isinstance(n, ast.Assign) and name in map(dotted, n.targets)]
+    if len(assigned) == 1 and text_of(assigned[0]):
+        yield assigned[0], "%s = {}" % name
+    for function in () if assigned else functions_in(tree).values():
+        arguments = [one.arg for one in function.args.args]
+        if name in arguments and any(one is node for one in ast.walk(function)):
+            owners = [n.name for n in walk(tree) if isinstance(n, ast.ClassDef) and function in n.body]
+            called = owners[0] if owners and function.name == "__init__" else function.name
+            calls = [
+                n
+                for n in walk(tree)
+                if isinstance(n, ast.Call) and dotted(n.func) in (called, "self." + called)
+            ]
+            place = arguments.index(name) - (arguments[0] == "self")
+            found = argument(calls[0], place, name) if len(calls) == 1 else []
+            if found and text_of(found[0]):
+                alone = len(calls[0].args) + len(calls[0].keywords) == 1
+                by_name = found[0] in [one.value for one in calls[0].keywords]
+                written = "%s={}" % name if by_name else "%s({})" % called if alone else "{}"
+                yield found[0], written
 
 
 def published_type(call):

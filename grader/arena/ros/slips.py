@@ -536,7 +536,8 @@ def imports(tree):
             fix = "delete line %d: nothing in the script uses `%s`" % (node.lineno, "`, `".join(bound))
             yield slip(node.lineno, "unused-import", module, fix=fix, name=bound[0])
         if not is_there(module):
-            yield slip(node.lineno, "lacking-import", module, name=bound[0])
+            whole = modules[0] if modules[0] != module else ""
+            yield slip(node.lineno, "lacking-import", module, fix=whole, name=bound[0])
 
 
 def is_there(module):

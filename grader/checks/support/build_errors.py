@@ -360,9 +360,7 @@ def _below(path: str, package: PackageFacts) -> str:
 def _no_cmake_lists(_found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     name = misspelt_cmake_lists(package)
     if not name:
-        return Explained(
-            "the package has no CMakeLists.txt", "add the CMakeLists.txt that catkin_create_pkg writes"
-        )
+        return Explained("there is no CMakeLists.txt", "add the CMakeLists.txt that catkin_create_pkg writes")
     why = f"the file is called {name}, and CMake looks for CMakeLists.txt"
     return Explained(why, f"git mv {name} CMakeLists.txt")
 

@@ -399,7 +399,8 @@ def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | 
         return told["message"], told["fix"]
     if never := next((s for s in slips if s.kind == "no-init"), None):
         return never.message, f"call `rospy.init_node(…)`, with the node's name, above line {place.line}"
-    below = [s.line for s in slips if s.kind == "node-name" and place.line and s.line > place.line]
+    calls = [s.line for s in slips if s.kind == "node-name" and not s.fix]
+    below = [line for line in calls if place.line and line > place.line]
     move = f"move `rospy.init_node(…)` from line {below[0]} up, above line {place.line}" if below else ""
     return (CAUSES["ROSInitException"][0], move) if move else None
 
@@ -566,7 +567,9 @@ def _lacking(found: Traceback, package: PackageFacts) -> str:
 def _is_module(name: str, package: PackageFacts) -> bool:
     """Return whether it is a module of Python, and no package of ROS that messages come from."""
     declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
-    return name not in declared and not name.endswith(("_msgs", "_srvs"))
+    whole = [one.fix for one in package.slips if one.kind == "lacking-import" and one.message == name]
+    of_messages = any(one.endswith((".msg", ".srv")) for one in whole)
+    return name not in declared and not name.endswith(("_msgs", "_srvs")) and not of_messages
 
 
 def _broken(found: Traceback, package: PackageFacts) -> str:

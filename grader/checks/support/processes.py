@@ -141,10 +141,15 @@ def named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tupl
 
 def all_named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tuple[FileCitation, ...]:
     """Return the lines of the run's scripts that name this node or topic."""
+    return tuple(dict.fromkeys(slip.place for slip in slips_that_name(package, run, kind, name)))
+
+
+def slips_that_name(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> list[PythonSlip]:
+    """Return where the run's scripts name this node or topic."""
     scripts = {one.start.script for one in lives(run)}
     said = [s for s in package.slips if s.kind == kind and s.file in scripts]
     last = name.rpartition("/")[2]
-    return tuple(dict.fromkeys(s.place for s in said if s.message.rpartition("/")[2].lstrip("~") == last))
+    return [s for s in said if s.message.rpartition("/")[2].lstrip("~") == last]
 
 
 def early_end(run: Run) -> Life | None:
@@ -234,10 +239,15 @@ def wanted_names(names: Iterable[str], anonymous: Anonymous) -> str:
 def wrong_name(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:
     """Return how the names of the nodes differ from those that are wanted: in themselves, or in their ending alone."""
     there = tuple(nodes)
-    if {base_name(n) for n in there}.isdisjoint(_bases(names)):
+    if is_other_name(names, there):
         return f"the node is named {join_words(there)}, not {join_words(_bases(names), 'or')}"
     how = "without" if anonymous == "required" else "with"
     return f"the node is named {join_words(there)}, {how} the numbers that anonymous=True adds to the name"
+
+
+def is_other_name(names: Iterable[str], nodes: Iterable[str]) -> bool:
+    """Return whether no node has one of the names, not even with numbers behind it."""
+    return {base_name(n) for n in nodes}.isdisjoint(_bases(names))
 
 
 def name_hint(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:
