@@ -316,7 +316,11 @@ LAST_BRACKET = re.compile(r" \((?=[a-z]+ [^()]*\)$)")
 
 def headline(text: str) -> tuple[str, str]:
     """Return what a message says first, and the rest of a long one: what follows its last stop that leaves no more than
-    `HEADLINE_CHARS`. A message without one is a headline as a whole."""
+    `HEADLINE_CHARS`. A message without one is a headline as a whole. What was judged on a repaired copy says so last.
+    """
+    if copy := ON_COPY.match(text):
+        first, rest = headline(text[copy.end() :])
+        return first, "; ".join(filter(None, (rest, copy[0].removesuffix(": "))))
     if len(text) <= HEADLINE_CHARS:
         return text, ""
     stops = [
@@ -405,7 +409,7 @@ def where_to_type(reproduce: str) -> str:
 STARTS = re.compile(
     r"""(a|add|after|all|an|another|at|both|bring|build|call|check|close|correct|create|declare|delete|do
     |does|drive|each|every|executable|fill|find|first|fix|from(?!\ \S+\ import)|give|hand|have|in|indent|install|it
-    |its|keep|leave|let|line|look|loop|make|more|move|negative|neither|no|nothing|on|once|one|only|open
+    |its|judged|keep|leave|let|line|look|loop|make|more|move|negative|neither|no|nothing|on|once|one|only|open
     |order|pass|perhaps|print|publish|put|read|record|remove|rename|replace|reset|run|save|send|set
     |something|starts?|steer|brings?|loads?|stop|subscribe|take|tell|the|there|this|too|try|turn|twice|two|use|what|whether
     |which|while|with|wrap|write|wrong|your)[,:;]?(?=\ )""",

@@ -122,6 +122,8 @@ def test_a_long_message_says_the_verdict_first() -> None:
     assert (first, rest) == (FLOOD, "rosrun answers: nothing at all")
     long = "it ends with NameError: name 'mgs; not' is not defined " + "x" * 100
     assert headline(long) == (long, "")
+    on_copy = "judged on a copy with src/a.py line 5 repaired"
+    assert headline(f"{on_copy}: /a runs at 9 Hz") == ("/a runs at 9 Hz", on_copy)
 
 
 def test_a_fix_with_several_steps_is_told_step_by_step() -> None:
