@@ -222,13 +222,12 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     """Return how its end after Ctrl-C was wrong, None where it was not."""
     stopped_by = one.end.stopped_by if one.end else None
     if stopped_by in {"TERM", "KILL"}:
-        excuse = _locked_up(one, run)
-        if excuse is not None:
-            return excuse
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
         deaf = next((s for s in package.slips if s.kind == "deaf" and s.file == one.start.script), None)
         if deaf is not None:
             return failed(f"{message}: {deaf.message}", hint=deaf.fix, citations=(deaf.place,))
+        if excuse := _locked_up(one, run):
+            return excuse
         hint = IN_A_LOOP + both("; a bare `except:` in the loop swallows the Ctrl-C", "")
         return failed(message, hint=hint)
     found = process_tracebacks(run, one.name, after_ns=one.interrupt_ns)

@@ -405,24 +405,37 @@ SWALLOWS = {"KeyboardInterrupt", "ROSInterruptException", "ROSException", "Excep
 ENDS = (ast.Break, ast.Return, ast.Raise)
 
 
+RAISING = ("wait_for_message", "wait_for_service")
+"""Calls that end with an exception on Ctrl-C. `rate.sleep()` is none of them: by the real clock it sleeps on."""
+ASKS = "check `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
+
+
 def deaf_loops(tree):
     """Why a node goes on after Ctrl-C: loops that do not ask for it, an `except` within them, signals put off."""
-    catching, endless, others = [], [], []
+    endless, others, counted = [], [], []
     for loop in walk(tree):
-        inside = list(ast.walk(loop)) if isinstance(loop, ast.While) or is_counted_for(loop) else []
-        if not inside or any(map(is_shutdown, inside)):
+        is_while = isinstance(loop, ast.While)
+        inside = list(ast.walk(loop)) if is_while or isinstance(loop, ast.For) else []
+        if (
+            not inside
+            or any(map(is_shutdown, inside))
+            or not (is_while or is_endless_for(loop) or sleeps(loop))
+        ):
             continue
         caught = [h for n in inside if isinstance(n, ast.Try) for h in n.handlers if goes_on(h)]
-        wakes = any(dotted(n.func) != "time.sleep" for n in calls_in(loop, "sleep"))
-        asks = "check `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
-        for handler in caught[:1]:
-            message = "the `except` on line %d catches what Ctrl-C raises, and the loop on line %d goes on"
-            message %= (handler.lineno, loop.lineno)
-            catching.append(slip(loop.lineno, "deaf", message, fix=asks))
-        if not caught and not wakes:
-            known = isinstance(loop, ast.While) and isinstance(loop.test, ast.Constant)
-            message = "the loop on line %d never checks whether the node should end" % loop.lineno
-            (endless if known else others).append(slip(loop.lineno, "deaf", message, fix=asks))
+        if calls_in(loop, *RAISING):
+            for handler in caught[:1]:
+                message = (
+                    "the `except` on line %d catches what Ctrl-C raises, and the loop on line %d goes on"
+                )
+                endless.append(slip(loop.lineno, "deaf", message % (handler.lineno, loop.lineno), fix=ASKS))
+        elif is_while or is_endless_for(loop):
+            known = not is_while or isinstance(loop.test, ast.Constant)
+            (endless if known else others).append(
+                deaf(loop, [n for n in inside if n is not loop and sleeps(n)])
+            )
+        else:
+            counted.append(deaf(loop, []))
     for node in walk(tree):
         if is_call(node, "init_node") and any(k.arg == "disable_signals" for k in node.keywords):
             message = "`disable_signals=True` on line %d keeps Ctrl-C from rospy" % node.lineno
@@ -430,11 +443,30 @@ def deaf_loops(tree):
         if is_call(node, "signal") and node.args and dotted(node.args[0]).endswith("SIGINT"):
             message = "line %d gives Ctrl-C another meaning" % node.lineno
             yield slip(node.lineno, "deaf", message, fix="delete it")
-    yield from catching or endless or others
+    yield from endless or others or counted
 
 
-def is_counted_for(loop):
+def deaf(loop, within):
+    """Return the slip of a loop that never asks, with those `within` it that take their time."""
+    lines = [one.lineno for one in (loop, *within)]
+    named = "loops on lines %s and %d never check" % (", ".join(map(str, lines[:-1])), lines[-1])
+    named = named if within else "loop on line %d never checks" % loop.lineno
+    ends = ["write `if rospy.is_shutdown(): break` below the `for` on line %d" % one.lineno for one in within]
+    fixes = (
+        [ASKS, *ends]
+        if isinstance(loop, ast.While) or within
+        else ["write `if rospy.is_shutdown(): break` in it"]
+    )
+    return slip(loop.lineno, "deaf", "the %s whether the node should end" % named, fix="; then ".join(fixes))
+
+
+def is_endless_for(loop):
     return isinstance(loop, ast.For) and called_name(loop.iter) == "count"
+
+
+def sleeps(loop):
+    """Whether it is a `for` that sleeps in each of its turns, so that it can take long."""
+    return isinstance(loop, ast.For) and bool(calls_in(loop, "sleep"))
 
 
 def goes_on(handler):
