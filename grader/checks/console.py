@@ -162,7 +162,8 @@ def _not_printed(
     if not own:
         nothing = unjudged(f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True").once()
         return nothing.model_copy(update={"silent": True})
-    return failed(f"it never prints {params.words}; it prints {shown(own[0].text)!r}", hint=hint).once()
+    meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
+    return failed(f"it never prints {params.words}; it prints {shown(meant.text)!r}", hint=hint).once()
 
 
 def _slip(line: Line, params: PrintsParams) -> str:

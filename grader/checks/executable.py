@@ -29,6 +29,7 @@ from grader.evidence.events import CATKIN_MAKE
 from grader.evidence.run import Run
 from grader.model.package import CMAKE, Fault, PackageFacts, SourceFile
 from grader.model.record import Record
+from grader.model.repair import as_code
 from grader.model.submission import chmod_hint
 from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, there_is
@@ -141,7 +142,7 @@ def _syntax_verdict(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -
     hint = syntax_hint(fault)
     why = (fault.cause or fault.message) if fault.fix and fault.fix in hint else fault.explanation
     fixes = [hint, *(o.fix for o in obstacles)]
-    source = f", {where}: {shown(fault.source.strip())}" if fault.source.strip() else ""
+    source = f", {where}: {as_code(shown(fault.source.strip()))}" if fault.source.strip() else ""
     return failed(
         f"{file.path} {where}: {fault.kind}: {why}{others}",
         measured=f"{file.path}: {_mode(file)}, {_first_line(file)}{source}",

@@ -158,9 +158,11 @@ def apply_repaired_copy(
         verdict, copy = first[criterion.id], on_copy[criterion.id]
         share = min(rubric.share_of(one.kind) for one in needed) if criterion.points else 1.0
         told = repairs_as_handed_in(charged or needed, repairs)
+        others = [one for one in needs[criterion.id] if one not in charged]
+        elsewhere = bool(cited_lines(verdict.citations) & _lines_read_now(others))
         placed = with_names_as_handed_in(copy, repairs)
         verdicts[criterion.id] = (
-            _charge(verdict, copy, told, cited_lines(placed.citations))
+            _charge(verdict, copy, told, cited_lines(placed.citations), elsewhere=elsewhere)
             if charged
             else _share(placed, told, share)
         )
@@ -291,16 +293,19 @@ def _is_next(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> bool:
     """Return whether a loss is in what was repaired, and the copy loses the criterion by another fault."""
     files = {repair.file for repair in repairs}
     found = {(c.file, c.line) for c in one.citations if isinstance(c, FileCitation) and c.file in files}
-    again = {(c.file, c.line) for c in copy.citations if isinstance(c, FileCitation)}
-    read_now = {
+    again = cited_lines(copy.citations)
+    again -= _lines_read_now(repairs)
+    return found != set() and not copy.unjudged and not found & again and _is_other_fault(one, copy)
+
+
+def _lines_read_now(repairs: Iterable[Repair]) -> set[tuple[str, int]]:
+    """Return the lines that could not be read before these repairs."""
+    return {
         (repair.file, repair.line + further)
         for repair in repairs
         if repair.kind in OF_SYNTAX and repair.line is not None
         for further in range(len(repair.before.split("\n")))
     }
-    return (
-        found != set() and not copy.unjudged and not found & again - read_now and _is_other_fault(one, copy)
-    )
 
 
 def _is_other_fault(one: Verdict, copy: Verdict) -> bool:
@@ -399,16 +404,24 @@ def _new_words(repair: Repair) -> set[str]:
 
 
 def _charge(
-    verdict: Verdict, copy: Verdict, repairs: Sequence[Repair], lines: Collection[tuple[str, int]]
+    verdict: Verdict,
+    copy: Verdict,
+    repairs: Sequence[Repair],
+    lines: Collection[tuple[str, int]],
+    *,
+    elsewhere: bool,
 ) -> Verdict:
     """Return the loss, with the repairs that were seen to help as its hint, and what the copy loses it by, at these
-    lines of the package as it is."""
-    blocked = verdict.status is Status.BLOCKED
+    lines of the package as it is. `elsewhere`: what was found at first is told by another criterion."""
+    blocked = verdict.status is Status.BLOCKED or elsewhere
     is_next = _is_next(verdict, copy, repairs) or (blocked and copy.status.is_lost and not copy.unjudged)
     if blocked:
         message = "; ".join(messages_of(repairs))
         verdict = failed(
-            message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
+            message,
+            expected=copy.expected,
+            measured=verdict.measured,
+            citations=() if elsewhere else verdict.citations,
         )
     further = copy.status is Status.BLOCKED and verdict.unjudged and copy.cause != verdict.cause
     paths = re.findall(r"[\w-]+(?:/[\w.-]+)+", copy.hint)
