@@ -208,5 +208,13 @@ def within_faults(about: Asked) -> Iterator[Fault]:
             at,
             f"the step waits {limit_s:g} s for the result (limit_s), and gives it up before {within_s:g} s",
         )
+    after_s = (goal or {}).get("cancel_after_s")
+    if goal is not None and all(map(is_number, (after_s, limit_s := _limit_s(goal)))):
+        left_s = limit_s - after_s
+        if 0 < left_s <= within_s <= limit_s:
+            fault = (
+                f"the step gives the goal up {left_s:g} s after it has cancelled it (limit_s: {limit_s:g})"
+            )
+            yield at, f"{fault}: give it a longer limit_s"
     if about.check in {"reacts", "ends-at"} and most_s is not None and within_s >= most_s:
         yield at, f"{about.name} lasts {most_s:g} s at most: what comes later is not seen"
