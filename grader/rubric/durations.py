@@ -128,7 +128,7 @@ def longest_s(scenario: dict[str, Any]) -> float | None:
 def _waits_s(step: Step, first_s: float) -> float:
     """Return how long a step may wait for the student's nodes."""
     if step.call is not None:
-        return first_s + step.call.delay_s + ANSWER_S
+        return first_s + step.call.delay_s + (ANSWER_S if step.call.limit_s is None else step.call.limit_s)
     if step.action is not None:
         return 2 * first_s + (step.action.cancel_after_s or 0) + step.action.limit_s
     if step.wait is not None and step.wait.seconds is None:
