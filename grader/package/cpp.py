@@ -33,6 +33,8 @@ _IN_DEGREES = re.compile(rf"\b(?P<name>[A-Za-z_]\w*)\s*=\s*[^;=]*{_DEGREES}")
 _OF_ANGLE = re.compile(
     r"\b(?:std::)?(?P<call>sin|cos|tan)f?\s*\(\s*(?P<given>[^();]*(?:\([^()]*\)[^();]*)?)\)"
 )
+_TURNED = re.compile(r"180|rad|PI\b", re.IGNORECASE)
+"""So an angle in degrees is made one in radians."""
 _WHOLE_TURN = 7
 """Of a number of radians, no one writes more."""
 
@@ -128,7 +130,8 @@ def _degrees(path: str, code: str) -> Iterator[PythonSlip]:
     for match in _OF_ANGLE.finditer(code):
         given = match["given"].strip()
         number = float(given.rstrip("f")) if re.fullmatch(r"\d+(?:\.\d*)?f?", given) else 0.0
-        if given in names or re.search(_DEGREES, given):
+        in_degrees = not names.isdisjoint(re.findall(r"[A-Za-z_]\w*", given)) and not _TURNED.search(given)
+        if in_degrees or re.search(_DEGREES, given):
             fix = "leave out `* 180 / M_PI`: the angle is in radians before"
         elif number >= _WHOLE_TURN or re.fullmatch(r"\w*(?:deg|degrees)\w*", given, re.IGNORECASE):
             fix = f"write `{match['call']}({given} * M_PI / 180)`"

@@ -60,6 +60,7 @@ def test_a_callback_that_waits(line: str, told: str, given: str) -> None:
         "while (i < 3) i++;",
         "message.data = std::sin(angle * M_PI / 180);",
         "message.data = cos(yaw);",
+        "double a = yaw * 180 / M_PI; x = cos(a * M_PI / 180) + cos(radians(a));",
         "message.data = sin(3.14159);",
     ],
 )
@@ -71,6 +72,7 @@ def test_a_callback_that_is_right(line: str) -> None:
     ("line", "fix"),
     [
         ("double a = tf::getYaw(q) * 180 / M_PI; x = cos(a);", "leave out `* 180 / M_PI`"),
+        ("yaw = 2 * atan2(z, w) * 180 / M_PI; x = cos(yaw / 2);", "leave out `* 180 / M_PI`"),
         ("x = std::sin(yaw * 180.0 / M_PI);", "leave out `* 180 / M_PI`"),
         ("x = sin(90);", "write `sin(90 * M_PI / 180)`"),
         ("x = cos(angle_deg);", "write `cos(angle_deg * M_PI / 180)`"),
