@@ -219,13 +219,13 @@ def explain_by_misplaced_parameter(
     asked, param, node = found
     sets = f"line {param.line} of {param.file} sets {param.name}, and {node.full_name} reads {asked}"
     message = f"{verdict.message}; {sets}"
-    value = "" if param.value is None else f' value="{param.value}"'
-    line = f'<param name="{asked.rpartition("/")[2]}"{value}/>'
-    hint = (
-        f"write `{line}` inside the <node> on line {node.line} of {node.file}, in place of line {param.line}"
-    )
-    if not asked.startswith(f"{node.full_name}/"):
-        hint = f'on line {param.line}, write name="{asked}"'
+    last, within = asked.rpartition("/")[2], f"{node.full_name}/"
+    hint = f"on line {param.line} of {param.file}, write "
+    if asked.startswith(within) and not param.name.startswith(within):
+        place = f"the <node> on line {node.line}"
+        hint = f'move line {param.line} of {param.file} into {place}, as <param name="{last}" …/>'
+    else:
+        hint += f'name="{last if asked.startswith(within) else asked}"'
     cited = (FileCitation(file=param.file, line=param.line), *verdict.citations)
     update = {"message": message, "hint": hint, "citations": cited, "cause": asked}
     return verdict.model_copy(update=update)
