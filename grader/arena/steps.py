@@ -473,12 +473,14 @@ class StepRunner:
         about = {"topic": call.service, "type": call.type, "value": shown}
         record = {"action": "call", "actor": "grader", **about}
         encoded = base64.b64encode(data).decode()
-        begun_s, limit_s = time.monotonic(), AGAIN_S if call.service in self._in_vain else ANSWER_S
+        limit_s = ANSWER_S if call.limit_s is None else call.limit_s
+        again_s = min(AGAIN_S, limit_s / 2)
+        begun_s, limit_s = time.monotonic(), again_s if call.service in self._in_vain else limit_s
         answer = await self._arena.call(
             limit_s, service=call.service, type=call.type, data=encoded, record=record
         )
         if "data" not in answer:
-            if time.monotonic() > begun_s + AGAIN_S:
+            if time.monotonic() > begun_s + again_s:
                 self._in_vain.add(call.service)
             self._answer(call, None, answer["error"])
             return

@@ -12,7 +12,6 @@ from pydantic import Field
 from grader.checks.launch_files import missing_node
 from grader.checks.launch_params import params_in_place, params_misplaced
 from grader.checks.registry import DependencyName, LaunchName, ProgramName, check
-from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.launch import (
     finished,
     is_exact,
@@ -274,8 +273,9 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
         or _judge_nodes(package, file, run, params)
     ).in_part(share, right)
     ended = early_end(run)
-    if verdict.status is Status.FAIL and not verdict.cause and ended is not None and refusal(run, package):
-        verdict = verdict.model_copy(update={"cause": explain_end(ended, run, package).cause})
+    refused = refusal(run, package) if ended is not None else None
+    if verdict.status is Status.FAIL and not verdict.cause and refused is not None:
+        verdict = verdict.model_copy(update={"cause": refused.why})
     citations = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph"))
     return verdict.about(expected=expected, measured=_listed_nodes(run), citations=citations)
 

@@ -100,7 +100,8 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
 
     How it is measured
         The grader calls the service once it is offered and compares each field that the rubric names:
-        numbers within a tolerance, text exactly. Other fields do not matter.
+        numbers within a tolerance, text exactly. Other fields do not matter. Of several calls, each that
+        is answered as it should be earns its share.
 
     How to fix
         The callback takes the request and ends with `return <Type>Response(…)` on every way through it;
@@ -108,9 +109,16 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
     """
     made = exchanges(run, params.service)
     pairs = list(zip(made, params.expect, strict=False))
-    wrong = next(((one, v) for one, w in pairs if (v := _fault(one, w, package, run, params))), None)
+    faults = [(one, v) for one, w in pairs if (v := _fault(one, w, package, run, params))]
+    wrong = faults[0] if faults else None
+    right = len(pairs) - len(faults)
+    share = right / len(params.expect)
     verdict = (
-        (wrong[1] if wrong else None)
+        (
+            wrong[1].in_part(share, f"{right} of {plural(len(params.expect), 'answer')} right")
+            if wrong
+            else None
+        )
         or _judge_uncalled(made, package, run, params)
         or passed(f"{params.service} answers {plural(len(pairs), 'call')} as it should")
     )

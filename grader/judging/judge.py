@@ -17,7 +17,8 @@ from grader.checks import CHECKS, Check
 from grader.checks.build import explain_by_build
 from grader.checks.registry import NotRecorded
 from grader.checks.support.exit_causes import explain_by_exception
-from grader.checks.support.parameters import explain_by_unread_parameter
+from grader.checks.support.launch import explain_by_refused_launch
+from grader.checks.support.parameters import explain_by_misplaced_parameter, explain_by_unread_parameter
 from grader.checks.support.processes import plain_type
 from grader.checks.support.scripts import SYNTAX, without_git
 from grader.checks.support.text import near_names, texts_in
@@ -25,6 +26,7 @@ from grader.checks.support.topics import (
     SYSTEM_TOPICS,
     account_for_losses,
     explain_by_unheard_topic,
+    explain_by_waiting_callback,
     explain_by_wrong_value,
 )
 from grader.errors import EvidenceError
@@ -201,10 +203,13 @@ def _with_made_up(rubric: Rubric, criterion: Criterion, verdict: Verdict) -> Ver
 
 
 EXPLANATIONS = (
+    explain_by_refused_launch,
     explain_by_exception,
     explain_by_unheard_topic,
     explain_by_unread_parameter,
+    explain_by_misplaced_parameter,
     explain_by_wrong_value,
+    explain_by_waiting_callback,
 )
 
 

@@ -273,7 +273,7 @@ SlipKind = Literal[
 
 class PythonSlip(Record):
     """What is remarkable in a Python file, most of it slips that show only when the node runs. For a file that does
-    not compile, only names, types and rates are known.
+    not compile, only names, types and rates are known; for one of C++, only `callback-waits` and `degrees`.
 
     `message` says what is wrong on that line, `fix` what to do if that is always the same, and `name` is the
     function or variable that both are about. For a kind that is not a slip, `message` is what the line says: a
@@ -292,11 +292,11 @@ class PythonSlip(Record):
     whose `sleep()` is outside it; `sleep-twice`: a loop that waits twice in each turn; `publish-twice`: one that
     publishes on one topic more than once in each turn. `callback-called`, `callback-values`, `callback-missing`: a
     callback that is called where it should only be named, that takes another number of values than ROS passes, or
-    that does not exist. `callback-waits`: a topic's callback that sleeps, or never ends. `queue-size`: a queue size
-    that is a text, with which rospy sends nothing. `clock-value`: the values of the topic `message` are read from a
-    clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C. `outside-method`: a call in a class, but
-    outside its methods, that uses an unknown name. `object`: why an object of a class lacks an attribute where it is
-    read, or that the class is used in its place. `undefined`: why a name has no value where it is read.
+    that does not exist. `callback-waits`: a topic's or service's callback that sleeps, or never ends. `queue-size`: a
+    queue size that is a text, with which rospy sends nothing. `clock-value`: the values of the topic `message` are
+    read from a clock, and nothing is counted. `deaf`: why the node goes on after Ctrl-C. `outside-method`: a call in
+    a class, but outside its methods, that uses an unknown name. `object`: why an object of a class lacks an attribute
+    where it is read, or that the class is used in its place. `undefined`: why a name has no value where it is read.
     `commented-out`: a ROS call in a comment; `name` is `sleep`, or `pub = Publisher`. `no-effect` and `compared`: a
     statement such as `++i`, or `i == 0`. `no-init`: a script with topics, or that does more than define names, never
     calls `init_node`. `publishes` and `prints`: no slips, but a text that is published or printed, with `{}` for a

@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 from grader.model.message_definitions import PARTS, parse_interface
 from grader.model.package import Fault, Interface, PackageFacts, PythonSlip, Shebang, ShebangFault, SourceFile
 from grader.model.submission import SourcePackage, Submission
+from grader.package.cpp import SUFFIXES, cpp_slips
 from grader.package.python import check_syntax
 from grader.package.reading import (
     LEFT_OUT,
@@ -318,7 +319,7 @@ def read_package(
         files=_with_faults(files, faults),
         launch_files=launch_files,
         hints=hints,
-        slips=report.slips,
+        slips=(*report.slips, *cpp_slips(package.folder, (e.path for e in _readable(entries)))),
         interfaces=_interfaces(package.folder, _readable(entries)),
         asked=package.asked,
     )
@@ -340,7 +341,8 @@ def with_build_facts(
 ) -> PackageFacts:
     """Return `facts` refined by what the build showed: CMake's own trace, and ROS's own Python on the sources.
 
-    What is None stays as it was. `python_faults` replace the faults of all `python_paths`.
+    What is None stays as it was. `python_faults` replace the faults of all `python_paths`, and `python_slips` the slips
+    of all but C++.
     """
     changes: dict[str, object] = {}
     if cmake_trace is not None and facts.cmake is not None:
@@ -353,7 +355,8 @@ def with_build_facts(
         kept = {f.path: f.python_fault for f in facts.files if f.python_fault and f.path not in asked}
         changes["files"] = _with_faults(facts.files, {**kept, **python_faults})
     if python_slips is not None:
-        changes["slips"] = python_slips
+        of_cpp = (slip for slip in facts.slips if PurePosixPath(slip.file).suffix in SUFFIXES)
+        changes["slips"] = (*python_slips, *of_cpp)
     return facts.model_copy(update=changes)
 
 

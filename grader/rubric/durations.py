@@ -128,7 +128,7 @@ def longest_s(scenario: dict[str, Any]) -> float | None:
 def _waits_s(step: Step, first_s: float) -> float:
     """Return how long a step may wait for the student's nodes."""
     if step.call is not None:
-        return first_s + step.call.delay_s + ANSWER_S
+        return first_s + step.call.delay_s + (ANSWER_S if step.call.limit_s is None else step.call.limit_s)
     if step.action is not None:
         return 2 * first_s + (step.action.cancel_after_s or 0) + step.action.limit_s
     if step.wait is not None and step.wait.seconds is None:
@@ -208,5 +208,13 @@ def within_faults(about: Asked) -> Iterator[Fault]:
             at,
             f"the step waits {limit_s:g} s for the result (limit_s), and gives it up before {within_s:g} s",
         )
+    after_s = (goal or {}).get("cancel_after_s")
+    if goal is not None and all(map(is_number, (after_s, limit_s := _limit_s(goal)))):
+        left_s = limit_s - after_s
+        if 0 < left_s <= within_s <= limit_s:
+            fault = (
+                f"the step gives the goal up {left_s:g} s after it has cancelled it (limit_s: {limit_s:g})"
+            )
+            yield at, f"{fault}: give it a longer limit_s"
     if about.check in {"reacts", "ends-at"} and most_s is not None and within_s >= most_s:
         yield at, f"{about.name} lasts {most_s:g} s at most: what comes later is not seen"

@@ -15,8 +15,10 @@ from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
 from grader.rubric.durations import Asked, late_faults, longest_s, often_faults, within_faults
 from grader.rubric.message_fields import PATH_PARTS
+from grader.rubric.room import room_faults, start_faults
 from grader.rubric.scenario import Scenario, Until
-from grader.rubric.simulators import FIELD_M, robot_of
+from grader.rubric.simulators import FIELD_M, PROGRAMS, robot_of
+from grader.rubric.started import starts_of
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
 from grader.wording import plural
@@ -37,7 +39,10 @@ def reach_faults(
     """Yield what the runs of a rubric's scenarios cannot show."""
     yield from _too_many(rubric, scenarios, checks)
     yield from _too_few(rubric, scenarios)
+    yield from _too_many_nodes(scenarios)
     yield from late_faults(scenarios)
+    for name, scenario in scenarios.items():
+        yield from start_faults(("scenarios", name), scenario)
     criteria = list(as_maps(rubric.get("criteria")))
     for index, criterion in criteria:
         path, given = ("criteria", index, "with"), as_map(criterion.get("with"))
@@ -48,10 +53,12 @@ def reach_faults(
         about = Asked(path, str(criterion.get("check")), given, str(criterion.get("scenario")), scenario)
         yield from often_faults(about)
         yield from within_faults(about)
+        yield from room_faults(about)
         yield from _never_sent(about, others)
         if about.check in {"ends-at", "path", "stays-within"}:
             yield from _too_far(about, others)
     yield from _contradictions(criteria, scenarios)
+    yield from _other_effects(criteria, scenarios)
     yield from _other_ends(criteria)
 
 
@@ -78,6 +85,17 @@ def _too_many(
             if takes_s > limit_s:
                 fault = f"{count} messages at {rates[topic]:g} Hz take {takes_s:.3g} s, and limit_s is {limit_s:g} s"
                 yield ("scenarios", name, "until", "messages", topic), fault
+
+
+def _too_many_nodes(scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield counts of nodes that a run's scripts, each of which is one node, never are."""
+    for name, scenario in scenarios.items():
+        nodes, starts = as_map(scenario.get("until")).get("nodes"), starts_of(scenario)
+        scripts = [start for start in starts if start.get("script") is not None]
+        of_scripts = all(start.get("script") or start.get("program") in PROGRAMS for start in starts)
+        if isinstance(nodes, int) and of_scripts and starts and nodes > len(scripts):
+            fault = f"{name} starts {plural(len(scripts), 'script')} of the student's, and each is one node"
+            yield ("scenarios", name, "until", "nodes"), fault
 
 
 def _too_few(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
@@ -311,7 +329,7 @@ def _goal_faults(
     about: Asked, others: Sequence[dict[str, Any]], robot: _Robot, farthest_m: float, limit: str
 ) -> Iterator[Fault]:
     given, goal, tolerance_m = about.given, _spot(about.given.get("goal")), about.given["tolerance_m"]
-    number, within_s = given.get("number", 1), given.get("within_s")
+    number = given.get("number", 1)
     if goal is None or given.get("relative") is True:
         return
     at = (*about.path, "goal")
@@ -332,9 +350,8 @@ def _goal_faults(
     away_m = math.dist(start, goal) - 2 * tolerance_m if start else 0
     if away_m > farthest_m:
         yield at, f"it cannot come so far: {limit}"
-    elif robot.fastest_m_s and is_number(within_s) and away_m > robot.fastest_m_s * within_s:
-        needed = f"{away_m:.3g} m from {_pair(start or goal)} at {robot.fastest_m_s:g} m/s"
-        yield (*about.path, "within_s"), f"{needed} take longer than {within_s:g} s"
+    else:
+        yield from _too_soon(about, robot, away_m, f"{away_m:.3g} m from {_pair(start or goal)}")
     for one in others if not given.get("relative") else ():
         kept = as_map(one.get("with"))
         corners = [_spot(corner) for corner in _items(kept.get("box"))]
@@ -342,6 +359,38 @@ def _goal_faults(
         known = len(corners) == 2 and None not in corners and not kept.get("relative")
         if same and known and not _is_between(goal, corners, tolerance_m):
             yield at, f"is outside of the box that {one.get('id')} keeps it in"
+
+
+def _too_soon(about: Asked, robot: _Robot, away_m: float, way: str) -> Iterator[Fault]:
+    """Yield a goal that the robot cannot come to before the next one is asked for, or within the time."""
+    within_s, fastest, until_s = about.given.get("within_s"), robot.fastest_m_s, _until_next_s(about)
+    if not fastest:
+        return
+    needed = f"{way} at {fastest:g} m/s take longer than"
+    if until_s is not None and away_m > fastest * until_s:
+        after = f"the {until_s:g} s until the next message on {about.given['asked_on']}"
+        yield (*about.path, "goal"), f"{needed} {after} asks for another place"
+    elif is_number(within_s) and away_m > fastest * within_s:
+        yield (*about.path, "within_s"), f"{needed} {within_s:g} s"
+
+
+def _until_next_s(about: Asked) -> float | None:
+    """Return how long after the message that a goal is asked with the next one is sent; None where that is not known,
+    or it is the last."""
+    passed_s, number = None, 0
+    for _, step in as_maps(about.scenario.get("steps")):
+        is_goal = "publish" in step and as_map(step["publish"]).get("topic") == about.given.get("asked_on")
+        if is_goal and passed_s is not None:
+            return passed_s
+        seconds = as_map(step.get("wait")).get("seconds")
+        number += is_goal
+        if is_goal and number == about.given.get("number", 1):
+            passed_s = 0.0
+        elif passed_s is not None:
+            if not is_number(seconds):
+                return None
+            passed_s += seconds
+    return None
 
 
 def _not_last(about: Asked, others: Sequence[dict[str, Any]], goal: tuple[float, float]) -> str:
@@ -368,6 +417,57 @@ def _is_between(spot: tuple[float, float], corners: Sequence[Any], tolerance_m: 
 
 def _pair(spot: tuple[float, float]) -> str:
     return f"({spot[0]:g}, {spot[1]:g})"
+
+
+def _other_effects(
+    criteria: Sequence[tuple[int, dict[str, Any]]], scenarios: dict[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield causes that one message shows together with the cause of an earlier criterion, which wants another effect
+    of it."""
+    before: list[tuple[str, str, dict[str, Any]]] = []
+    for index, criterion in criteria:
+        given, name = as_map(criterion.get("with")), str(criterion.get("scenario"))
+        if criterion.get("check") != "reacts":
+            continue
+        for run, earlier, other in before:
+            causes, effects = ([as_map(g.get(key)) for g in (given, other)] for key in ("cause", "effect"))
+            shown = _shown_by_both(causes[0], causes[1], scenarios.get(name, {}))
+            if run == name and _differ(effects[0], effects[1]) and (number := next(shown, 0)):
+                message = f"message {number} that {name} sends on {causes[0].get('topic')}"
+                fault = f"{message} is a cause for {earlier} too, which wants another effect"
+                yield ("criteria", index, "with", "cause"), fault
+        before.append((name, str(criterion.get("id")), given))
+
+
+def _differ(effect: dict[str, Any], other: dict[str, Any]) -> bool:
+    """Return whether no message has both effects."""
+    if any(effect.get(key) != other.get(key) for key in ("topic", "field")):
+        return False
+    every = [next(_demands("reacts", one), None) for one in (effect, other)]
+    demands = [one._replace(every=True) for one in every if one is not None]
+    return len(demands) == 2 and demands[0].excludes(demands[1])
+
+
+def _shown_by_both(cause: dict[str, Any], other: dict[str, Any], scenario: dict[str, Any]) -> Iterator[int]:
+    """Yield the numbers of the messages that the scenario sends and of which both causes are true."""
+    if cause.get("topic") != other.get("topic"):
+        return
+    for number, value in enumerate(_sent_on(str(cause.get("topic")), scenario) or (), 1):
+        if all(_is_so(one, value) for one in (cause, other)):
+            yield number
+
+
+def _is_so(cause: dict[str, Any], value: object) -> bool:
+    """Return whether a cause is true of a message that is sent, where that is known."""
+    condition, parts = _condition(cause), PATH_PARTS.findall(str(cause.get("field")))
+    if condition is None or "field" not in cause or _length(value, parts) is not None:
+        return False
+    found = _values_at(value, parts)
+    return (
+        bool(found)
+        and all(map(is_number, found or ()))
+        and condition.holds(Reading(0, tuple(found or ()), ""))
+    )
 
 
 def _other_ends(criteria: Sequence[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:

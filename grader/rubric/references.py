@@ -41,6 +41,7 @@ ASKED_OF_STUDENT = frozenset({
 WHERE_IT_IS = frozenset({"ends-at", "stays-within", "path"})
 NEVER_OF_GRADER = frozenset({"latched", "counter-start", "counter-step", "counter-wrap"})
 """Checks of the student's messages that have no `of`."""
+OTHER_DISTROS = ("melodic", "kinetic", "indigo", "foxy", "humble", "jazzy")
 _DIGITS = re.compile(r"\d+")
 _TOPIC = re.compile(r"(?:^|:=)(/[\w/]*\w)")
 
@@ -63,8 +64,13 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
             )
             yield from ((("criteria", index, "with", *at), fault) for at, fault in asked)
     for index, package in as_texts(as_map(rubric.get("needs")).get("ros")):
-        if fault := ros_packages().misspelt(package):
+        if package in packages_in(rubric):
+            yield ("needs", "ros", index), "is the package that students hand in: no machine has it before"
+        elif fault := ros_packages().misspelt(package):
             yield ("needs", "ros", index), fault
+    for index, package in as_texts(as_map(rubric.get("needs")).get("apt")):
+        if fault := _no_debian_package(package):
+            yield ("needs", "apt", index), fault
     yield from field_faults(rubric)
     yield from frame_faults(rubric)
     yield from _unused_faults(rubric, scenarios, checks)
@@ -80,6 +86,18 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
     yield from _same_names(criteria, scenarios)
     yield from _misspelt_scripts(rubric, scenarios)
     yield from _other_goals_and_types(rubric, scenarios)
+
+
+def _no_debian_package(package: str) -> str:
+    """Return why no machine with ROS Noetic has a Debian package of ROS's; empty where one may."""
+    _, *of_ros = re.split(r"^ros-([a-z]+)-", package)
+    if not of_ros:
+        return ""
+    distro, name = of_ros
+    if distro in OTHER_DISTROS:
+        return f"is of ROS {distro.capitalize()}: write ros-noetic-{name}"
+    fault = ros_packages().misspelt(name.replace("-", "_")) if distro == "noetic" else ""
+    return fault.replace("_", "-")
 
 
 def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -356,7 +374,8 @@ def _too_short(one: Reference, check: Check, scenario: dict[str, Any]) -> Iterat
     if not isinstance(one.value, int | float) or len(known) <= len(lasting):
         return
     done_s = steps_s(scenario)
-    waits = any(until.get(key) for key in OTHER_CONDITIONS)
+    is_one_node = until.get("nodes") == 1 and bool(lasting) and not scenario.get("calls")
+    waits = any(until.get(key) for key in OTHER_CONDITIONS if not (key == "nodes" and is_one_node))
     if done_s is None or not isinstance(limit_s, int | float):
         return
     if done_s and not lasting and not waits:
@@ -448,6 +467,14 @@ def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
     criteria = list(as_maps(rubric.get("criteria")))
     files = [str(as_map(c.get("with")).get("file")) for _, c in criteria if c.get("check") == "definition"]
     names, own = {PurePosixPath(file).stem for file in files}, packages_in(rubric)
+    defined = {
+        (
+            str(c.get("package") or next(iter(own), "")),
+            PurePosixPath(str(as_map(c.get("with")).get("file"))).stem,
+        )
+        for _, c in criteria
+        if c.get("check") == "definition"
+    }
     typed: list[tuple[KeyPath, dict[str, Any]]] = [
         (("criteria", n, "with"), as_map(c.get("with"))) for n, c in criteria
     ]
@@ -458,6 +485,10 @@ def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
         kind = given.get("type")
         package, _, name = kind.partition("/") if isinstance(kind, str) else ("", "", "")
         near = closest(name, names, cutoff=SURE) if package in own and name not in names else ""
+        places = {judged for judged, stem in defined if stem == name}
+        if package in own and places and package not in places:
+            fault = f"a criterion looks for {name} in {join_words(sorted(places))}, and this is {kind}"
+            yield (*path, "type"), f"{fault}: give the criterion package: {package}"
         if near:
             yield (*path, "type"), f'no criterion asks for {name} (did you mean "{package}/{near}"?)'
 

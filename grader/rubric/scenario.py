@@ -133,6 +133,9 @@ class Call(Record):
     another order, the service is not called, and the report says why."""
     delay_s: Seconds = 0.0
     """How long after the service is offered."""
+    limit_s: StepSeconds | None = None
+    """How long the run waits for its answer, on a machine that does nothing else; null: 10 s. Once one was not answered
+    in time, the calls of that service after it have half as long, 2 s at most."""
 
 
 class Served(Record):

@@ -56,7 +56,10 @@ PROGRAMS: Mapping[str, Program] = {
         }),
     ),
 }  # fmt: skip
-ROBOTS = {"turtlebot3": {"max_linear": 0.22, "samples": 360}, "stage": {"max_linear": 1.0, "samples": 271}}
+ROBOTS = {
+    "turtlebot3": {"max_linear": 0.22, "samples": 360, "radius": 0.105},
+    "stage": {"max_linear": 1.0, "samples": 271, "radius": 0.18},
+}
 """What the robots of the robot world are like, where no parameter says otherwise."""
 FIELD_M = 11.09
 """How long the field of turtlesim is on each side."""

@@ -12,6 +12,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
+from grader.rubric.demand_warnings import demand_warnings
 from grader.rubric.message_fields import POSES, VELOCITIES, services_in
 from grader.rubric.simulators import set_in, topics_of_programs
 from grader.rubric.spelling import texts_in
@@ -22,8 +23,7 @@ from grader.wording import join_words, plural
 
 SHORT = {"limit_s": 3.0, "first_message_s": 3.0, "quiet_s": 1.0, "alive_s": 0.5, "window_s": 2.0}
 """Conditions of `until` that a correct package may miss on a busy machine if they are shorter."""
-STRICT = 0.02
-"""Of a rate, the least tolerance that a busy machine keeps."""
+WAIT_S = 0.5
 JUDGED = ("check", "scenario", "package", "with")
 """What makes a criterion judge something."""
 WORDS = {
@@ -41,7 +41,8 @@ _NUMBER = rf"\d+(?:\.\d+)?|{'|'.join(WORDS)}"
 PER_SECOND = re.compile(rf"\b({_NUMBER})(?: ?Hz\b|(?: \w+)? (?:a|per) second)", re.IGNORECASE)
 SHIFTS = (10, 100, 0.1, 0.01, -1)
 """By so much a number is another where a digit is forgotten, or a sign."""
-EXPECTED = ("value", "values", "numbers", "rate_hz", "result", "expect", "goal", "start", "min", "max")
+EXPECTED = ("value", "values", "numbers", "rate_hz", "result", "expect", "goal", "start", "min", "max",
+            "translation", "tolerance_m")  # fmt: skip
 """Keys of what a criterion asks for, as numbers."""
 
 
@@ -51,6 +52,7 @@ def warnings(data: object) -> Iterator[Fault]:
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     criteria = as_maps(rubric.get("criteria"))
     yield from _short_runs(scenarios)
+    yield from _short_waits(scenarios)
     yield from _misnamed_processes(rubric, scenarios)
     yield from _first_packages(rubric, scenarios)
     yield from _lone_quotes(rubric)
@@ -58,6 +60,7 @@ def warnings(data: object) -> Iterator[Fault]:
     yield from _other_rates(criteria, scenarios)
     yield from _not_private(scenarios, str(rubric.get("handout") or ""))
     yield from _without_input(criteria, scenarios)
+    yield from demand_warnings(rubric, criteria, scenarios)
     for index, criterion in criteria:
         at, given = ("criteria", index, "with"), as_map(criterion.get("with"))
         scenario = scenarios.get(str(criterion.get("scenario")), {})
@@ -78,6 +81,16 @@ def _short_runs(scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
             if is_number(given_s) and given_s < least_s:
                 fault = f"{given_s:g} s is very short: on a busy machine a correct package may need more"
                 yield ("scenarios", name, "until", key), fault
+
+
+def _short_waits(scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield waits for a topic or node that is there before them at no student's."""
+    for name, scenario in scenarios.items():
+        for index, step in as_maps(scenario.get("steps")):
+            limit_s = as_map(step.get("wait")).get("limit_s")
+            if is_number(limit_s) and limit_s < WAIT_S:
+                fault = f"{limit_s:g} s is very short: on a busy machine a correct package may need more"
+                yield ("scenarios", name, "steps", index, "wait", "limit_s"), fault
 
 
 def _lone_quotes(rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -188,10 +201,13 @@ def _fewer_answers(at: KeyPath, criterion: dict[str, Any], scenario: dict[str, A
 def _asked_for_nothing(at: KeyPath, criterion: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
     """Yield numbers of a request that nothing in the run has, where others of the same field come from the run."""
     expect = as_map(criterion.get("with")).get("expect")
+    parts = {key: part for key, part in scenario.items() if key not in {"until", "serves"}}
+    sent = {number for _, number in _numbers_in((), parts)}
+    sent |= {float(text) for _, text in texts_in((), parts) if re.fullmatch(r"-?\d+(\.\d+)?", text)}
+    if criterion.get("check") == "calls" and isinstance(expect, dict):
+        yield from _asked_once_for_nothing((*at, "expect"), expect, sent, str(criterion.get("scenario")))
     if criterion.get("check") != "calls" or not isinstance(expect, list):
         return
-    parts = {key: part for key, part in scenario.items() if key != "until"}
-    sent = {number for _, number in _numbers_in((), parts)}
     for key in dict.fromkeys(key for one in expect for key in as_map(one)):
         each = [(n, one[key]) for n, one in enumerate(expect) if is_number(as_map(one).get(key))]
         alone = [(n, value) for n, value in each if value not in sent]
@@ -199,6 +215,18 @@ def _asked_for_nothing(at: KeyPath, criterion: dict[str, Any], scenario: dict[st
             (number, value), name = alone[0], criterion.get("scenario")
             fault = f"nothing in {name} has {value:g}, and it has the other numbers that are asked for"
             yield (*at, "expect", number, key), fault
+
+
+def _asked_once_for_nothing(
+    at: KeyPath, expect: dict[str, Any], sent: set[float], name: str
+) -> Iterator[Fault]:
+    """Yield the one number of a request that the run does not have, where a number with another sign or a digit more is
+    there."""
+    alone = [(key, value) for key, value in expect.items() if is_number(value) and value not in sent]
+    for key, value in alone:
+        near = next((value / by for by in SHIFTS if round(value / by, 9) in sent), None)
+        if near is not None and len(alone) == 1:
+            yield (*at, key), f"nothing in {name} has {value:g}, and it has {near:g}"
 
 
 def _not_private(scenarios: Mapping[str, dict[str, Any]], handout: str) -> Iterator[Fault]:
@@ -281,7 +309,8 @@ def _other_run(
 ) -> Iterator[Fault]:
     """Yield topics that another run is about, with other processes, and that this one nowhere names."""
     criterion = dict(criteria)[index]
-    name, topic = str(criterion.get("scenario")), as_map(criterion.get("with")).get("topic")
+    name, given = str(criterion.get("scenario")), as_map(criterion.get("with"))
+    topic = given.get("topic") or next(iter(as_map(given.get("topics"))), None)
     here = scenarios.get(name, {})
     if not isinstance(topic, str) or "start" not in here or _is_named(topic, here):
         return
@@ -318,7 +347,7 @@ def _shifted_numbers(index: int, criterion: dict[str, Any], rubric: dict[str, An
     prose = " ".join([*about, str(rubric.get("handout", ""))])
     said = {float(number) for number in re.findall(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w]|\.\d)", prose)}
     said_hz = {float(WORDS.get(number.lower(), number)) for number in PER_SECOND.findall(prose)}
-    there = [number for _, number in _numbers_in((), rubric)]
+    there = [number for at, number in _numbers_in((), rubric) if not _is_setting(at)]
     for key in EXPECTED:
         for at, number in _numbers_in((key,), as_map(criterion.get("with")).get(key)):
             known = said_hz if key == "rate_hz" else said
@@ -333,6 +362,14 @@ def _shifted_numbers(index: int, criterion: dict[str, Any], rubric: dict[str, An
                 ("criteria", index, "with", *at),
                 f"{number:g} is on no other line, and the rubric's text has {meant:g}",
             )
+
+
+def _is_setting(path: KeyPath) -> bool:
+    """Return whether a number is about the run or the marks, and not about what a node publishes or prints."""
+    key = next((part for part in reversed(path) if not isinstance(part, int)), "")
+    return bool(
+        re.search(r"_s$|^(?:rate_hz|warp|points|bonus|penalty|at_most|digits|goal|number)$", str(key))
+    )
 
 
 def _numbers_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, float]]:

@@ -194,6 +194,10 @@ WAITING = {
     "spins": ("rospy.spin()", "move line 3 out of it"),
     "short": ("rospy.sleep(0.01)", None),
     "ends": ("for i in range(3): print(i)", None),
+    "never-changes": ("near = m.data < 1\n    while near: print(1)", "take the loop out of it"),
+    "changes": ("near = m.data < 1\n    while near: near = look()", None),
+    "of-the-module": ("global near\n    near = True\n    while near: print(1)", None),
+    "of-an-object": ("near = m\n    while near.data: print(1)", None),
 }
 
 
@@ -202,7 +206,15 @@ def test_a_callback_that_waits(tmp_path, case):
     line, fix = WAITING[case]
     (tmp_path / "a.py").write_text(CALLBACK.format(line))
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "callback-waits"]
-    assert [(s.line, s.fix, s.name) for s in slips] == ([(3, fix, "callback")] if fix else [])
+    last = 3 + line.count("\n")
+    assert [(s.line, s.fix, s.name) for s in slips] == ([(last, fix, "callback")] if fix else [])
+
+
+def test_a_handler_of_a_service_that_waits(tmp_path):
+    code = "def add(request):\n    rospy.sleep(20)\n    return 1\nrospy.Service('/add', Add, add)\n"
+    (tmp_path / "a.py").write_text(code)
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "callback-waits"]
+    assert [(s.line, s.message) for s in slips] == [(2, "the callback `add` sleeps on line 2")]
 
 
 ARGUMENTS = {

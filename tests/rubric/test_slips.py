@@ -353,7 +353,10 @@ def test_what_is_known_of_the_simulators_is_what_they_are() -> None:
         n.value for n in source.body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "ROBOTS"
     )
     robots = eval(ast.unparse(table), {"math": math})  # noqa: S307 - the grader's own source
-    known = {name: {key: robot[key] for key in ("max_linear", "samples")} for name, robot in robots.items()}
+    known = {
+        name: {key: robot[key] for key in ("max_linear", "samples", "radius")}
+        for name, robot in robots.items()
+    }
     assert known == ROBOTS
     field = ast.parse((STANDINS / "turtlesim" / "field.py").read_text(encoding="utf-8"))
     pixels = {

@@ -50,6 +50,8 @@ from script_objects import (
 
 SLIPS_LIMIT = 100
 """Of a file."""
+CALLED_BACK = {"Subscriber": "callback", "Service": "handler"}
+"""What calls a function of the script's, and the name of that argument."""
 
 
 def slips(tree):
@@ -346,14 +348,15 @@ def publishes_twice(tree):
 
 
 def waiting_callbacks(tree):
-    """Callbacks of topics that do not come to their end, or late: no further message is read before."""
+    """Callbacks of topics and services that do not come to their end, or late: nothing further is read before."""
     functions = functions_in(tree)
     for node in walk(tree):
-        given = argument(node, 2, "callback") if called_name(node) == "Subscriber" else []
+        kind = called_name(node)
+        given = argument(node, 2, CALLED_BACK[kind]) if kind in CALLED_BACK else []
         own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
         inside = list(ast.walk(own)) if own is not None else []
         for inner in inside if node not in inside else ():
-            if isinstance(inner, ast.While) and is_endless(inner):
+            if isinstance(inner, ast.While) and is_endless(inner, own):
                 message, fix = "the loop in the callback `%s`, line %d, never ends", "take the loop out of it"
             elif is_call(inner, "spin"):
                 message, fix = "the callback `%s` calls spin() on line %d", "move line %d out of it"
@@ -372,14 +375,38 @@ def is_short(sleep):
     return bool(sleep.args) and (constant(sleep.args[0], lambda node: node) or 1.0) < 0.1
 
 
-def is_endless(loop):
-    """Whether it asks for nothing but the node's end, and nothing in it leaves it."""
-    test = loop.test
+def is_endless(loop, function=None):
+    """Whether it asks for nothing but the node's end, and nothing in it leaves it; in a function, also for variables of
+    the function that nothing in the loop changes."""
+    asks = asks_for_ever(loop.test) or (function is not None and is_unchanging(loop, function))
+    return asks and not any(isinstance(n, (ast.Break, ast.Return, ast.Raise)) for n in ast.walk(loop))
+
+
+def asks_for_ever(test):
     inverted = isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not)
-    asks = (isinstance(test, ast.Constant) and bool(test.value)) or (
+    return (isinstance(test, ast.Constant) and bool(test.value)) or (
         inverted and is_call(test.operand, "is_shutdown")
     )
-    return asks and not any(isinstance(n, (ast.Break, ast.Return, ast.Raise)) for n in ast.walk(loop))
+
+
+def is_unchanging(loop, function):
+    """Whether a loop's condition is made of the function's own variables and numbers, and nothing in it sets them."""
+    parts = [loop.test]
+    if isinstance(loop.test, ast.BoolOp) and isinstance(loop.test.op, ast.And):
+        parts = [part for part in loop.test.values if not asks_for_ever(part)]
+    inside = [n for part in parts for n in ast.walk(part)]
+    names = {n.id for n in inside if isinstance(n, ast.Name)}
+    shared = {
+        name for n in ast.walk(function) if isinstance(n, (ast.Global, ast.Nonlocal)) for name in n.names
+    }
+    own, changed = set_in(function) - shared, set_in(loop)
+    is_plain_test = not any(isinstance(n, (ast.Call, ast.Attribute, ast.Subscript)) for n in inside)
+    return bool(names) and is_plain_test and names <= own - changed
+
+
+def set_in(tree):
+    """Return the names that are set somewhere in a tree."""
+    return {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and not isinstance(n.ctx, ast.Load)}
 
 
 def constant(node, given, depth=4):

@@ -7,9 +7,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
+from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_traceback, process_tracebacks, syntax_hint
 from grader.checks.support.launch_slips import PROGRAMS_OF, at_its_lines, node_slip, own_script, owner_of
-from grader.checks.support.processes import lives, observed_until_ns
+from grader.checks.support.processes import early_end, lives, observed_until_ns
 from grader.checks.support.scripts import (
     paths_by_name,
     programs,
@@ -60,7 +61,7 @@ _REFUSALS = (
      "write $(find <package>)/config/{0}, and push the file"),
     (NO_PACKAGE, "there is no package {0}",
      "$(find …) and pkg need the package's exact name"),
-    (r"requires the '(\w+)' arg to be set", 'its <arg name="{0}"> has no default',
+    (_UNSET.pattern, 'its <arg name="{0}"> has no default',
      'write <arg name="{0}" default="…"/>'),
     (r"output must be one of", 'output is "screen" or "log", in lower case', 'write output="screen"'),
     (r"multiple files named", "the package has two launch files of that name",
@@ -173,8 +174,31 @@ def refusal(run: Run, package: PackageFacts | None = None) -> Absence | None:
             if package is not None and pattern == NO_FILE and (meant := _file_meant(package, words[0])):
                 fix = f"write $(find {package.name})/{meant}"
             said = f"roslaunch starts nothing: {why.format(*words)}"
-            return Absence(said, fix, refused=pattern, about="".join(words[:1]))
+            cited = _declared(words[0], package) if pattern == _UNSET.pattern and package is not None else ()
+            return Absence(said, fix, citations=cited, refused=pattern, about="".join(words[:1]))
     return None
+
+
+def _declared(name: str, package: PackageFacts) -> tuple[FileCitation, ...]:
+    """Return where an argument without a default is declared."""
+    args = (arg for file in package.launch_files for arg in file.unset_args if arg.declared)
+    return tuple(FileCitation(file=arg.file, line=arg.line) for arg in args if arg.name == name)[:1]
+
+
+def explain_by_refused_launch(
+    _check: Check, package: PackageFacts | None, run: object, verdict: Verdict
+) -> Verdict:
+    """Return a lost mark with why roslaunch started nothing, where it ended and that is all that is said."""
+    if package is None or not verdict.status.is_lost or not isinstance(run, Run):
+        return verdict
+    ended = early_end(run)
+    refused = refusal(run, package) if ended is not None and ended.start.argv[:1] == ("roslaunch",) else None
+    if refused is None or refused.why in verdict.message or not verdict.cause:
+        return verdict
+    message = verdict.message.replace(f" ({verdict.cause})", "").replace(f": {verdict.cause}", "")
+    update = {"message": f"{message}: {refused.why}", "hint": refused.hint, "cause": refused.why}
+    citations = tuple(dict.fromkeys((*refused.citations, *verdict.citations)))
+    return verdict.model_copy(update={**update, "citations": citations})
 
 
 def _file_meant(package: PackageFacts, name: str) -> str:

@@ -6,7 +6,7 @@ Maps are taken apart into their leaves (`/details/name/first`).
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple
@@ -16,11 +16,11 @@ from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
 from grader.checks.support.processes import early_end
 from grader.checks.support.text import get_param, init, near_names
-from grader.checks.support.topics import published_topics
+from grader.checks.support.topics import nodes_on, published_topics
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
-from grader.model.package import LaunchParam, PackageFacts
-from grader.model.verdict import EvidenceCitation, Verdict
+from grader.model.package import LaunchNode, LaunchParam, PackageFacts
+from grader.model.verdict import EvidenceCitation, FileCitation, Verdict
 from grader.wording import there_is
 
 SYSTEM = (
@@ -235,6 +235,57 @@ def explain_by_unread_parameter(
     cited = EvidenceCitation(evidence=run.evidence, topic="/grader/actor")
     update = {"message": message, "hint": hint, "citations": (*verdict.citations, cited), "cause": name}
     return verdict.model_copy(update=update)
+
+
+def explain_by_misplaced_parameter(
+    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
+) -> Verdict:
+    """Return a lost mark with the parameter that the node asks for in vain, and that a launch file sets elsewhere."""
+    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
+    if not unexplained or package is None or not isinstance(run, Run) or early_end(run):
+        return verdict
+    found = next(_misplaced(package, run, _publishing(verdict, run)), None)
+    if found is None:
+        return verdict
+    asked, param, node = found
+    sets = f"line {param.line} of {param.file} sets {param.name}, and {node.full_name} reads {asked}"
+    message = f"{verdict.message}; {sets}"
+    last, within = asked.rpartition("/")[2], f"{node.full_name}/"
+    hint = f"on line {param.line} of {param.file}, write "
+    if asked.startswith(within) and not param.name.startswith(within):
+        place = f"the <node> on line {node.line}"
+        hint = f'move line {param.line} of {param.file} into {place}, as <param name="{last}" …/>'
+    else:
+        hint += f'name="{last if asked.startswith(within) else asked}"'
+    cited = (FileCitation(file=param.file, line=param.line), *verdict.citations)
+    update = {"message": message, "hint": hint, "citations": cited, "cause": asked}
+    return verdict.model_copy(update=update)
+
+
+def _publishing(verdict: Verdict, run: Run) -> set[str]:
+    """Return the student's nodes that publish on the topics of the verdict's evidence; all, if it has none."""
+    topics = {c.topic for c in verdict.citations if isinstance(c, EvidenceCitation)}
+    nodes = {node for topic in topics for node in nodes_on(run, topic, "publishers")}
+    return nodes or set(run.student_nodes())
+
+
+def _misplaced(
+    package: PackageFacts, run: Run, nodes: Collection[str]
+) -> Iterator[tuple[str, LaunchParam, LaunchNode]]:
+    """Yield the names that nodes ask for and that are not there, each with the parameter of the same name that a launch
+    file sets and no node reads, and with the node in that file."""
+    reads = [(e, absolute_name(e.topic or "")) for _, e in run.actors if e.action == "read"]
+    got = {name for event, name in reads if not event.detail}
+    there = params_on_server(run).keys() - got
+    for event, name in reads:
+        if not event.detail or event.actor not in nodes or name in SYSTEM:
+            continue
+        for file in package.launch_files:
+            node = next((one for one in file.brings if one.full_name == event.actor), None)
+            last = name.rpartition("/")[2]
+            params = (p for p in file.params if p.name in there and p.name.rpartition("/")[2] == last)
+            if node is not None and (param := next(params, None)):
+                yield name, param, node
 
 
 def is_printed(value: object, lines: Sequence[Line]) -> bool:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
+from pathlib import PurePosixPath
 from typing import Literal
 
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end, explain_error
 from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives, named_at, plain_type
+from grader.checks.support.scripts import programs
 from grader.checks.support.text import (
     INIT,
     LOOP,
@@ -336,13 +338,57 @@ def explain_by_wrong_value(
     unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
     if not unexplained or package is None or not isinstance(run, Run):
         return verdict
-    scripts = {one.start.script for one in lives(run)}
-    found = (s for s in package.slips if s.kind == "wrong-value" and s.file in scripts)
+    files = _files_that_run(package, run)
+    found = (s for s in package.slips if s.kind == "wrong-value" and s.file in files)
     slip = next((s for s in found if re.search(SEEN_AS[s.name], verdict.message)), None)
     if slip is None:
         return verdict
     message = f"{verdict.message}; line {slip.line} of {slip.file}: {slip.message}"
     update = {"message": message, "hint": slip.fix, "citations": (slip.place, *verdict.citations)}
+    return verdict.model_copy(update={**update, "cause": slip.message})
+
+
+LATE = re.compile(
+    r"comes up to [\d.]+ s after|does not follow|never follows|of an older pose|gives no answer: no answer within"
+)
+"""How it shows that a node comes to a message, or a request, too late."""
+AT_ONCE = "in the first message"
+ENDLESS, FLOODED = "never ends", "; the recorder kept "
+"""What a slip says of such a loop, and a verdict of a topic on which more came than is recorded."""
+OF_RESULTS = ("prints", "rostest")
+"""Checks of what comes of callbacks in the end."""
+
+
+def _files_that_run(package: PackageFacts, run: Run) -> set[str | None]:
+    """Return the scripts that run, those that a launch file started, and the sources of programs of C++."""
+    scripts = {one.start.script for one in lives(run)}
+    nodes = [node for file in package.launch_files for node in file.brings]
+    types = {node.type for node in nodes if node.full_name in run.student_nodes()}
+    launched = {file.path for file in package.files if PurePosixPath(file.path).name in types}
+    made = (one.call.args[1:] for one in programs(package) if one.name in scripts | types)
+    return scripts.union(launched, *made)
+
+
+def explain_by_waiting_callback(
+    check: Check, package: PackageFacts | None, run: object, verdict: Verdict
+) -> Verdict:
+    """Return a lost mark with the callback in which a script that runs is kept, so that it hears nothing meanwhile."""
+    of_callbacks = check.of_callbacks or check.name in OF_RESULTS
+    if not of_callbacks or verdict.cause or package is None or not isinstance(run, Run):
+        return verdict
+    files = _files_that_run(package, run)
+    slip = next((s for s in package.slips if s.kind == "callback-waits" and s.file in files), None)
+    if slip is None or AT_ONCE in verdict.message:
+        return verdict
+    if ENDLESS in slip.message and FLOODED in verdict.message and verdict.status is Status.INCONCLUSIVE:
+        lost = verdict.message.partition("; but the grading machine")[0]
+        verdict = verdict.model_copy(update={"status": Status.FAIL, "message": lost})
+    if not verdict.status.is_lost or not (ENDLESS in slip.message or LATE.search(verdict.message)):
+        return verdict
+    message = f"{verdict.message}; in {slip.file}, {slip.message}"
+    ends = "the caller waits" if "answer" in verdict.message else "nothing else is heard"
+    hint = f"in {slip.file}, {slip.fix}: {ends} until the callback ends"
+    update = {"message": message, "hint": hint, "citations": (slip.place, *verdict.citations)}
     return verdict.model_copy(update={**update, "cause": slip.message})
 
 

@@ -1,0 +1,144 @@
+"""What compiles in a student's C++ and is not meant, as far as the text shows it: callbacks that wait, and angles in
+degrees of which a sine is taken. Nothing is compiled."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path, PurePosixPath
+from typing import NamedTuple
+
+from grader.model.package import Fault, PythonSlip
+from grader.package.reading import SOURCE_LIMIT_BYTES, printable, read_markup
+
+SUFFIXES = frozenset({".cpp", ".cc", ".cxx"})
+FILES_MAX = 50
+SHORT_S = 0.1
+"""A callback may wait for less than this."""
+_TEXT = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
+_CALLBACK = re.compile(
+    r"\b(?:subscribe|advertiseService)\s*(?:<[^;()]*>)?\s*\([^;]*?,\s*&?\s*(?P<name>[A-Za-z_][\w:]*)\s*[,)]"
+)
+_ENDLESS = re.compile(
+    r"\bwhile\s*\(\s*(?:(?:ros::|\w+(?:\.|->))ok\s*\(\s*\)|true|1)\s*\)|\bfor\s*\(\s*;\s*;\s*\)"
+)
+_LEAVES = re.compile(r"\b(?:break|return|throw|goto|spinOnce)\b")
+_SPIN = re.compile(r"\bros::spin\s*\(")
+_SLEEP = re.compile(
+    r"\b(?:ros::)?(?:Wall)?Duration\s*\(\s*(?P<s>[\d.]+)\s*\)\s*\.\s*sleep\s*\(|\bus?leep\s*\(\s*(?P<us>\d+)"
+    r"|\bsleep_for\s*\(\s*(?:std::)?(?:chrono::)?milliseconds\s*\(\s*(?P<ms>\d+)|\bsleep(?:_for)?\s*\("
+)
+_DEGREES = r"\*\s*180(?:\.0*f?)?\s*/\s*(?:M_PI|3\.14\d*f?|PI|pi)\b"
+_IN_DEGREES = re.compile(rf"\b(?P<name>[A-Za-z_]\w*)\s*=\s*[^;=]*{_DEGREES}")
+_OF_ANGLE = re.compile(
+    r"\b(?:std::)?(?P<call>sin|cos|tan)f?\s*\(\s*(?P<given>[^();]*(?:\([^()]*\)[^();]*)?)\)"
+)
+_TURNED = re.compile(r"180|rad|PI\b", re.IGNORECASE)
+"""So an angle in degrees is made one in radians."""
+_WHOLE_TURN = 7
+"""Of a number of radians, no one writes more."""
+
+
+class _Body(NamedTuple):
+    """A function's name, and where the text between its braces begins and ends."""
+
+    name: str
+    start: int
+    end: int
+
+
+def cpp_slips(folder: Path, paths: Iterable[str]) -> tuple[PythonSlip, ...]:
+    """Return the slips of the C++ sources among the paths."""
+    sources = [path for path in paths if PurePosixPath(path).suffix in SUFFIXES][:FILES_MAX]
+    found: list[PythonSlip] = []
+    for path in sources:
+        data = read_markup(folder, path, SOURCE_LIMIT_BYTES)
+        if not isinstance(data, Fault):
+            found += slips_of(printable(path), data.decode("utf-8", "replace"))
+    return tuple(found)
+
+
+def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
+    """Yield the slips of one source, in the order of their kinds."""
+    code = _TEXT.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
+    yield from _waiting(path, code)
+    yield from _degrees(path, code)
+
+
+def _waiting(path: str, code: str) -> Iterator[PythonSlip]:
+    for name in dict.fromkeys(match["name"].rpartition("::")[2] for match in _CALLBACK.finditer(code)):
+        body = _body(name, code)
+        found = next(_waits_in(body, code), None) if body else None
+        if found is not None:
+            at, message, fix = found
+            line = code.count("\n", 0, at) + 1
+            message = message.format(name=name, line=line)
+            yield PythonSlip(
+                file=path,
+                line=line,
+                kind="callback-waits",
+                message=message,
+                fix=fix.format(line=line),
+                name=name,
+            )
+
+
+def _body(name: str, code: str) -> _Body | None:
+    """Return the body of the function of that name; None where the source has none."""
+    head = re.search(rf"\b(?:\w+::)*{re.escape(name)}\s*\([^;{{}}]*\)\s*(?:const\s*)?{{", code)
+    return _Body(name, head.end(), _closing(code, head.end())) if head else None
+
+
+def _closing(code: str, start: int) -> int:
+    """Return where the brace is that closes the one before `start`."""
+    depth = 1
+    for match in re.compile(r"[{}]").finditer(code, start):
+        depth += 1 if match[0] == "{" else -1
+        if not depth:
+            return match.start()
+    return len(code)
+
+
+def _waits_in(body: _Body, code: str) -> Iterator[tuple[int, str, str]]:
+    """Yield where the function does not come to its end, or late, with what to say and to do."""
+    for match in _ENDLESS.finditer(code, body.start, body.end):
+        brace = code.find("{", match.end(), body.end)
+        end = _closing(code, brace + 1) if brace >= 0 else body.end
+        if not _LEAVES.search(code, match.end(), end):
+            yield (
+                match.start(),
+                "the loop in the callback `{name}`, line {line}, never ends",
+                "take the loop out of it",
+            )
+    for match in _SPIN.finditer(code, body.start, body.end):
+        yield match.start(), "the callback `{name}` calls spin() on line {line}", "move line {line} out of it"
+    for match in _SLEEP.finditer(code, body.start, body.end):
+        if _seconds(match) >= SHORT_S:
+            yield match.start(), "the callback `{name}` sleeps on line {line}", "delete line {line}"
+
+
+def _seconds(match: re.Match[str]) -> float:
+    """Return how long a call sleeps; of one that does not say it, that it is long."""
+    for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if match[unit] and re.fullmatch(r"\d+\.?\d*|\.\d+", match[unit]):
+            return float(match[unit]) * factor
+    return 1.0
+
+
+def _degrees(path: str, code: str) -> Iterator[PythonSlip]:
+    names = {match["name"] for match in _IN_DEGREES.finditer(code)}
+    for match in _OF_ANGLE.finditer(code):
+        given = match["given"].strip()
+        number = float(given.rstrip("f")) if re.fullmatch(r"\d+(?:\.\d*)?f?", given) else 0.0
+        in_degrees = not names.isdisjoint(re.findall(r"[A-Za-z_]\w*", given)) and not _TURNED.search(given)
+        if in_degrees or re.search(_DEGREES, given):
+            fix = "leave out `* 180 / M_PI`: the angle is in radians before"
+        elif number >= _WHOLE_TURN or re.fullmatch(r"\w*(?:deg|degrees)\w*", given, re.IGNORECASE):
+            fix = f"write `{match['call']}({given} * M_PI / 180)`"
+        else:
+            continue
+        line, message = (
+            code.count("\n", 0, match.start()) + 1,
+            f"`{match['call']}` takes radians, and gets degrees",
+        )
+        yield PythonSlip(file=path, line=line, kind="wrong-value", message=message, fix=fix, name="degrees")

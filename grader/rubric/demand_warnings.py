@@ -1,0 +1,447 @@
+"""What a criterion demands of a node that nearly every node meets, or that a correct one may miss: warnings."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import Any
+
+from grader.checks.support.fields import is_number
+from grader.rubric.message_fields import services_in
+from grader.rubric.simulators import set_in
+from grader.rubric.spelling import is_slip, texts_in
+from grader.rubric.started import starts_of
+from grader.rubric.step_faults import given_steps
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts
+from grader.wording import join_words, plural
+
+Criteria = Sequence[tuple[int, dict[str, Any]]]
+Scenarios = Mapping[str, dict[str, Any]]
+
+SHORTEST_S = {"reacts": 0.1, "action-result": 0.2, "stamps": 0.02}
+"""By check, the shortest time within which a correct node's answer comes on a busy machine."""
+STRICT, LAX = 0.02, 0.5
+"""Of a rate, the least tolerance that a busy machine keeps, and one with which half or twice the rate passes."""
+CLOSE_M = 0.02
+"""No student's robot stops as near to its goal as this."""
+OF_VALUES = frozenset({"field-equals", "field-bounds", "reacts"})
+UNSET = frozenset({"linear.y", "linear.z", "angular.x", "angular.y"})
+SIDEWAYS = re.compile(r"sideways|sideward|holonomic|strafe|drone|quadrotor|\by\b|up\b", re.IGNORECASE)
+EMPTY = "std_srvs/Empty"
+PRIMITIVE = re.compile(r"(?:std_msgs/)?([Uu]?[Ii]nt|[Ff]loat)(8|16|32|64)")
+
+
+def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield what may be such a demand."""
+    handout = str(rubric.get("handout") or "")
+    yield from _ends_and_lives(criteria, scenarios)
+    yield from _answers_waited_for(scenarios, handout)
+    yield from _left_out(scenarios)
+    yield from _fewer_arguments(scenarios)
+    yield from _numbers_as_text(scenarios)
+    yield from _other_lengths(criteria)
+    yield from _other_counters(criteria)
+    yield from _late(as_map(rubric.get("late")))
+    yield from _waited_for_nothing(criteria, scenarios)
+    yield from _without_its_node(rubric, scenarios)
+    yield from _launched_nodes(criteria, scenarios)
+    yield from _other_transforms(criteria, scenarios)
+    for index, criterion in criteria:
+        at, given, check = (
+            ("criteria", index, "with"),
+            as_map(criterion.get("with")),
+            str(criterion.get("check")),
+        )
+        scenario = scenarios.get(str(criterion.get("scenario")), {})
+        yield from _hard(at, check, given)
+        yield from _easy(at, check, given, scenario)
+        if check == "service-answers":
+            yield from _any_answer(at, given, scenario)
+        if check in OF_VALUES and not SIDEWAYS.search(handout):
+            yield from _never_set(at, given)
+        yield from _other_node(at, check, given, scenario, handout)
+        yield from _other_number(at, check, given, scenario, str(criterion.get("scenario")))
+        yield from _other_types(at, given, handout)
+        yield from _misspelt_keys(at, given, rubric)
+
+
+def _hard(at: KeyPath, check: str, given: dict[str, Any]) -> Iterator[Fault]:
+    """Yield demands that a correct node may miss."""
+    within_s, least_s = given.get("within_s"), SHORTEST_S.get(check)
+    if is_number(within_s) and least_s is not None and within_s < least_s:
+        fault = f"{within_s:g} s is very short: on a busy machine a correct package may need more"
+        yield (*at, "within_s"), fault
+    tolerance, tolerance_m = given.get("tolerance"), given.get("tolerance_m")
+    if check == "rate" and is_number(tolerance) and tolerance < STRICT:
+        yield (
+            (*at, "tolerance"),
+            f"{tolerance:g} is very strict: on a busy machine a correct package may miss it",
+        )
+    if check in {"ends-at", "path"} and is_number(tolerance_m) and tolerance_m < CLOSE_M:
+        yield (*at, "tolerance_m"), f"{tolerance_m:g} m is very strict: no robot keeps it"
+
+
+def _easy(at: KeyPath, check: str, given: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield demands that a wrong node meets too."""
+    tolerance = given.get("tolerance")
+    if check == "rate" and is_number(tolerance) and tolerance >= LAX and is_number(given.get("rate_hz")):
+        rates = [given["rate_hz"] * (1 + sign * tolerance) for sign in (-1, 1)]
+        yield (
+            (*at, "tolerance"),
+            f"all rates from {rates[0]:g} to {rates[1]:g} Hz pass: it is a share of the rate",
+        )
+    if check == "node-lives" and given.get("min_s") == 0:
+        yield (*at, "min_s"), "is 0 s: a node that ends at once passes"
+    if check == "action-result" and given.get("feedback") == 0:
+        yield (
+            (*at, "feedback"),
+            "asks for none: leave it out, or give how many messages of feedback have to come",
+        )
+    for part in ((), ("cause",), ("effect",)):
+        asked = as_map(given.get(part[0])) if part else given
+        value, off = asked.get("value"), asked.get("tolerance")
+        if is_number(value) and is_number(off) and off >= abs(value) > 0 and "field" in asked:
+            yield (
+                (*at, *part, "tolerance"),
+                f"is as large as the value, {value:g}: a field that is always 0 passes",
+            )
+    if check == "field-bounds" and is_number(given.get("min")) and given.get("min") == given.get("max"):
+        yield (*at, "max"), f"is min, too: only {given['min']:g} is within these bounds"
+    if check == "stamps" and is_number(within_s := given.get("within_s")):
+        lasting_s = as_map(scenario.get("until")).get("window_s")
+        if is_number(lasting_s) and within_s >= lasting_s:
+            yield (
+                (*at, "within_s"),
+                f"the run's window is {lasting_s:g} s: the time of the first message passes for all",
+            )
+
+
+def _never_set(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
+    """Yield fields of velocities that a robot on wheels leaves at 0, and of which 0 is asked."""
+    for part in ((), ("effect",)):
+        asked = as_map(given.get(part[0])) if part else given
+        field, value = asked.get("field"), asked.get("value")
+        least, most = asked.get("min", 0), asked.get("max", 0)
+        bounded = is_number(least) and is_number(most) and least <= 0 <= most
+        is_zero = value == 0 if "value" in asked else bounded
+        if field in UNSET and str(asked.get("topic")).endswith("cmd_vel") and is_zero:
+            fault = f"{field} is 0 in each message of a robot on wheels: a node that never sets it passes"
+            yield (*at, *part, "field"), fault
+
+
+def _any_answer(at: KeyPath, given: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
+    expect, service = given.get("expect"), given.get("service")
+    kinds = {str(one.get("type")) for _, _, one in services_in(scenario) if one.get("service") == service}
+    if isinstance(expect, list) and expect and not any(expect) and kinds - {EMPTY}:
+        yield (*at, "expect"), "is right for any answer: give the fields that it has to have"
+
+
+def _ends_and_lives(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield runs that wait for the end of a process, while a criterion wants the same one to stay alive."""
+    lives: dict[str, str] = {}
+    for _, criterion in criteria:
+        run, process = (
+            scenarios.get(str(criterion.get("scenario")), {}),
+            as_map(criterion.get("with")).get("process"),
+        )
+        if criterion.get("check") == "node-lives":
+            found = (start for start in starts_of(run) if start.get("name") == process)
+            lives.update({_what(start): str(criterion.get("id")) for start in found})
+    for name, scenario in scenarios.items():
+        starts = {str(start.get("name")): start for start in starts_of(scenario)}
+        for index, ended in as_texts(as_map(scenario.get("until")).get("ended")):
+            stopped = any(
+                step.get(kind) == ended
+                for _, step in as_maps(scenario.get("steps"))
+                for kind in ("stop", "kill")
+            )
+            if ended in starts and (of := lives.get(_what(starts[ended]))) and not stopped:
+                fault = f"{of} wants {ended} to stay alive, and this run waits for its end"
+                yield ("scenarios", name, "until", "ended", index), fault
+
+
+def _what(start: dict[str, Any]) -> str:
+    return json.dumps([start.get(key) for key in ("script", "launch", "package", "args")])
+
+
+PERIODIC = re.compile(r"\bHz\b|\b(?:a|per|each|every) (?:\w+ )?second\b|times", re.IGNORECASE)
+ANSWERED_TIMES = 2
+"""A node that answers each message may publish so many times as many, and what it publishes at its start."""
+
+
+def _answers_waited_for(scenarios: Scenarios, handout: str) -> Iterator[Fault]:
+    """Yield counts of messages that come only if the node publishes many for each that it hears, where the handout has
+    no rate."""
+    if PERIODIC.search(handout):
+        return
+    for name, scenario in scenarios.items():
+        sent = _sent(scenario)
+        for topic, count in as_map(as_map(scenario.get("until")).get("messages")).items():
+            if sent and isinstance(count, int) and count > ANSWERED_TIMES * (sent + 1):
+                fault = f"{name} sends {plural(sent, 'message')}, and waits for {count}: is that meant?"
+                yield ("scenarios", name, "until", "messages", topic), fault
+
+
+def _sent(scenario: dict[str, Any]) -> int:
+    """Return how many messages the grader sends in a run; 0 where it sends none, or something else may."""
+    is_script = all(start.get("script") for start in starts_of(scenario))
+    if not is_script or given_steps(scenario, "play"):
+        return 0
+    number = 0
+    for one in (*given_steps(scenario, "publish"), *(probe for _, probe in as_maps(scenario.get("probes")))):
+        values = one.get("values")
+        if {"count", "duration_s", "background", "times", "text", "integers", "among"} & one.keys():
+            return 0
+        number += len(values) if isinstance(values, list) else 1
+    return number
+
+
+def _left_out(scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield fields that one call of a service leaves out, or one goal of an action, and that all others give."""
+    asked: dict[str, list[tuple[KeyPath, dict[str, Any]]]] = {}
+    for name, scenario in scenarios.items():
+        for at, part, one in services_in(scenario):
+            if part == "request":
+                asked.setdefault(str(one.get("service")), []).append(
+                    (("scenarios", name, *at, part), as_map(one.get(part)))
+                )
+        for index, step in as_maps(scenario.get("steps")):
+            one = as_map(step.get("action"))
+            at = ("scenarios", name, "steps", index, "action", "goal")
+            if one:
+                asked.setdefault(str(one.get("name")), []).append((at, as_map(one.get("goal"))))
+    for each in asked.values():
+        for place, (at, given) in enumerate(each):
+            others = [other for n, (_, other) in enumerate(each) if n != place]
+            lacking = set.intersection(*map(set, others)) - given.keys() if len(others) > 1 else set()
+            if given and lacking:
+                yield at, f"leaves out {join_words(sorted(lacking))}, which the others give: it is 0 or empty"
+
+
+def _fewer_arguments(scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield starts of a script with another number of arguments than in other runs."""
+    first: dict[str, int] = {}
+    for name, scenario in scenarios.items():
+        for index, start in as_maps(scenario.get("start")):
+            args = [text for _, text in as_texts(start.get("args")) if ":=" not in text]
+            if args and isinstance(script := start.get("script"), str):
+                other = first.setdefault(script, len(args))
+                if other != len(args):
+                    fault = f"{plural(len(args), 'argument')}, and {script} is started with {other} elsewhere"
+                    yield ("scenarios", name, "start", index, "args"), fault
+
+
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+
+
+def _numbers_as_text(scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield parameters that are set to a number in quotes."""
+    for name, scenario in scenarios.items():
+        for at, one in set_in(scenario):
+            value = one.get("value")
+            if isinstance(value, str) and NUMBER.fullmatch(value):
+                fault = f'"{value}" in quotes is text: a node that reads a number needs {value}, without them'
+                yield ("scenarios", name, *at, "value"), fault
+
+
+def _other_lengths(criteria: Criteria) -> Iterator[Fault]:
+    """Yield lists of another length than an earlier criterion wants of the same field in the same run."""
+    first: dict[tuple[str, ...], tuple[str, int]] = {}
+    for index, criterion in criteria:
+        given = as_map(criterion.get("with"))
+        value = given.get("value")
+        if criterion.get("check") == "field-equals" and isinstance(value, list):
+            key = tuple(
+                str(one) for one in (criterion.get("scenario"), given.get("topic"), given.get("field"))
+            )
+            earlier, length = first.setdefault(key, (str(criterion.get("id")), len(value)))
+            if length != len(value):
+                fault = (
+                    f"has {plural(len(value), 'item')}, and {earlier} has {length} for {key[2]} of {key[1]}"
+                )
+                yield ("criteria", index, "with", "value"), fault
+
+
+def _other_counters(criteria: Criteria) -> Iterator[Fault]:
+    """Yield ends of a counter that an earlier criterion has otherwise."""
+    first: dict[tuple[str, str], tuple[str, object]] = {}
+    for index, criterion in criteria:
+        given = as_map(criterion.get("with"))
+        for key in ("minimum", "maximum") if str(criterion.get("check")).startswith("counter-") else ():
+            if key in given:
+                earlier, value = first.setdefault(
+                    (str(given.get("topic")), key), (str(criterion.get("id")), given[key])
+                )
+                if value != given[key]:
+                    yield ("criteria", index, "with", key), f"is {given[key]}, and {earlier} has {value}"
+
+
+def _late(late: dict[str, Any]) -> Iterator[Fault]:
+    lost, cap = late.get("lost"), late.get("cap", 100)
+    if is_number(lost) and is_number(cap) and cap < lost:
+        yield (
+            ("late", "cap"),
+            f"{cap:g} is less than the {lost:g} that are lost for the first {late.get('per', 'day')}",
+        )
+    if late.get("cut_off_days") == 0 and lost:
+        yield ("late", "cut_off_days"), "with 0 nothing counts that is late: lost and per then mean nothing"
+
+
+TOPICS_WAITED = ("connected", "topics")
+
+
+def _waited_for_nothing(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield topics that a run waits for and no criterion of it judges, where a criterion judges another topic that
+    nothing in the run names."""
+    for name, scenario in scenarios.items():
+        until = as_map(scenario.get("until"))
+        waited: dict[str, KeyPath] = {topic: ("messages", topic) for topic in as_map(until.get("messages"))}
+        waited |= {topic: (key, n) for key in TOPICS_WAITED for n, topic in as_texts(until.get(key))}
+        named = {text for key, part in scenario.items() for _, text in texts_in((), part)}
+        about = [as_map(one.get("with")) for _, one in criteria if one.get("scenario") == name]
+        judged = {text for one in about for _, text in texts_in((), one)}
+        topics = sorted({str(one["topic"]) for one in about if "topic" in one} - named)
+        for topic, at in waited.items():
+            near = [one for one in topics if one.count("/") == topic.count("/") and _is_beside(topic, one)]
+            if (
+                topic not in judged
+                and near
+                and not any(start.get("program") for start in starts_of(scenario))
+            ):
+                fault = f"no criterion of {name} is about {topic}, and one is about {near[0]}: is that meant?"
+                yield ("scenarios", name, "until", *at), fault
+
+
+def _is_beside(topic: str, other: str) -> bool:
+    return topic.rpartition("/")[0] == other.rpartition("/")[0]
+
+
+def _without_its_node(rubric: dict[str, Any], scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield topics that a run waits for beside an instructor's tests, and that are named as a script which it does not
+    start."""
+    texts = [text for _, text in texts_in((), rubric)]
+    scripts = {PurePosixPath(text).stem: text for text in texts if re.fullmatch(r"[\w./-]+\.py", text)}
+    for name, scenario in scenarios.items():
+        starts = starts_of(scenario)
+        if not any(str(start.get("program")).endswith(".test") for start in starts):
+            continue
+        started = {PurePosixPath(str(start.get("script"))).stem for start in starts}
+        if any(start.get("launch") or start.get("built") for start in starts):
+            continue
+        for topic in as_map(as_map(scenario.get("until")).get("messages")):
+            word = str(topic).rpartition("/")[2]
+            if word in scripts and word not in started:
+                fault = f"{name} does not start {scripts[word]}: is it who publishes this?"
+                yield ("scenarios", name, "until", "messages", topic), fault
+
+
+def _launched_nodes(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield counts of nodes of a launch file that are more than the criterion about it names."""
+    for _, criterion in criteria:
+        name, nodes = str(criterion.get("scenario")), as_map(as_map(criterion.get("with")).get("nodes"))
+        scenario = scenarios.get(name, {})
+        count = as_map(scenario.get("until")).get("nodes")
+        if nodes and isinstance(count, int) and count > len(nodes) and len(starts_of(scenario)) == 1:
+            fault = (
+                f"{criterion.get('id')} names {plural(len(nodes), 'node')}: the run waits for more in vain"
+            )
+            yield ("scenarios", name, "until", "nodes"), fault
+
+
+def _other_transforms(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield transforms that have to move and that the rubric itself sends as static ones, or the other way round."""
+    sent: dict[tuple[str, str], bool] = {}
+    for scenario in scenarios.values():
+        for one in given_steps(scenario, "transform"):
+            sent[(str(one.get("parent")), str(one.get("child")))] = one.get("static") is True
+    for index, criterion in criteria:
+        given = as_map(criterion.get("with"))
+        is_static = sent.get((str(given.get("parent")), str(given.get("child"))))
+        asked = given.get("static") if criterion.get("check") == "transform" else None
+        if is_static is not None and isinstance(asked, bool) and asked != is_static:
+            kind = "static" if is_static else "not static"
+            yield (
+                ("criteria", index, "with", "static"),
+                f"elsewhere the rubric sends this transform, and it is {kind}",
+            )
+
+
+def _other_node(
+    at: KeyPath, check: str, given: dict[str, Any], scenario: dict[str, Any], handout: str
+) -> Iterator[Fault]:
+    """Yield the name of a process in place of its node's."""
+    names = [name for _, name in as_texts(given.get("names"))]
+    starts = [start for start in starts_of(scenario) if start.get("name") == given.get("process")]
+    if check not in {"node-lives", "node-name"} or len(names) != 1 or len(starts) != 1 or not handout:
+        return
+    script, name = PurePosixPath(str(starts[0].get("script"))).stem, names[0]
+    quoted = re.findall(r"`[/~]?(\w+)`", handout)
+    if (
+        name == given.get("process")
+        and script != name
+        and script in quoted
+        and not re.search(rf"\b{name}\b", handout)
+    ):
+        fault = f"{name} is what the rubric calls the process, and the handout has `{script}`: is that the node's name?"
+        yield (*at, "names", 0), fault
+
+
+def _other_number(
+    at: KeyPath, check: str, given: dict[str, Any], scenario: dict[str, Any], name: str
+) -> Iterator[Fault]:
+    """Yield a value of a field that is named as a parameter of the run, and that the run sets otherwise."""
+    last, value = re.split(r"[.\[]", str(given.get("field")))[-1], given.get("value")
+    if check != "field-equals" or not is_number(value):
+        return
+    for _, one in set_in(scenario):
+        param = str(one.get("name"))
+        if param.rpartition("/")[2] == last and is_number(one.get("value")) and one["value"] != value:
+            yield (*at, "value"), f"{name} sets {param} to {json.dumps(one['value'])}"
+            return
+
+
+def _other_types(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[Fault]:
+    """Yield types of numbers that the handout does not have, where it has another of the same kind and size."""
+    said = {match[0] for match in PRIMITIVE.finditer(handout)}
+    if not said:
+        return
+    asked: list[tuple[KeyPath, object]] = [((*at, "type"), given.get("type"))]
+    asked += [((*at, "fields", key), kind) for key, kind in as_map(given.get("fields")).items()]
+    asked += [
+        ((*at, "topics", key, "type"), as_map(one).get("type"))
+        for key, one in as_map(given.get("topics")).items()
+    ]
+    for path, kind in asked:
+        is_number_type = PRIMITIVE.fullmatch(str(kind))
+        if (
+            is_number_type
+            and str(kind) not in said
+            and not (str(kind).partition("/")[2] and _plain(kind) in map(_plain, said))
+        ):
+            near = [one for one in sorted(said) if ("/" in one) == ("/" in str(kind))]
+            if near:
+                yield path, f"the handout has {join_words(near)}, and not {kind}"
+
+
+def _plain(kind: object) -> str:
+    return str(kind).rpartition("/")[2].lower()
+
+
+def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield constants and nodes of which a part is one letter off from a word of the handout, and that no other line
+    has."""
+    handout = str(rubric.get("handout") or "")
+    words = set(re.findall(r"\w+", handout))
+    texts = [text for _, text in texts_in((), rubric)]
+    for key in ("constants", "nodes"):
+        for name in as_map(given.get(key)):
+            for part in filter(None, str(name).split("/")):
+                near = next((one for one in sorted(words) if is_slip(part, one)), "")
+                times = sum(len(re.findall(rf"\b{re.escape(part)}\b", text)) for text in texts)
+                if part not in words and near and times == 1:
+                    yield (
+                        (*at, key, name),
+                        f'{part} is on no other line: did you mean "{near}", as in the handout?',
+                    )

@@ -1,0 +1,83 @@
+"""Slips of C++ sources: callbacks that wait, and angles in degrees."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.package.cpp import slips_of
+
+NODE = """\
+#include <ros/ros.h>
+// while (true) in a comment
+void hear(const std_msgs::Float32::ConstPtr& distance)
+{
+  %s
+}
+
+int main(int argc, char** argv)
+{
+  ros::Subscriber distances = node.subscribe("/distance", 10, %s);
+  while (ros::ok()) ros::Duration(5).sleep();
+}
+"""
+
+
+def _told(line: str, given: str = "hear") -> list[str]:
+    return [f"{one.line}: {one.message}; {one.fix}" for one in slips_of("src/node.cpp", NODE % (line, given))]
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        (
+            "while (ros::ok()) { mean.publish(message); }",
+            "the loop in the callback `hear`, line 5, never ends",
+        ),
+        ("for (;;) mean.publish(message);", "the loop in the callback `hear`, line 5, never ends"),
+        ("ros::Duration(1.0).sleep();", "the callback `hear` sleeps on line 5"),
+        ("usleep(500000);", "the callback `hear` sleeps on line 5"),
+        ("rate.sleep();", "the callback `hear` sleeps on line 5"),
+        (
+            "std::this_thread::sleep_for(std::chrono::milliseconds(300));",
+            "the callback `hear` sleeps on line 5",
+        ),
+        ("ros::spin();", "the callback `hear` calls spin() on line 5"),
+    ],
+)
+@pytest.mark.parametrize("given", ["hear", "&Node::hear, this"])
+def test_a_callback_that_waits(line: str, told: str, given: str) -> None:
+    (found,) = _told(line, given)
+    assert found.startswith(f"5: {told}; ")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "while (true) { if (done) break; }",
+        "ros::Duration(0.01).sleep();",
+        "usleep(1000);",
+        'ROS_INFO("sleep(5)");',
+        "while (i < 3) i++;",
+        "message.data = std::sin(angle * M_PI / 180);",
+        "message.data = cos(yaw);",
+        "double a = yaw * 180 / M_PI; x = cos(a * M_PI / 180) + cos(radians(a));",
+        "message.data = sin(3.14159);",
+    ],
+)
+def test_a_callback_that_is_right(line: str) -> None:
+    assert _told(line) == []
+
+
+@pytest.mark.parametrize(
+    ("line", "fix"),
+    [
+        ("double a = tf::getYaw(q) * 180 / M_PI; x = cos(a);", "leave out `* 180 / M_PI`"),
+        ("yaw = 2 * atan2(z, w) * 180 / M_PI; x = cos(yaw / 2);", "leave out `* 180 / M_PI`"),
+        ("x = std::sin(yaw * 180.0 / M_PI);", "leave out `* 180 / M_PI`"),
+        ("x = sin(90);", "write `sin(90 * M_PI / 180)`"),
+        ("x = cos(angle_deg);", "write `cos(angle_deg * M_PI / 180)`"),
+    ],
+)
+def test_a_sine_of_degrees(line: str, fix: str) -> None:
+    (found,) = _told(line)
+    assert f" takes radians, and gets degrees; {fix}" in found
