@@ -47,6 +47,8 @@ from grader.wording import join_words, significant
 NAMES_SHOWN = 3
 ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
 """A line that calls `input()`."""
+OF_LINE = re.compile(r"(?:on line \d+, )?write (?P<code>`.*?`)(?: instead of .* on line \d+)?")
+"""A fix that says how its slip's own line is written."""
 OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
@@ -206,6 +208,11 @@ class Later:
             yield f"write a value in the code where line {line} of {file} asks for input"
         for slip in self._of("never-called"):
             yield f"call `{slip.name}()`, which nothing in {slip.file} calls"
+        for slip in self._of("main-guard"):
+            yield f"write `if __name__ == '__main__':` on {_line(slip)}"
+        for slip in self._of("loop-left"):
+            if named := OF_LINE.fullmatch(slip.fix):
+                yield f"write {named['code']} on {_line(slip)}"
 
     def _text_of(self, slip: PythonSlip) -> str:
         lines = self._build.file_lines(slip.file) if self._build is not None else ()

@@ -129,6 +129,7 @@ def apply_repaired_copy(
     repairs: tuple[Repair, ...],
     *,
     built: bool,
+    builds: bool,
     launched: Collection[str],
 ) -> tuple[dict[str, Verdict], dict[str, Repaired]]:
     """Return the verdicts with what the copy shows, and for each criterion that it changes the repairs behind it.
@@ -139,7 +140,11 @@ def apply_repaired_copy(
     verdicts, uses = dict(first), dict[str, Repaired]()
     on_copy = {name: with_lines_as_handed_in(verdict, repairs) for name, verdict in on_copy.items()}
     needs = {
-        c.id: tuple(one for one in repairs if concerns(one, c, rubric, first, built=built, launched=launched))
+        c.id: tuple(
+            one
+            for one in repairs
+            if concerns(one, c, rubric, first, built=built, builds=builds, launched=launched)
+        )
         for c in rubric.criteria
     }
     better = {
@@ -175,12 +180,13 @@ def concerns(
     *,
     built: bool,
     launched: Collection[str],
+    builds: bool = False,
 ) -> bool:
     """Return whether the criterion may depend on what was repaired: its run or build uses it, or it, or what blocks it,
     cites the file. What the files of the build lack stays lost, though: the criteria of these files ask for just that.
 
     `found` is what each criterion came to without the repair, `built` whether what is run was built without it, or
-    needs no build.
+    needs no build; `builds`, whether the package as handed in was: its build needs no further line of the manifest.
     """
     if criterion.scenario is not None:
         sleeps = repair.before.endswith(".sleep") and repair.after == f"{repair.before}()"
@@ -191,7 +197,7 @@ def concerns(
         wrong = _words(repair.before) - _words(repair.after)
         return bool(wrong & _words(found[criterion.id].message)) or _cites(found[criterion.id], repair)
     if repair.kind in OF_BUILDS and (criterion.check == BUILD or is_unmade(found[criterion.id])):
-        return True
+        return repair.kind != "manifest-line" or not builds
     seen = f"{found[criterion.id].message} {found[criterion.id].measured}"
     if repair.kind == "file-name" and PurePosixPath(repair.before).name in seen:
         return True

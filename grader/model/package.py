@@ -279,10 +279,11 @@ class PythonSlip(Record):
     function or variable that both are about. For a kind that is not a slip, `message` is what the line says: a
     name, a number or a text.
 
-    `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and nodes
-    get none. `misspelt`: a name that the file does not define, next to one that it does. `no-clock`: the file
-    publishes and counts, and nothing that it sends contains the time, except at most the value from which it counts
-    on; a slip only if its messages have to contain the time. `rate-parameter` and `rate-number`: no slips, but a
+    `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and nodes get
+    none; `name` is `once` where no loop does it again, and `paused` in a loop that sleeps. `misspelt`: a name that the
+    file does not define, next to one that it does. `no-clock`: the file publishes and counts, and nothing that it sends
+    contains the time, except at most the value from which it counts on; a slip only if its messages have to contain the
+    time. `rate-parameter` and `rate-number`: no slips, but a
     loop or a timer whose rate is a parameter or a number, in Hz. `reset-value` and `reset-limit`: where a counter
     goes back, to the number `message`, or when it reaches it. `set-in-loop` and `reset-early`: a counter that is
     set in each turn of its loop, or goes back before one is added. `never-called`: a function that makes a node,

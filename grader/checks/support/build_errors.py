@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.support.build_output import BuildError, folder_names
-from grader.checks.support.scripts import OF_INTERFACES, cmake_calls, installed
+from grader.checks.support.scripts import OF_FILES, OF_INTERFACES, cmake_calls, installed
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
     LIBRARIES,
@@ -374,10 +374,15 @@ def misspelt_cmake_lists(package: PackageFacts) -> str:
     return next((n for n in names if n.casefold() in slips and n != "CMakeLists.txt"), "")
 
 
-def _missing_dependency(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    why = f"add_dependencies({found[2]} {found[1]}) names the target {found[1]}, which does not exist"
+def _missing_dependency(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    target = found[1]
+    why = f"add_dependencies({found[2]} {target}) names the target {target}, which does not exist"
     targets = "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"
-    hint = f"write add_dependencies({found[2]} {targets})"
+    calls = [call for call in cmake_calls(package, "add_dependencies") if target in call.args[1:]]
+    written = [f"add_dependencies({name} {targets})" for name in dict.fromkeys(c.args[0] for c in calls)]
+    hint = f"write {join_words(written or [f'add_dependencies({found[2]} {targets})'])}"
+    if not any(PurePosixPath(file.path).suffix in OF_FILES.values() for file in package.files):
+        return Explained(f"{why}: the package has no messages of its own", hint)
     hint = f"{hint}; messages of your own need generate_messages(…) above it"
     return Explained(why, hint, uncalled="generate_messages")
 

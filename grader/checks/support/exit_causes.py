@@ -407,17 +407,22 @@ def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | 
 def _asks_for_input(
     found: Traceback, place: FileCitation | None, package: PackageFacts
 ) -> tuple[str, str] | None:
-    """Return the cause and the hint of a script that asks for input and has a Rate already."""
+    """Return the cause and the hint of a script that asks for input once, or has a Rate already."""
     rated = {one.file for one in package.slips if one.kind.startswith("rate-")}
-    asking = sorted({s.line for s in package.slips if s.kind == "input" and place and s.file == place.file})
+    asks = {s.line: s.name for s in package.slips if s.kind == "input" and place and s.file == place.file}
+    asking = sorted(asks)
     source = found.own_frames[-1].source if found.own_frames else ""
     if found.kind == "EOFError" and len(asking) > 1:
         lines = join_words(map(str, asking))
         return CAUSES["EOFError"][0], f"write values in the code in place of each `input()`: lines {lines}"
     if found.kind == "EOFError" and (number := _NUMBER_ASKED.search(source)):
         return CAUSES["EOFError"][0], f"write a number in the code in place of `{number[0]}…))`"
+    if found.kind == "EOFError" and asks and "once" in asks.values():
+        return CAUSES["EOFError"][0], "write a value in the code in place of `input()`"
     if found.kind != "EOFError" or place is None or place.file not in rated:
         return None
+    if "paused" in asks.values():
+        return CAUSES["EOFError"][0], NO_INPUT
     return CAUSES["EOFError"][0], f"{NO_INPUT}, and make sure that the loop calls `sleep()` of its Rate"
 
 
