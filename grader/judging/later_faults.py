@@ -297,7 +297,8 @@ class Later:
         if elsewhere and not self._ran:
             yield f"subscribe to {self._topic} on {_line(heard[0])}, not to {heard[0].message}"
         other = sent and len(types) == 1 and types[0].message != own
-        if other and (elsewhere or (not heard and f"/{types[0].message}" not in self._verdict.message)):
+        told = heard and self._ran  # of a node on its topic, what ROS refused says it
+        if other and (elsewhere or (not told and f"/{types[0].message}" not in self._verdict.message)):
             yield self._retype("subscribe with", sent[0], types[0])
         template, said = str(self._wanted.get("template", VALUE)), self._of("prints")
         said = [one for one in said if SAID_DATA in one.message]
@@ -309,7 +310,10 @@ class Later:
         elif self._lacks_words(template.partition(VALUE)[0]):
             yield f"print '{in_words(template)}'"
         elif other and not said and len(self._of("prints")) == 1:  # a field that the right type does not have
-            yield f"print the `data` of the message on {_line(self._of('prints')[0])}"
+            only = self._of("prints")[0]
+            says_it = " ".join(template.partition(VALUE)[0].split()) in " ".join(only.message.split())
+            what = "the `data` of the message" if says_it else f"'{in_words(template)}'"
+            yield f"print {what} on {_line(only)}"
 
     def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> str:
         lines = self._build.file_lines(slip.file) if self._build is not None else []

@@ -12,6 +12,7 @@ import json
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from graphlib import TopologicalSorter
 from pathlib import PurePosixPath
 
@@ -30,7 +31,7 @@ from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Scenario
 from grader.wording import join_words
 
-REPAIRS, BUILD = "repairs", "build"
+REPAIRS, BUILD, INSTALL = "repairs", "build", "cmake-install"
 NAMES = {
     "topic-name",
     "service-name",
@@ -286,7 +287,7 @@ def _is_other_fault(one: Verdict, copy: Verdict) -> bool:
 def _charges(
     rubric: Rubric,
     first: Mapping[str, Verdict],
-    better: Collection[str],
+    better: AbstractSet[str],
     needs: Mapping[str, tuple[Repair, ...]],
 ) -> dict[Repair, set[str]]:
     """Return for each repair the criterion that asks for what was wrong: one of the files, else by its name where a
@@ -301,7 +302,8 @@ def _charges(
         asking = [c for c in rubric.criteria if c.scenario is None and _asks_for(first[c.id], repair)]
         if repair.kind in OF_BUILDS:  # of a file with several faults, those that speak of this line
             new = _new_words(repair)
-            asking = [c for c in asking if c.id in better or new & _words(first[c.id].message)]
+            better_by_it = better - {c.id for c in rubric.criteria if c.check == INSTALL}
+            asking = [c for c in asking if c.id in better_by_it or new & _words(first[c.id].message)]
         sought = [c for c in asking if _seeks(first[c.id], repair)]
         asking = sought or [c for c in asking if _names(c, repair)] or asking
         if asking:

@@ -293,6 +293,19 @@ def _message_of_another(found: re.Match[str], package: PackageFacts, lines: Sequ
     return Explained(why, f"write {named[2]} after DEPENDENCIES in generate_messages(…){more}")
 
 
+def _unfound_dependency(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    name, calls = found[1], cmake_calls(package, "find_package")
+    of_catkin = next((call.line for call in calls if call.args[:1] == ("catkin",)), None)
+    where = f" on line {of_catkin}" if of_catkin else ""
+    why = f"generate_messages(…) names {name}, and find_package(catkin …) does not"
+    manifest = package.manifest
+    kinds = ("build_depend", "run_depend") if manifest is not None and manifest.format == 1 else ("depend",)
+    declared = manifest is not None and any(d.name == name for d in manifest.dependencies)
+    lines = join_words(f"<{kind}>{name}</{kind}>" for kind in kinds)
+    more = "" if declared else f"; in package.xml, add {lines}"
+    return Explained(why, f"write {name} after COMPONENTS in the find_package(…){where}{more}")
+
+
 def _before_catkin_package(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     why = f"{found[1]}() is called after catkin_package()"
     return Explained(why, f"move {found[1]}(…) above catkin_package(…)")
@@ -605,6 +618,7 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"roslaunch_add_file_check\(\) path '([^']+)' was not found", _missing_launch),
     (r"Cannot find source file: (\S+)", _missing_source),
     (r"Could not find messages which '([^']+)' depends on", _message_of_another),
+    (r"Messages depends on unknown pkg: ([\w-]+)", _unfound_dependency),
     (r"(Invalid declaration|is not a legal message|InvalidMsgSpec|MsgNotFound)", _no_definition),
     (r"(generate_messages)\(\) must be called before catkin_package\(\)", _before_catkin_package),
     (r"You must call project\(\) before calling (\w+)\(\)", _late_project),
