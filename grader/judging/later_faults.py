@@ -47,8 +47,10 @@ from grader.wording import join_words, significant
 NAMES_SHOWN = 3
 ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
 """A line that calls `input()`."""
-OF_LINE = re.compile(r"(?:on line \d+, )?write (?P<code>`.*?`)(?: instead of .* on line \d+)?")
+OF_LINE = re.compile(r"on line \d+, write (?P<code>`while .*?`)")
 """A fix that says how its slip's own line is written."""
+SLEEPS_FOR = re.compile(r"[^#'\"]*\brospy\.sleep\(\s*\)")
+MAKES_RATE = re.compile(r"\s*([\w.]+)\s*=\s*rospy\.Rate\(")
 OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
@@ -240,6 +242,12 @@ class Later:
         for slip in self._of("not-called"):
             if "sleep" in slip.name:
                 yield f"on {_line(slip)}, {slip.fix}"
+        for path in sorted(self._paths) if not self._ran else ():
+            lines = [line[:LINE_CHARS] for line in self._build.file_lines(path)] if self._build else []
+            rate = next((found[1] for line in lines if (found := MAKES_RATE.match(line))), "")
+            for number, line in enumerate(lines, 1) if rate else ():
+                if SLEEPS_FOR.match(line):
+                    yield f"write `{rate}.sleep()` on line {number} of {path}: rospy.sleep() needs a time"
 
     def _node_name(self) -> Iterator[str]:
         own, names = self._of("node-name"), list(texts_in(self._wanted.get("names")))
@@ -296,6 +304,10 @@ class Later:
         elsewhere = len(heard) == 1 and f"/{heard[0].message.lstrip('/')}" != self._topic
         if elsewhere and not self._ran:
             yield f"subscribe to {self._topic} on {_line(heard[0])}, not to {heard[0].message}"
+        others = [one for one in heard if f"/{one.message.lstrip('/')}" != self._topic]
+        if sent and len(others) == len(heard) > 1 and not self._ran:
+            names = join_words(f"{one.message} (line {one.line})" for one in heard[:NAMES_SHOWN])
+            yield f"subscribe to {self._topic} with {sent[0]}: {heard[0].file} subscribes to {names}"
         other = sent and len(types) == 1 and types[0].message != own
         told = heard and self._ran  # of a node on its topic, what ROS refused says it
         if other and (elsewhere or (not told and f"/{types[0].message}" not in self._verdict.message)):
