@@ -338,6 +338,8 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
     ]
     such = f"$(find {found.name})"
     such += f" or `from {found.name}.msg import …`" if package.interfaces else ""
+    has_cpp = any(PurePosixPath(file.path).suffix == ".cpp" for file in package.files)
+    such += f' or `#include "{found.name}/….h"`' if package.interfaces and has_cpp else ""
     made = next((word for c in calls for word in c.args if word.startswith(f"{found.name}_gen")), "")
     words, such = ("", f"{such} or {made}") if made else ("w", such)
     search = f"`grep -rn{words} {found.name} .` shows whether it stands anywhere else, as in {such}"

@@ -395,7 +395,7 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     if refused is not None and refused.refused != NOT_STARTED and not any(refusals(package, file)):
         yield f"{refused.hint}: {refused.why}"
     yield from unset_arg_fixes(file, refused.hint if refused is not None else "")
-    nodes = [one for one in file.brings if one.type in names]
+    nodes = [one for one in file.brings if {one.type, f"{one.type}.py"} & names]
     if topic := wanted.get("topic"):
         renaming = find_renaming(package, nodes, str(topic))
         yield from [f"in {file.path} {renaming.fix}"] if renaming else []

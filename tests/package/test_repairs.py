@@ -658,6 +658,10 @@ CASES = {
         ["build-line"] * 2, "write geometry_msgs after DEPENDENCIES",
         after={CMAKELISTS: "DEPENDENCIES geometry_msgs std"},
     ),
+    "messages-of-no-definition": Case(
+        {CMAKELISTS: CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")}, ["build-line"],
+        "delete generate_messages(…)", after={CMAKELISTS: "rospy)\ncatkin_package()"},
+    ),
     "program-that-does-not-wait-for-its-header": Case(
         {**OWN, "src/mean.cpp": '#include "lab/Level.h"\nint main() {}\n',
          CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")

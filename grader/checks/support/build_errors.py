@@ -455,6 +455,9 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
             # found, and so built beside this package: its messages come too late
             what, targets = f"the messages of {found[1]}", "${catkin_EXPORTED_TARGETS}"
             return _unwaited(package, text, what, targets, lines)
+        if made & {f.path for f in package.files}:
+            why = f"{text}: the build makes {found[2]}.h in {package.name}/, the package's name"
+            return Explained(why, f'write `#include "{package.name}/{found[2]}.h"`')
         return Explained(f"{text}: there is no such header", "check the #include and find_package(…)")
     return _unwaited(package, text, "its message", OWN_TARGETS, lines)
 

@@ -47,6 +47,7 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
     used = _used_kinds(files, package, name, code)
     made = {c: _definitions(package, folder) for c, folder in INTERFACE_FOLDERS.items() if folder in used}
     if not any(made.values()):
+        _delete_generation(files, package)
         return
     _correct_types(files, package)
     _wait_for_headers(files, package, name)
@@ -71,6 +72,24 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
             )
             return
         _name_components(files, [GENERATION])
+
+
+def _delete_generation(files: Files, package: PackageFacts) -> None:
+    """Delete the call of generate_messages(…) that has nothing to make, where CMake does not know it."""
+    calls, (of_catkin, named) = calls_of(files, GENERATE), _components(files)
+    folders = {PurePosixPath(file.path).suffix.removeprefix(".") for file in package.files}
+    known = {GENERATION, "genmsg"}.intersection(named) or any("$" in word for word in named)
+    if len(calls) != 1 or not of_catkin or known or folders & {*INTERFACE_FOLDERS.values()}:
+        return
+    text, span = cmake_text(files), calls[0].span
+    message = f"line {calls[0].line} of {CMAKE}: {GENERATE}(…) is called, and there are no messages to make"
+    files.change(
+        "build-line",
+        CMAKE,
+        text[: span.start] + text[span.stop :].lstrip("\n"),
+        message,
+        f"delete {GENERATE}(…)",
+    )
 
 
 def _wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
