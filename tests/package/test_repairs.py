@@ -660,7 +660,7 @@ CASES = {
     ),
     "messages-of-no-definition": Case(
         {CMAKELISTS: CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")}, ["build-line"],
-        "delete generate_messages(…)", after={CMAKELISTS: "rospy)\ncatkin_package()"},
+        "delete line 4, generate_messages(…)", after={CMAKELISTS: "rospy)\ncatkin_package()"},
     ),
     "program-that-does-not-wait-for-its-header": Case(
         {**OWN, "src/mean.cpp": '#include "lab/Level.h"\nint main() {}\n',

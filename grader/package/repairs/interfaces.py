@@ -23,7 +23,7 @@ from grader.package.repairs.cmake_calls import (
 from grader.package.repairs.editing import Files
 from grader.package.repairs.files import is_own
 from grader.package.repairs.names import CPP, Wanted, is_near
-from grader.wording import is_one_edit, join_words
+from grader.wording import is_one_edit, join_words, lines_text
 
 OF_GENERATION = re.compile(r"_generate_messages|_gen(cpp|py)$")
 """Targets that generate_messages(…) makes."""
@@ -82,14 +82,10 @@ def _delete_generation(files: Files, package: PackageFacts) -> None:
     if len(calls) != 1 or not of_catkin or known or folders & {*INTERFACE_FOLDERS.values()}:
         return
     text, span = cmake_text(files), calls[0].span
+    first, last = (text.count("\n", 0, at) for at in (span.start, span.stop))
     message = f"line {calls[0].line} of {CMAKE}: {GENERATE}(…) is called, and there are no messages to make"
-    files.change(
-        "build-line",
-        CMAKE,
-        text[: span.start] + text[span.stop :].lstrip("\n"),
-        message,
-        f"delete {GENERATE}(…)",
-    )
+    fix = f"delete {lines_text(first, last)}, {GENERATE}(…)"
+    files.change("build-line", CMAKE, text[: span.start] + text[span.stop :].lstrip("\n"), message, fix)
 
 
 def _wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
