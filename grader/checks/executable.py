@@ -200,10 +200,10 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     near += [p for n, p in names.items() if n == wanted.stem and p not in near]
     movable = [p for p in near if can_be_moved(p, path)]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
-    seen = f"; {there_is(near)}" if near else ""
-    alike = "" if near else script_of_role(package, path)
+    alike = "" if movable else script_of_role(package, path)
     meant = list(filter(None, [*movable, alike]))[:1]
-    seen = f"; there is {meant[0]}" if meant and not near else seen
+    there = dict.fromkeys([*near, *meant])
+    seen = f"; {there_is(there)}" if there else ""
     hint = add_hint(package, path)
     if meant:
         moved, named = move_hint(package, meant[0], path), _where_named(package, meant[0])

@@ -12,6 +12,7 @@ from grader.checks.registry import LaunchName, ProgramName, check
 from grader.checks.support.launch import died, nodes_up, not_run, quoted, refusal, why_died, why_not_up
 from grader.checks.support.launch_slips import (
     Slip,
+    built_fixes,
     find_launch,
     has_program,
     illegal_name,
@@ -21,6 +22,7 @@ from grader.checks.support.launch_slips import (
     nodes_of_script,
     read_launch,
     refusals,
+    starts_built,
 )
 from grader.checks.support.scripts import RIGHT_SHEBANG, add_hint, find_script, programs
 from grader.checks.support.text import near_names, shown
@@ -133,6 +135,12 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
         return unjudged(message, hint=hint).lost_by("file-missing", script)
     meant = (_slip_for(package, node, name) for node in file.brings if _is_meant(node, name))
     slip = next(filter(None, meant), None)
+    if slip is None and (built := starts_built(package, file, name)):
+        message = (
+            f"{file.path} has no <node> for {name}: line {built[0].line} starts {built[0].type}, which is C++"
+        )
+        cited = (FileCitation(file=built[0].file, line=built[0].line),)
+        return failed(message, hint="; ".join(built_fixes(package, file, name)), citations=cited)
     return slip.verdict() if slip else _no_node(file, package.name, name)
 
 

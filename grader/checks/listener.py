@@ -22,6 +22,7 @@ from grader.checks.support.text import (
     IN_OWN_WORDS,
     OTHER_WORDS_SHARE,
     SPIN,
+    TYPE_SLOT,
     VALUE,
     both,
     in_words,
@@ -200,7 +201,9 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     elif verdict is None:
         near = near_names(topic, subscribed)
         other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""
-        hint = f"{f'name the topic {topic} in' if near else 'add'} {subscriber(topic, '…, callback')}"
+        hint = (
+            f"{f'name the topic {topic} in' if near else 'add'} {subscriber(topic, f'{TYPE_SLOT}, callback')}"
+        )
         if copied := copied_topic(package, run, "subscriber"):
             other = f"{other}, on {copied}"
             hint = f"write {topic} on the one of {copied} whose callback is for it"

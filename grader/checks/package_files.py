@@ -201,7 +201,7 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
 def _judge_manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
     found = package.manifest
     if found is None:
-        return _unreadable(package)
+        return _unreadable(package, params.name)
     if (found.build_type or "").startswith("ament"):
         return _of_ros_2(found, params)
     wrong = [v for v in (_judge_misnamed(package, found, params.name), _unbuilt(found)) if v is not None]
@@ -338,6 +338,8 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
     ]
     such = f"$(find {found.name})"
     such += f" or `from {found.name}.msg import …`" if package.interfaces else ""
+    has_cpp = any(PurePosixPath(file.path).suffix == ".cpp" for file in package.files)
+    such += f' or `#include "{found.name}/….h"`' if package.interfaces and has_cpp else ""
     made = next((word for c in calls for word in c.args if word.startswith(f"{found.name}_gen")), "")
     words, such = ("", f"{such} or {made}") if made else ("w", such)
     search = f"`grep -rn{words} {found.name} .` shows whether it stands anywhere else, as in {such}"
@@ -385,7 +387,7 @@ def _last_line(found: Manifest) -> int:
     return max((d.line for d in found.dependencies), default=found.name_line)
 
 
-def _unreadable(package: PackageFacts) -> Verdict:
+def _unreadable(package: PackageFacts, name: str) -> Verdict:
     fault = package.manifest_fault
     if fault is None or package.has_no_manifest:
         meant = next(filter(None, (meant_manifest(file.path) for file in package.files)), "")
@@ -395,10 +397,16 @@ def _unreadable(package: PackageFacts) -> Verdict:
         absent = failed("there is no package.xml", measured="no file", hint=meant or hint)
         return absent.lost_by("file-elsewhere" if meant else "file-missing", MANIFEST)
     line = f", line {fault.line}" if fault.line else ""
+    hint = fault.advice or "open the file at that line and close or correct the element"
+    lacks_tag = "exactly one" in fault.message and '"name"' not in fault.message  # and is well-formed
+    other = ""
+    if lacks_tag and package.name != name:
+        other = f"; it names the package {package.name!r} instead of {name!r}"
+        hint = f"{hint}; write <name>{name}</name>, and project({name}) in CMakeLists.txt"
     return failed(
-        f"{fault.file}{line} cannot be read: {fault.explanation}",
+        f"{fault.file}{line} cannot be read: {fault.explanation}{other}",
         measured=fault.message,
-        hint=fault.advice or "open the file at that line and close or correct the element",
+        hint=hint,
         citations=(fault.place,),
     )
 

@@ -17,7 +17,7 @@ from grader.checks.support.exit_causes import syntax_hint
 from grader.checks.support.launch import not_executable
 from grader.checks.support.launch_slips import node_slip, own_script
 from grader.checks.support.scripts import BACKUPS, PYTHON, SYNTAX, installed, is_product, names_script
-from grader.checks.support.text import RATE_SLOT, VALUE_SLOT, in_language
+from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, in_language
 from grader.judging.facts import SOURCES, Facts, language_of
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.result import CriterionResult
@@ -152,8 +152,13 @@ def with_own_name(result: CriterionResult, rubric: Rubric, package: PackageFacts
 
 
 def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:
-    """Return the verdict; its hint has the text and the rate that the lab wants of the node, where it has slots for
-    them."""
+    """Return the verdict; its hint has the text, the rate and the type that the lab wants of the node, where it has
+    slots for them."""
+    if TYPE_SLOT in verdict.hint:
+        scenario = rubric.scenarios.get(criterion.scenario or "")
+        sent = {str(probe.topic): probe.type for probe in scenario.probes} if scenario is not None else {}
+        name = str(sent.get(str(criterion.parameters.get("topic", "")), "…")).rpartition("/")[2]
+        verdict = verdict.model_copy(update={"hint": verdict.hint.replace(TYPE_SLOT, name)})
     if VALUE_SLOT not in verdict.hint:
         return verdict
     asked = {

@@ -119,7 +119,13 @@ def judge_all_runs(
         needed = needs_build(of_copy.package)
         built = not needed or was_built(first) or not was_built(repaired)
         verdicts, uses = apply_repaired_copy(
-            rubric, verdicts, on_copy, repairs, built=built, launched=launched_in(of_copy.package)
+            rubric,
+            verdicts,
+            on_copy,
+            repairs,
+            built=built,
+            builds=was_built(first),
+            launched=launched_in(of_copy.package),
         )
         verdicts = add_later_faults(verdicts, rubric, of_copy, handed_in=facts.package, repairs=repairs)
     else:

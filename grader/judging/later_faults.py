@@ -47,6 +47,10 @@ from grader.wording import join_words, significant
 NAMES_SHOWN = 3
 ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
 """A line that calls `input()`."""
+OF_LINE = re.compile(r"on line \d+, write (?P<code>`while .*?`)")
+"""A fix that says how its slip's own line is written."""
+SLEEPS_FOR = re.compile(r"[^#'\"]*\brospy\.sleep\(\s*\)")
+MAKES_RATE = re.compile(r"\s*([\w.]+)\s*=\s*rospy\.Rate\(")
 OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_TOPICS = ("hears", "topic-type")
 """Checks that say by themselves that a node is on another topic, and not of which type."""
@@ -206,6 +210,11 @@ class Later:
             yield f"write a value in the code where line {line} of {file} asks for input"
         for slip in self._of("never-called"):
             yield f"call `{slip.name}()`, which nothing in {slip.file} calls"
+        for slip in self._of("main-guard"):
+            yield f"write `if __name__ == '__main__':` on {_line(slip)}"
+        for slip in self._of("loop-left"):
+            if named := OF_LINE.fullmatch(slip.fix):
+                yield f"write {named['code']} on {_line(slip)}"
 
     def _text_of(self, slip: PythonSlip) -> str:
         lines = self._build.file_lines(slip.file) if self._build is not None else ()
@@ -233,6 +242,12 @@ class Later:
         for slip in self._of("not-called"):
             if "sleep" in slip.name:
                 yield f"on {_line(slip)}, {slip.fix}"
+        for path in sorted(self._paths) if not self._ran else ():
+            lines = [line[:LINE_CHARS] for line in self._build.file_lines(path)] if self._build else []
+            rate = next((found[1] for line in lines if (found := MAKES_RATE.match(line))), "")
+            for number, line in enumerate(lines, 1) if rate else ():
+                if SLEEPS_FOR.match(line):
+                    yield f"write `{rate}.sleep()` on line {number} of {path}: rospy.sleep() needs a time"
 
     def _node_name(self) -> Iterator[str]:
         own, names = self._of("node-name"), list(texts_in(self._wanted.get("names")))
@@ -289,8 +304,13 @@ class Later:
         elsewhere = len(heard) == 1 and f"/{heard[0].message.lstrip('/')}" != self._topic
         if elsewhere and not self._ran:
             yield f"subscribe to {self._topic} on {_line(heard[0])}, not to {heard[0].message}"
+        others = [one for one in heard if f"/{one.message.lstrip('/')}" != self._topic]
+        if sent and len(others) == len(heard) > 1 and not self._ran:
+            names = join_words(f"{one.message} (line {one.line})" for one in heard[:NAMES_SHOWN])
+            yield f"subscribe to {self._topic} with {sent[0]}: {heard[0].file} subscribes to {names}"
         other = sent and len(types) == 1 and types[0].message != own
-        if other and (elsewhere or (not heard and f"/{types[0].message}" not in self._verdict.message)):
+        told = heard and self._ran  # of a node on its topic, what ROS refused says it
+        if other and (elsewhere or (not told and f"/{types[0].message}" not in self._verdict.message)):
             yield self._retype("subscribe with", sent[0], types[0])
         template, said = str(self._wanted.get("template", VALUE)), self._of("prints")
         said = [one for one in said if SAID_DATA in one.message]
@@ -302,7 +322,10 @@ class Later:
         elif self._lacks_words(template.partition(VALUE)[0]):
             yield f"print '{in_words(template)}'"
         elif other and not said and len(self._of("prints")) == 1:  # a field that the right type does not have
-            yield f"print the `data` of the message on {_line(self._of('prints')[0])}"
+            only = self._of("prints")[0]
+            says_it = " ".join(template.partition(VALUE)[0].split()) in " ".join(only.message.split())
+            what = "the `data` of the message" if says_it else f"'{in_words(template)}'"
+            yield f"print {what} on {_line(only)}"
 
     def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> str:
         lines = self._build.file_lines(slip.file) if self._build is not None else []
@@ -372,7 +395,7 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     if refused is not None and refused.refused != NOT_STARTED and not any(refusals(package, file)):
         yield f"{refused.hint}: {refused.why}"
     yield from unset_arg_fixes(file, refused.hint if refused is not None else "")
-    nodes = [one for one in file.brings if one.type in names]
+    nodes = [one for one in file.brings if {one.type, f"{one.type}.py"} & names]
     if topic := wanted.get("topic"):
         renaming = find_renaming(package, nodes, str(topic))
         yield from [f"in {file.path} {renaming.fix}"] if renaming else []

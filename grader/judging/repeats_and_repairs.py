@@ -12,6 +12,7 @@ import json
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from graphlib import TopologicalSorter
 from pathlib import PurePosixPath
 from types import MappingProxyType
@@ -31,7 +32,7 @@ from grader.rubric.model import Criterion, Rubric
 from grader.rubric.scenario import Scenario
 from grader.wording import join_words
 
-REPAIRS, BUILD = "repairs", "build"
+REPAIRS, BUILD, INSTALL = "repairs", "build", "cmake-install"
 NAMES = {
     "topic-name",
     "service-name",
@@ -130,6 +131,7 @@ def apply_repaired_copy(
     repairs: tuple[Repair, ...],
     *,
     built: bool,
+    builds: bool,
     launched: Launched,
 ) -> tuple[dict[str, Verdict], dict[str, Repaired]]:
     """Return the verdicts with what the copy shows, and for each criterion that it changes the repairs behind it.
@@ -140,7 +142,11 @@ def apply_repaired_copy(
     verdicts, uses = dict(first), dict[str, Repaired]()
     on_copy = {name: with_lines_as_handed_in(verdict, repairs) for name, verdict in on_copy.items()}
     needs = {
-        c.id: tuple(one for one in repairs if concerns(one, c, rubric, first, built=built, launched=launched))
+        c.id: tuple(
+            one
+            for one in repairs
+            if concerns(one, c, rubric, first, built=built, builds=builds, launched=launched)
+        )
         for c in rubric.criteria
     }
     better = {
@@ -178,12 +184,13 @@ def concerns(
     *,
     built: bool,
     launched: Launched,
+    builds: bool = False,
 ) -> bool:
     """Return whether the criterion may depend on what was repaired: its run or build uses it, or it, or what blocks it,
     cites the file. What the files of the build lack stays lost, though: the criteria of these files ask for just that.
 
     `found` is what each criterion came to without the repair, `built` whether what is run was built without it, or
-    needs no build.
+    needs no build; `builds`, whether the package as handed in was: its build needs no further line of the manifest.
     """
     if criterion.scenario is not None:
         sleeps = repair.before.endswith(".sleep") and repair.after == f"{repair.before}()"
@@ -194,7 +201,7 @@ def concerns(
         wrong = _words(repair.before) - _words(repair.after)
         return bool(wrong & _words(found[criterion.id].message)) or _cites(found[criterion.id], repair)
     if repair.kind in OF_BUILDS and (criterion.check == BUILD or is_unmade(found[criterion.id])):
-        return True
+        return repair.kind != "manifest-line" or not builds
     seen = f"{found[criterion.id].message} {found[criterion.id].measured}"
     if repair.kind == "file-name" and PurePosixPath(repair.before).name in seen:
         return True
@@ -316,7 +323,7 @@ def _is_other_fault(one: Verdict, copy: Verdict) -> bool:
 def _charges(
     rubric: Rubric,
     first: Mapping[str, Verdict],
-    better: Collection[str],
+    better: AbstractSet[str],
     needs: Mapping[str, tuple[Repair, ...]],
 ) -> dict[Repair, set[str]]:
     """Return for each repair the criterion that asks for what was wrong: one of the files, else by its name where a
@@ -331,7 +338,8 @@ def _charges(
         asking = [c for c in rubric.criteria if c.scenario is None and _asks_for(first[c.id], repair)]
         if repair.kind in OF_BUILDS:  # of a file with several faults, those that speak of this line
             new = _new_words(repair)
-            asking = [c for c in asking if c.id in better or new & _words(first[c.id].message)]
+            better_by_it = better - {c.id for c in rubric.criteria if c.check == INSTALL}
+            asking = [c for c in asking if c.id in better_by_it or new & _words(first[c.id].message)]
         sought = [c for c in asking if _seeks(first[c.id], repair)]
         asking = sought or [c for c in asking if _names(c, repair)] or asking
         if asking:

@@ -124,8 +124,13 @@ def _added(before: str, after: str) -> list[str]:
     return [line.strip() for line in after.split("\n") if line not in old and line.strip()]
 
 
+TABS_INSIDE = re.compile(r"""("[^"]*"|'[^']*')|[ ]*\t[ \t]*""")
+
+
 def as_code(line: str) -> str:
-    """Return a line of code in backticks, unless it has some itself."""
+    """Return a line of code in backticks, unless it has some itself; with a space for the tabs between its words, which
+    a report would write out."""
+    line = TABS_INSIDE.sub(lambda found: found[1] or " ", line)
     return line if "`" in line else f"`{line}`"
 
 

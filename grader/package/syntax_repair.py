@@ -78,7 +78,7 @@ def _one_step(text: str, error: Error) -> Step | None:
         if candidate == text:
             continue
         left = syntax_error(candidate)
-        if left is None:
+        if left is None or (left["line"] > error["line"] and _only_tabs(candidate, left)):
             return _step(cause, text, candidate, error)
         if further is None and (left["line"] > error["line"] or _is_next(error, left)):
             further = _step(cause, text, candidate, error)
@@ -128,6 +128,11 @@ def _is_next(error: Error, left: Error) -> bool:
     if OF_SIGNS.search(error["message"]) and not OF_SIGNS.search(left["message"]):
         return left["kind"] not in spaces
     return all("never closed" in one["message"] for one in (error, left)) and left["line"] < error["line"]
+
+
+def _only_tabs(text: str, error: Error) -> bool:
+    """Whether the text parses but for tabs, which are a mistake of their own."""
+    return error["kind"] == "TabError" and syntax_error(_all_expanded(text, 8)) is None
 
 
 def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:

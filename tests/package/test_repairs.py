@@ -163,6 +163,14 @@ CASES = {
         "line 8 of src/talker.py: this line is further out than the lines around it",
         after={TALKER: "    count = 0\n    rate = rospy"},
     ),
+    "between-two-of-one-level-with-a-tab-below": Case(
+        swapped(
+            TALKER, ("    rate = rospy", "count = 0\n    rate = rospy"), ("        rate.sleep()", "\trate.sleep()")
+        ),
+        ["python-syntax"] * 2,
+        "line 8 of src/talker.py: this line is further out than the lines around it",
+        after={TALKER: "    count = 0\n    rate = rospy"},
+    ),
     "further-out-after-a-deeper-block": Case(
         swapped(TALKER, ("        rate.sleep()", f"{DEEPER}    a = 1\n    b = 2\n        rate.sleep()")),
         ["python-syntax"],
@@ -647,7 +655,20 @@ CASES = {
     "own-message-of-another": Case(
         {**OWN, "msg/Level.msg": "Header header\ngeometry_msgs/Point at\n",
          CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")},
-        ["build-line"], "write geometry_msgs after DEPENDENCIES", after={CMAKELISTS: "DEPENDENCIES geometry_msgs std"},
+        ["build-line"] * 2, "write geometry_msgs after DEPENDENCIES",
+        after={CMAKELISTS: "DEPENDENCIES geometry_msgs std"},
+    ),
+    "messages-of-no-definition": Case(
+        {CMAKELISTS: CMAKE.replace("catkin_p", "generate_messages(DEPENDENCIES std_msgs)\ncatkin_p")}, ["build-line"],
+        "delete line 4, generate_messages(…)", after={CMAKELISTS: "rospy)\ncatkin_package()"},
+    ),
+    "program-that-does-not-wait-for-its-header": Case(
+        {**OWN, "src/mean.cpp": '#include "lab/Level.h"\nint main() {}\n',
+         CMAKELISTS: OWN_CMAKE.replace("catkin_p", "generate_messages()\ncatkin_p")
+         + "add_executable(mean src/mean.cpp)\ntarget_link_libraries(mean ${catkin_LIBRARIES})\n"},
+        ["build-line"],
+        "below the add_executable(…) on line 7, write add_dependencies(mean ${${PROJECT_NAME}_EXPORTED_TARGETS})",
+        after={CMAKELISTS: ".cpp)\nadd_dependencies(mean ${${PROJECT_NAME}_EXPORTED_TARGETS})\ntarget"},
     ),
     "own-action-without-its-messages": Case(
         {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\n---\nint32 n\n---\nint32 n\n",

@@ -66,7 +66,7 @@ def slips(tree):
         name = asked(node, functions)
         if name:
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
-            found.append(slip(node.lineno, "input", message))
+            found.append(slip(node.lineno, "input", message, name=how_often(node, tree)))
     finders = (
         misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice,
         publishes_twice, callbacks, waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops,
@@ -571,6 +571,14 @@ def asked(node, functions):
     if name in ("input", "raw_input"):
         return None if name in functions else name
     return name if name in ("sys.stdin.read", "sys.stdin.readline", "sys.stdin.readlines") else None
+
+
+def how_often(node, tree):
+    """Return "once" for what no loop around it does again, "paused" for what a loop does that sleeps, "" else."""
+    loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For)) and node in ast.walk(n)]
+    if not loops:
+        return "once"
+    return "paused" if calls_in(loops[-1], "sleep") else ""
 
 
 IMPORTS_LIMIT = 30

@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.support.build_output import BuildError, folder_names
-from grader.checks.support.scripts import OF_INTERFACES, cmake_calls, installed
+from grader.checks.support.scripts import OF_FILES, OF_INTERFACES, cmake_calls, installed
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
     LIBRARIES,
@@ -293,6 +293,19 @@ def _message_of_another(found: re.Match[str], package: PackageFacts, lines: Sequ
     return Explained(why, f"write {named[2]} after DEPENDENCIES in generate_messages(…){more}")
 
 
+def _unfound_dependency(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    name, calls = found[1], cmake_calls(package, "find_package")
+    of_catkin = next((call.line for call in calls if call.args[:1] == ("catkin",)), None)
+    where = f" on line {of_catkin}" if of_catkin else ""
+    why = f"generate_messages(…) names {name}, and find_package(catkin …) does not"
+    manifest = package.manifest
+    kinds = ("build_depend", "run_depend") if manifest is not None and manifest.format == 1 else ("depend",)
+    declared = manifest is not None and any(d.name == name for d in manifest.dependencies)
+    lines = join_words(f"<{kind}>{name}</{kind}>" for kind in kinds)
+    more = "" if declared else f"; in package.xml, add {lines}"
+    return Explained(why, f"write {name} after COMPONENTS in the find_package(…){where}{more}")
+
+
 def _before_catkin_package(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     why = f"{found[1]}() is called after catkin_package()"
     return Explained(why, f"move {found[1]}(…) above catkin_package(…)")
@@ -372,10 +385,15 @@ def misspelt_cmake_lists(package: PackageFacts) -> str:
     return next((n for n in names if n.casefold() in slips and n != "CMakeLists.txt"), "")
 
 
-def _missing_dependency(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    why = f"add_dependencies({found[2]} {found[1]}) names the target {found[1]}, which does not exist"
+def _missing_dependency(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    target = found[1]
+    why = f"add_dependencies({found[2]} {target}) names the target {target}, which does not exist"
     targets = "${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS}"
-    hint = f"write add_dependencies({found[2]} {targets})"
+    calls = [call for call in cmake_calls(package, "add_dependencies") if target in call.args[1:]]
+    written = [f"add_dependencies({name} {targets})" for name in dict.fromkeys(c.args[0] for c in calls)]
+    hint = f"write {join_words(written or [f'add_dependencies({found[2]} {targets})'])}"
+    if not any(PurePosixPath(file.path).suffix in OF_FILES.values() for file in package.files):
+        return Explained(f"{why}: the package has no messages of its own", hint)
     hint = f"{hint}; messages of your own need generate_messages(…) above it"
     return Explained(why, hint, uncalled="generate_messages")
 
@@ -435,6 +453,9 @@ def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[st
             # found, and so built beside this package: its messages come too late
             what, targets = f"the messages of {found[1]}", "${catkin_EXPORTED_TARGETS}"
             return _unwaited(package, text, what, targets, lines)
+        if made & {f.path for f in package.files}:
+            why = f"{text}: the build makes {found[2]}.h in {package.name}/, the package's name"
+            return Explained(why, f'write `#include "{package.name}/{found[2]}.h"`')
         return Explained(f"{text}: there is no such header", "check the #include and find_package(…)")
     return _unwaited(package, text, "its message", OWN_TARGETS, lines)
 
@@ -598,6 +619,7 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"roslaunch_add_file_check\(\) path '([^']+)' was not found", _missing_launch),
     (r"Cannot find source file: (\S+)", _missing_source),
     (r"Could not find messages which '([^']+)' depends on", _message_of_another),
+    (r"Messages depends on unknown pkg: ([\w-]+)", _unfound_dependency),
     (r"(Invalid declaration|is not a legal message|InvalidMsgSpec|MsgNotFound)", _no_definition),
     (r"(generate_messages)\(\) must be called before catkin_package\(\)", _before_catkin_package),
     (r"You must call project\(\) before calling (\w+)\(\)", _late_project),

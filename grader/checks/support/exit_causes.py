@@ -61,6 +61,11 @@ ARGUMENT_HINT = (
 )
 NO_INPUT = f"write {VALUE_SLOT} in place of `input()`"
 PAUSE = f"write `rate = {RATE_SLOT}` above it and `rate.sleep()` as its last line"
+PRINTED_ERROR = re.compile(
+    r"name '\w+' is not defined|has no attribute|unexpected keyword argument|missing \d+ required|takes \d+ positional"
+    r"|unsupported operand|must be str|not callable|(?:Error|Exception)\b"
+)
+"""What an `except Exception as e: print(e)` prints of a mistake in the script."""
 LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
 CAUSES = {
     "EOFError": ("it waits for input (`input()`), and a graded node gets no input",
@@ -166,10 +171,9 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
         return explain_traceback(found[-1], package)
     if life.end is not None and life.end.signal is not None and life.end.stopped_by is None:
         return Ending(f"{_signal_name(life.end.signal)} ended it", RUN_IT)
-    if code == 0:
-        hint = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
-        return _not_run(life, package) or Ending("its script ran to the end", hint, by_itself=True)
     printed = [line.line for _, line in run.lines(life.name) if line.line.strip()]
+    if code == 0:
+        return _not_run(life, package) or _ran_to_the_end(printed)
     exceptions = [line for line in printed if line.startswith("RLException: ")]
     last = next(iter(exceptions or printed[::-1]), "")
     words = f"; its last output: {shown(last)}" if last else ""
@@ -184,6 +188,16 @@ MAKES_NODES = {
     "spin": "",
 }
 """Calls, and the kind of slip that there is where the script has one of them that is not in a comment."""
+
+
+def _ran_to_the_end(printed: Sequence[str]) -> Ending:
+    """Explain it by what was printed last, where an `except` may have printed it."""
+    last = printed[-1] if printed else ""
+    hint = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
+    if not PRINTED_ERROR.search(last):
+        return Ending("its script ran to the end", hint, by_itself=True)
+    hint = "repair that: without the `except` that prints it, Python says in which line it is"
+    return Ending(f"its script ran to the end, and printed last: {shown(last)}", hint, by_itself=True)
 
 
 def _not_run(life: Life, package: PackageFacts) -> Ending | None:
@@ -408,17 +422,22 @@ def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | 
 def _asks_for_input(
     found: Traceback, place: FileCitation | None, package: PackageFacts
 ) -> tuple[str, str] | None:
-    """Return the cause and the hint of a script that asks for input and has a Rate already."""
+    """Return the cause and the hint of a script that asks for input once, or has a Rate already."""
     rated = {one.file for one in package.slips if one.kind.startswith("rate-")}
-    asking = sorted({s.line for s in package.slips if s.kind == "input" and place and s.file == place.file})
+    asks = {s.line: s.name for s in package.slips if s.kind == "input" and place and s.file == place.file}
+    asking = sorted(asks)
     source = found.own_frames[-1].source if found.own_frames else ""
     if found.kind == "EOFError" and len(asking) > 1:
         lines = join_words(map(str, asking))
         return CAUSES["EOFError"][0], f"write values in the code in place of each `input()`: lines {lines}"
     if found.kind == "EOFError" and (number := _NUMBER_ASKED.search(source)):
         return CAUSES["EOFError"][0], f"write a number in the code in place of `{number[0]}…))`"
+    if found.kind == "EOFError" and asks and "once" in asks.values():
+        return CAUSES["EOFError"][0], "write a value in the code in place of `input()`"
     if found.kind != "EOFError" or place is None or place.file not in rated:
         return None
+    if "paused" in asks.values():
+        return CAUSES["EOFError"][0], NO_INPUT
     return CAUSES["EOFError"][0], f"{NO_INPUT}, and make sure that the loop calls `sleep()` of its Rate"
 
 

@@ -108,23 +108,48 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
     stem = PurePosixPath(launch).stem
     near += [p for n, p in names.items() if n == f"{stem}.xml" and p not in near]
     seen = f"; {there_is(dict.fromkeys([*near, *others]))}" if near or others else ""
+    files = {file.path: file for file in package.launch_files}
     if starting := full or guessed:
+        built = {n.type: one for one in programs for n in starts_built(package, files[starting[0]], one)}
+        called = sorted((programs - {*built.values()}) | {str(kind) for kind in built})
         which = "which" if starting == others else f"and {join_words(starting)}"
-        seen += f", {which} {'each start' if len(starting) > 1 else 'starts'} {join_words(sorted(programs))}"
+        seen += f", {which} {'each start' if len(starting) > 1 else 'starts'} {join_words(called)}"
     parts = {} if full else _parts_started(started)
     if parts:
-        seen += f", and {join_words(f'{path} starts {name}' for path, name in parts.items())}"
+        alone = [*parts] == others
+        seen += (
+            f", which starts {parts[others[0]]}"
+            if alone and len(others) == 1
+            else f", and {join_words(f'{path} starts {name}' for path, name in parts.items())}"
+        )
     movable = [p for p in near if can_be_moved(p, launch) and (not wanted or started.get(p, wanted))]
     movable += full[:1] if len(full) == 1 else []
     path = f"launch/{launch}"
     hint = move_hint(package, movable[0], path) if movable else add_hint(package, path)
     if guessed and not movable:
         hint = f"{hint}, or {move_hint(package, guessed[0], path)} if that is meant to be it"
+    if full and movable:
+        fixes = [one for name in sorted(wanted) for one in built_fixes(package, files[movable[0]], name)]
+        hint = f"{hint}; then {join_words(fixes)}" if fixes else hint
     if parts and set(parts.values()) == wanted and not movable:
         hint = f"{hint}, with the <node>s of {join_words(parts)} in it"
     verdict = failed(f"{launch} is not in the package{seen}", hint=hint)
     kind: MistakeKind = "file-elsewhere" if movable or guessed else "file-missing"
     return verdict.about(citations=(FileCitation(file=movable[0] if movable else path),)).lost_by(kind, path)
+
+
+def starts_built(package: PackageFacts, file: LaunchFile, script: str) -> list[LaunchNode]:
+    """Return the nodes that start a program which CMake builds, and which is called as the script is without its
+    `.py`."""
+    stem = PurePosixPath(script).stem
+    is_built = stem != script and any(one.is_called(stem) for one in programs(package))
+    return [node for node in file.nodes if is_built and node.type == stem]
+
+
+def built_fixes(package: PackageFacts, file: LaunchFile, script: str) -> list[str]:
+    """Return how the nodes of `starts_built` come to start the script."""
+    nodes = starts_built(package, file, script)
+    return [f'write type="{script}" on line {node.line}, not type="{node.type}"' for node in nodes]
 
 
 def _program_meant(package: PackageFacts, name: str) -> str:

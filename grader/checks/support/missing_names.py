@@ -196,7 +196,8 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
     if wanted and wanted[1] in noetic_messages().get(wanted[2], ()):
         near = (wanted[2],)
     if near:
-        return f"messages come from {near[0]}.msg", f"write `from {near[0]}.msg import …`"
+        name = wanted[1] if wanted else "…"
+        return f"messages come from {near[0]}.msg", f"write `from {near[0]}.msg import {name}`"
     meant = meant or (nearest_module(asked[1], package.own_modules) if asked else "")
     return (f"did you mean {meant}?", f"write {meant} instead of {asked[1]}") if asked and meant else None
 

@@ -87,7 +87,7 @@ def paths_by_name(package: PackageFacts) -> dict[str, str]:
 
 
 ROLES = (
-    ("talker", "publisher", "pub", "sender", "emitter"),
+    ("talker", "publisher", "pub", "sender", "emitter", "speaker"),
     ("listener", "subscriber", "sub", "receiver"),
     ("server", "service"),
 )

@@ -145,8 +145,9 @@ def both(python: str, cpp: str) -> str:
     return f"\ue000{python}\ue001{cpp}\ue002"
 
 
-VALUE_SLOT, RATE_SLOT = "\ue003", "\ue004"
-"""Parts of a hint in whose place the judge writes what the lab asks for: a node's text, and the rate of its loop."""
+VALUE_SLOT, RATE_SLOT, TYPE_SLOT = "\ue003", "\ue004", "\ue005"
+"""Parts of a hint in whose place the judge writes what the lab asks for: a node's text, the rate of its loop, and the
+type of what is sent to it."""
 
 
 def in_language(hint: str, language: Language | None) -> str:

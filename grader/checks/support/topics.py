@@ -15,6 +15,7 @@ from grader.checks.support.text import (
     INIT,
     LOOP,
     PUBLISHER,
+    TYPE_SLOT,
     both,
     imports,
     near_names,
@@ -169,7 +170,11 @@ def _not_advertised(
     if slip := why_unreached(package, run):
         verdict = of_node(f"{what}: {slip.message}", measured=measured, hint=_reach_hint(slip))
         return verdict.about(citations=(slip.place,))
-    hint = f"add {publisher(topic)} and publish in the loop"
+    of_types, _, name = kind.partition("/")
+    call = (
+        publisher(topic, f"{name}, queue_size=10", type=f"{of_types}::{name}") if name else publisher(topic)
+    )
+    hint = f"add {call} and publish in the loop"
     if slip := call_in_comment(package, run, "Publisher"):
         return _commented_out(what, slip, of_node).about(measured=measured)
     if not published:
@@ -287,7 +292,7 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     seen = f"; {nodes_on(run, found[0], 'subscribers')[0]} subscribes to {join_words(found)}" if found else ""
     message = f"the run publishes on {topic}, and no node subscribes to it{seen}"
     remapped = _remap_to(package, run, topic, found[0]) if package is not None and found else ""
-    return failed(message, hint=remapped or f"add {subscriber(topic, '…, callback')}")
+    return failed(message, hint=remapped or f"add {subscriber(topic, f'{TYPE_SLOT}, callback')}")
 
 
 def _remap_to(package: PackageFacts, run: Run, topic: str, heard: str) -> str:

@@ -6,6 +6,8 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import PurePosixPath
 
+from cmake_parser.ast import Command
+
 from grader.installable import noetic_messages
 from grader.model.message_definitions import DIVIDER, PARTS, exchanged_parts, meant_type
 from grader.model.package import CMAKE, INTERFACE_FOLDERS, PackageFacts
@@ -21,7 +23,7 @@ from grader.package.repairs.cmake_calls import (
 from grader.package.repairs.editing import Files
 from grader.package.repairs.files import is_own
 from grader.package.repairs.names import CPP, Wanted, is_near
-from grader.wording import is_one_edit, join_words
+from grader.wording import is_one_edit, join_words, lines_text
 
 OF_GENERATION = re.compile(r"_generate_messages|_gen(cpp|py)$")
 """Targets that generate_messages(…) makes."""
@@ -45,8 +47,10 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
     used = _used_kinds(files, package, name, code)
     made = {c: _definitions(package, folder) for c, folder in INTERFACE_FOLDERS.items() if folder in used}
     if not any(made.values()):
+        _delete_generation(files, package)
         return
     _correct_types(files, package)
+    _wait_for_headers(files, package, name)
     _generate(files, package)  # from below, so that the lines above stay where they are
     run = [path for path in code if path in scripts or path.endswith(CPP)]
     needed = {word for path in run for word in re.findall(r"\w+", files.text(path) or "")}
@@ -55,15 +59,9 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
     }
     for call, names in reversed(made.items()):
         _name_definitions(files, call, names, needed)
-    of_catkin = [
-        c for c in calls_of(files, "find_package") if [t.value for t in words_of(c)][:1] == ["catkin"]
-    ]
-    named = [token.value for call in of_catkin for token in words_of(call)]
-    if (
-        of_catkin
-        and not {GENERATION, "genmsg"}.intersection(named)
-        and not any("$" in word for word in named)
-    ):
+    of_catkin, named = _components(files)
+    lacks = of_catkin and not {GENERATION, "genmsg"}.intersection(named)
+    if lacks and not any("$" in word for word in named):
         words = words_of(of_catkin[0])
         near = next((token for token in words if is_one_edit(token.value, GENERATION)), None)
         if near is not None:
@@ -73,11 +71,69 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
                 "build-line", CMAKE, replace_token(cmake_text(files), near, GENERATION), message, fix
             )
             return
-        listed = next((t for t in words if t.value == "COMPONENTS"), None)
-        token, new = (listed, GENERATION) if listed else (words[-1], f"COMPONENTS {GENERATION}")
-        changed = replace_token(cmake_text(files), token, f"{token.value} {new}")
-        message = f"line {of_catkin[0].line} of {CMAKE}: find_package(catkin …) does not name {GENERATION}"
-        files.change("build-line", CMAKE, changed, message, f"write {new} after {token.value}")
+        _name_components(files, [GENERATION])
+
+
+def _delete_generation(files: Files, package: PackageFacts) -> None:
+    """Delete the call of generate_messages(…) that has nothing to make, where CMake does not know it."""
+    calls, (of_catkin, named) = calls_of(files, GENERATE), _components(files)
+    folders = {PurePosixPath(file.path).suffix.removeprefix(".") for file in package.files}
+    known = {GENERATION, "genmsg"}.intersection(named) or any("$" in word for word in named)
+    if len(calls) != 1 or not of_catkin or known or folders & {*INTERFACE_FOLDERS.values()}:
+        return
+    text, span = cmake_text(files), calls[0].span
+    first, last = (text.count("\n", 0, at) for at in (span.start, span.stop))
+    message = f"line {calls[0].line} of {CMAKE}: {GENERATE}(…) is called, and there are no messages to make"
+    fix = f"delete {lines_text(first, last)}, {GENERATE}(…)"
+    files.change("build-line", CMAKE, text[: span.start] + text[span.stop :].lstrip("\n"), message, fix)
+
+
+def _wait_for_headers(files: Files, package: PackageFacts, name: str) -> None:
+    """Make programs wait for the headers of the package's own definitions, which they include and nothing makes them
+    wait for."""
+    own = "|".join(PurePosixPath(one.path).stem for one in package.interfaces)
+    includes = re.compile(
+        rf"#\s*include\s*[<\"]{re.escape(name)}/(?:{own})(?:Request|Response|Action)?\.h[>\"]"
+    )
+    waiting = {token.value for call in calls_of(files, "add_dependencies") for token in words_of(call)[:1]}
+    found = []
+    for call in calls_of(files, "add_executable"):
+        target, *sources = [token.value for token in words_of(call)]
+        if target not in waiting and any(includes.search(files.text(path) or "") for path in sources):
+            found.append((target, call))
+    if not own or not found:
+        return
+    lines, fixes = cmake_text(files).split("\n"), list[str]()
+    for target, call in reversed(found):
+        at = cmake_text(files).count("\n", 0, call.span.stop) + 1
+        new = f"add_dependencies({target} ${{${{PROJECT_NAME}}_EXPORTED_TARGETS}})"
+        lines.insert(at, new)
+        fixes.insert(0, f"below the add_executable(…) on line {call.line}, write {new}")
+    targets = join_words(target for target, _ in found)
+    message = (
+        f"line {found[0][1].line} of {CMAKE}: {targets} may be compiled before the headers of the messages"
+    )
+    files.change("build-line", CMAKE, "\n".join(lines), message, "; ".join(fixes))
+
+
+def _components(files: Files) -> tuple[list[Command], list[str]]:
+    """Return the calls of find_package(catkin …), and the words in them."""
+    calls = [c for c in calls_of(files, "find_package") if [t.value for t in words_of(c)][:1] == ["catkin"]]
+    return calls, [token.value for call in calls for token in words_of(call)]
+
+
+def _name_components(files: Files, names: Sequence[str]) -> None:
+    """Name these packages in find_package(catkin …), where it lists its packages in plain words."""
+    of_catkin, named = _components(files)
+    missing = " ".join(name for name in names if name not in named)
+    if not of_catkin or not missing or any("$" in word for word in named):
+        return
+    words = words_of(of_catkin[0])
+    listed = next((t for t in words if t.value == "COMPONENTS"), None)
+    token, new = (listed, missing) if listed else (words[-1], f"COMPONENTS {missing}")
+    changed = replace_token(cmake_text(files), token, f"{token.value} {new}")
+    message = f"line {of_catkin[0].line} of {CMAKE}: find_package(catkin …) does not name {missing}"
+    files.change("build-line", CMAKE, changed, message, f"write {new} after {token.value}")
 
 
 def exchange_parts(files: Files, package: PackageFacts, wanted: Wanted) -> None:
@@ -178,3 +234,4 @@ def _generate(files: Files, package: PackageFacts) -> None:
         message = f"line {call.line} of {CMAKE}: {GENERATE}(…) does not name {join_words(missing)}"
         fix = f"write {listed} after DEPENDENCIES" if token else f"write {GENERATE}({added})"
         files.change("build-line", CMAKE, text[:at] + added + text[at:], message, fix)
+        _name_components(files, missing)
