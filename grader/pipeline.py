@@ -175,7 +175,6 @@ def warm_up() -> None:
     from grader.arena.arena_process import template_of  # noqa: PLC0415
     from grader.arena.sandbox import choose_sandbox  # noqa: PLC0415
     from grader.arena.session import arena_command  # noqa: PLC0415
-    from grader.evidence import message_values  # noqa: F401, PLC0415
     from grader.package import launch, launch_loader  # noqa: F401, PLC0415
     from grader.report import figures, junit, markdown  # noqa: F401, PLC0415
     from grader.report.html.page import load_template  # noqa: PLC0415

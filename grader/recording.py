@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from grader.arena.static_recorder import StaticRecorder
     from grader.model import SandboxMode
 
-LATER = ("grader.evidence.decode", "grader.evidence.reader")
+LATER = ("grader.evidence.reader",)
 """Slow to import, and needed by no verdict that the files alone decide: imported while the build runs. The arena is
 imported when it begins, and what judges or reports recordings when it is called."""
 

@@ -12,17 +12,14 @@ from __future__ import annotations
 import base64
 import math
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from grader.arena.session import ArenaSession
 from grader.errors import ArenaError
 from grader.evidence.events import GOAL_STATUS, MISFIT, OTHER_TYPE, ActorEvent
+from grader.evidence.message_values import MessageType, Moment, ServiceTypes, action_texts
 from grader.model.message_definitions import other_fields
 from grader.rubric.scenario import Served
-
-if TYPE_CHECKING:
-    from grader.evidence.message_values import MessageType, ServiceTypes
-
 
 FAILS = "the service cannot do it"
 """What a client of one that `fails` is told."""
@@ -44,8 +41,6 @@ class ServedServices:
             self._offer(one)
 
     def _offer(self, one: Served) -> None:
-        from grader.evidence.message_values import Moment  # noqa: PLC0415 - numpy, which not every run needs
-
         try:
             types = self._types[one.name] = self._find(one.type, one.definition)
             now_ns, total = self._arena.ros_now_ns(), len(one.in_turn)
@@ -61,8 +56,6 @@ class ServedServices:
 
     def _find(self, type_: str, text: str | None = None) -> ServiceTypes:
         """Return a type by the text of its `.srv` file. Raises ValueError where there is none, or it is none."""
-        from grader.evidence.message_values import ServiceTypes  # noqa: PLC0415 - as above
-
         place = self._arena.place
         text = place.type_text(type_, "srv") if text is None else text
         if text is None:
@@ -142,8 +135,6 @@ class ServedAction:
         self._send("status", {"status_list": []})
 
     def _find(self) -> dict[str, MessageType]:
-        from grader.evidence.message_values import MessageType, action_texts  # noqa: PLC0415 - numpy, which not every run needs
-
         type_, place = self._served.type, self._arena.place
         text = place.type_text(type_, "action")
         texts = {} if text is None else action_texts(type_, text)
@@ -193,8 +184,6 @@ class ServedAction:
         return any(one and one["id"] in {"", goal} for one in asked)
 
     def _encode(self, name: str, value: dict[str, Any]) -> bytes:
-        from grader.evidence.message_values import Moment  # noqa: PLC0415 - as above
-
         moment = Moment(0, 1, self._arena.ros_now_ns())
         return self._types[name].encode({"header": {"stamp": "now"}, **value}, moment)
 

@@ -29,14 +29,14 @@ from grader.arena.scenario_inputs import make_shots
 from grader.arena.served import ServedAction, ServedServices
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
+from grader.evidence.decode import FindText
 from grader.evidence.events import GOAL_STATUS, MISFIT, UNHEARD, ActorEvent
+from grader.evidence.message_values import MessageType, Moment, ServiceTypes, action_texts, md5_of
 from grader.model.message_definitions import other_fields
 from grader.rubric.scenario import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
 
 if TYPE_CHECKING:
-    from grader.evidence.decode import FindText
-    from grader.evidence.message_values import MessageType
     from grader.evidence.run import Channel
 
 Tell = Callable[[str], None]
@@ -176,8 +176,6 @@ class StepRunner:
     # --- Messages ----------------------------------------------------------------------------------------------------
 
     def _advertise(self, topic: str, type_: str, *, latched: bool, find_text: FindText | None = None) -> None:
-        from grader.evidence.message_values import MessageType  # noqa: PLC0415 - numpy, which not every run needs
-
         if topic in self._types:
             return
         try:
@@ -207,8 +205,6 @@ class StepRunner:
         self, topic: str, value: object, index: int, total: int | None, deed: dict[str, Any] | None = None
     ) -> None:
         """Send one message, and note it as `deed`. Raises ValueError where the value does not fit."""
-        from grader.evidence.message_values import Moment  # noqa: PLC0415 - as above
-
         self._live.sent_s = time.monotonic()
         type_, moment = self._types[topic], Moment(index, total, self._arena.ros_now_ns())
         data, shown = type_.encode(value, moment), type_.shown(value, moment)
@@ -317,7 +313,6 @@ class StepRunner:
 
     def _advertise_bag(self, play: Play) -> None:
         """Advertise the recording's topics, each by its first channel; a type that a topic has already stays."""
-        from grader.evidence.message_values import md5_of  # noqa: PLC0415 - numpy, which not every run needs
         from grader.evidence.reader import load_run  # noqa: PLC0415 - few runs play anything
 
         if play.bag not in self._bags:
@@ -454,8 +449,6 @@ class StepRunner:
             await self._ask(call)
 
     async def _ask(self, call: Call) -> None:
-        from grader.evidence.message_values import Moment, ServiceTypes  # noqa: PLC0415 - numpy, which not every run needs
-
         text, fits = None, True
         try:
             text = self._arena.place.type_text(call.type, "srv")
@@ -500,8 +493,6 @@ class StepRunner:
     # --- Actions (wiki.ros.org/actionlib/DetailedDescription) ---------------------------------------------------------
 
     def _advertise_action(self, action: Action) -> None:
-        from grader.evidence.message_values import MessageType, action_texts  # noqa: PLC0415 - as above
-
         try:
             text = self._arena.place.type_text(action.type, "action")
             texts = action_texts(action.type, text) if text is not None else {}

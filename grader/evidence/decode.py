@@ -1,32 +1,25 @@
-"""Decode and encode messages and service calls with rosbags, from their recorded definitions.
+"""Decode and encode messages and service calls as ROS 1 sends them, from their recorded definitions.
 
-Nothing that ROS or a student generated is ever imported.
+Nothing that ROS or a student generated is ever imported, and no code is made of a definition. The fields of a message
+follow one another without a gap (wiki.ros.org/msg): numbers with their lowest byte first; before a text, and before an
+array that can grow, its length in four bytes.
 """
 
 from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import Any, TypeAlias
-
-import numpy as np
-from rosbags.interfaces import Nodetype
-from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.base import TypesysError
-from rosbags.typesys.store import Typestore
+from typing import Any, NamedTuple, TypeAlias
 
 from grader.evidence.definitions import (
-    PACKAGE,
     PRIMITIVES,
+    Bound,
     DefinitionError,
     Field,
     Types,
-    alias,
     bound,
-    canonical,
     parse,
 )
 from grader.evidence.run import DECODED_BYTES_MAX
@@ -35,14 +28,18 @@ from grader.model.message_definitions import RULE
 
 Value: TypeAlias = Any
 """What a message holds: numbers, text, bytes, lists and dicts of these."""
+Read: TypeAlias = Callable[[bytes, int], tuple[Value, int]]
+"""From a message's bytes and where a value begins in them to the value and where it ends."""
 
 KEPT_LETTERS_MAX = 8_000
-"""Longer definitions make much code, which is not kept for later."""
+"""What reads messages of longer definitions takes much memory, and is not kept for later."""
+FLOAT32_MAX = (2 - 2**-23) * 2.0**127
 _LETTERS = {
     "bool": "?", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q",
     "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
 """What `struct` calls ROS's numbers."""
+_LENGTH = struct.Struct("<I")
 
 
 class Decoder:
@@ -72,18 +69,10 @@ class Decoder:
         if self._plan is None or self.decoded_bytes(len(data)) > DECODED_BYTES_MAX:
             return None
         try:
-            return self._plan.decode(data)
-        except (SerdeError, struct.error, ValueError, IndexError, OverflowError):
+            value, end = self._plan.read(data, 0)
+        except (struct.error, ValueError):
             return None
-
-    def from_cdr(self, data: bytes) -> bytes:
-        """Return a message of ROS 2 (little-endian CDR) as ROS 1's bytes; none where it does not fit the definition."""
-        if self._plan is None or self.decoded_bytes(len(data)) > DECODED_BYTES_MAX:
-            return b""
-        try:
-            return self._plan.from_cdr(data)
-        except (SerdeError, struct.error, ValueError, IndexError, OverflowError, AssertionError):
-            return b""
+        return value if end == len(data) else None
 
 
 class Encoder:
@@ -93,85 +82,64 @@ class Encoder:
         plan = _plan(type, definition)
         if plan is None:
             raise ValueError(f"the definition of {type} cannot be followed")
-        self._plan = plan
+        self._type, self._types = type, plan.types
 
     def encode(self, value: Mapping[str, Any]) -> bytes:
         """Return the message's bytes; fields that `value` leaves out are zero. Raises ValueError where it does
         not fit."""
-        return self._plan.encode(value)
-
-
-class _Plan:
-    def __init__(self, type_: str, definition: str) -> None:
-        self._types: Types = parse(type_, definition)
-        self.bound = bound(self._types)
-        self._type = type_
-        self._store = get_typestore(Stores.EMPTY)
-        self._store.register(get_types_from_msg(canonical(self._types), f"{PACKAGE}/{alias(type_)}"))
-        self._name = f"{PACKAGE}/msg/{alias(type_)}"
-        self._store.get_msgdef(self._name)
-        self._numbers = _as_struct(self._types[type_])
-        self._names = [field.name for field in self._types[type_]]
-
-    def decode(self, data: bytes) -> dict[str, Any]:
-        if self._numbers is not None:  # as rosbags would, in half of the time
-            return dict(zip(self._names, self._numbers.unpack(data), strict=True))
-        if not self._types[self._type] and not data:
-            return {}
-        return self._plain(self._type, self._store.deserialize_ros1(data, self._name))
-
-    def from_cdr(self, data: bytes) -> bytes:
-        """Return nothing for a message without fields, of which CDR makes a byte."""
-        return bytes(self._store.cdr_to_ros1(data, self._name)) if self._types[self._type] else b""
-
-    def encode(self, value: Mapping[str, Any]) -> bytes:
-        if not self._types[self._type]:
-            return _nothing(self._type, value)
-        message = _message(self._store, self._name, self._rename_fields(self._type, value))
         try:
-            return bytes(self._store.serialize_ros1(message, self._name))
-        except (struct.error, OverflowError, SerdeError, AttributeError, TypeError) as error:
+            return b"".join(self._fields(self._type, value))
+        except (struct.error, OverflowError) as error:
             raise ValueError(f"{self._type} cannot hold {value!r}: {error}") from error
 
-    def _rename_fields(self, type_: str, value: Value) -> Value:
-        """Return the fields by the names that they have in generated code."""
+    def _fields(self, type_: str, value: Value) -> Iterator[bytes]:
         if not isinstance(value, Mapping):
             raise ValueError(f"{type_} is made of fields, not {value!r}")  # noqa: TRY004 - as every other misfit
-        fields = {f.name: f for f in self._types[type_]}
-        if unknown := value.keys() - fields.keys():
+        fields = self._types[type_]
+        if unknown := value.keys() - {field.name for field in fields}:
             raise ValueError(f"{type_} has no field {', '.join(sorted(map(str, unknown)))}")
-        return {fields[name].attribute: self._inner(fields[name], item) for name, item in value.items()}
-
-    def _inner(self, field: Field, value: Value) -> Value:
-        if field.primitive:
-            return value
-        if field.array:
-            return [self._rename_fields(field.type, item) for item in value]
-        return self._rename_fields(field.type, value)
-
-    def _plain(self, type_: str, message: object) -> dict[str, Any]:
-        return {f.name: self._value(f, getattr(message, f.attribute)) for f in self._types[type_]}
-
-    def _value(self, field: Field, value: Value) -> Value:
-        if not field.primitive:
+        for field in fields:
             if field.array:
-                return [self._plain(field.type, item) for item in value]
-            return self._plain(field.type, value)
-        if not field.array:
-            return value
-        if field.type == "uint8":
-            return value.tobytes()
-        return value if field.type == "string" else value.tolist()
+                yield from self._array(field, value.get(field.name))
+            elif field.primitive:
+                item = value.get(field.name)
+                yield _primitive_bytes(field.type, _zero(field.type) if item is None else item)
+            else:
+                yield from self._fields(field.type, value.get(field.name, {}))
+
+    def _array(self, field: Field, value: Value) -> Iterator[bytes]:
+        if value is None:
+            value = [_zero(field.type) if field.primitive else {}] * (field.size or 0)
+        if not isinstance(value, list | tuple | bytes):
+            raise ValueError(f"a list is asked for, not {value!r}")  # noqa: TRY004 - as every other misfit
+        if field.size is None:
+            yield _LENGTH.pack(len(value))
+        elif len(value) != field.size:
+            raise ValueError(f"{field.name} holds {field.size}, not {len(value)}")
+        if letter := _LETTERS.get(field.type):
+            yield struct.pack(f"<{len(value)}{letter}", *[_check_value(field.type, item) for item in value])
+            return
+        for item in value:
+            if field.primitive:
+                yield _primitive_bytes(field.type, item)
+            else:
+                yield from self._fields(field.type, item)
 
 
-def _as_struct(fields: Sequence[Field]) -> struct.Struct | None:
-    """Return how numbers lie in a message that has nothing else; None for any other."""
-    letters = [_LETTERS.get(field.type, "") for field in fields if not field.array]
-    return (
-        struct.Struct("<" + "".join(letters))
-        if fields and all(letters) and len(letters) == len(fields)
-        else None
-    )
+def _primitive_bytes(type_: str, value: Value) -> bytes:
+    checked = _check_value(type_, value)
+    if type_ == "string":
+        text: bytes = checked.encode()
+        return _LENGTH.pack(len(text)) + text
+    return struct.pack("<" + _LETTERS[type_], checked)
+
+
+class _Plan(NamedTuple):
+    """A definition as its types, with what their messages take once decoded, and what reads them."""
+
+    types: Types
+    bound: Bound
+    read: Read
 
 
 def _plan(type_: str, definition: str) -> _Plan | None:
@@ -189,9 +157,113 @@ def _cached_plan(type_: str, definition: str) -> _Plan | None:
 
 def _make_plan(type_: str, definition: str) -> _Plan | None:
     try:
-        return _Plan(type_, definition)
-    except (DefinitionError, TypesysError, SyntaxError, RecursionError):
+        types = parse(type_, definition)
+    except DefinitionError:
         return None
+    return _Plan(types, bound(types), _Readers(types).of(type_))
+
+
+class _Readers:
+    """Makes what reads values of these types: of each type once."""
+
+    def __init__(self, types: Types) -> None:
+        self._types = types
+        self._known: dict[str, Read] = {}
+
+    def of(self, type_: str) -> Read:
+        """Return what reads a message of this type."""
+        if type_ not in self._known:
+            fields = self._types[type_]
+            numbers = _as_struct(fields)
+            self._known[type_] = (
+                _fields([(field.name, self._field(field)) for field in fields])
+                if numbers is None
+                else _numbers([field.name for field in fields], numbers)
+            )
+        return self._known[type_]
+
+    def _field(self, field: Field) -> Read:
+        if field.type == "uint8" and field.array:
+            return _sized(field.size, _raw)
+        if field.type in _LETTERS and field.array:
+            return _sized(field.size, _list_of_numbers(_LETTERS[field.type]))
+        if field.type in _LETTERS:
+            return _number(struct.Struct("<" + _LETTERS[field.type]))
+        one = _text if field.type == "string" else self.of(field.type)
+        return _sized(field.size, _list_of(one)) if field.array else one
+
+
+def _as_struct(fields: Sequence[Field]) -> struct.Struct | None:
+    """Return how numbers lie in a message that has nothing else; None for any other."""
+    letters = [_LETTERS.get(field.type, "") for field in fields if not field.array]
+    return (
+        struct.Struct("<" + "".join(letters))
+        if fields and all(letters) and len(letters) == len(fields)
+        else None
+    )
+
+
+def _fields(readers: Sequence[tuple[str, Read]]) -> Read:
+    def read(data: bytes, at: int) -> tuple[Value, int]:
+        found: dict[str, Value] = {}
+        for name, reader in readers:
+            found[name], at = reader(data, at)
+        return found, at
+
+    return read
+
+
+def _numbers(names: Sequence[str], numbers: struct.Struct) -> Read:
+    return lambda data, at: (dict(zip(names, numbers.unpack_from(data, at), strict=True)), at + numbers.size)
+
+
+def _number(number: struct.Struct) -> Read:
+    return lambda data, at: (number.unpack_from(data, at)[0], at + number.size)
+
+
+def _text(data: bytes, at: int) -> tuple[Value, int]:
+    (size,) = _LENGTH.unpack_from(data, at)
+    text, end = _raw(data, at + _LENGTH.size, size)
+    return text.decode(), end
+
+
+ReadMany: TypeAlias = Callable[[bytes, int, int], tuple[Value, int]]
+"""As `Read`, of an array with so many values."""
+
+
+def _sized(size: int | None, read: ReadMany) -> Read:
+    """Return what reads an array of this size, or one that can grow."""
+    if size is not None:
+        return lambda data, at: read(data, at, size)
+    return lambda data, at: read(data, at + _LENGTH.size, _LENGTH.unpack_from(data, at)[0])
+
+
+def _raw(data: bytes, at: int, count: int) -> tuple[Value, int]:
+    end = at + count
+    if end > len(data):
+        raise ValueError("more bytes are told than there are")
+    return data[at:end], end
+
+
+def _list_of_numbers(letter: str) -> ReadMany:
+    size = struct.calcsize("<" + letter)
+
+    def read(data: bytes, at: int, count: int) -> tuple[Value, int]:
+        part, end = _raw(data, at, count * size)
+        return list(struct.unpack(f"<{count}{letter}", part)), end
+
+    return read
+
+
+def _list_of(one: Read) -> ReadMany:
+    def read(data: bytes, at: int, count: int) -> tuple[Value, int]:
+        items = []
+        for _ in range(count):
+            item, at = one(data, at)
+            items.append(item)
+        return items, at
+
+    return read
 
 
 def encode(type: str, value: Mapping[str, Any]) -> bytes:  # noqa: A002 - ROS's own word
@@ -218,47 +290,8 @@ def _of_noetic(type_: str) -> tuple[str, str]:
     return noetic_definitions()[type_]
 
 
-def _message(store: Typestore, name: str, value: Mapping[str, Any]) -> object:
-    fields = store.fielddefs[name][1]
-    if unknown := value.keys() - {n for n, _ in fields}:
-        raise ValueError(f"{name} has no field {', '.join(sorted(unknown))}")
-    kept = [(n, desc) for n, desc in fields if n != "structure_needs_at_least_one_member"]
-    return store.types[name](*[_field(store, desc, value.get(n)) for n, desc in kept])
-
-
-def _field(store: Typestore, desc: Value, value: Value) -> Value:
-    kind, detail = desc
-    if kind == Nodetype.BASE:
-        return _zero(detail[0]) if value is None else _check_value(detail[0], value)
-    if kind == Nodetype.NAME:
-        if value is not None and not isinstance(value, Mapping):
-            raise ValueError(f"a map of fields is asked for, not {value!r}")
-        return _message(store, detail, value or {})
-    inner, size = detail
-    if value is not None and not isinstance(value, list | tuple | bytes):
-        raise ValueError(f"a list is asked for, not {value!r}")
-    items = list(value) if value is not None else [None] * (size if kind == Nodetype.ARRAY else 0)
-    converted = [_field(store, inner, item) for item in items]
-    if inner[0] == Nodetype.BASE and inner[1][0] != "string":
-        return np.array(converted, dtype=_dtype(inner[1][0]))
-    return converted
-
-
-def _nothing(type_: str, value: Mapping[str, Any]) -> bytes:
-    if value:
-        raise ValueError(f"{type_} has no field {', '.join(sorted(value))}")
-    return b""
-
-
-def _dtype(base: str) -> str:
-    return {"byte": "int8", "char": "uint8"}.get(base, base)
-
-
 def _zero(base: str) -> Value:
     return "" if base == "string" else False if base == "bool" else 0
-
-
-FLOAT32_MAX = float(np.finfo(np.float32).max)
 
 
 def _check_value(base: str, value: Value) -> Value:
@@ -266,8 +299,8 @@ def _check_value(base: str, value: Value) -> Value:
     if not isinstance(value, wanted) or (isinstance(value, bool) and base != "bool"):
         raise ValueError(f"{value!r} is no {base}")
     if isinstance(value, int) and wanted is int:
-        bits = 8 * PRIMITIVES[_dtype(base)]
-        low = 0 if _dtype(base).startswith("u") else -(1 << bits - 1)
+        bits = 8 * PRIMITIVES[base]
+        low = 0 if base.startswith("u") else -(1 << bits - 1)
         if not low <= value < low + (1 << bits):
             raise ValueError(f"{value} is out of range for {base}")
     if base == "float32" and FLOAT32_MAX < abs(value) < float("inf"):

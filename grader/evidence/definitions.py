@@ -1,8 +1,8 @@
-"""Reads a recorded ROS 1 message definition into a form that is safe to hand to a code generator.
+"""Reads a recorded ROS 1 message definition into a form that is safe to follow, and to hand to a code generator.
 
-A student's node sends the definition, and rosbags turns definitions into Python code. So nothing of it is
-passed on but its structure: every type and field gets a name of ours, and what would unroll or nest without
-end is refused.
+A student's node sends the definition, so what would unroll or nest without end is refused. For messages of ROS 2
+(`ros2.py`) rosbags turns definitions into Python code: nothing is passed on to it but their structure, and every type
+and field gets a name of ours.
 """
 
 from __future__ import annotations

@@ -7,16 +7,26 @@ from __future__ import annotations
 
 import re
 import sqlite3
+import struct
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from grader.errors import EvidenceError
-from grader.evidence.definitions import DefinitionError, sections_of
+from grader.evidence.definitions import (
+    PACKAGE,
+    DefinitionError,
+    alias,
+    bound,
+    canonical,
+    parse,
+    sections_of,
+)
 from grader.evidence.run import (
+    DECODED_BYTES_MAX,
     BudgetExceeded,
     Channel,
     MemoryBudget,
@@ -77,10 +87,34 @@ def _fields(lines: tuple[str, ...]) -> Iterator[str]:
 
 def ros1_messages(type_: str, definition: str, data: list[bytes]) -> list[bytes]:
     """Return messages in CDR as ROS 1's bytes, by a definition of ROS 1's; what does not fit becomes empty."""
-    from grader.evidence.decode import Decoder  # noqa: PLC0415 - numpy, which few recordings need
+    convert = _converter(type_, definition)
+    return [convert(one) if convert is not None else b"" for one in data]
 
-    decoder = Decoder(type_, definition)
-    return [decoder.from_cdr(one) for one in data]
+
+def _converter(type_: str, definition: str) -> Callable[[bytes], bytes] | None:
+    """Return what makes ROS 1's bytes of a message in CDR; None where there are none to make."""
+    from rosbags.serde import SerdeError  # noqa: PLC0415 - numpy, which few recordings need
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: PLC0415 - as above
+    from rosbags.typesys.base import TypesysError  # noqa: PLC0415 - as above
+
+    store, name = get_typestore(Stores.EMPTY), f"{PACKAGE}/msg/{alias(type_)}"
+    try:
+        types = parse(type_, definition)
+        store.register(get_types_from_msg(canonical(types), name))
+        store.get_msgdef(name)
+    except (DefinitionError, TypesysError, SyntaxError, RecursionError):
+        return None
+    memory = bound(types)
+
+    def convert(data: bytes) -> bytes:
+        if memory.decoded(len(data)) > DECODED_BYTES_MAX:
+            return b""
+        try:
+            return bytes(store.cdr_to_ros1(data, name))
+        except (SerdeError, struct.error, ValueError, IndexError, OverflowError, AssertionError):
+            return b""
+
+    return convert if types[type_] else None  # CDR makes a byte of a message without fields
 
 
 def as_ros1(channel: Channel, qos_profiles: str) -> Channel:

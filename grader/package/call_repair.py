@@ -16,6 +16,7 @@ from itertools import chain, pairwise
 from typing import Literal, NamedTuple, TypeGuard
 
 from grader.package.member_repair import with_place
+from grader.package.script_tree import nodes_in, tree_of
 from grader.package.syntax_repair import Step, edited, is_docstring, last_name, span_of, step_to
 
 GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "logerr")
@@ -43,7 +44,7 @@ class Unbound(NamedTuple):
 def with_values_called(text: str) -> Iterator[Step]:
     """`rate = rospy.rate = 10`, for `rate = rospy.Rate(10)`: a value is given to what takes it as an argument."""
     lines = text.split("\n")
-    for node in ast.walk(ast.parse(text)):
+    for node in nodes_in(tree_of(text)):
         target = node.targets[-1] if isinstance(node, ast.Assign) else None
         if (
             not isinstance(target, ast.Attribute)
@@ -63,13 +64,13 @@ def with_values_called(text: str) -> Iterator[Step]:
 
 
 def with_calls(text: str) -> Iterator[Step]:
-    tree, lines = ast.parse(text), text.split("\n")
-    own = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
-    own -= {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and n.decorator_list}
+    tree, lines = tree_of(text), text.split("\n")
+    own = {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
+    own -= {n.name for n in nodes_in(tree) if isinstance(n, ast.FunctionDef) and n.decorator_list}
     named = [
-        n for n in chain.from_iterable(map(_uncalled_expressions, ast.walk(tree))) if _is_callable(n, own)
+        n for n in chain.from_iterable(map(_uncalled_expressions, nodes_in(tree))) if _is_callable(n, own)
     ]
-    alone = (n.value for n in ast.walk(tree) if isinstance(n, ast.Expr))
+    alone = (n.value for n in nodes_in(tree) if isinstance(n, ast.Expr))
     named += [n for n in alone if isinstance(n, ast.Attribute) and n.attr in own - CALLED]
     spans = [span for n in named if (span := span_of(lines, n))]
     if spans:
@@ -81,7 +82,7 @@ def with_calls(text: str) -> Iterator[Step]:
 def with_quoted_calls(text: str) -> Iterator[Step]:
     """`"rospy.spin()"`: a call that stands alone in quotes."""
     lines = text.split("\n")
-    for node in ast.walk(ast.parse(text)):
+    for node in nodes_in(tree_of(text)):
         value = node.value if isinstance(node, ast.Expr) else None
         code = value.value if isinstance(value, ast.Constant) and isinstance(value.value, str) else ""
         span = span_of(lines, value) if value is not None and QUOTED.fullmatch(code) else None
@@ -109,10 +110,10 @@ def _is_callable(node: ast.expr, own: set[str]) -> bool:
 def with_callbacks(text: str) -> Iterator[Step]:
     """`Subscriber('x', String, on_x())` calls the function instead of naming it: one that takes a message, or that
     gives nothing back."""
-    tree, lines = ast.parse(text), text.split("\n")
-    own = {n.name: n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+    tree, lines = tree_of(text), text.split("\n")
+    own = {n.name: n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
     called = []
-    for node in ast.walk(tree):
+    for node in nodes_in(tree):
         if isinstance(node, ast.Call) and last_name(node.func) in TAKE_FUNCTIONS:
             given = [*node.args[:3], *(k.value for k in node.keywords if k.arg in {"callback", "handler"})]
             calls = (n for n in given if isinstance(n, ast.Call) and not n.args and not n.keywords)
@@ -125,14 +126,14 @@ def with_callbacks(text: str) -> Iterator[Step]:
 
 
 def _is_callback(function: ast.FunctionDef) -> bool:
-    returns = (n.value for n in ast.walk(function) if isinstance(n, ast.Return | ast.Yield))
+    returns = (n.value for n in nodes_in(function) if isinstance(n, ast.Return | ast.Yield))
     given = [a for a in function.args.args if a.arg != "self"]
     return len(given) > len(function.args.defaults) or not any(returns)
 
 
 def with_arguments(text: str) -> Iterator[Step]:
     lines = text.split("\n")
-    tree = ast.parse(text)
+    tree = tree_of(text)
     for mistake in chain(_wrong_arguments(tree), _names_of_objects(tree)):
         spans = [(span, new) for node, new in mistake.edits if (span := span_of(lines, node))]
         if len(spans) == len(mistake.edits):
@@ -145,7 +146,7 @@ def with_arguments(text: str) -> Iterator[Step]:
 
 def with_globals(text: str) -> Iterator[Step]:
     lines = text.split("\n")
-    for found in _unbound_variables(ast.parse(text)):
+    for found in _unbound_variables(tree_of(text)):
         at = found.first.lineno - 1
         blanks = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
         after = "\n".join([*lines[:at], f"{blanks}global {found.name}", *lines[at:]])
@@ -157,18 +158,18 @@ def with_globals(text: str) -> Iterator[Step]:
 
 def with_lines_turned(text: str) -> Iterator[Step]:
     """A line of a function that reads what the line right below it gives its only value."""
-    tree, lines = ast.parse(text), text.split("\n")
+    tree, lines = tree_of(text), text.split("\n")
     shared = {name for one in tree.body for name in _bound_in(one)} | set(dir(builtins))
-    for function in (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)):
-        names = [n for n in ast.walk(function) if isinstance(n, ast.Name)]
+    for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
+        names = [n for n in nodes_in(function) if isinstance(n, ast.Name)]
         stored = [n.id for n in names if not isinstance(n.ctx, ast.Load)]
-        known = shared | {n.arg for n in ast.walk(function) if isinstance(n, ast.arg)}
-        blocks = [n.body for n in ast.walk(function) if isinstance(n, ast.FunctionDef | ast.While | ast.For)]
+        known = shared | {n.arg for n in nodes_in(function) if isinstance(n, ast.arg)}
+        blocks = [n.body for n in nodes_in(function) if isinstance(n, ast.FunctionDef | ast.While | ast.For)]
         for first, second in chain.from_iterable(map(pairwise, blocks)):
             given = {
-                n.id for n in ast.walk(second) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+                n.id for n in nodes_in(second) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
             }
-            read = {n.id for n in ast.walk(first) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+            read = {n.id for n in nodes_in(first) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
             late = {name for name in given & read - known if stored.count(name) == 1}
             alone = (
                 first.end_lineno == first.lineno == second.lineno - 1 and second.end_lineno == second.lineno
@@ -188,13 +189,13 @@ def _wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
     """Yield what calls of rospy's are given in another form than they take it."""
     types, of_rospy = _imported(tree, "msg"), _imported(tree, "rospy")
     functions = {one.name for one in tree.body if isinstance(one, ast.FunctionDef)}
-    values = [(t, n.value) for n in ast.walk(tree) if isinstance(n, ast.Assign) for t in n.targets]
+    values = [(t, n.value) for n in nodes_in(tree) if isinstance(n, ast.Assign) for t in n.targets]
     rates = {ast.unparse(target) for target, value in values if _called(value) == "Rate"}
     of_numbers = {
         ast.unparse(target) for target, value in values if NUMBERS.fullmatch(_published_type(value))
     }
     yield from _published_nothing(tree)
-    for call in (n for n in ast.walk(tree) if isinstance(n, ast.Call)):
+    for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call)):
         name = _called(call)
         if name == "sleep" and isinstance(call.func, ast.Attribute) and ast.unparse(call.func.value) in rates:
             if call.args:
@@ -267,7 +268,7 @@ def _text_of_a_number(call: ast.Call) -> Iterator[Argument]:
 
 def _names_beside(function: ast.FunctionDef, call: ast.Call) -> set[str]:
     """Return the names that the block with a call by itself gives a value."""
-    for node in ast.walk(function):
+    for node in nodes_in(function):
         block = getattr(node, "body", [])
         if isinstance(block, list) and any(isinstance(s, ast.Expr) and s.value is call for s in block):
             given = (target for s in block if isinstance(s, ast.Assign) for target in s.targets)
@@ -277,11 +278,11 @@ def _names_beside(function: ast.FunctionDef, call: ast.Call) -> set[str]:
 
 def _published_nothing(tree: ast.Module) -> Iterator[Argument]:
     """Yield `publish()` where its function gives a value to one name and does nothing with it, or its block to one."""
-    for function in (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)):
-        names = [n for n in ast.walk(function) if isinstance(n, ast.Name)]
+    for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
+        names = [n for n in nodes_in(function) if isinstance(n, ast.Name)]
         read = {n.id for n in names if isinstance(n.ctx, ast.Load)}
         unread = {n.id for n in names if isinstance(n.ctx, ast.Store)} - read
-        calls = [n for n in ast.walk(function) if _called(n) == "publish" and isinstance(n, ast.Call)]
+        calls = [n for n in nodes_in(function) if _called(n) == "publish" and isinstance(n, ast.Call)]
         beside = _names_beside(function, calls[0]) if len(calls) == 1 else set()
         meant = unread if len(unread) == 1 else beside
         if len(meant) == len(calls) == 1 and not calls[0].args and not calls[0].keywords:
@@ -320,19 +321,19 @@ def _names_of_objects(tree: ast.Module) -> Iterator[Argument]:
     classes = [n for n in tree.body if isinstance(n, ast.ClassDef)]
     for one in classes:
         methods = [n for n in one.body if isinstance(n, ast.FunctionDef) and not n.decorator_list]
-        stored = (n for n in ast.walk(one) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store))
+        stored = (n for n in nodes_in(one) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store))
         attributes = {n.attr for n in stored if _is_self(n.value)} | {n.name for n in methods}
         attributes |= {name for part in one.body if isinstance(part, ast.Assign) for name in _bound_in(part)}
         for method in (n for n in methods if n.args.args and n.args.args[0].arg == "self"):
             known = shared | {name for part in method.body for name in _bound_in(part)}
-            known |= {n.arg for n in ast.walk(method) if isinstance(n, ast.arg)}
+            known |= {n.arg for n in nodes_in(method) if isinstance(n, ast.arg)}
             for name in (
-                n for n in ast.walk(method) if isinstance(n, ast.Name) and n.id in attributes - known
+                n for n in nodes_in(method) if isinstance(n, ast.Name) and n.id in attributes - known
             ):
                 yield Argument([(name, f"self.{name.id}")], f"`{name.id}` belongs to the class {one.name}")
-    used = {ast.unparse(n.value) for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
+    used = {ast.unparse(n.value) for n in nodes_in(tree) if isinstance(n, ast.Attribute)}
     made = {one.name for one in classes if not one.bases}
-    for node in (n for n in ast.walk(tree) if isinstance(n, ast.Assign) and len(n.targets) == 1):
+    for node in (n for n in nodes_in(tree) if isinstance(n, ast.Assign) and len(n.targets) == 1):
         if (
             isinstance(node.value, ast.Name)
             and node.value.id in made
@@ -353,7 +354,7 @@ def _bound_in(part: ast.AST) -> set[str]:
     if isinstance(part, ast.FunctionDef | ast.ClassDef):
         return {part.name}
     found = set()
-    for node in ast.walk(part):
+    for node in nodes_in(part):
         if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
             found.add(node.id)
         elif isinstance(node, ast.Import | ast.ImportFrom):
@@ -406,12 +407,12 @@ def _unbound_variables(tree: ast.Module) -> Iterator[Unbound]:
         for target in ([one.target] if isinstance(one, ast.AnnAssign) else one.targets)
         if isinstance(target, ast.Name)
     }
-    for function in (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)):
+    for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
         inner = [
-            n for n in ast.walk(function) if isinstance(n, ast.FunctionDef | ast.Lambda) and n is not function
+            n for n in nodes_in(function) if isinstance(n, ast.FunctionDef | ast.Lambda) and n is not function
         ]
-        nodes = set(ast.walk(function)) - {n for one in inner for n in ast.walk(one)}
-        own = {n.arg for n in ast.walk(function.args) if isinstance(n, ast.arg)}
+        nodes = set(nodes_in(function)) - {n for one in inner for n in nodes_in(one)}
+        own = {n.arg for n in nodes_in(function.args) if isinstance(n, ast.arg)}
         own |= {name for n in nodes if isinstance(n, ast.Global | ast.Nonlocal) for name in n.names}
         for name in sorted(shared - own):
             uses = sorted(_reads_and_writes(nodes, name))
@@ -425,19 +426,19 @@ def _unbound_variables(tree: ast.Module) -> Iterator[Unbound]:
 
 def _is_read_outside(tree: ast.Module, name: str, function: ast.FunctionDef) -> bool:
     """Return whether the file's own variable is read, and only outside of a function that has one of that name."""
-    inside = {*ast.walk(function)}
-    for one in ast.walk(tree):
+    inside = {*nodes_in(function)}
+    for one in nodes_in(tree):
         if isinstance(one, ast.FunctionDef) and one not in inside and _has_its_own(one, name):
-            inside |= {*ast.walk(one)}
+            inside |= {*nodes_in(one)}
     reads = [
-        n for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id == name and isinstance(n.ctx, ast.Load)
+        n for n in nodes_in(tree) if isinstance(n, ast.Name) and n.id == name and isinstance(n.ctx, ast.Load)
     ]
-    return any(n not in inside for n in reads) and not any(n in {*ast.walk(function)} for n in reads)
+    return any(n not in inside for n in reads) and not any(n in {*nodes_in(function)} for n in reads)
 
 
 def _has_its_own(function: ast.FunctionDef, name: str) -> bool:
     """Return whether a function takes a variable of that name, or gives it a value without a `global`."""
-    nodes = list(ast.walk(function))
+    nodes = list(nodes_in(function))
     given = any(isinstance(n, ast.Name) and n.id == name and not isinstance(n.ctx, ast.Load) for n in nodes)
     shared = any(isinstance(n, ast.Global) and name in n.names for n in nodes)
     return any(isinstance(n, ast.arg) and n.arg == name for n in nodes) or (given and not shared)
@@ -445,7 +446,7 @@ def _has_its_own(function: ast.FunctionDef, name: str) -> bool:
 
 def _reads_and_writes(nodes: set[ast.AST], name: str) -> Iterator[tuple[tuple[int, int], bool]]:
     """Yield line and kind of each use. What is on one line is read before it is written, but for a loop's variable."""
-    loops = {n for one in nodes if isinstance(one, ast.For | ast.comprehension) for n in ast.walk(one.target)}
+    loops = {n for one in nodes if isinstance(one, ast.For | ast.comprehension) for n in nodes_in(one.target)}
     for node in nodes:
         if isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name) and node.target.id == name:
             yield (node.lineno, 0), False
@@ -457,7 +458,7 @@ def _reads_and_writes(nodes: set[ast.AST], name: str) -> Iterator[tuple[tuple[in
 def _imported(tree: ast.Module, ending: str) -> set[str]:
     return {
         a.asname or a.name
-        for one in ast.walk(tree)
+        for one in nodes_in(tree)
         if isinstance(one, ast.ImportFrom) and f".{one.module}".endswith(f".{ending}")
         for a in one.names
     }

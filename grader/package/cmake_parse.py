@@ -8,6 +8,7 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from itertools import islice, takewhile
 from pathlib import Path
 from typing import NamedTuple
@@ -245,11 +246,15 @@ def parse_tree_of(data: bytes, file: str) -> tuple[list[nodes.AstFileNode], Faul
     return tree, fault
 
 
-def commands_of(data: bytes) -> list[nodes.Command] | None:
-    """Return every command of a CMake file, also those in blocks and definitions; None where it cannot be read."""
+@lru_cache(maxsize=8)
+def commands_of(data: bytes) -> tuple[nodes.Command, ...] | None:
+    """Return every command of a CMake file, also those in blocks and definitions; None where it cannot be read.
+
+    Each repair asks for those of the same file.
+    """
     text = _readable(data)
     commands, fault = ([], None) if text is None else _commands(text, "")
-    return None if text is None or fault else commands
+    return None if text is None or fault else tuple(commands)
 
 
 def _readable(data: bytes) -> str | None:

@@ -13,6 +13,7 @@ from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 
 from grader.package.name_repair import bound_in, meant_by
+from grader.package.script_tree import nodes_in, tree_of
 from grader.package.syntax_repair import Step, edited, is_docstring, last_name, span_of, step_to, with_line
 from grader.wording import is_one_edit
 
@@ -45,7 +46,7 @@ def with_modules(text: str, types: list[str]) -> Iterator[Step]:
     known = {package: set(names.split()) for package, names in MESSAGES.items()}
     for package, _, name in (kind.partition("/") for kind in types):
         known.setdefault(package, set()).add(name)
-    for node in ast.walk(ast.parse(text)):
+    for node in nodes_in(tree_of(text)):
         if isinstance(node, ast.Import):
             for step in (*_with_class_imported(text, node, known), *_with_inner_module(text, node)):
                 text = step["text"]
@@ -82,13 +83,13 @@ def _is_near_one(name: str, known: Collection[str]) -> bool:
 def with_classes(text: str, types: list[str]) -> Iterator[Step]:
     """`from std_msgs.msg import Sting` where the script uses `String`, which nothing imports; or where it uses `Sting`
     too, and the lab's own type is meant, or the same word in other letters."""
-    tree, lines = ast.parse(text), text.split("\n")
-    uses = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
+    tree, lines = tree_of(text), text.split("\n")
+    uses = [n for n in nodes_in(tree) if isinstance(n, ast.Name)]
     known = {name for names in MESSAGES.values() for name in names.split()} | {
         t.partition("/")[2] for t in types
     }
     unbound = {n.id for n in uses} & known - bound_in(tree)
-    for node in ast.walk(tree):
+    for node in nodes_in(tree):
         package, _, module = (getattr(node, "module", "") or "").partition(".")
         if not isinstance(node, ast.ImportFrom) or module != "msg":
             continue
@@ -118,7 +119,7 @@ def _with_class_imported(text: str, node: ast.Import, known: dict[str, set[str]]
     if len(node.names) > 1 or node.names[0].asname or module != "msg" or name not in known.get(package, ()):
         return
     whole = f"{package}.msg.{name}"
-    used = any(isinstance(n, ast.Attribute) and ast.unparse(n) == whole for n in ast.walk(ast.parse(text)))
+    used = any(isinstance(n, ast.Attribute) and ast.unparse(n) == whole for n in nodes_in(tree_of(text)))
     right = f"import {package}.msg" if used else f"from {package}.msg import {name}"
     after = re.sub(rf"import\s+{re.escape(whole)}\b", right, lines[at], count=1)
     yield from step_to("module", at + 1, text, with_line(lines, at, after), whole)
@@ -134,18 +135,18 @@ def _with_inner_module(text: str, node: ast.Import) -> Iterator[Step]:
 
 
 def with_imports(text: str, types: list[str]) -> Iterator[Step]:
-    tree = ast.parse(text)
+    tree = tree_of(text)
     bound = bound_in(tree)
     if "*" in bound:
         return
     packages = {name: package for package, names in MESSAGES.items() for name in names.split()}
     packages |= {name: package for package, _, name in (kind.partition("/") for kind in types)}
-    parts = [n for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)]
+    parts = [n for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)]
     modules = {last_name(n.value) for n in parts}
     of_messages = {
         last_name(n.value): f"{last_name(n.value)}.{n.attr}" for n in parts if n.attr in ("msg", "srv")
     }
-    loaded = [n for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)]
+    loaded = [n for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)]
     missing = {n.id: n.lineno for n in sorted(loaded, key=lambda n: -n.lineno) if n.id not in bound}
     for name in sorted(missing, key=lambda name: (missing[name], name)):
         if hasattr(builtins, name) or re.search(rf"\.(msg|srv)\s*,\s*{name}\b", text):
@@ -175,9 +176,9 @@ def _imported_instead(tree: ast.Module, name: str, package: str, types: list[str
     """Return the lab's type that the script imports and never uses, where it uses another size of it: Int8 for Int16;
     "" where there is none."""
     of_lab = {kind.partition("/")[2] for kind in types if kind.startswith(f"{package}/")}
-    froms = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module == f"{package}.msg"]
+    froms = [n for n in nodes_in(tree) if isinstance(n, ast.ImportFrom) and n.module == f"{package}.msg"]
     imported = {a.name for n in froms for a in n.names if a.asname is None}
-    used = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
+    used = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name)}
     same = (one for one in sorted(imported & of_lab - used) if SIZE.sub("", one) == SIZE.sub("", name))
     return "" if name in of_lab else next(same, "")
 
@@ -185,7 +186,7 @@ def _imported_instead(tree: ast.Module, name: str, package: str, types: list[str
 def _with_class(text: str, name: str, meant: str) -> Iterator[Step]:
     """`Int8` in place of each `Int16`."""
     lines = text.split("\n")
-    uses = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name) and n.id == name]
+    uses = [n for n in nodes_in(tree_of(text)) if isinstance(n, ast.Name) and n.id == name]
     spans = [span for n in uses if (span := span_of(lines, n))]
     if spans:
         after = edited(text, [(*span, meant) for span in spans])
@@ -195,8 +196,8 @@ def _with_class(text: str, name: str, meant: str) -> Iterator[Step]:
 def _import_meant(text: str, name: str) -> str:
     """Return the text with `import rospy` in place of `import ros`, a module that there is none of and that nothing in
     the script uses; "" where no line imports such a one."""
-    tree, lines = ast.parse(text), text.split("\n")
-    used = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
+    tree, lines = tree_of(text), text.split("\n")
+    used = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name)}
     for one in (n for n in tree.body if isinstance(n, ast.Import) and len(n.names) == 1):
         module = one.names[0].name
         begins_alike = "." not in name and module[:SLIP_CHARS] == name[:SLIP_CHARS]
@@ -209,7 +210,7 @@ def _import_meant(text: str, name: str) -> str:
 
 def _add_import(text: str, statement: str, module: str, name: str) -> str:
     """The text with one more import: in the line that imports from this module, or below the last import."""
-    body, lines = ast.parse(text).body, text.split("\n")
+    body, lines = tree_of(text).body, text.split("\n")
     imports = [s for s in body if isinstance(s, ast.Import | ast.ImportFrom)]
     for one in imports:
         if module and isinstance(one, ast.ImportFrom) and one.module == module and not one.level:
@@ -228,7 +229,7 @@ def _add_import(text: str, statement: str, module: str, name: str) -> str:
 def with_message_classes(text: str) -> Iterator[Step]:
     """`std_msgs.msg.Sting(…)` and `std_msgs.mgs.String(…)`, for `std_msgs.msg.String(…)`."""
     names = set(MESSAGES["std_msgs"].split())
-    for node in (n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Attribute)):
+    for node in (n for n in nodes_in(tree_of(text)) if isinstance(n, ast.Attribute)):
         owner, member, span = ast.unparse(node.value), node.attr, span_of(text.split("\n"), node)
         meant = ""
         if owner == "std_msgs.msg" and member not in names | OTHERS_OF_STD:

@@ -17,6 +17,7 @@ from collections.abc import Collection, Iterator
 from itertools import chain
 
 from grader.package.name_repair import bound_in
+from grader.package.script_tree import nodes_in, tree_of
 from grader.package.syntax_repair import Step, edited, last_name, span_of, step_to
 from grader.wording import is_one_edit
 
@@ -68,7 +69,7 @@ class _Names:
         self.bound, self.own = bound_in(tree), _of_self(tree)
         self.known = self.bound | set(dir(builtins))
         self._members = {"rospy": set(of_rospy), "math": set(dir(math)), "time": set(dir(time))}
-        for node in (n for n in ast.walk(tree) if isinstance(n, ast.Attribute)):
+        for node in (n for n in nodes_in(tree) if isinstance(n, ast.Attribute)):
             if isinstance(node.value, ast.Name) and node.value.id != "rospy":
                 self._members.setdefault(node.value.id, set(ALL_MEMBERS)).add(node.attr)
 
@@ -100,7 +101,7 @@ class _Names:
 
 def _dots(text: str, of_rospy: Collection[str]) -> Iterator[tuple[Edit, str]]:
     """Yield `rospy,spin()` and `rospyspin()`, for `rospy.spin()`, and `"chatter". String`, for `"chatter", String`."""
-    names = _Names(ast.parse(text), of_rospy)
+    names = _Names(tree_of(text), of_rospy)
     if "*" in names.bound:
         return
     given = list(tokenize.generate_tokens(io.StringIO(text).readline))
@@ -123,7 +124,7 @@ def _dots(text: str, of_rospy: Collection[str]) -> Iterator[tuple[Edit, str]]:
 
 def _of_self(tree: ast.Module) -> set[str]:
     """Return the attributes and methods that classes of the script have, and no plain name has."""
-    nodes = list(ast.walk(tree))
+    nodes = list(nodes_in(tree))
     attributes = {n.attr for n in nodes if isinstance(n, ast.Attribute) and last_name(n.value) == "self"}
     classes = [n for n in nodes if isinstance(n, ast.ClassDef)]
     methods = {m.name for one in classes for m in one.body if isinstance(m, ast.FunctionDef)}
@@ -143,19 +144,19 @@ def _of_self(tree: ast.Module) -> set[str]:
 
 def _misspelt_members(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
     """Yield `rate.slep()` and `msg.Data`."""
-    tree, lines = ast.parse(text), text.split("\n")
+    tree, lines = tree_of(text), text.split("\n")
     kinds = {
         ast.unparse(n.targets[0]): last_name(n.value.func)
-        for n in ast.walk(tree)
+        for n in nodes_in(tree)
         if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)
     }
     own = {one.name: _members_of(one) for one in tree.body if isinstance(one, ast.ClassDef) and not one.bases}
     inside = {
-        id(n): name for one in tree.body if (name := getattr(one, "name", "")) in own for n in ast.walk(one)
+        id(n): name for one in tree.body if (name := getattr(one, "name", "")) in own for n in nodes_in(one)
     }
-    stored = {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
+    stored = {n.attr for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
     messages = _messages_of_std(tree)
-    for node in (n for n in ast.walk(tree) if isinstance(n, ast.Attribute)):
+    for node in (n for n in nodes_in(tree) if isinstance(n, ast.Attribute)):
         members: tuple[str, ...] = MEMBERS["message"] if id(node.value) in messages else ()
         of_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
         owner = ast.unparse(node.value)
@@ -170,27 +171,27 @@ def _misspelt_members(text: str, _names: Collection[str]) -> Iterator[tuple[Edit
 
 def _members_of(one: ast.ClassDef) -> tuple[str, ...]:
     """Return what the objects of a class have."""
-    nodes = list(ast.walk(one))
+    nodes = list(nodes_in(one))
     stored = [n.attr for n in nodes if isinstance(n, ast.Attribute) and not isinstance(n.ctx, ast.Load)]
     named = [
-        n.id for s in one.body for n in ast.walk(s) if isinstance(s, ast.Assign) and isinstance(n, ast.Name)
+        n.id for s in one.body for n in nodes_in(s) if isinstance(s, ast.Assign) and isinstance(n, ast.Name)
     ]
     return (*(s.name for s in one.body if isinstance(s, ast.FunctionDef)), *stored, *named)
 
 
 def _messages_of_std(tree: ast.Module) -> set[int]:
     """Return the uses of callbacks' messages that are of std_msgs, whose field is `data`, by their identity."""
-    imports = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module == "std_msgs.msg"]
+    imports = [n for n in nodes_in(tree) if isinstance(n, ast.ImportFrom) and n.module == "std_msgs.msg"]
     types = {a.asname or a.name for n in imports for a in n.names}
-    calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and last_name(n.func) == "Subscriber"]
+    calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call) and last_name(n.func) == "Subscriber"]
     named = {last_name(c.args[2]) for c in calls if len(c.args) > 2 and last_name(c.args[1]) in types}
     functions = [
-        n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and n.name in named and n.args.args
+        n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef) and n.name in named and n.args.args
     ]
     return {
         id(use)
         for function in functions
-        for use in ast.walk(function)
+        for use in nodes_in(function)
         if isinstance(use, ast.Name) and use.id == function.args.args[-1].arg
     }
 
@@ -198,7 +199,7 @@ def _messages_of_std(tree: ast.Module) -> set[int]:
 def _misspelt_keywords(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
     """Yield `Publisher(…, quue_size=10)`, and `queue_size10`."""
     lines = text.split("\n")
-    for call in (n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Call)):
+    for call in (n for n in nodes_in(tree_of(text)) if isinstance(n, ast.Call)):
         keywords = KEYWORDS.get(last_name(call.func), ())
         for one in (k for k in call.keywords if keywords and k.arg and k.arg not in keywords):
             right, at = _near(str(one.arg), keywords), one.lineno - 1
@@ -223,15 +224,15 @@ def _misspelt_keywords(text: str, _names: Collection[str]) -> Iterator[tuple[Edi
 
 def _lost_values(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
     """Yield `rate : rospy.Rate(10)` and `rate == rospy.Rate(10)`, which give a name no value."""
-    tree, lines = ast.parse(text), text.split("\n")
-    stored = {ast.unparse(n) for n in ast.walk(tree) if isinstance(getattr(n, "ctx", None), ast.Store)}
-    for one in (n.value for n in ast.walk(tree) if isinstance(n, ast.Expr)):
+    tree, lines = tree_of(text), text.split("\n")
+    stored = {ast.unparse(n) for n in nodes_in(tree) if isinstance(getattr(n, "ctx", None), ast.Store)}
+    for one in (n.value for n in nodes_in(tree) if isinstance(n, ast.Expr)):
         left = one.left if isinstance(one, ast.Compare) and isinstance(one.ops[0], ast.Eq) else None
         span = span_of(lines, left) if left is not None and ast.unparse(left) not in stored else None
         sign = lines[span[0]].find("==", span[2]) if span is not None else -1
         if span is not None and sign >= 0:
             yield ((span[0], sign, sign + 2), "="), "a name gets its value by `=`, and not by `==`"
-    for node in (n for n in ast.walk(tree) if isinstance(n, ast.AnnAssign) and n.value is None):
+    for node in (n for n in nodes_in(tree) if isinstance(n, ast.AnnAssign) and n.value is None):
         span, kind = span_of(lines, node.target), node.annotation
         is_value = isinstance(kind, ast.Call | ast.BinOp) or (
             isinstance(kind, ast.Constant) and kind.value is not None
@@ -244,7 +245,7 @@ def _lost_values(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str
 def _lost_places(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
     """Yield `"hello world s" % x` and `"hello world %s" & x`."""
     lines = text.split("\n")
-    for node in (n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.BinOp)):
+    for node in (n for n in nodes_in(tree_of(text)) if isinstance(n, ast.BinOp)):
         left, span = node.left, span_of(lines, node.left)
         if not isinstance(left, ast.Constant) or not isinstance(left.value, str) or span is None:
             continue

@@ -11,6 +11,7 @@ import builtins
 from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 
+from grader.package.script_tree import nodes_in, tree_of
 from grader.package.syntax_repair import Step, edited, span_of, step_to
 from grader.wording import is_one_edit
 
@@ -32,7 +33,7 @@ SHORT_NAME_CHARS_MIN = 2
 
 def bound_in(tree: ast.Module) -> set[str]:
     found: set[str] = set()
-    for node in ast.walk(tree):
+    for node in nodes_in(tree):
         if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
             found.add(node.id)
         elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
@@ -48,10 +49,10 @@ def bound_in(tree: ast.Module) -> set[str]:
 
 def with_self(text: str) -> Iterator[Step]:
     """`def stop(Self):` of a method that uses `self`."""
-    tree, lines = ast.parse(text), text.split("\n")
-    methods = (m for one in ast.walk(tree) if isinstance(one, ast.ClassDef) for m in one.body)
+    tree, lines = tree_of(text), text.split("\n")
+    methods = (m for one in nodes_in(tree) if isinstance(one, ast.ClassDef) for m in one.body)
     for method in (m for m in methods if isinstance(m, ast.FunctionDef) and m.args.args):
-        first, used = method.args.args[0], {n.id for n in ast.walk(method) if isinstance(n, ast.Name)}
+        first, used = method.args.args[0], {n.id for n in nodes_in(method) if isinstance(n, ast.Name)}
         span = span_of(lines, first)  # type: ignore[arg-type] # an argument has a place too
         is_slip = is_one_edit(first.arg, "self") and "self" in used and first.arg not in used
         if is_slip and span is not None:
@@ -66,13 +67,13 @@ OF_SELF = "a method's own object is called `self`, and not `%s`"
 
 def with_names(text: str) -> Iterator[Step]:
     """`true`, `rospu` and `Sting`: a name that nothing in the file has, and one alone is nearly the same."""
-    tree, lines = ast.parse(text), text.split("\n")
+    tree, lines = tree_of(text), text.split("\n")
     bound = bound_in(tree)
-    if "*" in bound or any(isinstance(n, ast.Try) and _catches_names(n) for n in ast.walk(tree)):
+    if "*" in bound or any(isinstance(n, ast.Try) and _catches_names(n) for n in nodes_in(tree)):
         return
     shared = {name for one in tree.body for name in _bound_by(one)}
     known = bound | set(dir(builtins)) | {"__file__"}
-    loaded = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+    loaded = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
     blocks = (
         inner
         for one in tree.body
@@ -81,8 +82,8 @@ def with_names(text: str) -> Iterator[Step]:
     )
     for block in blocks:
         own = shared | (bound_in(ast.Module([block], [])) if isinstance(block, ast.FunctionDef) else set())
-        missing = [n for n in ast.walk(block) if isinstance(n, ast.Name) and n.id not in known]
-        stated = (n.value for n in ast.walk(block) if isinstance(n, ast.Expr))
+        missing = [n for n in nodes_in(block) if isinstance(n, ast.Name) and n.id not in known]
+        stated = (n.value for n in nodes_in(block) if isinstance(n, ast.Expr))
         alone = {n.id for n in stated if isinstance(n, ast.Name) and is_one_edit(n.id.lower(), "pass")}
         for name in dict.fromkeys(n.id for n in missing):
             guards = name == "name" and any(_is_guard(one) for one in tree.body)

@@ -29,6 +29,7 @@ from grader.package.call_repair import (
 from grader.package.import_repair import with_classes, with_imports, with_message_classes, with_modules
 from grader.package.member_repair import with_members
 from grader.package.name_repair import bound_in, meant_by, with_names, with_self
+from grader.package.script_tree import nodes_in, tree_of
 from grader.package.syntax_repair import (
     Step,
     as_python3,
@@ -122,9 +123,9 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
 
 
 def _without_old_names(text: str) -> Iterator[Step]:
-    tree, lines = ast.parse(text), text.split("\n")
+    tree, lines = tree_of(text), text.split("\n")
     bound = bound_in(tree)
-    uses = [n for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id in OLD_NAMES and n.id not in bound]
+    uses = [n for n in nodes_in(tree) if isinstance(n, ast.Name) and n.id in OLD_NAMES and n.id not in bound]
     spans = [(span, OLD_NAMES[n.id]) for n in uses if (span := span_of(lines, n))]
     if spans:
         names = ", ".join(sorted({n.id for n in uses}))
@@ -134,7 +135,7 @@ def _without_old_names(text: str) -> Iterator[Step]:
 
 def _without_old_print(text: str) -> Iterator[Step]:
     """`print >>file, x` parses, as a shift."""
-    for node in ast.walk(ast.parse(text)):
+    for node in nodes_in(tree_of(text)):
         value = node.value if isinstance(node, ast.Expr) else None
         first = value.elts[0] if isinstance(value, ast.Tuple) and value.elts else value
         if (
@@ -151,17 +152,17 @@ def _without_old_print(text: str) -> Iterator[Step]:
 def _with_quotes(text: str) -> Iterator[Step]:
     """`Publisher(chatter, …)`, for `Publisher('chatter', …)`: a name without a value, where ROS is told one; and
     `details[name]`, where the name stands for a key of parameters."""
-    tree, lines = ast.parse(text), text.split("\n")
+    tree, lines = tree_of(text), text.split("\n")
     known = bound_in(tree) | set(dir(builtins))
     if "*" in known:
         return
     stored: dict[str, list[int]] = {}
-    for name in (n for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)):
+    for name in (n for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)):
         stored.setdefault(name.id, []).append(name.lineno)
     texts = [n for n in _texts_of_ros(tree) if isinstance(n, ast.Name)]
     missing = [n for n in texts if n.id not in known and not meant_by(n.id, set(stored))]
-    assigned = [n for n in ast.walk(tree) if isinstance(n, ast.Assign)]
-    own = {id(inner): last_name(n.targets[0]) for n in assigned for inner in ast.walk(n.value)}
+    assigned = [n for n in nodes_in(tree) if isinstance(n, ast.Assign)]
+    own = {id(inner): last_name(n.targets[0]) for n in assigned for inner in nodes_in(n.value)}
     keys = [
         n
         for n in _keys_of_parameters(tree)
@@ -177,7 +178,7 @@ def _with_quotes(text: str) -> Iterator[Step]:
 def _texts_of_ros(tree: ast.Module) -> Iterator[ast.expr]:
     """Yield what stands where ROS is told the name of a node, a topic, a parameter or a frame."""
     yield from (node for _, node in _named_texts(tree))
-    for node in ast.walk(tree):
+    for node in nodes_in(tree):
         if isinstance(node, ast.Call) and last_name(node.func) in OF_TWO_FRAMES:
             yield from node.args[:2]
         elif isinstance(node, ast.Assign) and last_name(node.targets[0]) in ("frame_id", "child_frame_id"):
@@ -188,12 +189,12 @@ def _keys_of_parameters(tree: ast.Module) -> Iterator[ast.Name]:
     """Yield the names in the brackets behind what `get_param(…)` gives."""
     read = {
         ast.unparse(n.targets[0])
-        for n in ast.walk(tree)
+        for n in nodes_in(tree)
         if isinstance(n, ast.Assign)
         and isinstance(n.value, ast.Call)
         and last_name(n.value.func) == "get_param"
     }
-    for node in ast.walk(tree):
+    for node in nodes_in(tree):
         root: ast.expr | None = node if isinstance(node, ast.Subscript) else None
         while isinstance(root, ast.Subscript):
             root = root.value
@@ -205,7 +206,7 @@ def _keys_of_parameters(tree: ast.Module) -> Iterator[ast.Name]:
 def _with_attributes(text: str) -> Iterator[Step]:
     """`rospy.subscriber(…)`, for `rospy.Subscriber(…)`: what rospy lacks, and has nearly under that name."""
     lines = text.split("\n")
-    for node in ast.walk(ast.parse(text)):
+    for node in nodes_in(tree_of(text)):
         if not isinstance(node, ast.Attribute) or last_name(node.value) != "rospy" or node.attr in ROSPY:
             continue
         plain = {name.lower(): name for name in ROSPY}
@@ -228,18 +229,18 @@ def _with_attributes(text: str) -> Iterator[Step]:
 def _with_start(text: str) -> Iterator[Step]:
     """A function that goes on after two blank lines: the first line of the next one is missing; or, where it makes the
     node or calls a function there, the line that begins the script's own part."""
-    tree, lines = ast.parse(text), text.split("\n")
+    tree, lines = tree_of(text), text.split("\n")
     functions = [n for n in tree.body if isinstance(n, ast.FunctionDef)]
     plain = (ast.FunctionDef, ast.ClassDef, ast.Import, ast.ImportFrom)
     started = any(
-        isinstance(n, ast.Call) for one in tree.body if not isinstance(one, plain) for n in ast.walk(one)
+        isinstance(n, ast.Call) for one in tree.body if not isinstance(one, plain) for n in nodes_in(one)
     )
     for function in functions:
         for before, after in pairwise(function.body):
             if after.lineno - (before.end_lineno or after.lineno) <= BLANK_LINES:
                 continue
             rest = ast.Module(function.body[function.body.index(after) :], [])
-            calls = {last_name(n.func) for n in ast.walk(rest) if isinstance(n, ast.Call)}
+            calls = {last_name(n.func) for n in nodes_in(rest) if isinstance(n, ast.Call)}
             head = lost_head(text, ast.unparse(rest))
             begins = not started and calls & {"init_node", *(one.name for one in functions)}
             line = head or ("if __name__ == '__main__':" if begins else "")
@@ -255,8 +256,8 @@ BLANK_LINES = 2
 
 def _with_main(text: str) -> Iterator[Step]:
     """A script that calls nothing, or only where `__name__` has a value that it never has."""
-    tree, lines = ast.parse(text), text.split("\n")
-    for node in ast.walk(tree):
+    tree, lines = tree_of(text), text.split("\n")
+    for node in nodes_in(tree):
         if isinstance(node, ast.Compare) and isinstance(node.left, ast.Name) and node.left.id == "__name__":
             word, span = node.comparators[0], span_of(lines, node.comparators[0])
             if (
@@ -275,16 +276,16 @@ def _with_main(text: str) -> Iterator[Step]:
         for s in tree.body
         if not isinstance(s, ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom)
     )
-    if any(isinstance(n, ast.Call) for s in runs for n in ast.walk(s)):
+    if any(isinstance(n, ast.Call) for s in runs for n in nodes_in(s)):
         return
     makers = [
         f
         for f in tree.body
         if isinstance(f, ast.FunctionDef)
         and len(f.args.args) == len(f.args.defaults)
-        and any(isinstance(n, ast.Call) and last_name(n.func) == "init_node" for n in ast.walk(f))
+        and any(isinstance(n, ast.Call) and last_name(n.func) == "init_node" for n in nodes_in(f))
     ]
-    named = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
+    named = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name)}
     if len(makers) == 1 and makers[0].name not in named:
         after = f"{text.rstrip()}\n\n\nif __name__ == '__main__':\n    {makers[0].name}()\n"
         yield from step_to("main", makers[0].lineno, text, after, makers[0].name)
@@ -292,12 +293,12 @@ def _with_main(text: str) -> Iterator[Step]:
 
 def _with_spin(text: str) -> Iterator[Step]:
     """A node that only waits for messages, and ends at once."""
-    tree = ast.parse(text)
-    calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call)]
+    tree = tree_of(text)
+    calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call)]
     waits = [c for c in calls if last_name(c.func) in {"Subscriber", "Service", "Timer"}]
-    rospy = next((a.asname or a.name for n in ast.walk(tree) if isinstance(n, ast.Import)
+    rospy = next((a.asname or a.name for n in nodes_in(tree) if isinstance(n, ast.Import)
                   for a in n.names if a.name == "rospy"), "")  # fmt: skip
-    loops = any(isinstance(n, ast.While) for n in ast.walk(tree))
+    loops = any(isinstance(n, ast.While) for n in nodes_in(tree))
     makes_node = any(last_name(c.func) == "init_node" for c in calls)
     if not waits or loops or not rospy or not makes_node or LOOPED & {last_name(c.func) for c in calls}:
         return
@@ -315,7 +316,7 @@ def _with_spin(text: str) -> Iterator[Step]:
 def _last_block(tree: ast.Module, waits: list[ast.Call]) -> list[ast.stmt]:
     """The body in which the node would have to stay: of the function that subscribes, or else of the script."""
     for node in tree.body:
-        if isinstance(node, ast.FunctionDef) and any(c in set(ast.walk(node)) for c in waits):
+        if isinstance(node, ast.FunctionDef) and any(c in set(nodes_in(node)) for c in waits):
             return node.body
     block = tree.body
     while isinstance(block[-1], ast.If | ast.Try):
@@ -330,7 +331,7 @@ def _names(text: str) -> list[dict[str, Any]]:
     """Return the texts that name a topic, a node or a parameter, each with its role, value and place."""
     if syntax_error(text) is not None:
         return []
-    tree, lines = ast.parse(text), text.split("\n")
+    tree, lines = tree_of(text), text.split("\n")
     constants, keys = _constants(tree), _keys_read(tree)
     found = []
     for role, node in _named_texts(tree):
@@ -347,9 +348,9 @@ def _names(text: str) -> list[dict[str, Any]]:
 def _keys_read(tree: ast.Module) -> dict[int, list[str]]:
     """Return for the first argument of a call, by its identity, the keys that are read of what the call gives:
     `first` of `get_param('name')['first']`, and of `name['first']` below `name = get_param('name')`."""
-    calls = {ast.unparse(n.targets[0]): n.value for n in ast.walk(tree) if isinstance(n, ast.Assign)}
+    calls = {ast.unparse(n.targets[0]): n.value for n in nodes_in(tree) if isinstance(n, ast.Assign)}
     found: dict[int, list[str]] = {}
-    for node in ast.walk(tree):
+    for node in nodes_in(tree):
         if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
             of = node.value if isinstance(node.value, ast.Call) else calls.get(ast.unparse(node.value))
             if isinstance(of, ast.Call) and of.args and isinstance(node.slice.value, str):
@@ -358,7 +359,7 @@ def _keys_read(tree: ast.Module) -> dict[int, list[str]]:
 
 
 def _named_texts(tree: ast.Module) -> Iterator[tuple[str, ast.expr]]:
-    for call in ast.walk(tree):
+    for call in nodes_in(tree):
         if isinstance(call, ast.Subscript) and isinstance(call.slice, ast.Constant):
             yield "key", call.slice
         if not isinstance(call, ast.Call):
@@ -373,7 +374,7 @@ def _named_texts(tree: ast.Module) -> Iterator[tuple[str, ast.expr]]:
 def _constants(tree: ast.Module) -> dict[str, ast.expr]:
     """Names that are given one value, once, in the whole file."""
     found: dict[str, list[ast.expr]] = {}
-    for node in ast.walk(tree):
+    for node in nodes_in(tree):
         if isinstance(node, ast.Assign):
             for target in node.targets:
                 if isinstance(target, ast.Name):

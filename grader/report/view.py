@@ -357,10 +357,11 @@ def steps(hint: str) -> list[str]:
 
 def _outside(text: str, wanted: re.Pattern[str]) -> Iterator[re.Match[str]]:
     """Yield where it is found outside of brackets, quotes and code."""
+    found = {match.start(): match for match in wanted.finditer(text)}
     depth, quoted = 0, ""
-    for i, letter in enumerate(text):
-        if not quoted and not depth and (found := wanted.match(text, i)):
-            yield found
+    for i, letter in enumerate(text[: max(found, default=-1) + 1]):
+        if not quoted and not depth and i in found:
+            yield found[i]
         if quoted:
             quoted = "" if letter == quoted else quoted
         elif letter in '`"' or (letter == "'" and not text[i - 1 : i].isalnum()):

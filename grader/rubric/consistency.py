@@ -12,6 +12,7 @@ from typing import Any
 
 from grader.checks.registry import Check
 from grader.checks.support.fields import is_number
+from grader.evidence.decode import definition, encode
 from grader.rubric.fault_words import model_faults
 from grader.rubric.model import ManualParams
 from grader.rubric.references import reference_faults
@@ -411,8 +412,6 @@ def _contents(at: KeyPath, probe: dict[str, Any], kind: str) -> Iterator[Fault]:
 
 
 def _misfits(at: KeyPath, kind: str, values: list[tuple[int, Any]]) -> Iterator[Fault]:
-    from grader.evidence.decode import definition, encode  # noqa: PLC0415 - slow to load, and few rubrics need it
-
     def misfit(work: Callable[[], object]) -> str:
         try:
             work()

@@ -14,7 +14,9 @@ from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
 from grader.checks.support.fields import is_number
+from grader.evidence.decode import full_definition
 from grader.evidence.definitions import Field, Types, parse
+from grader.evidence.message_values import ANGLES, FORMS, MessageType
 from grader.installable import noetic_messages
 from grader.model.message_definitions import (
     BUILT_IN,
@@ -151,8 +153,6 @@ class Shape(NamedTuple):
 
     def compare(self, field: Field, value: object, done: str) -> None:
         """Raise Misfit where the field can never have the value."""
-        from grader.evidence.message_values import ANGLES, FORMS  # noqa: PLC0415 - slow to load, and few rubrics need it
-
         fields = {one.name for one in self.types.get(field.type, ())}
         if (
             isinstance(value, Mapping)
@@ -234,9 +234,6 @@ class Definitions:
         return {name for owner, _, name in types if owner == package}
 
     def _shape(self, type_: str, part: str) -> Shape | None:
-        from grader.evidence.decode import full_definition  # noqa: PLC0415 - slow to load, and few rubrics need it
-        from grader.evidence.message_values import MessageType  # noqa: PLC0415 - as above
-
         suffix = SUFFIXES[part]
         own = self._own.get((type_, suffix))
         text = own.text if own else None

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from grader.checks.reacts import Condition
 from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
+from grader.evidence.message_values import ANGLES, FORMS
 from grader.rubric.durations import Asked, late_faults, longest_s, often_faults, within_faults
 from grader.rubric.message_fields import PATH_PARTS
 from grader.rubric.room import room_faults, start_faults
@@ -154,8 +155,6 @@ def _items(value: object) -> list[Any]:
 
 def _values_at(value: object, parts: Sequence[str]) -> list[Any] | None:
     """Return what a value that is sent has at a path; None where a form makes it another each time. Raises TooShort."""
-    from grader.evidence.message_values import ANGLES, FORMS  # noqa: PLC0415 - slow to load, and few rubrics need it
-
     part = parts[0] if parts else ""
     if isinstance(value, dict) and value and {*FORMS, ANGLES}.issuperset(value):
         if (

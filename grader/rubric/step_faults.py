@@ -14,6 +14,7 @@ from grader.checks.support.fields import is_number
 from grader.checks.support.processes import odd_name
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.errors import EvidenceError
+from grader.evidence.message_values import FIRST, OTHER_TEXTS, MessageType, ServiceTypes, action_texts
 from grader.installable import noetic_messages
 from grader.model.message_definitions import NOT_FINITE
 from grader.ros_packages import ros_packages
@@ -205,8 +206,6 @@ def misfits(
 
     `at` is the place of the type.
     """
-    from grader.evidence.message_values import FIRST, OTHER_TEXTS, MessageType  # noqa: PLC0415 - slow to load, and few rubrics need it
-
     package, _, name = kind.partition("/")
     names = noetic_messages().get(package, ())
     if not names and kind not in OTHER_TEXTS:
@@ -344,8 +343,6 @@ def _answers(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:
 
 def of_type(at: KeyPath, served: dict[str, Any]) -> Iterator[Fault]:
     """Yield what does not fit the type of a call, or of what is served, where its text is known before a run."""
-    from grader.evidence.message_values import MessageType, ServiceTypes, action_texts  # noqa: PLC0415 - slow to load, and few rubrics need it
-
     kind, text = served.get("type"), served.get("definition")
     if not isinstance(kind, str) or "/" not in kind:
         return

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sqlite3
+import sys
 from contextlib import closing
 from io import BytesIO
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -137,6 +139,16 @@ def test_what_does_not_fit_cannot_be_read(data: bytes) -> None:
 
 def test_a_message_without_fields() -> None:
     assert ros1_messages("std_msgs/Empty", ros1_definition("std_msgs/Empty", ""), [b"\0\1\0\0\0"]) == [b""]
+
+
+def test_only_names_of_our_own_reach_the_code_generator(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rosbags.usertypes", ModuleType("rosbags.usertypes"))
+    data = b"\0\1\0\0" + b"\1\0\0\0" + b"\3\0\0\0ab\0\0"
+    (message,) = ros1_messages("demo/A", "int8 os\nstring exec", [data])
+    assert Decoder("demo/A", "int8 os\nstring exec").decode(message) == {"os": 1, "exec": "ab"}
+    names = [name for name in vars(sys.modules["rosbags.usertypes"]) if "__msg__" in name]
+    assert names
+    assert all(name.startswith("recorded__msg__T") for name in names)
 
 
 def test_definitions_that_cannot_be_followed_leave_the_messages_unread(tmp_path: Path) -> None:

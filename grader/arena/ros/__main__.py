@@ -12,7 +12,6 @@ ends.
 import array
 import base64
 import contextlib
-import ctypes
 import gc
 import importlib
 import json
@@ -26,7 +25,7 @@ import threading
 
 from calibration import Calibration, Lateness, peak_bytes
 from loop import Loop
-from namespaces import Stage, enter_own_namespaces, leave_keys_behind
+from namespaces import LIBC, Stage, enter_own_namespaces, leave_keys_behind
 from process_tree import Groups
 from processes import WATCH_S, Process, kill_orphans, reap_all
 from sockets import buffer_bytes
@@ -310,8 +309,7 @@ class Arena:
 def run_arena():
     """Run one arena, from its start to its end."""
     set_clock()
-    libc = ctypes.CDLL(None, use_errno=True)
-    libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    LIBC.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     signal.signal(signal.SIGINT, lambda *_: None)  # ignored, it would be ignored by all that is started
     wire = Wire(os.dup(1))
     os.dup2(2, 1)

@@ -8,7 +8,6 @@ are recorded with the times of their arrival.
 """
 
 import contextlib
-import ctypes
 import os
 import signal
 import socket
@@ -17,6 +16,7 @@ import threading
 import time
 
 from bounded_sockets import note_arrivals, receive
+from namespaces import LIBC
 from process_tree import TICKS_HZ
 from wire import LENGTH, now_ns
 
@@ -78,7 +78,7 @@ class Calibration:
 def _live(sock, parent):
     """Run the publisher from its start to its end, in a session of its own, with nothing of the arena's open."""
     try:
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
         os.setsid()
         if sock.fileno() > 0:
             os.dup2(sock.fileno(), 0)

@@ -38,6 +38,8 @@ KEYCTL = {
     "s390x": 280,
 }
 PROBED = "/sys"  # in a namespace that ends with the probe
+LIBC = ctypes.CDLL(None, use_errno=True)
+"""Every arena is a copy of a process that has it already."""
 
 
 def enter_own_namespaces():
@@ -63,22 +65,18 @@ def mount_tmpfs(folder, size_bytes, inodes, owner, mode):
 
 def unmount(folder):
     """Unmount it now, or as soon as it is used no more."""
-    _libc().umount2(os.fsencode(folder), MNT_DETACH)
-
-
-def _libc():
-    return ctypes.CDLL(None, use_errno=True)
+    LIBC.umount2(os.fsencode(folder), MNT_DETACH)
 
 
 def _unshare(flags):
-    if _libc().unshare(flags) != 0:
+    if LIBC.unshare(flags) != 0:
         number = ctypes.get_errno()
         raise OSError(number, "no namespaces of its own: " + os.strerror(number))
 
 
 def _mount(source, target, kind, flags, options):
     words = [None if word is None else os.fsencode(word) for word in (source, target, kind, options)]
-    if _libc().mount(words[0], words[1], words[2], ctypes.c_ulong(flags), words[3]) != 0:
+    if LIBC.mount(words[0], words[1], words[2], ctypes.c_ulong(flags), words[3]) != 0:
         number = ctypes.get_errno()
         raise OSError(number, "nothing can be mounted: " + os.strerror(number))
 
@@ -101,7 +99,7 @@ def leave_keys_behind():
     does not let it, there is nothing that could be read either way."""
     number = KEYCTL.get(os.uname().machine)
     if number is not None:
-        ctypes.CDLL(None, use_errno=True).syscall(number, KEYCTL_JOIN_SESSION_KEYRING, None)
+        LIBC.syscall(number, KEYCTL_JOIN_SESSION_KEYRING, None)
 
 
 class Stage:

@@ -12,7 +12,6 @@ import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from html import escape
-from importlib import import_module
 from pathlib import Path
 
 from waitress.server import create_server
@@ -38,8 +37,7 @@ def serve(
     """Serve `review` until interrupted; `opened` is given the address with its token, and `ending` how many reports are
     still to be written at the end. Port 0 is any that is free.
 
-    Gives whether all that follows a decision is written. Raises UsageError where the port cannot be had. What a
-    report's figures need is loaded while the first page is read, so that no one waits for it at the first decision.
+    Gives whether all that follows a decision is written. Raises UsageError where the port cannot be had.
     """
     with _bound(port) as listening:
         token = secrets.token_urlsafe(TOKEN_BYTES)
@@ -56,7 +54,6 @@ def serve(
         review.start()
         try:
             opened(f"http://{HOST}:{number}/?token={token}")
-            threading.Thread(target=import_module, args=("rosbags.typesys",), daemon=True).start()
             server.run()
         except KeyboardInterrupt:
             pass

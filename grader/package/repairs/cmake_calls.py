@@ -20,8 +20,8 @@ def cmake_text(files: Files) -> str:
     return files.text(CMAKE) or ""
 
 
-def all_calls(files: Files) -> list[Command]:
-    return commands_of(cmake_text(files).encode()) or []
+def all_calls(files: Files) -> tuple[Command, ...]:
+    return commands_of(cmake_text(files).encode()) or ()
 
 
 def calls_of(files: Files, *names: str) -> list[Command]:
