@@ -160,6 +160,11 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
         kind = own.path.rpartition(".")[2].replace("msg", "message").replace("srv", "service")
         hint = f"list {own.path.rpartition('/')[2]} in add_{kind}_files(…)"
         return f"the build has not made it from {own.path}", hint
+    asked = re.search(rf"'{re.escape(maker.name or '')}\.(msg|srv)'", found.message)
+    if asked is not None and all(own.module != asked[1] for own in maker.interfaces):
+        kind = {"msg": "message", "srv": "service"}[asked[1]]
+        hint = f"write the definition in {asked[1]}/, and list it in add_{kind}_files(…)"
+        return f"the package has no .{asked[1]} file for the build to make it of", hint
     whose = "the package's own messages" if maker is package else f"the messages of {maker.name}"
     hint = "first get the build to pass: catkin_make"
     if not cmake_calls(maker, "generate_messages"):

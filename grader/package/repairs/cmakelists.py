@@ -33,6 +33,7 @@ from grader.package.repairs.programs import (
     INSTALL,
     correct_paths,
     install_scripts,
+    leave_out_missing,
     link_programs,
     name_programs,
 )
@@ -105,6 +106,7 @@ def repair_cmake(
     if not package.folder_beside:  # what it names is right once it lies there itself
         install_scripts(files, package, wanted)
         correct_paths(files, package)
+        leave_out_missing(files, wanted)
     link_programs(files)
     _correct_include(files)
     _declare_exported(files)

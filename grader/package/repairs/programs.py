@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
+from itertools import takewhile
 from pathlib import PurePosixPath
 
 from cmake_parser.ast import Command, Token
@@ -98,6 +99,45 @@ def correct_paths(files: Files, package: PackageFacts) -> None:
         message = f"line {call.line} of {CMAKE}: {call.identifier}(…) names {named}, which the package has as {there}"
         fix = " and ".join(f"write {right} instead of {token.value}" for token, right in moved)
         files.change("build-line", CMAKE, text, message, fix)
+
+
+OF_TARGETS = ("add_executable", "target_link_libraries", "add_dependencies", "set_target_properties")
+"""Calls that begin with a target's name."""
+
+
+def leave_out_missing(files: Files, wanted: Wanted) -> None:
+    """Leave out of the copy's build what two calls name and the package does not have, so that the rest is made. What
+    the lab asks for is not left out: a criterion of its own is lost by it."""
+    asked = {PurePosixPath(path).name for path in wanted.scripts}
+    for call in reversed(calls_of(files, INSTALL, "add_executable")):  # places above stay
+        words = [token for token in words_of(call) if token.value]
+        first = next((i for i, token in enumerate(words) if token.value == "PROGRAMS"), 0) + 1
+        listed = list(takewhile(lambda token: not token.value.isupper(), words[first:]))
+        lost = [token for token in listed if _is_missing(files, token.value, asked)]
+        if not lost:
+            continue
+        is_program = call.identifier.lower() == "add_executable"
+        about = [
+            c
+            for c in calls_of(files, *OF_TARGETS)
+            if words_of(c)[:1] and words_of(c)[0].value == words[0].value
+        ]
+        whole = about if is_program else [call] if len(lost) == len(listed) else []
+        spans = [one.span for one in whole or lost]
+        text = cmake_text(files)
+        for span in sorted(spans, key=lambda one: -one.start):
+            text = text[: span.start].rstrip(" ") + text[span.stop :]
+        names = join_words(token.value for token in lost)
+        message = f"line {call.line} of {CMAKE}: {call.identifier}(…) names {names}, which the package does not have"
+        fix = f"add {names} and push it, or remove {'the program' if is_program else 'it'} from {CMAKE}"
+        files.change("build-line", CMAKE, text, message, fix)
+
+
+def _is_missing(files: Files, word: str, asked: Collection[str]) -> bool:
+    path = PurePosixPath(_plain(word))
+    renamed = {repair.after for repair in files.repairs if repair.kind == "file-name"}
+    known = "$" in word or path.name in asked or str(path) in renamed or ".." in path.parts
+    return not known and not path.is_absolute() and not (files.folder / path).exists()
 
 
 def _place(own: Sequence[str], files: Files, script: str) -> str:
