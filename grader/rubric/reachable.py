@@ -18,7 +18,7 @@ from grader.rubric.durations import Asked, late_faults, longest_s, often_faults,
 from grader.rubric.message_fields import PATH_PARTS
 from grader.rubric.room import room_faults, start_faults
 from grader.rubric.scenario import Scenario, Until
-from grader.rubric.simulators import FIELD_M, PROGRAMS, robot_of
+from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, robot_of
 from grader.rubric.started import starts_of
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps
@@ -276,9 +276,7 @@ def _robot(about: Asked, others: Sequence[dict[str, Any]]) -> _Robot:
     if world := robot_of(about.scenario):
         fastest = world.get("max_linear")
         start = _spot(world.get("start"))
-        return _Robot(
-            start if topic == "/base_pose_ground_truth" else (0, 0), fastest if is_number(fastest) else None
-        )
+        return _Robot(start if topic == TRUE_POSE else (0, 0), fastest if is_number(fastest) else None)
     if not topic.startswith("/turtle1/"):
         return _Robot(None)
     bounds = [as_map(one.get("with")) for one in others if one.get("check") == "field-bounds"]

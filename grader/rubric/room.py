@@ -9,14 +9,13 @@ from typing import Any
 
 from grader.checks.support.fields import is_number
 from grader.rubric.durations import Asked, longest_s
-from grader.rubric.simulators import FORMS, robot_of, set_in
+from grader.rubric.simulators import FORMS, TRUE_POSE, robot_of, set_in
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map
 
 Spot = tuple[float, float]
 AHEAD_M = 0.3
 """By so much a laser may be nearer to a wall than the robot's centre."""
 SCANS = frozenset({"/scan", "/base_scan"})
-PLACES = "/base_pose_ground_truth"
 
 
 def room_faults(about: Asked) -> Iterator[Fault]:
@@ -29,12 +28,12 @@ def room_faults(about: Asked) -> Iterator[Fault]:
     away_m = min(_distance(place, *ends) for line in lines for ends in pairwise(line))
     if not is_number(robot.get("radius")) or away_m < robot["radius"]:  # said of the start
         return
-    if about.check == "stays-within" and about.given.get("topic") == PLACES:
+    if about.check == "stays-within" and about.given.get("topic") == TRUE_POSE:
         yield from _too_near(about, away_m)
     if about.check == "reacts":
         yield from _never_near(about, robot, away_m)
     goal = _spot(about.given.get("goal"))
-    is_place = about.check == "ends-at" and about.given.get("topic") == PLACES
+    is_place = about.check == "ends-at" and about.given.get("topic") == TRUE_POSE
     if is_place and goal and about.given.get("relative") is not True:
         yield from _outside(about, lines, place, goal)
 

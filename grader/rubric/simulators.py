@@ -56,6 +56,8 @@ PROGRAMS: Mapping[str, Program] = {
         }),
     ),
 }  # fmt: skip
+TRUE_POSE = "/base_pose_ground_truth"
+"""Where the robot world says where its robot is, as Stage does."""
 ROBOTS = {
     "turtlebot3": {"max_linear": 0.22, "samples": 360, "radius": 0.105},
     "stage": {"max_linear": 1.0, "samples": 271, "radius": 0.18},

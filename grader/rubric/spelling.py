@@ -10,6 +10,7 @@ from typing import Any
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.installable import noetic_messages
 from grader.rubric.message_fields import type_judged, types_of
+from grader.rubric.simulators import TRUE_POSE
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import is_one_edit
 
@@ -27,6 +28,8 @@ WORDS = {"text", "template", "value", "values"}
 """Keys of texts that students have to write as the handout has them; or of lists of them."""
 FIELDS = {"result", "expect", "request", "goal", "answer", "feedback"}
 """Keys of maps from fields to values."""
+USUAL_FRAMES = {"map", "odom", "base_link", "base_footprint", "base_scan", "laser", "world"}
+"""Frames of REP 105, and those of TurtleBot3 and Stage."""
 _WORD = r"[^\W\d]\w+"
 CHARS_MIN = 3
 """Of names of so few letters, one that differs in a letter is another name."""
@@ -99,12 +102,13 @@ def _named_once(data: object, folder: Path) -> Iterator[tuple[KeyPath, str, str]
     names = [(path, text, last) for path, text in texts if (last := _last_word(path, text, rubric))]
     names = [one for one in names if not PROSE & {*one[0]}]
     actions = {text for path, text in texts if path[-1] == "action"}
+    known_ones = {*SYSTEM_TOPICS, *USUAL_FRAMES} | ({TRUE_POSE} if "robot_world" in programs else set())
     handout = str(rubric.get("handout"))
     words = {word for path, text in texts if not PROSE & {*path} for word in re.findall(r"\w+", text)}
     for path, text, last in names:
         if text.rpartition("/")[0] in actions:  # `/dock/cancel`
             continue
-        if text in SYSTEM_TOPICS or (folder / text).is_file() or not programs.isdisjoint(text.split("/")):
+        if text in known_ones or (folder / text).is_file() or not programs.isdisjoint(text.split("/")):
             continue
         if _count(last, text, texts) == 1:
             known = (
