@@ -229,7 +229,7 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
         if excuse := _locked_up(one, run):
             return excuse
         hint = IN_A_LOOP + both("; a bare `except:` in the loop swallows the Ctrl-C", "")
-        return failed(message, hint=hint)
+        return failed(message, hint=hint).once()  # no line of the script is known to be why
     found = process_tracebacks(run, one.name, after_ns=one.interrupt_ns)
     own = [f for f in found if not is_rospys_own(f)]
     if not own:
