@@ -110,8 +110,8 @@ def grade(
         wait_for_children(),
         open_source(source, rubric, options, progress) as submission,
     ):
-        rubric = rubric.of_submission(submission.digest)
         context.submission = submission_info(submission)
+        rubric = rubric.of_submission(submission.digest, context.submission.package)
         context.rubric_origin = origin_of(rubric, (local_path(source), options.repository))
         earlier = options.find_earlier(context.submission)
         if earlier is not None:
@@ -148,7 +148,7 @@ def record(
             raise UsageError(
                 f"{submission.source}: there is nothing to run in it", hint="grade it, or judge it"
             )
-        rubric = rubric.of_submission(submission.digest)
+        rubric = rubric.of_submission(submission.digest, submission.package.name)
         with Results(out / submission.id) as results:
             job = recording_job(submission, rubric, results.evidence, options, progress)
             with make_recorder(job) as recorder:

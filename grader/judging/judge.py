@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from graphlib import TopologicalSorter
 from pathlib import PurePath
 from traceback import extract_tb
@@ -107,6 +108,9 @@ def judge_all_runs(
     rubric = with_recorded_values(rubric, runs)
     first, repeated, repaired = split_runs(runs)
     facts = try_facts(rubric, first)
+    if facts.package is not None and facts.package.name:
+        rubric = rubric.with_types_of(facts.package.name)
+        facts = replace(facts, rubric=rubric)
     verdicts = judge_facts(rubric, facts, checks)
     doubtful = frozenset(c.scenario for c in rubric.criteria if verdicts[c.id].timing and c.scenario)
     if repeated:

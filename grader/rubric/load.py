@@ -67,12 +67,13 @@ class LoadedRubric(Record):
         made = {**about, "package": package, "scenarios": dict(scenarios), "criteria": (criterion,)}
         return cls(rubric=Rubric.model_validate(made), path=Path(), digest="")
 
-    def of_submission(self, digest: str) -> LoadedRubric:
-        """Return the rubric with the values that are made up for the submission whose content has this digest."""
-        if not self.rubric.made_up:
-            return self
-        rubric = with_values(self.rubric, draw_values(self.rubric, digest))
-        return self.model_copy(update={"rubric": rubric})
+    def of_submission(self, digest: str, package: str = "") -> LoadedRubric:
+        """Return the rubric with the values that are made up for the submission whose content has this digest, and with
+        the name that its package has in the types that are the package's own."""
+        rubric = self.rubric.with_types_of(package)
+        if rubric.made_up:
+            rubric = with_values(rubric, draw_values(rubric, digest))
+        return self.model_copy(update={"rubric": rubric}) if rubric is not self.rubric else self
 
     @property
     def docs(self) -> dict[str, dict[str, str]]:

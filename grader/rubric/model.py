@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Mapping
 from datetime import datetime
 from typing import Annotated, Any, Literal
@@ -188,6 +190,30 @@ class Rubric(Record):
         """Keep what it was made of; return it."""
         self._written, self._values = dict(written), dict(values)
         return self
+
+    def with_types_of(self, package: str) -> Self:
+        """Return the rubric for a package that has another name than the lab's: its own messages and services have that
+        name too, `my_lab/State` in place of `lab/State`."""
+        own = re.compile(rf"{re.escape(self.package)}/(?=[A-Z]\w*$)")
+
+        def renamed(part: Any) -> Any:  # noqa: ANN401 - any part of a rubric
+            if isinstance(part, Mapping):
+                return {key: renamed(value) for key, value in part.items()}
+            if isinstance(part, list | tuple):
+                return [renamed(value) for value in part]
+            return own.sub(f"{package}/", part) if isinstance(part, str) else part
+
+        plain = {name: one.model_dump(exclude_unset=True) for name, one in self.scenarios.items()}
+        texts = json.dumps([plain, [c.parameters for c in self.criteria]], default=str)
+        if package in {"", self.package} or not re.search(rf'"{re.escape(self.package)}/[A-Z]\w*"', texts):
+            return self
+        update = {
+            "scenarios": {name: Scenario.model_validate(renamed(one)) for name, one in plain.items()},
+            "criteria": tuple(
+                c.model_copy(update={"parameters": renamed(c.parameters)}) for c in self.criteria
+            ),
+        }
+        return self.model_copy(update=update).remember(renamed(self.written), self.values)
 
     @property
     def package(self) -> str:

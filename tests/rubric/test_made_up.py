@@ -75,6 +75,18 @@ def test_values_of_each_kind(declared: dict[str, Any], fits: Any) -> None:
     assert all(map(fits, values)), values
 
 
+def test_a_package_of_another_name_has_types_of_that_name(tmp_path: Path) -> None:
+    examples = Path(__file__).parents[2] / "rubrics" / "examples"
+    lab = load_rubric(str(examples / "service-own-type.yaml"))
+    renamed = lab.of_submission("1", "my_service").rubric
+    assert {one.type for one in renamed.scenarios["server"].calls} == {"my_service/Clamp"}
+    assert [c.parameters["type"] for c in renamed.criteria if c.check == "service"] == ["my_service/Clamp"]
+    assert renamed.package == "own_service"
+    assert lab.of_submission("1", "own_service").rubric is lab.rubric
+    plain = load_rubric("leeds-comp3631-lab1")
+    assert plain.of_submission("1", "lab_1").rubric is plain.rubric
+
+
 def test_a_submission_has_values_of_its_own_that_stay(tmp_path: Path) -> None:
     lab = with_rate(tmp_path)
     assert lab.rubric.values == {}
