@@ -474,14 +474,15 @@ CASES = {
         after={CMAKELISTS: "COMPONENTS message_generation rospy)"}),
     "installs-what-is-not-there": Case(
         {CMAKELISTS: CMAKE + "catkin_install_python(PROGRAMS src/talker.py bin/hello DESTINATION x)\n"}, ["build-line"],
-        "add bin/hello and push it, or remove it from CMakeLists.txt",
+        "add bin/hello and push it, or remove it from that call",
         after={CMAKELISTS: CMAKE + "catkin_install_python(PROGRAMS src/talker.py DESTINATION x)\n"}),
     "installs-nothing-that-is-there": Case(
         {CMAKELISTS: CMAKE + "catkin_install_python(PROGRAMS bin/hello DESTINATION x)\n"}, ["build-line"],
         "add bin/hello and push it", after={CMAKELISTS: CMAKE}),
     "program-without-its-source": Case(
         {CMAKELISTS: CMAKE + "add_executable(other src/other.cpp)\ntarget_link_libraries(other x)\n"}, ["build-line"],
-        "add src/other.cpp and push it, or remove the program from CMakeLists.txt", after={CMAKELISTS: CMAKE}),
+        "add src/other.cpp and push it, or delete what is built from it: the calls on lines 5 and 6",
+        after={CMAKELISTS: CMAKE}),
     "installs-what-the-lab-asks-for-and-is-not-there": Case(
         {CMAKELISTS: CMAKE + "catkin_install_python(PROGRAMS src/listener.py DESTINATION x)\n"}, [],
         wanted=asking(scripts=(TALKER, "src/listener.py"))),

@@ -14,7 +14,7 @@ from grader.package.repairs.cmake_calls import calls_of, cmake_text, find_commen
 from grader.package.repairs.editing import Files
 from grader.package.repairs.files import is_own
 from grader.package.repairs.names import CPP, Wanted, is_near
-from grader.wording import join_words
+from grader.wording import join_words, numbers_text
 
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 INSTALL = "catkin_install_python"
@@ -109,28 +109,39 @@ def leave_out_missing(files: Files, wanted: Wanted) -> None:
     """Leave out of the copy's build what two calls name and the package does not have, so that the rest is made. What
     the lab asks for is not left out: a criterion of its own is lost by it."""
     asked = {PurePosixPath(path).name for path in wanted.scripts}
-    for call in reversed(calls_of(files, INSTALL, "add_executable")):  # places above stay
+    for call in reversed(calls_of(files, INSTALL)):  # places above stay
         words = [token for token in words_of(call) if token.value]
         first = next((i for i, token in enumerate(words) if token.value == "PROGRAMS"), 0) + 1
         listed = list(takewhile(lambda token: not token.value.isupper(), words[first:]))
         lost = [token for token in listed if _is_missing(files, token.value, asked)]
-        if not lost:
-            continue
-        is_program = call.identifier.lower() == "add_executable"
-        about = [
-            c
-            for c in calls_of(files, *OF_TARGETS)
-            if words_of(c)[:1] and words_of(c)[0].value == words[0].value
-        ]
-        whole = about if is_program else [call] if len(lost) == len(listed) else []
-        spans = [one.span for one in whole or lost]
-        text = cmake_text(files)
-        for span in sorted(spans, key=lambda one: -one.start):
-            text = text[: span.start].rstrip(" ") + text[span.stop :]
-        names = join_words(token.value for token in lost)
-        message = f"line {call.line} of {CMAKE}: {call.identifier}(…) names {names}, which the package does not have"
-        fix = f"add {names} and push it, or remove {'the program' if is_program else 'it'} from {CMAKE}"
-        files.change("build-line", CMAKE, text, message, fix)
+        whole = [call] if len(lost) == len(listed) else lost
+        _leave_out(files, call, lost, [one.span for one in whole], "remove {it} from that call")
+    made = [words for call in calls_of(files, "add_executable") if (words := words_of(call))]
+    sources = [(words[0], [t for t in words[1:] if _is_missing(files, t.value, asked)]) for words in made]
+    targets = {target.value for target, lost in sources if lost}
+    about = [c for c in calls_of(files, *OF_TARGETS) if words_of(c) and words_of(c)[0].value in targets]
+    lines = numbers_text([call.line for call in about])
+    instead = (
+        f"delete what is built from {{it}}: the calls on {'lines' if len(about) > 1 else 'line'} {lines}"
+    )
+    all_lost = [token for _, lost in sources for token in lost]
+    _leave_out(files, next(iter(about), None), all_lost, [one.span for one in about], instead)
+
+
+def _leave_out(
+    files: Files, call: Command | None, lost: Sequence[Token], spans: Sequence[slice], instead: str
+) -> None:
+    if call is None or not lost:
+        return
+    text = cmake_text(files)
+    for span in sorted(spans, key=lambda one: -one.start):
+        text = text[: span.start].rstrip(" ") + text[span.stop :]
+    names, them = join_words(token.value for token in lost), "them" if len(lost) > 1 else "it"
+    message = (
+        f"line {call.line} of {CMAKE}: {call.identifier}(…) names {names}, which the package does not have"
+    )
+    fix = f"add {names} and push {them}, or {instead.format(it=them)}"
+    files.change("build-line", CMAKE, text, message, fix)
 
 
 def _is_missing(files: Files, word: str, asked: Collection[str]) -> bool:
