@@ -194,6 +194,8 @@ class Rubric(Record):
     def with_types_of(self, package: str) -> Self:
         """Return the rubric for a package that has another name than the lab's: its own messages and services have that
         name too, `my_lab/State` in place of `lab/State`."""
+        if package in {"", self.package}:
+            return self
         own = re.compile(rf"{re.escape(self.package)}/(?=[A-Z]\w*$)")
 
         def renamed(part: Any) -> Any:  # noqa: ANN401 - any part of a rubric
@@ -205,7 +207,7 @@ class Rubric(Record):
 
         plain = {name: one.model_dump(exclude_unset=True) for name, one in self.scenarios.items()}
         texts = json.dumps([plain, [c.parameters for c in self.criteria]], default=str)
-        if package in {"", self.package} or not re.search(rf'"{re.escape(self.package)}/[A-Z]\w*"', texts):
+        if not re.search(rf'"{re.escape(self.package)}/[A-Z]\w*"', texts):
             return self
         update = {
             "scenarios": {name: Scenario.model_validate(renamed(one)) for name, one in plain.items()},
