@@ -59,7 +59,7 @@ def _turn(out: Path, workspace: Path) -> Turn:
         raise NotMeasured("rostest failed the reference solution")
     evidence = str(out / LAB / "evidence")
     judging = timed([*GRADER, "judge", evidence, "--rubric", LAB, "--out", os.devnull])
-    return Turn(grading, tested, judging, _first_verdict_s())
+    return Turn(grading, tested, judging, _first_verdict_s(out / "check"))
 
 
 def _grade(out: Path) -> Grading:
@@ -83,9 +83,9 @@ def largest_arena_bytes(evidence: Path) -> int:
     return max(event.max_rss_bytes or 0 for event in events if event.name == "arena")
 
 
-def _first_verdict_s() -> float:
+def _first_verdict_s(out: Path) -> float:
     """From the start of `grader check` until it has shown a verdict."""
-    argv, meter = [*GRADER, "check", str(SOLUTION / "lab1"), "--rubric", LAB], Meter()
+    argv, meter = [*GRADER, "check", str(SOLUTION / "lab1"), "--rubric", LAB, "--out", str(out)], Meter()
     with subprocess.Popen(argv, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         lines = iter(process.stdout or ())
         first_s = next((meter.wall_s() for line in lines if FIRST in line), None)

@@ -17,8 +17,8 @@ from grader.checks.support.processes import (
     are_noted,
     life,
     lives,
+    named_at,
     nodes_of,
-    slips_that_name,
 )
 from grader.checks.support.text import (
     GET_TIME,
@@ -36,7 +36,6 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import (
-    FileCitation,
     Verdict,
     failed,
     inconclusive,
@@ -164,14 +163,8 @@ def _taken_over(package: PackageFacts, run: Run, trio: Trio, params: CopiesParam
         message,
         hint=f"write {init(base, anonymous=True)}, so that each copy has its own name",
         measured=f"one name for two copies: {name}",
-        citations=(*_call_of(package, run, base), cite(run, "/grader/graph")),
+        citations=(*named_at(package, run, "node-name", base), cite(run, "/grader/graph")),
     )
-
-
-def _call_of(package: PackageFacts, run: Run, name: str) -> list[FileCitation]:
-    """Return the line of the only call that gives the node its name."""
-    calls = {one.place for one in slips_that_name(package, run, "node-name", name) if not one.fix}
-    return list(calls) if len(calls) == 1 else []
 
 
 def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | None:

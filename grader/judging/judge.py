@@ -105,12 +105,9 @@ def judge_all_runs(
     handed_out: Collection[str] = (),
 ) -> Judgement:
     """Judge the first runs, then what repeated runs and a repaired copy say besides."""
-    rubric = with_recorded_values(rubric, runs)
     first, repeated, repaired = split_runs(runs)
-    facts = try_facts(rubric, first)
-    if facts.package is not None and facts.package.name:
-        rubric = rubric.with_types_of(facts.package.name)
-        facts = replace(facts, rubric=rubric)
+    facts = _facts_as_recorded(rubric, runs, first)
+    rubric = facts.rubric
     verdicts = judge_facts(rubric, facts, checks)
     doubtful = frozenset(c.scenario for c in rubric.criteria if verdicts[c.id].timing and c.scenario)
     if repeated:
@@ -134,18 +131,10 @@ def judge_all_runs(
         verdicts = add_later_faults(verdicts, rubric, of_copy, handed_in=facts.package, repairs=repairs)
     else:
         verdicts = add_later_faults(verdicts, rubric, facts)
-    build = first.get(PACKAGE_RUN)
-    shown = dict(verdicts)
-    if build is not None:
-        for criterion in rubric.criteria:
-            placed = cite_quoted(verdicts[criterion.id], criterion, facts, build)
-            used = uses.get(criterion.id)
-            placed = cite_source(placed, criterion, facts, build, used.repairs if used else ())
-            placed = cite_unused_argument(placed, criterion, facts, build)
-            placed = cite_commented_call(placed, facts.package_of(criterion), build)
-            placed = cite_find(placed, criterion, facts.package_of(criterion), build)
-            shown[criterion.id] = show_lines(cite_name(placed, build), build)
-    shown = {name: _without_git(verdict, facts.package) for name, verdict in shown.items()}
+    shown = {
+        c.id: _without_git(_with_cited_lines(verdicts[c.id], c, facts, uses.get(c.id)), facts.package)
+        for c in rubric.criteria
+    }
     names = lab_names(rubric, {i for i, v in shown.items() if v.status.is_lost}, facts.package)
     results = tuple(
         result_of(c, with_lab_names(shown[c.id], names), rubric.digits, uses.get(c.id), values_of(rubric, c))
@@ -153,12 +142,33 @@ def judge_all_runs(
     )
     package = facts.package
     if package is not None:
-        results = tuple(name_unchanged_files(result, rubric, package, handed_out) for result in results)
-        results = tuple(with_own_name(result, rubric, package) for result in results)
-        results = add_advice(results, package, rubric)
+        named = (name_unchanged_files(result, rubric, package, handed_out) for result in results)
+        results = add_advice([with_own_name(one, rubric, package) for one in named], package, rubric)
     late = {i for i, v in shown.items() if v.status is Status.INCONCLUSIVE and not v.of_machine}
     undecided = frozenset(c.scenario for c in rubric.criteria if c.id in late and c.scenario)
     return Judgement(leave_out(rubric, results), doubtful, undecided)
+
+
+def _facts_as_recorded(rubric: Rubric, runs: Mapping[str, Run], first: Mapping[str, Run]) -> Facts:
+    """Return the facts of the first runs. Their rubric has the values that were made up for all of them, and the
+    package's own types by the name that it has."""
+    facts = try_facts(with_recorded_values(rubric, runs), first)
+    name = facts.package.name if facts.package is not None else None
+    return replace(facts, rubric=facts.rubric.with_types_of(name)) if name else facts
+
+
+def _with_cited_lines(verdict: Verdict, criterion: Criterion, facts: Facts, used: Repaired | None) -> Verdict:
+    """Return the verdict with the lines of the package that it is about, and their text."""
+    build = facts.runs.get(PACKAGE_RUN)
+    if build is None:
+        return verdict
+    package = facts.package_of(criterion)
+    verdict = cite_quoted(verdict, criterion, facts, build)
+    verdict = cite_source(verdict, criterion, facts, build, used.repairs if used else ())
+    verdict = cite_unused_argument(verdict, criterion, facts, build)
+    verdict = cite_commented_call(verdict, package, build)
+    verdict = cite_find(verdict, criterion, package, build)
+    return show_lines(cite_name(verdict, build), build)
 
 
 def judge_facts(rubric: Rubric, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> dict[str, Verdict]:

@@ -164,16 +164,25 @@ def apply_repaired_copy(
         verdict, copy = first[criterion.id], on_copy[criterion.id]
         share = min(rubric.share_of(one.kind) for one in needed) if criterion.points else 1.0
         told = repairs_as_handed_in(charged or needed, repairs)
-        others = [one for one in needs[criterion.id] if one not in charged]
-        elsewhere = bool(cited_lines(verdict.citations) & _lines_read_now(others))
+        verdict = (
+            _without_others(verdict, [one for one in needed if one not in charged]) if charged else verdict
+        )
         placed = with_names_as_handed_in(copy, repairs)
         verdicts[criterion.id] = (
-            _charge(verdict, copy, told, cited_lines(placed.citations), elsewhere=elsewhere)
+            _charge(verdict, copy, told, cited_lines(placed.citations))
             if charged
             else _share(placed, told, share)
         )
         uses[criterion.id] = Repaired(repairs=told, share=share, charged=bool(charged))
     return verdicts, uses
+
+
+def _without_others(verdict: Verdict, others: Sequence[Repair]) -> Verdict:
+    """Return the loss as blocked where what was found is in lines that other repairs made readable: the criterion that
+    these are charged to tells it."""
+    if cited_lines(verdict.citations).isdisjoint(_lines_read_now(others)):
+        return verdict
+    return verdict.model_copy(update={"status": Status.BLOCKED, "citations": ()})
 
 
 def concerns(
@@ -412,24 +421,16 @@ def _new_words(repair: Repair) -> set[str]:
 
 
 def _charge(
-    verdict: Verdict,
-    copy: Verdict,
-    repairs: Sequence[Repair],
-    lines: Collection[tuple[str, int]],
-    *,
-    elsewhere: bool,
+    verdict: Verdict, copy: Verdict, repairs: Sequence[Repair], lines: Collection[tuple[str, int]]
 ) -> Verdict:
     """Return the loss, with the repairs that were seen to help as its hint, and what the copy loses it by, at these
-    lines of the package as it is. `elsewhere`: what was found at first is told by another criterion."""
-    blocked = verdict.status is Status.BLOCKED or elsewhere
+    lines of the package as it is."""
+    blocked = verdict.status is Status.BLOCKED
     is_next = _is_next(verdict, copy, repairs) or (blocked and copy.status.is_lost and not copy.unjudged)
     if blocked:
         message = "; ".join(messages_of(repairs))
         verdict = failed(
-            message,
-            expected=copy.expected,
-            measured=verdict.measured,
-            citations=() if elsewhere else verdict.citations,
+            message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
         )
     further = copy.status is Status.BLOCKED and verdict.unjudged and copy.cause != verdict.cause
     paths = re.findall(r"[\w-]+(?:/[\w.-]+)+", copy.hint)

@@ -16,8 +16,16 @@ from itertools import chain, pairwise
 from typing import Literal, NamedTuple, TypeGuard
 
 from grader.package.member_repair import with_place
-from grader.package.script_tree import nodes_in, tree_of
-from grader.package.syntax_repair import Step, edited, is_docstring, last_name, span_of, step_to
+from grader.package.syntax_repair import (
+    Step,
+    edited,
+    is_docstring,
+    last_name,
+    nodes_in,
+    span_of,
+    step_to,
+    tree_of,
+)
 
 GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "logerr")
 CALLED = frozenset({"is_shutdown", "sleep", "spin"})

@@ -13,8 +13,17 @@ from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 
 from grader.package.name_repair import bound_in, meant_by
-from grader.package.script_tree import nodes_in, tree_of
-from grader.package.syntax_repair import Step, edited, is_docstring, last_name, span_of, step_to, with_line
+from grader.package.syntax_repair import (
+    Step,
+    edited,
+    is_docstring,
+    last_name,
+    nodes_in,
+    span_of,
+    step_to,
+    tree_of,
+    with_line,
+)
 from grader.wording import is_one_edit
 
 MESSAGES = {

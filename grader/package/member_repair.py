@@ -17,8 +17,7 @@ from collections.abc import Collection, Iterator
 from itertools import chain
 
 from grader.package.name_repair import bound_in
-from grader.package.script_tree import nodes_in, tree_of
-from grader.package.syntax_repair import Step, edited, last_name, span_of, step_to
+from grader.package.syntax_repair import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
 from grader.wording import is_one_edit
 
 MEMBERS = {

@@ -11,8 +11,7 @@ import builtins
 from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 
-from grader.package.script_tree import nodes_in, tree_of
-from grader.package.syntax_repair import Step, edited, span_of, step_to
+from grader.package.syntax_repair import Step, edited, nodes_in, span_of, step_to, tree_of
 from grader.wording import is_one_edit
 
 OF_PYTHON = (

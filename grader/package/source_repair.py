@@ -29,7 +29,6 @@ from grader.package.call_repair import (
 from grader.package.import_repair import with_classes, with_imports, with_message_classes, with_modules
 from grader.package.member_repair import with_members
 from grader.package.name_repair import bound_in, meant_by, with_names, with_self
-from grader.package.script_tree import nodes_in, tree_of
 from grader.package.syntax_repair import (
     Step,
     as_python3,
@@ -37,9 +36,11 @@ from grader.package.syntax_repair import (
     last_name,
     lost_head,
     make_readable,
+    nodes_in,
     span_of,
     step_to,
     syntax_error,
+    tree_of,
 )
 from grader.wording import is_one_edit
 

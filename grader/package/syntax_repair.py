@@ -11,6 +11,7 @@ import ast
 import builtins
 import re
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from itertools import takewhile
 from typing import Any
 
@@ -456,3 +457,15 @@ def step_to(cause: str, line: int, before: str, after: str, word: str = "") -> I
 def last_name(node: ast.AST | None) -> str:
     """Return `c` of the name `a.b.c`; "" of all else."""
     return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+
+
+@lru_cache(maxsize=2)
+def tree_of(text: str) -> ast.Module:
+    """Return the tree of a script, which all repairs share and nobody may change. Raises what `ast.parse` raises."""
+    return ast.parse(text)
+
+
+@lru_cache(maxsize=64)
+def nodes_in(tree: ast.AST) -> tuple[ast.AST, ...]:
+    """Return this node of such a tree and all below it, as `ast.walk` has them."""
+    return tuple(ast.walk(tree))

@@ -345,7 +345,7 @@ def _launched_nodes(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]
         count = as_map(scenario.get("until")).get("nodes")
         if nodes and isinstance(count, int) and count > len(nodes) and len(starts_of(scenario)) == 1:
             fault = (
-                f"{criterion.get('id')} names {plural(len(nodes), 'node')}: the run waits for more in vain"
+                f"{criterion.get('id')} names {plural(len(nodes), 'node')}: the run waits for more than these"
             )
             yield ("scenarios", name, "until", "nodes"), fault
 

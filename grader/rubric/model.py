@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from datetime import datetime
@@ -202,12 +201,12 @@ class Rubric(Record):
             if isinstance(part, Mapping):
                 return {key: renamed(value) for key, value in part.items()}
             if isinstance(part, list | tuple):
-                return [renamed(value) for value in part]
+                return type(part)(renamed(value) for value in part)
             return own.sub(f"{package}/", part) if isinstance(part, str) else part
 
         plain = {name: one.model_dump(exclude_unset=True) for name, one in self.scenarios.items()}
-        texts = json.dumps([plain, [c.parameters for c in self.criteria]], default=str)
-        if not re.search(rf'"{re.escape(self.package)}/[A-Z]\w*"', texts):
+        written = (plain, [c.parameters for c in self.criteria])
+        if renamed(written) == written:
             return self
         update = {
             "scenarios": {name: Scenario.model_validate(renamed(one)) for name, one in plain.items()},

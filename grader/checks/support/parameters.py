@@ -240,7 +240,7 @@ def explain_by_unread_parameter(
 def explain_by_misplaced_parameter(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
-    """Return a lost mark with the parameter that the node asks for in vain, and that a launch file sets elsewhere."""
+    """Return a lost mark with the parameter that the node reads and a launch file sets somewhere else."""
     unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
     if not unexplained or package is None or not isinstance(run, Run) or early_end(run):
         return verdict

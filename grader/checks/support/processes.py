@@ -134,18 +134,14 @@ def slips_of(package: PackageFacts, run: Run, callerid: str, *kinds: SlipKind) -
 
 
 def named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tuple[FileCitation, ...]:
-    """Return the line of the run's scripts that names this node or topic; nothing where none does, or several do."""
-    found = all_named_at(package, run, kind, name)
-    return found if len(found) == 1 else ()
-
-
-def all_named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tuple[FileCitation, ...]:
-    """Return the lines of the run's scripts that name this node or topic."""
-    return tuple(dict.fromkeys(slip.place for slip in slips_that_name(package, run, kind, name)))
+    """Return the line of the run's scripts whose call names this node, topic or parameter; nothing where none does, or
+    several do."""
+    found = {slip.place for slip in slips_that_name(package, run, kind, name) if not slip.fix}
+    return tuple(found) if len(found) == 1 else ()
 
 
 def slips_that_name(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> list[PythonSlip]:
-    """Return where the run's scripts name this node or topic."""
+    """Return where the run's scripts name this node, topic or parameter; those of a node may be in a variable."""
     scripts = {one.start.script for one in lives(run)}
     said = [s for s in package.slips if s.kind == kind and s.file in scripts]
     last = name.rpartition("/")[2]
