@@ -91,6 +91,7 @@ def test_every_report_is_where_gitlab_looks_for_it(job):
         "GRADER_POINTS=15",
         "GRADER_MAX_POINTS=20",
         "GRADER_STATUS=below-pass-mark",
+        "GRADER_RUBRIC_ORIGIN=grader",
     ]
     assert (job.project / JOB["artifacts"]["paths"][0] / "report.html").is_file()
 

@@ -113,7 +113,7 @@ def test_without_its_scheduler_the_batch_ends_with_one_line(place: Cluster, tmp_
     kill(place.scheduler.pid)
     with pytest.raises(HostError, match=r"the connection to the scheduler at .* is lost") as caught:
         list(outcomes)
-    assert "goes on where it stopped" in caught.value.hint
+    assert "continues where it stopped" in caught.value.hint
     assert not (out / EXCHANGE).exists()
 
 
