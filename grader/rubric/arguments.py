@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from grader.rubric.message_fields import slip_of
+from grader.rubric.definitions import slip_of
 from grader.rubric.simulators import PROGRAMS, set_in
 from grader.rubric.spelling import PROSE, is_slip, texts_in
 from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, as_texts

@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
-from grader.rubric.message_fields import services_in
+from grader.rubric.definitions import services_in
 from grader.rubric.simulators import set_in
 from grader.rubric.spelling import is_slip, texts_in
 from grader.rubric.started import starts_of

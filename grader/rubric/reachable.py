@@ -14,8 +14,8 @@ from grader.checks.reacts import Condition
 from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
 from grader.evidence.message_values import ANGLES, FORMS
+from grader.rubric.definitions import PATH_PARTS
 from grader.rubric.durations import Asked, late_faults, longest_s, often_faults, within_faults
-from grader.rubric.message_fields import PATH_PARTS
 from grader.rubric.room import room_faults, start_faults
 from grader.rubric.scenario import Scenario, Until
 from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, robot_of

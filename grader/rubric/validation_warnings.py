@@ -12,8 +12,9 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
+from grader.rubric.definitions import services_in
 from grader.rubric.demand_warnings import demand_warnings
-from grader.rubric.message_fields import POSES, VELOCITIES, services_in
+from grader.rubric.message_fields import POSES, VELOCITIES
 from grader.rubric.simulators import set_in, topics_of_programs
 from grader.rubric.spelling import texts_in
 from grader.rubric.started import starts_of
