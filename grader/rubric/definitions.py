@@ -68,6 +68,10 @@ class Shape(NamedTuple):
     def field_at(self, path: str) -> Field | None:
         """Return the field to which a path leads; None where that is not known. Raises Misfit."""
         field, done = self.root, ""
+        first, _, rest = path.partition(".")
+        names = {one.name for one in self.types[self.root.type]}
+        if first in {"msg", "message"} and first not in names and re.split(r"\W", rest)[0] in names:
+            raise Misfit(f"{self.what} has no field {first}: write {rest}")
         for part in PATH_PARTS.findall(path):
             found = self._item(field, part, done) if part[0] == "[" else self.inner(field, part, done)
             if found is None:
@@ -125,6 +129,11 @@ class Shape(NamedTuple):
                 inner = self.inner(field, str(key), done)
                 if inner is not None:
                     self.compare(inner, item, f"{done}.{key}" if done else str(key))
+        elif fields and not field.primitive and done and value is not None:
+            name = next(iter(one.name for one in self.types[field.type]))
+            raise Misfit(
+                f"{done} of {self.what} is {field.type}, not {value!r}: name one field of it, {done}.{name}"
+            )
         elif field.primitive and (wrong := no_value(field.type, value)):
             raise Misfit(f"{done} of {self.what} {wrong}")
 

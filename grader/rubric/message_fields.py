@@ -75,14 +75,15 @@ def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
     known = Definitions(rubric)
     yield from _no_types(rubric, known)
     yield from _quoted_params(rubric)
-    yield from _other_kinds(rubric)
+    other_kinds = list(_other_kinds(rubric))
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     for index, criterion in as_maps(rubric.get("criteria")):
         scenario = scenarios.get(str(criterion.get("scenario")), {})
         given, path = as_map(criterion.get("with")), ("criteria", index, "with")
         if criterion.get("check") == "stamps":
             given = {"field": "header", STAMPED: True, **given}
-        yield from _judged_fields(path, given, known, rubric, scenario)
+        judged = list(_judged_fields(path, given, known, rubric, scenario))
+        yield from judged or (one for one in other_kinds if one[0][: len(path)] == path)
         if str(criterion.get("check")) in PLACES:
             yield from _no_place(path, given, rubric, scenario)
         if criterion.get("check") == "topic-type":
@@ -135,7 +136,8 @@ def _judged_fields(
             faults = [_no_such(shape, field, given) if (shape := known.shape(kind)) else "" for kind in types]
             usual = USUAL_TYPES.get(topic.rpartition("/")[2])
             if not faults and usual and (shape := known.shape(usual)):
-                faults = [_no_such(shape._replace(partial=frozenset(shape.types)), field, {})]
+                values = {key: given[key] for key in ("value", "values") if key in given}
+                faults = [_no_such(shape._replace(partial=frozenset(shape.types)), field, values)]
             if isinstance(field, str) and faults and all(faults):
                 yield (*path, *at), faults[0]
         quoted = [one for key in ("value", "values") for one in _quoted((*path, key), given.get(key), topic)]
@@ -303,10 +305,23 @@ def types_of(topic: str, rubric: dict[str, Any], scenario: dict[str, Any] | None
             yield given.get("type")
         yield from (left["type"] for name, left in as_map(given.get("topics")).items()
                     if name == topic and as_map(left).get("type"))  # fmt: skip
+    yield from said_types(topic, str(rubric.get("handout") or ""))
     for one in as_map(rubric.get("scenarios")).values():
         sent = [probe for _, probe in as_maps(as_map(one).get("probes"))]
         sent += [as_map(step.get("publish")) for _, step in as_maps(as_map(one).get("steps"))]
         yield from (one.get("type") for one in sent if one.get("topic") == topic)
+
+
+def said_types(topic: str, handout: str) -> Iterator[str]:
+    """Yield the types of ROS's that the handout says the topic has: `/scan, a sensor_msgs/LaserScan`, or `a
+    geometry_msgs/Twist on /cmd_vel`."""
+    name, kind, tick = re.escape(topic), r"(\w+)/([A-Z]\w*)", "`?"
+    after = rf"{tick}{name}{tick}(?![\w/])[\s,:(]*(?:(?:an?|as|of type)\s+)*{tick}{kind}"
+    before = rf"{kind}{tick}(?:\s+messages?)?\s+on\s+(?:the\s+topic\s+)?{tick}{name}{tick}(?![\w/])"
+    for pattern in (rf"(?<![\w/]){after}", before):
+        for package, message in re.findall(pattern, handout) if topic.startswith("/") else ():
+            if message in noetic_messages().get(package, ()):
+                yield f"{package}/{message}"
 
 
 def _asked(criterion: dict[str, Any], scenario: dict[str, Any]) -> tuple[str, dict[str, Any] | None, bool]:

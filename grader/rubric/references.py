@@ -41,6 +41,8 @@ ASKED_OF_STUDENT = frozenset({
 WHERE_IT_IS = frozenset({"ends-at", "stays-within", "path"})
 NEVER_OF_GRADER = frozenset({"latched", "counter-start", "counter-step", "counter-wrap"})
 """Checks of the student's messages that have no `of`."""
+ENDINGS = (".py", ".yaml", ".yml", ".sh", ".bash", ".exe", ".pl", ".lua", ".js", ".rb")
+"""Of files that a start may name."""
 OTHER_DISTROS = ("melodic", "kinetic", "indigo", "foxy", "humble", "jazzy")
 
 
@@ -137,15 +139,20 @@ def _file_fault(file: str, rubric: dict[str, Any]) -> str:
         return f"is a source: write the name of the program that add_executable makes of it, {path.stem}"
     if file in PROGRAMS:
         return f"is not one of the student's files: write program: {file}"
+    handout = str(rubric.get("handout"))
+    source = re.search(rf"\b{re.escape(path.stem)}\.(?:cpp|cc|cxx)\b", handout)
+    if path.suffix == ".py" and source and path.name not in handout:
+        return f"the handout has {source[0]}: write the name of its program, {path.stem}"
     whole = _with_ending(file, rubric)
     return f"the rubric names {whole} elsewhere: write it with its ending" if whole else ""
 
 
 def _with_ending(file: str, rubric: dict[str, Any]) -> str:
-    """Return the name of a Python or YAML file that the rubric names with its ending, where this one has none."""
+    """Return the name of a Python or YAML file that the rubric names with its ending, where this one has none, or one
+    that no such file has."""
     path = PurePosixPath(file)
-    whole = re.compile(rf"(?<![\w.]){re.escape(path.name)}\.(?:py|ya?ml)(?!\w)")
-    texts = [text for _, text in texts_in((), rubric)] if path.name and not path.suffix else []
+    whole = re.compile(rf"(?<![\w.]){re.escape(path.stem)}\.(?:py|ya?ml)(?!\w)")
+    texts = [text for _, text in texts_in((), rubric)] if path.suffix.strip() not in ENDINGS else []
     return next((match[0] for text in texts if (match := whole.search(text))), "")
 
 
@@ -209,8 +216,8 @@ def _misfits(
         words, listed = LISTED[one.to]
         if value not in (there := sorted(listed(scenario))):
             yield words.format(name=name, value=value, instead=_instead(value, there))
-    elif one.to == "kept" and not any(PurePosixPath(value).match(keep) for keep in _kept_patterns(scenario)):
-        yield f'{name} keeps no file "{value}"{_instead(value, _kept_patterns(scenario))}; add it to its keeps'
+    elif one.to == "kept":
+        yield from _not_kept(str(name), value, _kept_patterns(scenario))
     elif one.to == "set" and not _is_set(value, scenario):
         there = [str(param.get("name")) for _, param in as_maps(scenario.get("params"))]
         yield f"{name} sets no parameter {value}{did_you_mean(value, there)}: add it to its params"
@@ -220,6 +227,14 @@ def _misfits(
         yield from _named_otherwise(value, of_process if len(of_process) == 1 else [])
     elif one.to == "published":
         yield from _wrong_sender(value, as_map(criterion.get("with")).get("of"), check, scenario)
+
+
+def _not_kept(scenario: str, file: str, kept: list[str]) -> Iterator[str]:
+    path = PurePosixPath(file)
+    if path.is_absolute() and path.parts[1:2] != ("tmp",):
+        yield f"no file is kept from {path.parent}: write {path.name}"
+    elif not any(path.match(keep) for keep in kept):
+        yield f'{scenario} keeps no file "{file}"{_instead(file, kept)}; add it to its keeps'
 
 
 def _wrong_sender(topic: str, says_of: object, check: Check, scenario: dict[str, Any]) -> Iterator[str]:
@@ -329,6 +344,9 @@ def _named_otherwise(name: str, starts: list[dict[str, Any]]) -> Iterator[str]:
         yield f"is the name of a node, not of its file: write {name.rpartition('.')[0]}"
     elif re.search(r"[^\w/]", name):
         yield f'no node is called "{name}": letters, digits and _, and anonymous: required where digits follow'
+    unnamed = [one for one in starts if not as_texts(one.get("args")) and one.get("script") is not None]
+    if "/" in name.strip("/") and unnamed:
+        yield f"a script has no namespace of its own: write {name.rpartition('/')[2]}, or give its start args, __ns:=…"
     for args in (as_texts(start.get("args")) for start in starts):
         given = dict(text.split(":=", 1) for _, text in args if text.startswith(("__ns:=", "__name:=")))
         own = given.get("__name", name.rpartition("/")[2])
