@@ -54,7 +54,8 @@ def _blanks(text: str) -> str:
 def _no_colon(text: str, start: dict[str, Any], known: Known) -> str:
     """Return that `_rate=5` sets no parameter, `gui=false` no argument, and `chatter=talk` remaps nothing."""
     name, mark, value = text.partition("=")
-    is_topic = name in {topic.rpartition("/")[2] for topic in known.topics}
+    is_name = re.fullmatch(r"[/A-Za-z][\w/]*", value)
+    is_topic = is_name and name in {topic.rpartition("/")[2] for topic in known.topics}
     is_own = start.get("launch") is not None or name.startswith("_") or is_topic
     is_meant = re.fullmatch(r"\w+", name) and is_own
     return f"ROS reads {name}:={value}, with a colon, and not {text}" if mark and is_meant else ""
@@ -91,10 +92,11 @@ def _fault(text: str, start: dict[str, Any], known: Known) -> str:
 
 
 def _other_way(text: str, start: dict[str, Any], scenario: dict[str, Any], known: Known) -> str:
-    """Return that a remap is the wrong way round, that its namespace is missing, or that it names a topic outside of
-    it: the run waits for a topic that the node then never has."""
+    """Return that a remap of a script that runs alone is the wrong way round, that its namespace is missing, or that it
+    names a topic outside of it: the run waits for a topic that the node then never has."""
     name, mark, value = text.partition(":=")
-    if not mark or start.get("script") is None or name.startswith("_"):
+    is_alone = start.get("script") is not None and len(as_maps(scenario.get("start"))) == 1
+    if not mark or not is_alone or name.startswith("_"):
         return ""
     given = dict(arg.split(":=", 1) for _, arg in as_texts(start.get("args")) if ":=" in arg)
     space = given.get("__ns", "").strip("/")

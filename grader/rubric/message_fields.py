@@ -136,7 +136,7 @@ def _judged_fields(
             faults = [_no_such(shape, field, given) if (shape := known.shape(kind)) else "" for kind in types]
             usual = USUAL_TYPES.get(topic.rpartition("/")[2])
             if not faults and usual and (shape := known.shape(usual)):
-                values = {key: given[key] for key in ("value", "values") if key in given}
+                values: dict[str, Any] = {key: given[key] for key in given if key in {"value", "values"}}
                 faults = [_no_such(shape._replace(partial=frozenset(shape.types)), field, values)]
             if isinstance(field, str) and faults and all(faults):
                 yield (*path, *at), faults[0]
