@@ -39,6 +39,7 @@ def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scena
     yield from _answers_waited_for(scenarios, handout)
     yield from _more_values(criteria, scenarios, handout)
     yield from _left_out(scenarios)
+    yield from _crossed(scenarios)
     yield from _fewer_arguments(scenarios)
     yield from _numbers_as_text(scenarios)
     yield from _other_lengths(criteria)
@@ -62,6 +63,7 @@ def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scena
         yield from _hard(at, check, given)
         yield from _easy(at, check, given, scenario)
         yield from _impossible(at, check, given)
+        yield from _not_its_name(at, given, rubric)
         if check == "service-answers":
             yield from _any_answer(at, given, scenario)
         if check in OF_VALUES and not SIDEWAYS.search(handout):
@@ -129,6 +131,39 @@ def _impossible(at: KeyPath, check: str, given: dict[str, Any]) -> Iterator[Faul
         same = next((other for other in list(constants)[:number] if constants[other] == value), None)
         if check == "definition" and same is not None:
             yield (*at, "constants", name), f"has the value of {same}"
+
+
+def _not_its_name(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield names that end in digits, where the rubric has parameters or services below the name without them."""
+    names = (
+        [name.strip("/") for _, name in as_texts(given.get("names"))]
+        if given.get("anonymous") == "required"
+        else []
+    )
+    texts = [text for path, text in texts_in((), rubric) if path[:1] in {("scenarios",), ("criteria",)}]
+    below = next((text for text in texts for name in names if re.fullmatch(rf"/{name}/\w+", text)), None)
+    if below is not None:
+        yield (
+            (*at, "anonymous"),
+            f"is required, and the rubric names {below}, which is below a name without digits",
+        )
+
+
+BOUNDS = (("low", "high"), ("min", "max"), ("lower", "upper"), ("minimum", "maximum"))
+
+
+def _crossed(scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield requests whose lower bound is above the upper one."""
+    for name, scenario in scenarios.items():
+        for at, part, one in services_in(scenario):
+            request = as_map(one.get(part)) if part == "request" else {}
+            for low, high in BOUNDS:
+                both = is_number(request.get(low)) and is_number(request.get(high))
+                if both and request[low] > request[high]:
+                    yield (
+                        ("scenarios", name, *at, part, low),
+                        f"is more than {high}, {request[high]:g}: is that meant?",
+                    )
 
 
 def _never_set(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:

@@ -365,8 +365,20 @@ def _expected(
     for at, one in each:
         if shape is None:
             yield from _quoted((*path, key, *at), one)
-        elif fault := shape.misfit(one):
+        elif fault := shape.misfit(one) or _of_other_part(one, str(about.get("type")), shape, known):
             yield (*path, key, *at), fault
+
+
+def _of_other_part(value: dict[str, Any], kind: str, shape: Shape, known: Definitions) -> str:
+    """Return that a field is one of the request, and not of the answer, or the like; empty where none is."""
+    names = {one.name for one in shape.types[shape.root.type]}
+    for part in (one for parts in PARTS.values() for one in parts if one):
+        other = known.shape(kind, part)
+        there = {one.name for one in other.types[other.root.type]} if other else set()
+        name = next((key for key in value if key in there - names), None)
+        if other is not None and name is not None:
+            return f"{shape.what} has no field {name}, which is one of {other.what}"
+    return ""
 
 
 def _sent_fields(scenario: dict[str, Any], known: Definitions) -> Iterator[tuple[KeyPath, str]]:

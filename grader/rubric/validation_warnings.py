@@ -61,6 +61,7 @@ def warnings(data: object) -> Iterator[Fault]:
         yield from _other_process(at, given, scenario, scenarios)
         yield from _fewer_answers(at, criterion, scenario)
         yield from _asked_for_nothing(at, criterion, scenario)
+        yield from _printed_elsewhere(at, criterion, scenarios)
         yield from _cancelled_goal(at, given, scenario)
         yield from _added_up(at, criterion, scenario)
         yield from _set_otherwise(at, criterion, scenario)
@@ -283,6 +284,22 @@ def _asked_for_nothing(at: KeyPath, criterion: dict[str, Any], scenario: dict[st
             (number, value), name = alone[0], criterion.get("scenario")
             fault = f"nothing in {name} has {value:g}, and it has the other numbers that are asked for"
             yield (*at, "expect", number, key), fault
+
+
+def _printed_elsewhere(
+    at: KeyPath, criterion: dict[str, Any], scenarios: Mapping[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield numbers to print that the grader answers in another run only."""
+    name = str(criterion.get("scenario"))
+    here = {number for _, number in numbers_in((), scenarios.get(name, {}))}
+    for key, number in numbers_in(("numbers",), as_map(criterion.get("with")).get("numbers")):
+        others = [
+            other
+            for other, one in scenarios.items()
+            if other != name and number in {answer for _, answer in numbers_in((), one.get("serves"))}
+        ]
+        if others and number not in here and scenarios.get(name, {}).get("serves"):
+            yield (*at, *key), f"{number:g} is what {others[0]} answers, and nothing in {name} has it"
 
 
 def _answered_otherwise(at: KeyPath, criterion: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
