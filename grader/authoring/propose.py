@@ -171,7 +171,8 @@ class Proposal(DraftSheet):
         answered = any(topic.name in self._answers(name, heard) for heard in self._seen[name].listens)
         if topic.silent and not answered:
             self.notes.append(
-                f"no message came on {topic.name}, which is not covered: what makes the node publish?"
+                f"no message came on {topic.name}, which is not covered: what makes the node publish? A step can "
+                "publish, call a service, set a parameter, or type a line on the node's standard input"
             )
             return
         kind = self.add(

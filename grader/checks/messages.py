@@ -415,7 +415,7 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     channels = sent_by(run, params.topic, params.of)
     found = readings(channels, params.field, numbers=False)
     if params.values and any(r.values for r in found):
-        return _in_order(found, run, params)
+        return _in_order(found, package, run, params)
     asked = {"first": found[:1], "last": found[-1:]}.get(params.when, found)
     wrong = [r for r in asked if not params.fits(r)]
     which = {"any": "any message", "every": "every message"}.get(params.when, f"the {params.when} message")
@@ -437,8 +437,10 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     )
 
 
-def _in_order(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> Verdict:
-    """Whether the values come one after the other; where one does not, what comes in its place."""
+def _in_order(
+    found: Sequence[Reading], package: PackageFacts, run: Run, params: FieldEqualsParams
+) -> Verdict:
+    """Whether the values come one after the other; where one does not, what comes in its place, or why nothing does."""
     at, what = 0, f"{params.field} of {params.topic}"
     verdict = passed(f"{what} is {params.words}")
     for number, value in enumerate(params.values):
@@ -454,6 +456,10 @@ def _in_order(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> 
                 else "no more comes"
             )
             message = f"{what} is never {value_text(value)}{before}: {came}"
+            ending = None if found[at:] else explain_early_end(package, run)
+            if ending is not None and not ending.by_itself:
+                verdict = ending.verdict(unjudged, f"{message}, as the node ended: {ending.cause}")
+                break
             make = f"set {params.field} to" if found[at:] else f"publish another message, with {params.field}"
             hint = f"{make} {value_text(value)}{before}; rostopic echo {params.topic} shows what your node publishes"
             verdict = failed(message, hint=hint)

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from grader.rubric.message_fields import slip_of
+from grader.rubric.definitions import slip_of
 from grader.rubric.simulators import PROGRAMS, set_in
 from grader.rubric.spelling import PROSE, is_slip, texts_in
 from grader.rubric.yaml_lines import KeyPath, as_map, as_maps, as_texts
@@ -25,6 +25,8 @@ class Known(NamedTuple):
     words: frozenset[str]
     quoted: frozenset[str]
     """Words that the handout has in backticks."""
+    said: frozenset[str]
+    """Names with a slash that the handout has."""
 
 
 def argument_faults(scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
@@ -33,8 +35,8 @@ def argument_faults(scenario: dict[str, Any], rubric: dict[str, Any]) -> Iterato
     for index, start in as_maps(scenario.get("start")):
         for number, text in as_texts(start.get("args")):
             known = known or _known(rubric)
-            fault = _blanks(text) or _no_colon(text, start) or _of_launch(text, start, known)
-            fault = fault or _fault(text, start, known)
+            fault = _blanks(text) or _no_colon(text, start, known) or _of_launch(text, start, known)
+            fault = fault or _other_way(text, start, scenario, known) or _fault(text, start, known)
             if fault:
                 yield ("start", index, "args", number), fault
 
@@ -49,10 +51,13 @@ def _blanks(text: str) -> str:
     return ""
 
 
-def _no_colon(text: str, start: dict[str, Any]) -> str:
-    """Return that `_rate=5` sets no parameter, and `gui=false` no argument."""
+def _no_colon(text: str, start: dict[str, Any], known: Known) -> str:
+    """Return that `_rate=5` sets no parameter, `gui=false` no argument, and `chatter=talk` remaps nothing."""
     name, mark, value = text.partition("=")
-    is_meant = re.fullmatch(r"\w+", name) and (start.get("launch") is not None or name.startswith("_"))
+    is_name = re.fullmatch(r"[/A-Za-z][\w/]*", value)
+    is_topic = is_name and name in {topic.rpartition("/")[2] for topic in known.topics}
+    is_own = start.get("launch") is not None or name.startswith("_") or is_topic
+    is_meant = re.fullmatch(r"\w+", name) and is_own
     return f"ROS reads {name}:={value}, with a colon, and not {text}" if mark and is_meant else ""
 
 
@@ -84,6 +89,34 @@ def _fault(text: str, start: dict[str, Any], known: Known) -> str:
             return ""
         return f'nothing else in the rubric names {name} (did you mean "_{near}:={value}"?)'
     return _remap(name, value, start, known)
+
+
+def _other_way(text: str, start: dict[str, Any], scenario: dict[str, Any], known: Known) -> str:
+    """Return that a remap of a script that runs alone is the wrong way round, that its namespace is missing, or that it
+    names a topic outside of it: the run waits for a topic that the node then never has."""
+    name, mark, value = text.partition(":=")
+    is_alone = start.get("script") is not None and len(as_maps(scenario.get("start"))) == 1
+    if not mark or not is_alone or name.startswith("_"):
+        return ""
+    given = dict(arg.split(":=", 1) for _, arg in as_texts(start.get("args")) if ":=" in arg)
+    space = given.get("__ns", "").strip("/")
+    old, new = (f"/{space}/{one}".replace("//", "/") if one[:1] != "/" else one for one in (name, value))
+    here = {one for _, one in texts_in((), {**scenario, "start": None}) if one in known.topics}
+    if old in here and new not in known.topics:
+        return (
+            f"what the node names comes before :=, and {old} is what the run asks for: write {value}:={name}"
+        )
+    spaces = [one.rpartition("/")[0] for one in here if one.endswith(f"/{value}") and one != new]
+    if (
+        not any("ns" in key for key in given)
+        and new not in known.topics
+        and len(spaces) == 1
+        and "/" not in value
+    ):
+        return f"this is {new}, and the run asks for {spaces[0]}/{value}: add __ns:={spaces[0].strip('/')}"
+    if space and name.startswith("/") and name[1:] in known.words and name not in known.said:
+        return f"{name} is not in the namespace {space}: write {name.lstrip('/')}:={value}"
+    return ""
 
 
 def _remap(name: str, value: str, start: dict[str, Any], known: Known) -> str:
@@ -118,5 +151,6 @@ def _known(rubric: dict[str, Any]) -> Known:
     words = {word for path, text in texts if PROSE & {*path} for word in re.findall(r"\w+", text)}
     private = {name for path, text in texts if PROSE & {*path} for name in re.findall(r"~(\w+)", text)}
     params = private | {name.rpartition("/")[2] for name in params}
-    quoted = re.findall(r"`~?(\w+)`", str(rubric.get("handout") or ""))
-    return Known(frozenset(topics), frozenset(params), frozenset(words), frozenset(quoted))
+    handout = str(rubric.get("handout") or "")
+    quoted, said = re.findall(r"`~?(\w+)`", handout), re.findall(r"(?<!\w)/\w[\w/]*", handout)
+    return Known(*map(frozenset, (topics, params, words, quoted, said)))

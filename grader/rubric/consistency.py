@@ -445,6 +445,10 @@ def _until(path: KeyPath, until: dict[str, Any], scenario: dict[str, Any]) -> It
             yield (*path, "messages", topic), f"must be at least 1, not {count}"
     if until.get("heard") is True and not (scenario.get("probes") or given_steps(scenario, "publish")):
         yield (*path, "heard"), "needs probes or steps that publish: there is nothing to hear"
+    for index, name in as_texts(until.get("opened")):
+        if name.startswith("/"):
+            fault = f"is for programs that are asked to open something, like firefox: write messages: {{{name}: 1}}"
+            yield (*path, "opened", index), fault
     names = [str(start.get("name")) for _, start in as_maps(scenario.get("start"))]
     for index, name in as_texts(until.get("ended")):
         if name not in names:

@@ -9,9 +9,9 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
-from grader.rubric.message_fields import services_in
+from grader.rubric.definitions import services_in
 from grader.rubric.simulators import set_in
-from grader.rubric.spelling import is_slip, texts_in
+from grader.rubric.spelling import texts_in
 from grader.rubric.started import starts_of
 from grader.rubric.step_faults import given_steps
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts
@@ -30,7 +30,6 @@ OF_VALUES = frozenset({"field-equals", "field-bounds", "reacts"})
 UNSET = frozenset({"linear.y", "linear.z", "angular.x", "angular.y"})
 SIDEWAYS = re.compile(r"sideways|sideward|holonomic|strafe|drone|quadrotor|\by\b|up\b", re.IGNORECASE)
 EMPTY = "std_srvs/Empty"
-PRIMITIVE = re.compile(r"(?:std_msgs/)?([Uu]?[Ii]nt|[Ff]loat)(8|16|32|64)")
 
 
 def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
@@ -38,11 +37,17 @@ def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scena
     handout = str(rubric.get("handout") or "")
     yield from _ends_and_lives(criteria, scenarios)
     yield from _answers_waited_for(scenarios, handout)
+    yield from _more_values(criteria, scenarios, handout)
     yield from _left_out(scenarios)
+    yield from _crossed(scenarios)
     yield from _fewer_arguments(scenarios)
     yield from _numbers_as_text(scenarios)
     yield from _other_lengths(criteria)
     yield from _other_counters(criteria)
+    yield from _unlike_others(criteria)
+    yield from _never_changed(criteria)
+    yield from _in_another_order(criteria, scenarios)
+    yield from _other_owners(criteria, scenarios)
     yield from _late(as_map(rubric.get("late")))
     yield from _waited_for_nothing(criteria, scenarios)
     yield from _without_its_node(rubric, scenarios)
@@ -57,14 +62,12 @@ def demand_warnings(rubric: dict[str, Any], criteria: Criteria, scenarios: Scena
         scenario = scenarios.get(str(criterion.get("scenario")), {})
         yield from _hard(at, check, given)
         yield from _easy(at, check, given, scenario)
+        yield from _impossible(at, check, given)
+        yield from _not_its_name(at, given, rubric)
         if check == "service-answers":
             yield from _any_answer(at, given, scenario)
         if check in OF_VALUES and not SIDEWAYS.search(handout):
             yield from _never_set(at, given)
-        yield from _other_node(at, check, given, scenario, handout)
-        yield from _other_number(at, check, given, scenario, str(criterion.get("scenario")))
-        yield from _other_types(at, given, handout)
-        yield from _misspelt_keys(at, given, rubric)
 
 
 def _hard(at: KeyPath, check: str, given: dict[str, Any]) -> Iterator[Fault]:
@@ -116,6 +119,51 @@ def _easy(at: KeyPath, check: str, given: dict[str, Any], scenario: dict[str, An
                 (*at, "within_s"),
                 f"the run's window is {lasting_s:g} s: the time of the first message passes for all",
             )
+
+
+def _impossible(at: KeyPath, check: str, given: dict[str, Any]) -> Iterator[Fault]:
+    """Yield bounds within which no robot drives forward, and constants that cannot be told from each other."""
+    is_forward = given.get("field") == "linear.x" and str(given.get("topic")).endswith("cmd_vel")
+    if check == "field-bounds" and is_forward and is_number(given.get("max")) and given["max"] <= 0:
+        yield (*at, "max"), f"is {given['max']:g}: no robot may drive forward"
+    constants = as_map(given.get("constants"))
+    for number, (name, value) in enumerate(constants.items()):
+        same = next((other for other in list(constants)[:number] if constants[other] == value), None)
+        if check == "definition" and same is not None:
+            yield (*at, "constants", name), f"has the value of {same}"
+
+
+def _not_its_name(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield names that end in digits, where the rubric has parameters or services below the name without them."""
+    names = (
+        [name.strip("/") for _, name in as_texts(given.get("names"))]
+        if given.get("anonymous") == "required"
+        else []
+    )
+    texts = [text for path, text in texts_in((), rubric) if path[:1] in {("scenarios",), ("criteria",)}]
+    below = next((text for text in texts for name in names if re.fullmatch(rf"/{name}/\w+", text)), None)
+    if below is not None:
+        yield (
+            (*at, "anonymous"),
+            f"is required, and the rubric names {below}, which is below a name without digits",
+        )
+
+
+BOUNDS = (("low", "high"), ("min", "max"), ("lower", "upper"), ("minimum", "maximum"))
+
+
+def _crossed(scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield requests whose lower bound is above the upper one."""
+    for name, scenario in scenarios.items():
+        for at, part, one in services_in(scenario):
+            request = as_map(one.get(part)) if part == "request" else {}
+            for low, high in BOUNDS:
+                both = is_number(request.get(low)) and is_number(request.get(high))
+                if both and request[low] > request[high]:
+                    yield (
+                        ("scenarios", name, *at, part, low),
+                        f"is more than {high}, {request[high]:g}: is that meant?",
+                    )
 
 
 def _never_set(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
@@ -182,6 +230,17 @@ def _answers_waited_for(scenarios: Scenarios, handout: str) -> Iterator[Fault]:
             if sent and isinstance(count, int) and count > ANSWERED_TIMES * (sent + 1):
                 fault = f"{name} sends {plural(sent, 'message')}, and waits for {count}: is that meant?"
                 yield ("scenarios", name, "until", "messages", topic), fault
+
+
+def _more_values(criteria: Criteria, scenarios: Scenarios, handout: str) -> Iterator[Fault]:
+    """Yield more values, one after the other, than the run sends messages, where the node answers each with one."""
+    for index, criterion in criteria:
+        sent = _sent(scenarios.get(str(criterion.get("scenario")), {}))
+        values = as_map(criterion.get("with")).get("values")
+        count = len(values) if isinstance(values, list) else 0
+        if sent and count == sent + 1 and not PERIODIC.search(handout) and re.search(r"\beach\b", handout):
+            fault = f"are {count}, and {criterion.get('scenario')} sends {plural(sent, 'message')}"
+            yield ("criteria", index, "with", "values"), fault
 
 
 def _sent(scenario: dict[str, Any]) -> int:
@@ -289,6 +348,97 @@ def _late(late: dict[str, Any]) -> Iterator[Fault]:
         yield ("late", "cut_off_days"), "with 0 nothing counts that is late: lost and per then mean nothing"
 
 
+def _unlike_others(criteria: Criteria) -> Iterator[Fault]:
+    """Yield values of a field that are ten or a hundred times what other criteria want of it."""
+    wanted: list[tuple[KeyPath, tuple[str, str], float]] = []
+    for index, criterion in criteria:
+        given = as_map(criterion.get("with"))
+        for part in ((), ("cause",), ("effect",)):
+            asked = as_map(given.get(part[0])) if part else given
+            if is_number(asked.get("value")) and "field" in asked:
+                place = str(asked.get("topic")), str(asked["field"])
+                wanted.append((("criteria", index, "with", *part, "value"), place, float(asked["value"])))
+    for number, (at, place, value) in enumerate(wanted):
+        others = [other for n, (_, there, other) in enumerate(wanted) if there == place and n != number]
+        near = [other for other in others if other and round(value / other, 6) in {10, 100, 0.1, 0.01}]
+        if near and value not in others and others.index(near[0]) < number:
+            yield at, f"is {value:g}, and another criterion wants {near[0]:g} of {place[1]} of {place[0]}"
+
+
+def _never_changed(criteria: Criteria) -> Iterator[Fault]:
+    """Yield values of the first and of the last message that are the same: a node that never changes them passes."""
+    first: dict[tuple[str, ...], tuple[str, object]] = {}
+    for index, criterion in criteria:
+        given = as_map(criterion.get("with"))
+        when, value = given.get("when"), given.get("value")
+        key = tuple(map(str, (criterion.get("scenario"), given.get("topic"), given.get("field"))))
+        if criterion.get("check") == "field-equals" and when in ("first", "last"):
+            earlier, other = first.setdefault(key, (str(criterion.get("id")), value))
+            if (
+                earlier != criterion.get("id")
+                and value == other
+                and isinstance(value, bool | int | float | str)
+            ):
+                fault = f"{earlier} wants {json.dumps(value)} too: a node that never changes it passes both"
+                yield ("criteria", index, "with", "value"), fault
+
+
+def _in_another_order(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield arguments and requests that are the numbers of another one, in another order."""
+    found: list[tuple[KeyPath, tuple[str, ...]]] = []
+    for name, scenario in scenarios.items():
+        for index, start in as_maps(scenario.get("start")):
+            args = tuple(text for _, text in as_texts(start.get("args")))
+            found.append((("scenarios", name, "start", index, "args"), args))
+        for at, part, one in services_in(scenario):
+            if part == "request":
+                found.append((("scenarios", name, *at, part), _as_arguments(one.get(part))))
+    for index, criterion in criteria:
+        if criterion.get("check") == "calls":
+            expect = as_map(criterion.get("with")).get("expect")
+            found.append((("criteria", index, "with", "expect"), _as_arguments(expect)))
+    for number, (at, values) in enumerate(found):
+        others = [
+            other for n, (_, other) in enumerate(found) if n != number and sorted(other) == sorted(values)
+        ]
+        earlier = any(sorted(other) == sorted(values) for _, other in found[:number])
+        if len(set(values)) > 1 and all(map(_is_known, values)) and earlier and values not in others:
+            yield at, f"has {join_words(list(values))}: elsewhere these are in another order"
+
+
+def _as_arguments(value: object) -> tuple[str, ...]:
+    return tuple(
+        f"{{made_up: {one['made_up']}}}" if isinstance(one, dict) and "made_up" in one else str(one)
+        for one in as_map(value).values()
+    )
+
+
+def _is_known(text: str) -> bool:
+    return NUMBER.fullmatch(text) is not None or text.startswith("{made_up:")
+
+
+def _other_owners(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fault]:
+    """Yield parameters below another name than all others of the run, and than that of its node."""
+    for name, scenario in scenarios.items():
+        given = [(at, str(one.get("name")).strip("/").split("/")) for at, one in set_in(scenario)]
+        owners = [parts[0] for _, parts in given if len(parts) > 1]
+        about = [as_map(one.get("with")) for _, one in criteria if one.get("scenario") == name]
+        nodes = {node for one in about for _, node in as_texts(one.get("names"))}
+        programs = {str(start.get("program")).rpartition("/")[2] for start in starts_of(scenario)}
+        for at, parts in given:
+            others = {owner for owner in owners if owner != parts[0]}
+            if (
+                len(parts) > 1
+                and owners.count(parts[0]) == 1
+                and len(others) == 1
+                and others <= nodes - programs
+            ):
+                fault = (
+                    f"is below {parts[0]}, and the node is called {min(others)}, as for the other parameters"
+                )
+                yield ("scenarios", name, *at, "name"), fault
+
+
 TOPICS_WAITED = ("connected", "topics")
 
 
@@ -304,7 +454,7 @@ def _waited_for_nothing(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fa
         judged = {text for one in about for _, text in texts_in((), one)}
         topics = sorted({str(one["topic"]) for one in about if "topic" in one} - named)
         for topic, at in waited.items():
-            near = [one for one in topics if one.count("/") == topic.count("/") and _is_beside(topic, one)]
+            near = [one for one in topics if _is_beside(topic, one) or _is_elsewhere(topic, one)]
             if (
                 topic not in judged
                 and near
@@ -315,7 +465,14 @@ def _waited_for_nothing(criteria: Criteria, scenarios: Scenarios) -> Iterator[Fa
 
 
 def _is_beside(topic: str, other: str) -> bool:
-    return topic.rpartition("/")[0] == other.rpartition("/")[0]
+    is_as_deep = topic.count("/") == other.count("/")
+    return is_as_deep and topic.rpartition("/")[0] == other.rpartition("/")[0]
+
+
+def _is_elsewhere(topic: str, other: str) -> bool:
+    """Return whether the two differ in one part between slashes, which one of them has besides."""
+    short, long = sorted((topic.split("/"), other.split("/")), key=len)
+    return len(long) == len(short) + 1 and any(long[:n] + long[n + 1 :] == short for n in range(len(long)))
 
 
 def _without_its_node(rubric: dict[str, Any], scenarios: Scenarios) -> Iterator[Fault]:
@@ -366,82 +523,10 @@ def _other_transforms(criteria: Criteria, scenarios: Scenarios) -> Iterator[Faul
                 ("criteria", index, "with", "static"),
                 f"elsewhere the rubric sends this transform, and it is {kind}",
             )
-
-
-def _other_node(
-    at: KeyPath, check: str, given: dict[str, Any], scenario: dict[str, Any], handout: str
-) -> Iterator[Fault]:
-    """Yield the name of a process in place of its node's."""
-    names = [name for _, name in as_texts(given.get("names"))]
-    starts = [start for start in starts_of(scenario) if start.get("name") == given.get("process")]
-    if check not in {"node-lives", "node-name"} or len(names) != 1 or len(starts) != 1 or not handout:
-        return
-    script, name = PurePosixPath(str(starts[0].get("script"))).stem, names[0]
-    quoted = re.findall(r"`[/~]?(\w+)`", handout)
-    if (
-        name == given.get("process")
-        and script != name
-        and script in quoted
-        and not re.search(rf"\b{name}\b", handout)
-    ):
-        fault = f"{name} is what the rubric calls the process, and the handout has `{script}`: is that the node's name?"
-        yield (*at, "names", 0), fault
-
-
-def _other_number(
-    at: KeyPath, check: str, given: dict[str, Any], scenario: dict[str, Any], name: str
-) -> Iterator[Fault]:
-    """Yield a value of a field that is named as a parameter of the run, and that the run sets otherwise."""
-    last, value = re.split(r"[.\[]", str(given.get("field")))[-1], given.get("value")
-    if check != "field-equals" or not is_number(value):
-        return
-    for _, one in set_in(scenario):
-        param = str(one.get("name"))
-        if param.rpartition("/")[2] == last and is_number(one.get("value")) and one["value"] != value:
-            yield (*at, "value"), f"{name} sets {param} to {json.dumps(one['value'])}"
-            return
-
-
-def _other_types(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[Fault]:
-    """Yield types of numbers that the handout does not have, where it has another of the same kind and size."""
-    said = {match[0] for match in PRIMITIVE.finditer(handout)}
-    if not said:
-        return
-    asked: list[tuple[KeyPath, object]] = [((*at, "type"), given.get("type"))]
-    asked += [((*at, "fields", key), kind) for key, kind in as_map(given.get("fields")).items()]
-    asked += [
-        ((*at, "topics", key, "type"), as_map(one).get("type"))
-        for key, one in as_map(given.get("topics")).items()
-    ]
-    for path, kind in asked:
-        is_number_type = PRIMITIVE.fullmatch(str(kind))
-        if (
-            is_number_type
-            and str(kind) not in said
-            and not (str(kind).partition("/")[2] and _plain(kind) in map(_plain, said))
-        ):
-            near = [one for one in sorted(said) if ("/" in one) == ("/" in str(kind))]
-            if near:
-                yield path, f"the handout has {join_words(near)}, and not {kind}"
-
-
-def _plain(kind: object) -> str:
-    return str(kind).rpartition("/")[2].lower()
-
-
-def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
-    """Yield constants and nodes of which a part is one letter off from a word of the handout, and that no other line
-    has."""
-    handout = str(rubric.get("handout") or "")
-    words = set(re.findall(r"\w+", handout))
-    texts = [text for _, text in texts_in((), rubric)]
-    for key in ("constants", "nodes"):
-        for name in as_map(given.get(key)):
-            for part in filter(None, str(name).split("/")):
-                near = next((one for one in sorted(words) if is_slip(part, one)), "")
-                times = sum(len(re.findall(rf"\b{re.escape(part)}\b", text)) for text in texts)
-                if part not in words and near and times == 1:
-                    yield (
-                        (*at, key, name),
-                        f'{part} is on no other line: did you mean "{near}", as in the handout?',
-                    )
+        parents = {parent for parent, child in sent if child == given.get("child")} - {given.get("parent")}
+        is_direct = criterion.get("check") == "transform" and given.get("through") is not True
+        if is_direct and is_static is None and parents:
+            fault = (
+                f"elsewhere {given.get('child')} is in {join_words(sorted(parents))}: a frame has one parent"
+            )
+            yield ("criteria", index, "with", "parent"), fault

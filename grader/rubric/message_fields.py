@@ -1,42 +1,41 @@
-"""What a rubric says of the fields of messages, against the definitions of their types.
-
-Those of ROS are known, and those of the students' own whose text the rubric has. Where a criterion asks for some
-fields of a type, there may be others: then only a name that is all but one of these is a slip.
-"""
+"""What a rubric says of the fields of messages, against the definitions of their types."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import PurePosixPath
-from typing import Any, NamedTuple
+from typing import Any
 
 from grader.checks.support.fields import is_number
-from grader.evidence.decode import full_definition
-from grader.evidence.definitions import Field, Types, parse
-from grader.evidence.message_values import ANGLES, FORMS, MessageType
+from grader.evidence.definitions import Field
 from grader.installable import noetic_messages
 from grader.model.message_definitions import (
     BUILT_IN,
-    DIVIDER,
     FULL_NAMES,
     PARTS,
     parse_definition,
     parse_interface,
 )
-from grader.model.package import InterfaceField
 from grader.ros_packages import ros_packages
+from grader.rubric.definitions import (
+    SUFFIXES,
+    Definitions,
+    Misfit,
+    Shape,
+    instead_of,
+    limits_of,
+    name_in,
+    no_value,
+    own_texts,
+    services_in,
+    slip_of,
+)
 from grader.rubric.simulators import set_in, topics_of_programs
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
-from grader.wording import closest, did_you_mean, is_one_edit, join_words
+from grader.wording import join_words
 
-ALMOST = 0.87
-"""How alike two names have to be for one to be a slip."""
-SUFFIXES = {part: suffix for suffix, parts in PARTS.items() for part in parts}
-"""The ending of the file in which a part is defined."""
-KINDS = {"string": "a text", "bool": "true or false"}
 USUAL_PACKAGES = ("std_msgs", "geometry_msgs", "sensor_msgs", "nav_msgs")
 USUAL_TYPES = {
     "cmd_vel": "geometry_msgs/Twist",
@@ -69,236 +68,6 @@ COUNTED = frozenset({"minimum", "maximum", "start"})
 STAMPED = "is_stamp"
 """Beside what a criterion says: its field has to be a stamp."""
 _NUMBER = re.compile(r"[-+]?\d+(\.\d*)?([eE][-+]?\d+)?")
-PATH_PARTS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
-"""The parts of a field's path: names, and items of lists."""
-
-
-def slip_of(name: str, there: Iterable[str]) -> str:
-    """Return the name that is meant, where this one is all but it; "" for none."""
-    names = [one for one in there if one != name]
-    same = (one for one in names if one.lower() == name.lower() or (len(name) > 3 and is_one_edit(one, name)))
-    return next(same, "") or closest(name, names, cutoff=ALMOST)
-
-
-def _instead(name: str, there: Iterable[str]) -> str:
-    names = list(there)
-    return did_you_mean(name, names) or (f": there is {join_words(names)}" if names else "")
-
-
-class Misfit(ValueError):
-    """Why a path leads to no field, or a value is none of its type."""
-
-
-class OwnText(NamedTuple):
-    """The definition of a type of the students' own; `whole` is False where it may have more fields."""
-
-    text: str
-    whole: bool
-
-
-class Shape(NamedTuple):
-    """A message, or one part of a service or an action. `what` is what a fault calls it; of the types in `partial` only
-    some fields are known."""
-
-    what: str
-    types: Types
-    partial: frozenset[str]
-
-    @property
-    def root(self) -> Field:
-        return Field(name="", attribute="", type=next(iter(self.types)), array=False, size=None)
-
-    def field_at(self, path: str) -> Field | None:
-        """Return the field to which a path leads; None where that is not known. Raises Misfit."""
-        field, done = self.root, ""
-        for part in PATH_PARTS.findall(path):
-            found = self._item(field, part, done) if part[0] == "[" else self.inner(field, part, done)
-            if found is None:
-                return None
-            field, done = found, done + (part if part[0] == "[" or not done else f".{part}")
-        return field
-
-    def inner(self, field: Field, name: str, done: str) -> Field | None:
-        """Return a field of a field; None where that is not known. Raises Misfit."""
-        there = {one.name: one for one in self.types.get(field.type, ())}
-        if not re.fullmatch(r"\w+", name):
-            raise Misfit(
-                f'no field is called "{name}": between a field and its value are a colon and a blank'
-            )
-        if field.array and there:
-            raise Misfit(f"{self.what}: {done} is a list: write {done}[0].{name}, or {done}[*].{name}")
-        if name in there:
-            return there[name]
-        whole = f"{done} of {self.what}" if done else self.what
-        if near := slip_of(name, there):
-            raise Misfit(f'{whole} has no field {name} (did you mean "{near}"?)')
-        if field.type in self.partial:
-            return None
-        raise Misfit(f"{whole} has no field {name}{_instead(name, there)}")
-
-    def _item(self, field: Field, part: str, done: str) -> Field:
-        if not field.array:
-            raise Misfit(f"{self.what}: {done} is not a list")
-        if part != "[*]" and field.size is not None and int(part[1:-1]) >= field.size:
-            raise Misfit(f"{self.what}: {done} has {field.size} items, counted from 0")
-        return replace(field, array=False)
-
-    def misfit(self, value: object) -> str:
-        """Return why no message has these fields with these values; empty where one may have."""
-        try:
-            self.compare(self.root, value, "")
-        except Misfit as error:
-            return str(error)
-        return ""
-
-    def compare(self, field: Field, value: object, done: str) -> None:
-        """Raise Misfit where the field can never have the value."""
-        fields = {one.name for one in self.types.get(field.type, ())}
-        if (
-            isinstance(value, Mapping)
-            and value
-            and {*FORMS, ANGLES}.issuperset(value)
-            and fields.isdisjoint(value)
-        ):
-            return  # a value that changes: what is sent is looked at elsewhere
-        if field.array:
-            self._compare_items(field, value, done)
-        elif isinstance(value, Mapping) and not field.primitive:
-            for key, item in value.items():
-                inner = self.inner(field, str(key), done)
-                if inner is not None:
-                    self.compare(inner, item, f"{done}.{key}" if done else str(key))
-        elif field.primitive and (wrong := _no_value(field.type, value)):
-            raise Misfit(f"{done} of {self.what} {wrong}")
-
-    def _compare_items(self, field: Field, value: object, done: str) -> None:
-        if not isinstance(value, list | tuple):
-            raise Misfit(
-                f"{self.what}: {done} is a list: give all its values, or name {done}[0] or {done}[*]"
-            )
-        for number, item in enumerate(value):
-            self.compare(replace(field, array=False), item, f"{done}[{number}]")
-
-
-def _no_value(kind: str, value: object) -> str:
-    """Return why a field of a primitive type is never so."""
-    if isinstance(value, list | tuple | Mapping):
-        return f"is one value, not {value!r}"
-    if value is None:
-        return "is empty here: give it a value"
-    wanted = KINDS.get(kind, "a number")
-    got = "a text" if isinstance(value, str) else "true or false" if isinstance(value, bool) else "a number"
-    if wanted != got and not (kind.startswith("float") and value in {".inf", "-.inf", "+.inf", ".nan"}):
-        return f"is {wanted}, not {value!r}"
-    low, high = limits_of(kind) or (0, 0)
-    if isinstance(value, float) and low < high and not value.is_integer():
-        return f"is {kind}, a whole number, and never {value:g}"
-    if isinstance(value, int | float) and low < high and not low <= value <= high:
-        return f"is {kind}, {low} to {high}, and never {value:g}"
-    return ""
-
-
-def limits_of(kind: str) -> tuple[int, int] | None:
-    """Return the least and the greatest value of an integer type."""
-    match = re.fullmatch(r"(u?)int(\d+)", kind)
-    if match is None:
-        return None
-    bits = int(match[2])
-    return (0, 2**bits - 1) if match[1] else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-
-
-class Definitions:
-    """The definitions that are known before a run."""
-
-    def __init__(self, rubric: dict[str, Any]) -> None:
-        self._own: dict[tuple[str, str], OwnText] = {}
-        for _, type_, suffix, own in own_texts(rubric):
-            known = self._own.get((type_, suffix))
-            if known is None or (own.whole and not known.whole):
-                self._own[type_, suffix] = own
-        self._shapes: dict[tuple[str, str], Shape | None] = {}
-
-    def shape(self, type_: str, part: str = "") -> Shape | None:
-        """Return a type's fields; of a service or an action, those of a part. None where they are not known."""
-        if (type_, part) not in self._shapes:
-            self._shapes[type_, part] = self._shape(type_, part)
-        return self._shapes[type_, part]
-
-    def text(self, type_: str, suffix: str) -> OwnText | None:
-        """Return what the rubric says of the students' own type."""
-        return self._own.get((type_, suffix))
-
-    def messages_of(self, package: str) -> set[str]:
-        """Return the names of a package's messages whose definitions the rubric has."""
-        types = (type_.partition("/") for type_, suffix in self._own if suffix == ".msg")
-        return {name for owner, _, name in types if owner == package}
-
-    def _shape(self, type_: str, part: str) -> Shape | None:
-        suffix = SUFFIXES[part]
-        own = self._own.get((type_, suffix))
-        text = own.text if own else None
-        if part and text is None:
-            text = ros_packages().text(type_, "srv" if suffix == ".srv" else "action")
-            if text is None:
-                return None
-        try:
-            full = (
-                MessageType(type_).definition
-                if text is None
-                else full_definition(type_, DIVIDER.split(text)[PARTS[suffix].index(part)], self._find)
-            )
-            types = parse(type_, full)
-        except (ValueError, IndexError):
-            return None
-        partial = {name for name in types if (found := self._own.get((name, ".msg"))) and not found.whole}
-        partial |= {type_} if own and not own.whole else set()
-        what = f"the {part} of {type_}" if part else type_
-        return Shape(what, types, frozenset(partial))
-
-    def _find(self, type_: str) -> str | None:
-        own = self._own.get((type_, ".msg"))
-        return own.text if own else None
-
-
-def own_texts(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str, str, OwnText]]:
-    """Yield each definition of a type that the rubric has: where, its type, the ending of its file."""
-    for index, criterion in as_maps(rubric.get("criteria")):
-        given = as_map(criterion.get("with"))
-        if criterion.get("check") == "topic-type" and isinstance(given.get("definition"), str):
-            path: KeyPath = ("criteria", index, "with", "definition")
-            yield path, str(given.get("type")), ".msg", OwnText(given["definition"], whole=True)
-        if criterion.get("check") == "definition":
-            file = PurePosixPath(str(given.get("file")))
-            package = criterion.get("package") or next(iter(packages_in(rubric)), "")
-            text = given.get("text")
-            own = OwnText(text, whole=True) if isinstance(text, str) and text else _of_fields(file, given)
-            if file.suffix in PARTS:
-                path = ("criteria", index, "with", "text" if own.whole else "fields")
-                yield path, f"{package}/{file.stem}", file.suffix, own
-    for name, scenario in as_map(rubric.get("scenarios")).items():
-        for at, _, one in services_in(as_map(scenario)):
-            if isinstance(one.get("definition"), str):
-                path = ("scenarios", name, *at, "definition")
-                yield path, str(one.get("type")), ".srv", OwnText(one["definition"], whole=True)
-
-
-def _of_fields(file: PurePosixPath, given: dict[str, Any]) -> OwnText:
-    lines: dict[str, list[str]] = {part: [] for part in PARTS.get(file.suffix, ())}
-    for name, kind in as_map(given.get("fields")).items():
-        part, _, bare = str(name).rpartition(".")
-        lines.get(part, []).append(f"{kind} {bare}")
-    return OwnText("\n---\n".join("\n".join(part) for part in lines.values()), whole=False)
-
-
-def services_in(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str, dict[str, Any]]]:
-    """Yield the services that a scenario calls or offers, where it says so, and the key of what it fills in."""
-    for key, part in (("calls", "request"), ("serves", "response")):
-        yield from (
-            ((key, n), part, one) for n, one in as_maps(scenario.get(key)) if one.get("action") is None
-        )
-    for index, step in as_maps(scenario.get("steps")):
-        if "call" in step:
-            yield ("steps", index, "call"), "request", as_map(step["call"])
 
 
 def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -306,14 +75,15 @@ def field_faults(rubric: dict[str, Any]) -> Iterator[Fault]:
     known = Definitions(rubric)
     yield from _no_types(rubric, known)
     yield from _quoted_params(rubric)
-    yield from _other_kinds(rubric)
+    other_kinds = list(_other_kinds(rubric))
     scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
     for index, criterion in as_maps(rubric.get("criteria")):
         scenario = scenarios.get(str(criterion.get("scenario")), {})
         given, path = as_map(criterion.get("with")), ("criteria", index, "with")
         if criterion.get("check") == "stamps":
             given = {"field": "header", STAMPED: True, **given}
-        yield from _judged_fields(path, given, known, rubric, scenario)
+        judged = list(_judged_fields(path, given, known, rubric, scenario))
+        yield from judged or (one for one in other_kinds if one[0][: len(path)] == path)
         if str(criterion.get("check")) in PLACES:
             yield from _no_place(path, given, rubric, scenario)
         if criterion.get("check") == "topic-type":
@@ -333,7 +103,7 @@ def _no_types(rubric: dict[str, Any], known: Definitions) -> Iterator[Fault]:
         messages = known.messages_of(package)
         for one in parse_interface(own.text.encode(), f"definition{suffix}").fields:
             kind = one.type.partition("[")[0]
-            at = path if own.whole else (*path, _name(one))
+            at = path if own.whole else (*path, name_in(one))
             if "/" in kind:
                 fault = ros_packages().type_fault(kind, "msg", own_packages) if own.whole else ""
             elif kind.islower() or kind in {*BUILT_IN, *FULL_NAMES, *messages}:
@@ -366,7 +136,8 @@ def _judged_fields(
             faults = [_no_such(shape, field, given) if (shape := known.shape(kind)) else "" for kind in types]
             usual = USUAL_TYPES.get(topic.rpartition("/")[2])
             if not faults and usual and (shape := known.shape(usual)):
-                faults = [_no_such(shape._replace(partial=frozenset(shape.types)), field, {})]
+                values: dict[str, Any] = {key: given[key] for key in given if key in {"value", "values"}}
+                faults = [_no_such(shape._replace(partial=frozenset(shape.types)), field, values)]
             if isinstance(field, str) and faults and all(faults):
                 yield (*path, *at), faults[0]
         quoted = [one for key in ("value", "values") for one in _quoted((*path, key), given.get(key), topic)]
@@ -399,7 +170,7 @@ def _counted(path: KeyPath, given: dict[str, Any], types: list[str]) -> Iterator
     """Yield values of a counter that its field never has."""
     for key in COUNTED & given.keys():
         kinds = [kind.partition("/")[2].lower() for kind in types if kind.startswith("std_msgs/")]
-        wrong = [_no_value(kind, given[key]) if limits_of(kind) else "" for kind in kinds]
+        wrong = [no_value(kind, given[key]) if limits_of(kind) else "" for kind in kinds]
         if wrong and all(wrong) and len(wrong) == len(types):
             yield (*path, key), f"data of {types[0]} {wrong[0]}"
 
@@ -534,10 +305,23 @@ def types_of(topic: str, rubric: dict[str, Any], scenario: dict[str, Any] | None
             yield given.get("type")
         yield from (left["type"] for name, left in as_map(given.get("topics")).items()
                     if name == topic and as_map(left).get("type"))  # fmt: skip
+    yield from said_types(topic, str(rubric.get("handout") or ""))
     for one in as_map(rubric.get("scenarios")).values():
         sent = [probe for _, probe in as_maps(as_map(one).get("probes"))]
         sent += [as_map(step.get("publish")) for _, step in as_maps(as_map(one).get("steps"))]
         yield from (one.get("type") for one in sent if one.get("topic") == topic)
+
+
+def said_types(topic: str, handout: str) -> Iterator[str]:
+    """Yield the types of ROS's that the handout says the topic has: `/scan, a sensor_msgs/LaserScan`, or `a
+    geometry_msgs/Twist on /cmd_vel`."""
+    name, kind, tick = re.escape(topic), r"(\w+)/([A-Z]\w*)", "`?"
+    after = rf"{tick}{name}{tick}(?![\w/])[\s,:(]*(?:(?:an?|as|of type)\s+)*{tick}{kind}"
+    before = rf"{kind}{tick}(?:\s+messages?)?\s+on\s+(?:the\s+topic\s+)?{tick}{name}{tick}(?![\w/])"
+    for pattern in (rf"(?<![\w/]){after}", before):
+        for package, message in re.findall(pattern, handout) if topic.startswith("/") else ():
+            if message in noetic_messages().get(package, ()):
+                yield f"{package}/{message}"
 
 
 def _asked(criterion: dict[str, Any], scenario: dict[str, Any]) -> tuple[str, dict[str, Any] | None, bool]:
@@ -581,8 +365,20 @@ def _expected(
     for at, one in each:
         if shape is None:
             yield from _quoted((*path, key, *at), one)
-        elif fault := shape.misfit(one):
+        elif fault := shape.misfit(one) or _of_other_part(one, str(about.get("type")), shape, known):
             yield (*path, key, *at), fault
+
+
+def _of_other_part(value: dict[str, Any], kind: str, shape: Shape, known: Definitions) -> str:
+    """Return that a field is one of the request, and not of the answer, or the like; empty where none is."""
+    names = {one.name for one in shape.types[shape.root.type]}
+    for part in (one for parts in PARTS.values() for one in parts if one):
+        other = known.shape(kind, part)
+        there = {one.name for one in other.types[other.root.type]} if other else set()
+        name = next((key for key in value if key in there - names), None)
+        if other is not None and name is not None:
+            return f"{shape.what} has no field {name}, which is one of {other.what}"
+    return ""
 
 
 def _sent_fields(scenario: dict[str, Any], known: Definitions) -> Iterator[tuple[KeyPath, str]]:
@@ -630,19 +426,15 @@ def _other_definitions(
     if own is None or not own.whole or not all(known.shape(type_, part) for part in PARTS[file.suffix]):
         return
     try:
-        found = {_name(one): one.type for one in parse_definition(own.text, file.suffix)}
+        found = {name_in(one): one.type for one in parse_definition(own.text, file.suffix)}
     except ValueError:  # said where it stands
         return
     for name, kind in as_map(given.get("fields")).items():
         if name not in found:
-            fault = f"the rubric's definition of {type_} has no {name}{_instead(str(name), found)}"
+            fault = f"the rubric's definition of {type_} has no {name}{instead_of(str(name), found)}"
             yield (*path, "fields", name), fault
         elif found[name] != kind:
             yield (
                 (*path, "fields", name),
                 f"is {found[name]} in the rubric's definition of {type_}, not {kind}",
             )
-
-
-def _name(one: InterfaceField) -> str:
-    return f"{one.part}.{one.name}" if one.part else one.name

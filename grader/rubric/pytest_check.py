@@ -51,6 +51,8 @@ class PytestParams(Record):
 
     @model_validator(mode="after")
     def _select_tells_tests_apart(self) -> PytestParams:
+        if dangling := re.search(r"(?:^|\s)(and|or|not)\s*$", self.select):
+            raise ValueError(f'select: a name is missing after "{dangling[1]}"')
         words = (word for word in re.findall(r"\w+", self.select) if word not in {"and", "or", "not"})
         if word := next((word for word in words if word.lower() in self.file.lower()), ""):
             raise ValueError(

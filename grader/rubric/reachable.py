@@ -14,8 +14,8 @@ from grader.checks.reacts import Condition
 from grader.checks.registry import Check
 from grader.checks.support.fields import Reading, is_number
 from grader.evidence.message_values import ANGLES, FORMS
+from grader.rubric.definitions import PATH_PARTS
 from grader.rubric.durations import Asked, late_faults, longest_s, often_faults, within_faults
-from grader.rubric.message_fields import PATH_PARTS
 from grader.rubric.room import room_faults, start_faults
 from grader.rubric.scenario import Scenario, Until
 from grader.rubric.simulators import FIELD_M, PROGRAMS, TRUE_POSE, robot_of
@@ -497,10 +497,12 @@ class _Demand(NamedTuple):
     every: bool
     word: str | bool | tuple[Any, ...] | None = None
     is_cause: bool = False
+    when: str = ""
+    """Which one message it is about, the `first` or the `last`."""
 
     def excludes(self, other: _Demand) -> bool:
         """Whether no messages satisfy both."""
-        if not (self.every or other.every):
+        if not (self.every or other.every or (self.when and self.when == other.when)):
             return False
         if self.word is None or other.word is None:
             return self.word is other.word and (self.low > other.high or self.high < other.low)
@@ -531,7 +533,7 @@ def _contradictions(
             for earlier, other in before.get(key, ()):
                 if demand.excludes(other):
                     wants = f"{earlier} wants {asked.get('field')} of {asked.get('topic')} otherwise in the same run"
-                    both = demand.every and other.every
+                    both = (demand.every and other.every) or demand.when == other.when != ""
                     yield at, wants if both else f"{wants}: {_way_out(demand, other)}"
             before.setdefault(key, []).append((str(criterion.get("id")), demand))
 
@@ -564,6 +566,9 @@ def _demands(check: str, asked: dict[str, Any]) -> Iterator[_Demand]:
     low, high, value = asked.get("min", -math.inf), asked.get("max", math.inf), asked.get("value")
     tolerance = asked.get("tolerance", 0)
     every = check == "field-bounds" and asked.get("share", 1) == 1
+    when = (
+        str(asked.get("when")) if check == "field-equals" and asked.get("when") in ("first", "last") else ""
+    )
     if check == "field-equals":
         every = asked.get("when", "every") == "every" and "values" not in asked
     elif check not in {"field-bounds", "reacts"} or asked.get("items") == "any":
@@ -571,10 +576,10 @@ def _demands(check: str, asked: dict[str, Any]) -> Iterator[_Demand]:
     if is_number(tolerance) and "field" in asked:
         for one in _items(asked.get("values")) if "values" in asked else [value]:
             if is_number(one):
-                yield _Demand(one - tolerance, one + tolerance, every)
+                yield _Demand(one - tolerance, one + tolerance, every, when=when)
             elif isinstance(one, str | bool):
-                yield _Demand(0, 0, every, one)
+                yield _Demand(0, 0, every, one, when=when)
             elif isinstance(one, list) and check == "field-equals":
-                yield _Demand(0, tolerance, every, tuple(one))
+                yield _Demand(0, tolerance, every, tuple(one), when=when)
     if value is None and is_number(low) and is_number(high) and check != "field-equals":
         yield _Demand(low, high, every)

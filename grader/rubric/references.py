@@ -12,18 +12,20 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.registry import Check, Reference
-from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
+from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.ros_packages import TypeKind, ros_packages
 from grader.rubric.arguments import argument_faults
+from grader.rubric.definitions import services_in
 from grader.rubric.durations import steps_s
 from grader.rubric.frames import frame_faults
-from grader.rubric.message_fields import field_faults, services_in
+from grader.rubric.message_fields import field_faults
 from grader.rubric.reachable import reach_faults
 from grader.rubric.scenario import PROGRAM_PATTERN, ROSTEST_ENDING, TYPE_PATTERN, Until
 from grader.rubric.simulators import PROGRAMS, asked_faults, only_publisher, parameter_faults
 from grader.rubric.spelling import texts_in
-from grader.rubric.started import started_faults
+from grader.rubric.started import started_faults, starts_of
 from grader.rubric.step_faults import given_steps
+from grader.rubric.unknown_names import SURE, topics_in, unknown_names, values_of, with_other_topics
 from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
 from grader.wording import closest, did_you_mean, join_words
 
@@ -31,8 +33,6 @@ LAUNCH_ENDINGS = (".launch", ".xml")
 OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended", "quiet_s")
 """Conditions of `until` that say nothing of how long a run lasts."""
 TYPES: Mapping[str, TypeKind] = {"message": "msg", "field": "msg", "service": "srv", "action": "action"}
-LIKELY, SURE = 0.6, 0.85
-"""How alike two names have to be: to be suggested, and to be taken for one with a slip."""
 ASKED_OF_STUDENT = frozenset({
     "rate", "field-equals", "field-bounds", "topic-type", "latched", "message", "stamps", "counter-start",
     "counter-step", "counter-wrap", "reacts",
@@ -41,9 +41,9 @@ ASKED_OF_STUDENT = frozenset({
 WHERE_IT_IS = frozenset({"ends-at", "stays-within", "path"})
 NEVER_OF_GRADER = frozenset({"latched", "counter-start", "counter-step", "counter-wrap"})
 """Checks of the student's messages that have no `of`."""
+ENDINGS = (".py", ".yaml", ".yml", ".sh", ".bash", ".exe", ".pl", ".lua", ".js", ".rb")
+"""Of files that a start may name."""
 OTHER_DISTROS = ("melodic", "kinetic", "indigo", "foxy", "humble", "jazzy")
-_DIGITS = re.compile(r"\d+")
-_TOPIC = re.compile(r"(?:^|:=)(/[\w/]*\w)")
 
 
 def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Iterator[Fault]:
@@ -54,14 +54,12 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
         yield from _type_faults(("scenarios", name), scenario, rubric)
         found = (*parameter_faults(scenario), *argument_faults(scenario, rubric))
         yield from ((("scenarios", name, *at), fault) for at, fault in found)
-    for index, criterion, others in _criteria(rubric):
+    for index, criterion, others in with_other_topics(rubric):
         check = checks.get(str(criterion.get("check")))
         if check is not None:
             judged = scenarios.get(str(criterion.get("scenario")))
             yield from _criterion_faults(("criteria", index), criterion, check, judged, rubric)
-            asked = asked_faults(
-                as_map(criterion.get("with")), judged or {}, others | set(_topics_in(judged))
-            )
+            asked = asked_faults(as_map(criterion.get("with")), judged or {}, others | set(topics_in(judged)))
             yield from ((("criteria", index, "with", *at), fault) for at, fault in asked)
     for index, package in as_texts(as_map(rubric.get("needs")).get("ros")):
         if package in packages_in(rubric):
@@ -75,16 +73,12 @@ def reference_faults(rubric: dict[str, Any], checks: Mapping[str, Check]) -> Ite
     yield from frame_faults(rubric)
     yield from _unused_faults(rubric, scenarios, checks)
     yield from started_faults(rubric, scenarios, checks)
-    yield from _unknown_topics(rubric, scenarios, checks)
+    yield from unknown_names(rubric, scenarios, checks)
     yield from reach_faults(rubric, scenarios, checks)
-    yield from _unknown_causes(rubric, scenarios, checks)
-    yield from _misspelt_nodes(rubric, scenarios)
-    yield from _own_types(rubric)
     criteria = list(as_maps(rubric.get("criteria")))
     yield from _of_grader(criteria, scenarios)
     yield from _forgotten_topics(criteria)
     yield from _same_names(criteria, scenarios)
-    yield from _misspelt_scripts(rubric, scenarios)
     yield from _other_goals_and_types(rubric, scenarios)
 
 
@@ -145,15 +139,20 @@ def _file_fault(file: str, rubric: dict[str, Any]) -> str:
         return f"is a source: write the name of the program that add_executable makes of it, {path.stem}"
     if file in PROGRAMS:
         return f"is not one of the student's files: write program: {file}"
+    handout = str(rubric.get("handout"))
+    source = re.search(rf"\b{re.escape(path.stem)}\.(?:cpp|cc|cxx)\b", handout)
+    if path.suffix == ".py" and source and path.name not in handout:
+        return f"the handout has {source[0]}: write the name of its program, {path.stem}"
     whole = _with_ending(file, rubric)
     return f"the rubric names {whole} elsewhere: write it with its ending" if whole else ""
 
 
 def _with_ending(file: str, rubric: dict[str, Any]) -> str:
-    """Return the name of a Python or YAML file that the rubric names with its ending, where this one has none."""
+    """Return the name of a Python or YAML file that the rubric names with its ending, where this one has none, or one
+    that no such file has."""
     path = PurePosixPath(file)
-    whole = re.compile(rf"(?<![\w.]){re.escape(path.name)}\.(?:py|ya?ml)(?!\w)")
-    texts = [text for _, text in texts_in((), rubric)] if path.name and not path.suffix else []
+    whole = re.compile(rf"(?<![\w.]){re.escape(path.stem)}\.(?:py|ya?ml)(?!\w)")
+    texts = [text for _, text in texts_in((), rubric)] if path.suffix.strip() not in ENDINGS else []
     return next((match[0] for text in texts if (match := whole.search(text))), "")
 
 
@@ -205,7 +204,7 @@ def _misfits(
     one: Reference, check: Check, criterion: dict[str, Any], scenario: dict[str, Any]
 ) -> Iterator[str]:
     """Yield why the scenario does not have what a parameter refers to."""
-    name, value, starts = criterion.get("scenario"), one.value, _starts(scenario)
+    name, value, starts = criterion.get("scenario"), one.value, starts_of(scenario)
     if one.to == "watched_s":
         yield from _too_short(one, check, scenario)
     elif not isinstance(value, str) or not value:
@@ -217,8 +216,8 @@ def _misfits(
         words, listed = LISTED[one.to]
         if value not in (there := sorted(listed(scenario))):
             yield words.format(name=name, value=value, instead=_instead(value, there))
-    elif one.to == "kept" and not any(PurePosixPath(value).match(keep) for keep in _kept_patterns(scenario)):
-        yield f'{name} keeps no file "{value}"{_instead(value, _kept_patterns(scenario))}; add it to its keeps'
+    elif one.to == "kept":
+        yield from _not_kept(str(name), value, _kept_patterns(scenario))
     elif one.to == "set" and not _is_set(value, scenario):
         there = [str(param.get("name")) for _, param in as_maps(scenario.get("params"))]
         yield f"{name} sets no parameter {value}{did_you_mean(value, there)}: add it to its params"
@@ -228,6 +227,14 @@ def _misfits(
         yield from _named_otherwise(value, of_process if len(of_process) == 1 else [])
     elif one.to == "published":
         yield from _wrong_sender(value, as_map(criterion.get("with")).get("of"), check, scenario)
+
+
+def _not_kept(scenario: str, file: str, kept: list[str]) -> Iterator[str]:
+    path = PurePosixPath(file)
+    if path.is_absolute() and path.parts[1:2] != ("tmp",):
+        yield f"no file is kept from {path.parent}: write {path.name}"
+    elif not any(path.match(keep) for keep in kept):
+        yield f'{scenario} keeps no file "{file}"{_instead(file, kept)}; add it to its keeps'
 
 
 def _wrong_sender(topic: str, says_of: object, check: Check, scenario: dict[str, Any]) -> Iterator[str]:
@@ -242,13 +249,13 @@ def _wrong_sender(topic: str, says_of: object, check: Check, scenario: dict[str,
         says_of is None
         and "of" in check.params.model_fields
         and topic in given
-        and topic not in _topics_in(until)
+        and topic not in topics_in(until)
     ):
         yield (
             f"the grader itself sends on {topic}, and {check.name} judges the student's messages: if students publish "
             "there too, write of: student"
         )
-    if of == "program" and not any(start.get("program") for start in _starts(scenario)):
+    if of == "program" and not any(start.get("program") for start in starts_of(scenario)):
         yield f"the scenario starts no program, and {check.name} judges the messages of one (of: program)"
 
 
@@ -337,6 +344,9 @@ def _named_otherwise(name: str, starts: list[dict[str, Any]]) -> Iterator[str]:
         yield f"is the name of a node, not of its file: write {name.rpartition('.')[0]}"
     elif re.search(r"[^\w/]", name):
         yield f'no node is called "{name}": letters, digits and _, and anonymous: required where digits follow'
+    unnamed = [one for one in starts if not as_texts(one.get("args")) and one.get("script") is not None]
+    if "/" in name.strip("/") and unnamed:
+        yield f"a script has no namespace of its own: write {name.rpartition('/')[2]}, or give its start args, __ns:=…"
     for args in (as_texts(start.get("args")) for start in starts):
         given = dict(text.split(":=", 1) for _, text in args if text.startswith(("__ns:=", "__name:=")))
         own = given.get("__name", name.rpartition("/")[2])
@@ -403,109 +413,6 @@ def _unused_faults(
             yield ("scenarios", name), "no criterion judges this scenario: remove it, or name it in one"
 
 
-def _unknown_topics(
-    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
-    """Yield topics that a run waits for and that nothing else knows.
-
-    Programs, launch files and checks of the instructor's own may know others: then only a near miss is a fault.
-    """
-    criteria = [criterion for _, criterion in as_maps(rubric.get("criteria"))]
-    named = {topic for criterion in criteria for topic in _topics_in(criterion.get("with"))}
-    named |= {topic for criterion in criteria for topic in READ_TOO.get(str(criterion.get("check")), ())}
-    found = [checks.get(str(criterion.get("check"))) for criterion in criteria]
-    own = any(check is None or check.source or "evidence" in check.facts for check in found)
-    for name, scenario in scenarios.items():
-        until = as_map(scenario.get("until"))
-        known = {*named, *SYSTEM_TOPICS}
-        known |= {t for key, part in scenario.items() if key != "until" for t in _topics_in(part)}
-        open_ = own or any(start.get("script") is None for start in _starts(scenario))
-        for at, topic in _waited_for(until):
-            near = _near(topic, named, cutoff=SURE if open_ else LIKELY)
-            if topic.startswith("/") and topic not in known and (near or not open_):
-                meant = f' (did you mean "{near}"?)' if near else ""
-                yield ("scenarios", name, "until", *at), f"no criterion and no probe names {topic}{meant}"
-        steps = [step for _, step in as_maps(scenario.get("steps")) if "wait" not in step]
-        there = {*named, *_topics_in(steps)}
-        for at, topic in _waits_in_steps(scenario):
-            near = "" if topic in there else _near(topic, named, cutoff=SURE)
-            if near:
-                yield ("scenarios", name, *at), f'no criterion names {topic} (did you mean "{near}"?)'
-
-
-def _unknown_causes(
-    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
-) -> Iterator[Fault]:
-    """Yield causes on topics that nothing in the scenario sends on, and that no other criterion names."""
-    for index, criterion, others in _criteria(rubric):
-        check, name = checks.get(str(criterion.get("check"))), str(criterion.get("scenario"))
-        scenario = scenarios.get(name, {})
-        sent = {*SYSTEM_TOPICS, *_topics_in(scenario), *_of_actions(scenario)}
-        open_ = any(start.get("script") is None for start in _starts(scenario)) or "recording" in scenario
-        for one in check.references(as_map(criterion.get("with"))) if check else ():
-            at = one.path if isinstance(one.value, str) else (*one.path, "topic")
-            topic = one.value if isinstance(one.value, str) else as_map(one.value).get("topic")
-            if one.to not in {"cause", "heard"} or not isinstance(topic, str) or topic in sent | others:
-                continue
-            near = _near(topic, sent, cutoff=SURE if open_ else LIKELY)
-            if near or not open_:
-                meant = f' (did you mean "{near}"?)' if near else ""
-                fault = f"nothing in {name} sends on {topic}, and no other criterion names it{meant}"
-                yield ("criteria", index, "with", *at), fault
-
-
-def _of_actions(scenario: dict[str, Any]) -> Iterator[str]:
-    """Yield the topics of the actions that the grader offers or asks: `/dock/goal`, `/dock/cancel`, …"""
-    offered = [one.get("action") for _, one in as_maps(scenario.get("serves"))]
-    asked = [as_map(step.get("action")).get("name") for _, step in as_maps(scenario.get("steps"))]
-    for name in filter(None, (*offered, *asked)):
-        yield from (f"{name}/{part}" for part in ("goal", "cancel", "status", "feedback", "result"))
-
-
-def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
-    """Yield types of the student's package that are all but one whose file a criterion asks for."""
-    criteria = list(as_maps(rubric.get("criteria")))
-    files = [str(as_map(c.get("with")).get("file")) for _, c in criteria if c.get("check") == "definition"]
-    names, own = {PurePosixPath(file).stem for file in files}, packages_in(rubric)
-    defined = {
-        (
-            str(c.get("package") or next(iter(own), "")),
-            PurePosixPath(str(as_map(c.get("with")).get("file"))).stem,
-        )
-        for _, c in criteria
-        if c.get("check") == "definition"
-    }
-    typed: list[tuple[KeyPath, dict[str, Any]]] = [
-        (("criteria", n, "with"), as_map(c.get("with"))) for n, c in criteria
-    ]
-    for scenario, one in as_map(rubric.get("scenarios")).items():
-        steps = [(n, key, as_map(step[key])) for n, step in as_maps(as_map(one).get("steps")) for key in step]
-        typed += [(("scenarios", scenario, "steps", n, key), given) for n, key, given in steps]
-    for path, given in typed:
-        kind = given.get("type")
-        package, _, name = kind.partition("/") if isinstance(kind, str) else ("", "", "")
-        near = closest(name, names, cutoff=SURE) if package in own and name not in names else ""
-        places = {judged for judged, stem in defined if stem == name}
-        if package in own and places and package not in places:
-            fault = f"a criterion looks for {name} in {join_words(sorted(places))}, and this is {kind}"
-            yield (*path, "type"), f"{fault}: give the criterion package: {package}"
-        if near:
-            yield (*path, "type"), f'no criterion asks for {name} (did you mean "{package}/{near}"?)'
-
-
-def _misspelt_scripts(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
-    """Yield scripts that nothing starts, and that are all but one that is started and that no criterion names."""
-    criteria = list(as_maps(rubric.get("criteria")))
-    paths = {n: as_map(c.get("with")).get("path") for n, c in criteria if c.get("check") == "executable"}
-    named = {n: PurePosixPath(path).name for n, path in paths.items() if isinstance(path, str)}
-    starts = [start for scenario in scenarios.values() for start in _starts(scenario)]
-    started = {PurePosixPath(script).name for script in _values_of(starts, "script")}
-    for index, name in named.items():
-        near = "" if name in started else _near(name, started - {*named.values()}, cutoff=SURE)
-        if near:
-            yield ("criteria", index, "with", "path"), f'no scenario starts {name} (did you mean "{near}"?)'
-
-
 def _other_goals_and_types(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
     """Yield goals that a scenario does not send, and types of services that are not those that it calls."""
     for index, criterion in as_maps(rubric.get("criteria")):
@@ -541,60 +448,6 @@ def _is_given_up(goal: dict[str, Any], scenario: dict[str, Any]) -> bool:
     return goal.get("cancel_after_s") is not None or any(one.get("background") is True for one in steps)
 
 
-def _misspelt_nodes(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
-    """Yield private parameters of a node whose name is all but one that a criterion asks for."""
-    asked: dict[str, set[str]] = {}
-    for _, criterion in as_maps(rubric.get("criteria")):
-        names = as_texts(as_map(criterion.get("with")).get("names"))
-        asked.setdefault(str(criterion.get("scenario")), set()).update(n.strip("/") for _, n in names)
-    for name, scenario in scenarios.items():
-        programs = _values_of(_starts(scenario), "program")
-        asked.setdefault(name, set()).update(program.rpartition("/")[2] for program in programs)
-        given: list[tuple[KeyPath, dict[str, Any]]] = [
-            (("params", n), one) for n, one in as_maps(scenario.get("params"))
-        ]
-        given += [
-            (("steps", n, "set_param"), as_map(s.get("set_param"))) for n, s in as_maps(scenario.get("steps"))
-        ]
-        for at, one in given:
-            node, _, private = str(one.get("name", "")).strip("/").partition("/")
-            nodes = asked.get(name, set())
-            near = _near(node, nodes, cutoff=SURE) if private and node not in nodes else ""
-            if near:
-                fault = f'the node is called {near}, and not {node} (did you mean "/{near}/{private}"?)'
-                yield ("scenarios", name, *at, "name"), fault
-
-
-def _waits_in_steps(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
-    for index, step in as_maps(scenario.get("steps")):
-        topic = as_map(step.get("wait")).get("topic")
-        if isinstance(topic, str):
-            yield ("steps", index, "wait", "topic"), topic
-
-
-def _waited_for(until: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
-    for key in ("topics", "connected"):
-        yield from (((key, index), topic) for index, topic in as_texts(until.get(key)))
-    yield from ((("messages", topic), topic) for topic in as_map(until.get("messages")))
-
-
-def _criteria(rubric: dict[str, Any]) -> Iterator[tuple[int, dict[str, Any], set[str]]]:
-    """Yield each criterion with its place, and the topics that the others name."""
-    criteria = list(as_maps(rubric.get("criteria")))
-    named = [set(_topics_in(criterion.get("with"))) for _, criterion in criteria]
-    for place, (index, criterion) in enumerate(criteria):
-        yield index, criterion, set().union(*named[:place], *named[place + 1 :])
-
-
-def _topics_in(value: object) -> Iterator[str]:
-    if isinstance(value, str):
-        yield from _TOPIC.findall(value)
-    elif isinstance(value, Mapping):
-        yield from (topic for key, item in value.items() for topic in (*_topics_in(key), *_topics_in(item)))
-    elif isinstance(value, list | tuple):
-        yield from (topic for item in value for topic in _topics_in(item))
-
-
 def _sent_by_grader(scenario: dict[str, Any]) -> set[str]:
     probes = [probe for _, probe in as_maps(scenario.get("probes"))]
     return {str(one.get("topic")) for one in (*given_steps(scenario, "publish"), *probes)}
@@ -603,7 +456,7 @@ def _sent_by_grader(scenario: dict[str, Any]) -> set[str]:
 def _sent_topics(scenario: dict[str, Any]) -> set[str]:
     """Return the topics on which probes send, and steps of the scenario."""
     sent = {str(probe.get("topic")) for _, probe in as_maps(scenario.get("probes"))}
-    return sent | set(_topics_in(scenario.get("steps")))
+    return sent | set(topics_in(scenario.get("steps")))
 
 
 def _actions(scenario: dict[str, Any]) -> list[str]:
@@ -625,14 +478,14 @@ def _served_names(scenario: dict[str, Any]) -> list[str]:
 LISTED: Mapping[str, tuple[str, Callable[[dict[str, Any]], Iterable[str]]]] = {
     "launch": (
         '{name} does not start "{value}"{instead}',
-        lambda scenario: _values_of(_starts(scenario), "launch"),
+        lambda scenario: values_of(starts_of(scenario), "launch"),
     ),
     "sent": ("no probe of {name} sends on {value}{instead}", _sent_topics),
     "action": ("no step of {name} sends a goal to {value}{instead}", _actions),
     "rostest": (
         '{name} starts no .test file as "{value}"{instead}',
         lambda scenario: [
-            str(s.get("name")) for s in _starts(scenario) if str(s.get("program")).endswith(ROSTEST_ENDING)
+            str(s.get("name")) for s in starts_of(scenario) if str(s.get("program")).endswith(ROSTEST_ENDING)
         ],
     ),
     "served": ("the grader does not offer {value} in {name}{instead}: add it to serves", _served_names),
@@ -640,20 +493,6 @@ LISTED: Mapping[str, tuple[str, Callable[[dict[str, Any]], Iterable[str]]]] = {
 """Of what a scenario has to list: what is said where it does not, and where to look."""
 
 
-def _starts(scenario: dict[str, Any]) -> list[dict[str, Any]]:
-    return [start for _, start in as_maps(scenario.get("start"))]
-
-
-def _values_of(starts: list[dict[str, Any]], key: str) -> list[str]:
-    return [start[key] for start in starts if isinstance(start.get(key), str)]
-
-
 def _instead(name: str, there: list[str]) -> str:
     """Return what is like the name, else all that is there."""
     return did_you_mean(name, there) or f": there is {join_words(there) or 'none'}"
-
-
-def _near(topic: str, named: Iterable[str], *, cutoff: float) -> str:
-    """Return the topic most like it. `/turtle1/pose` and `/turtle2/pose` are two, and not one with a slip."""
-    plain = _DIGITS.sub("", topic)
-    return closest(topic, [name for name in named if _DIGITS.sub("", name) != plain], cutoff=cutoff)

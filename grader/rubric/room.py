@@ -48,7 +48,11 @@ def start_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     boxes = [line for line in _boxes(robot) if _is_inside(place, line)]
     given = (at for at, one in set_in(scenario) if str(one.get("name")).endswith("/start"))
     where = (*path, *next(given, ("start",)))
-    if boxes:
+    closed = [line for line in _lines(robot) if line[0] == line[-1] and line not in _boxes(robot)]
+    rooms = [line for line in closed if any(_is_inside(box[0], line) for box in _boxes(robot))]
+    if rooms and not any(_is_inside(place, line) for line in rooms):
+        yield where, f"the robot starts at {_pair(place)}, outside of the room that the walls make"
+    elif boxes:
         inside = f"in the box from {_pair(boxes[0][0])} to {_pair(boxes[0][2])}"
         yield where, f"the robot starts at {_pair(place)}, {inside}"
     elif away_m < radius_m:

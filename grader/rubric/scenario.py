@@ -6,7 +6,7 @@ A new kind of step takes
 3. `evidence/events.py`: the `action` of the `ActorEvent` that says so, where none of those that are there fits;
 4. `rubric/step_faults.py`: what its record's types cannot say, and its entry in `NAMED` if it names something of ROS's;
 5. `rubric/made_up.py`: its entry in `GIVEN`, if a program meets its values;
-6. `rubric/references.py`: `_topics_in`, `_sent` and the like, if criteria refer to what it sends or calls;
+6. `rubric/references.py`: `_sent_topics` and the like, if criteria refer to what it sends or calls;
 7. `package/repairs/names.py`: `wanted_of`, if it has a name that a student's package may misspell;
 8. a section in `docs/how-to/steps.md`, and the pages that `make reference` writes.
 """

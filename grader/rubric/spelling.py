@@ -29,7 +29,8 @@ WORDS = {"text", "template", "value", "values"}
 FIELDS = {"result", "expect", "request", "goal", "answer", "feedback"}
 """Keys of maps from fields to values."""
 USUAL_FRAMES = {"map", "odom", "base_link", "base_footprint", "base_scan", "laser", "world"}
-"""Frames of REP 105, and those of TurtleBot3 and Stage."""
+"""Frames of REP 105, and those of TurtleBot3 and Stage: right on one line alone, unless the handout has others of
+them."""
 _WORD = r"[^\W\d]\w+"
 CHARS_MIN = 3
 """Of names of so few letters, one that differs in a letter is another name."""
@@ -102,8 +103,9 @@ def _named_once(data: object, folder: Path) -> Iterator[tuple[KeyPath, str, str]
     names = [(path, text, last) for path, text in texts if (last := _last_word(path, text, rubric))]
     names = [one for one in names if not PROSE & {*one[0]}]
     actions = {text for path, text in texts if path[-1] == "action"}
-    known_ones = {*SYSTEM_TOPICS, *USUAL_FRAMES} | ({TRUE_POSE} if "robot_world" in programs else set())
     handout = str(rubric.get("handout"))
+    frames = USUAL_FRAMES & {*re.findall(r"\w+", handout)} or USUAL_FRAMES
+    known_ones = {*SYSTEM_TOPICS, *frames} | ({TRUE_POSE} if "robot_world" in programs else set())
     words = {word for path, text in texts if not PROSE & {*path} for word in re.findall(r"\w+", text)}
     for path, text, last in names:
         if text.rpartition("/")[0] in actions:  # `/dock/cancel`

@@ -27,6 +27,8 @@ from grader.wording import did_you_mean
 KINDS = tuple(Step.model_fields)
 RUN_S_MAX = 2 * STEP_S_MAX
 PROCESS_STEPS = ("start", "stop", "kill", "restart")
+FOR_NODES = ("publish", "call", "action", "transform", "play", "wait")
+"""Steps in which a node takes part."""
 NAMED = {
     "publish": ("topic", "a topic"),
     "call": ("service", "a service"),
@@ -127,8 +129,7 @@ def _faults_of(at: KeyPath, kind: str, given: dict[str, Any], types: dict[str, s
     elif kind == "call":
         yield from of_type(at, given)
     elif kind == "action":
-        yield from _action_name(at, given)
-        yield from _cancelled_late(at, given)
+        yield from _action(at, given, types)
     elif kind == "wait":
         yield from _wait(at, given)
     elif kind == "set_param" and (given.get("value", "") is None or given.get("value") in tuple(NOT_FINITE)):
@@ -145,6 +146,20 @@ def _action_name(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
     if kind.endswith("Action"):
         short = kind.removesuffix("Action")
         yield (*at, "type"), f"is named as its .action file, without Action: {short}"
+
+
+def _action(at: KeyPath, given: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
+    """`types` are those of what earlier steps publish on, and send goals to."""
+    name, kind = str(given.get("name")), str(given.get("type"))
+    yield from _action_name(at, given)
+    types.setdefault(name, kind)
+    for one, other in ((kind, types[name]), (types[name], kind)):
+        if one != other and re.sub(r"(Action)?(Goal|Result|Feedback)$", "", one) == other:
+            yield (
+                (*at, "type"),
+                f"has to be the same for all goals of {name}, that of the .action file: {other}",
+            )
+    yield from _cancelled_late(at, given)
 
 
 def _cancelled_late(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
@@ -180,13 +195,15 @@ def _publish(at: KeyPath, publish: dict[str, Any], types: dict[str, str]) -> Ite
         yield at, "give one of value and values"
     if publish.get("count") is not None and publish.get("duration_s") is not None:
         yield at, "give count or duration_s, not both"
+    listed, count = publish.get("values"), publish.get("count")
+    if isinstance(listed, list) and isinstance(count, int) and 0 < count < len(listed):
+        yield (*at, "count"), f"only {count} of the {len(listed)} values are sent"
     if not isinstance(topic, str) or not isinstance(kind, str) or "/" not in kind:
         return
     if types.setdefault(topic, kind) != kind:
         yield (*at, "type"), f"an earlier step publishes {types[topic]} on {topic}"
-    values = publish.get("values")
-    listed = enumerate(values) if isinstance(values, list) else ()
-    places: list[tuple[KeyPath, Any]] = [((*at, "values", index), value) for index, value in listed]
+    values = enumerate(listed) if isinstance(listed, list) else ()
+    places: list[tuple[KeyPath, Any]] = [((*at, "values", index), value) for index, value in values]
     places += [((*at, "value"), publish["value"])] if "value" in publish else []
     yield from misfits((*at, "type"), kind, places, endless=_is_endless(publish))
 
@@ -259,8 +276,14 @@ def _transform(at: KeyPath, transform: dict[str, Any]) -> Iterator[Fault]:
 def _processes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     """Yield the faults of steps that start, stop or type to a process."""
     starts = {str(start.get("name")): start for _, start in as_maps(scenario.get("start"))}
-    runs: dict[str, bool] = {}
-    for index, step in as_maps(scenario.get("steps")):
+    steps = as_maps(scenario.get("steps"))
+    named = [
+        (kind, step[kind]) for _, step in steps for kind in PROCESS_STEPS if isinstance(step.get(kind), str)
+    ]
+    first = {name: kind for kind, name in reversed(named)}
+    later = {name for name, kind in first.items() if kind == "start"}
+    runs = dict.fromkeys(later, False)
+    for index, step in steps:
         for kind in (*PROCESS_STEPS, "type"):
             key = (kind,) if kind in PROCESS_STEPS else (kind, "process")
             name = as_map(step.get(kind)).get("process") if kind == "type" else step.get(kind)
@@ -274,9 +297,35 @@ def _processes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
             elif kind == "start" and runs.get(name, False):
                 yield at, f'"{name}" runs already: stop it before, or restart it'
             elif kind in {"stop", "kill", "type"} and not runs.get(name, True):
-                yield at, f'"{name}" does not run: an earlier step has stopped it'
+                why = (
+                    "an earlier step has stopped it"
+                    if name not in later
+                    else "no earlier step has started it"
+                )
+                yield at, f'"{name}" does not run: {why}'
             if kind != "type":
+                later.discard(name)
                 runs[name] = kind in {"start", "restart"}
+    yield from _after_the_last(path, steps, starts)
+
+
+def _after_the_last(
+    path: KeyPath, steps: list[tuple[int, dict[str, Any]]], starts: dict[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield the first step that sends something, or waits for messages, once all processes have been stopped for
+    good."""
+    living = {name for name, start in starts.items() if start.get("load") is None}
+    for place, (index, step) in enumerate(steps):
+        ended = str(step.get("stop") or step.get("kill"))
+        rest = steps[place + 1 :]
+        living -= {ended} if not any({"start", "restart"} & one.keys() for _, one in rest) else set()
+        kind = next((key for key in FOR_NODES if key in step), "")
+        if not living and starts and kind and as_map(step.get("wait")).get("seconds") is None:
+            yield (
+                (*path, "steps", index, kind),
+                "nothing runs any more that could take part: it has been stopped",
+            )
+            return
 
 
 def _wait(at: KeyPath, wait: dict[str, Any]) -> Iterator[Fault]:

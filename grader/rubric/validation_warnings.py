@@ -12,8 +12,10 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
+from grader.rubric.definitions import services_in
 from grader.rubric.demand_warnings import demand_warnings
-from grader.rubric.message_fields import POSES, VELOCITIES, services_in
+from grader.rubric.message_fields import POSES, VELOCITIES
+from grader.rubric.prose_warnings import SHIFTS, numbers_in, prose_warnings
 from grader.rubric.simulators import set_in, topics_of_programs
 from grader.rubric.spelling import texts_in
 from grader.rubric.started import starts_of
@@ -24,26 +26,12 @@ from grader.wording import join_words, plural
 SHORT = {"limit_s": 3.0, "first_message_s": 3.0, "quiet_s": 1.0, "alive_s": 0.5, "window_s": 2.0}
 """Conditions of `until` that a correct package may miss on a busy machine if they are shorter."""
 WAIT_S = 0.5
+LONG_S = 900.0
+"""Nothing of a lab takes so long; in milliseconds it is less than a second."""
+SELDOM_S = 5.0
+"""Nobody waits so long for the next message of a lab."""
 JUDGED = ("check", "scenario", "package", "with")
 """What makes a criterion judge something."""
-WORDS = {
-    "one": 1,
-    "two": 2,
-    "twice": 2,
-    "three": 3,
-    "four": 4,
-    "five": 5,
-    "ten": 10,
-    "twenty": 20,
-    "fifty": 50,
-}
-_NUMBER = rf"\d+(?:\.\d+)?|{'|'.join(WORDS)}"
-PER_SECOND = re.compile(rf"\b({_NUMBER})(?: ?Hz\b|(?: \w+)? (?:a|per) second)", re.IGNORECASE)
-SHIFTS = (10, 100, 0.1, 0.01, -1)
-"""By so much a number is another where a digit is forgotten, or a sign."""
-EXPECTED = ("value", "values", "numbers", "rate_hz", "result", "expect", "goal", "start", "min", "max",
-            "translation", "tolerance_m")  # fmt: skip
-"""Keys of what a criterion asks for, as numbers."""
 
 
 def warnings(data: object) -> Iterator[Fault]:
@@ -57,21 +45,27 @@ def warnings(data: object) -> Iterator[Fault]:
     yield from _first_packages(rubric, scenarios)
     yield from _lone_quotes(rubric)
     yield from _same_criteria(criteria)
+    yield from _without_requires(criteria)
+    yield from _required_of_runs(criteria)
+    yield from _patterns(criteria)
+    yield from _own_messages(criteria, scenarios)
+    yield from _heavy_members(rubric, criteria)
     yield from _other_rates(criteria, scenarios)
     yield from _not_private(scenarios, str(rubric.get("handout") or ""))
     yield from _without_input(criteria, scenarios)
     yield from demand_warnings(rubric, criteria, scenarios)
+    yield from prose_warnings(rubric)
     for index, criterion in criteria:
         at, given = ("criteria", index, "with"), as_map(criterion.get("with"))
         scenario = scenarios.get(str(criterion.get("scenario")), {})
         yield from _other_process(at, given, scenario, scenarios)
         yield from _fewer_answers(at, criterion, scenario)
         yield from _asked_for_nothing(at, criterion, scenario)
+        yield from _printed_elsewhere(at, criterion, scenarios)
         yield from _cancelled_goal(at, given, scenario)
         yield from _added_up(at, criterion, scenario)
         yield from _set_otherwise(at, criterion, scenario)
         yield from _other_run(criteria, index, scenarios)
-        yield from _shifted_numbers(index, criterion, rubric)
 
 
 def _short_runs(scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
@@ -81,16 +75,31 @@ def _short_runs(scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
             if is_number(given_s) and given_s < least_s:
                 fault = f"{given_s:g} s is very short: on a busy machine a correct package may need more"
                 yield ("scenarios", name, "until", key), fault
+            if is_number(given_s) and given_s > LONG_S:
+                fault = f"{given_s:g} s are {given_s / 60:.0f} minutes, which a package that never gets there takes"
+                yield ("scenarios", name, "until", key), fault
+        for index, step in as_maps(scenario.get("steps")):
+            rate_hz = as_map(step.get("publish")).get("rate_hz")
+            if is_number(rate_hz) and 0 < rate_hz < 1 / SELDOM_S:
+                fault = f"is a message every {1 / rate_hz:g} s: rate_hz is messages a second"
+                yield ("scenarios", name, "steps", index, "publish", "rate_hz"), fault
 
 
 def _short_waits(scenarios: Mapping[str, dict[str, Any]]) -> Iterator[Fault]:
-    """Yield waits for a topic or node that is there before them at no student's."""
+    """Yield waits for what is there before them at no student's: a topic or node, an answer, a result."""
     for name, scenario in scenarios.items():
-        for index, step in as_maps(scenario.get("steps")):
-            limit_s = as_map(step.get("wait")).get("limit_s")
+        waits: list[tuple[KeyPath, dict[str, Any]]] = [
+            (("steps", index, kind), as_map(step[kind]))
+            for index, step in as_maps(scenario.get("steps"))
+            for kind in ("wait", "call", "action")
+            if kind in step
+        ]
+        waits += [(("calls", index), call) for index, call in as_maps(scenario.get("calls"))]
+        for at, wait in waits:
+            limit_s = wait.get("limit_s")
             if is_number(limit_s) and limit_s < WAIT_S:
                 fault = f"{limit_s:g} s is very short: on a busy machine a correct package may need more"
-                yield ("scenarios", name, "steps", index, "wait", "limit_s"), fault
+                yield ("scenarios", name, *at, "limit_s"), fault
 
 
 def _lone_quotes(rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -98,6 +107,64 @@ def _lone_quotes(rubric: dict[str, Any]) -> Iterator[Fault]:
         for quote in ('"', "'"):
             if text.count(quote) == 1 and (text.startswith(quote) or text.endswith(quote)):
                 yield path, f"has one quotation mark, {quote}, without its partner"
+            is_value = path[-1] == "value" or path[-2:-1] == ("values",)
+            if is_value and len(text) > 2 and text.startswith(quote) and text.endswith(quote):
+                yield path, "has quotation marks in its quotation marks: a node has to publish them, too"
+
+
+def _own_messages(
+    criteria: Sequence[tuple[int, dict[str, Any]]], scenarios: Mapping[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield waits for messages on a topic on which the grader sends later, and of which no criterion judges any."""
+    judged = [as_map(criterion.get("with")).get("topic") for _, criterion in criteria]
+    for name, scenario in scenarios.items():
+        steps = as_maps(scenario.get("steps"))
+        for place, (index, step) in enumerate(steps):
+            topic = as_map(step.get("wait")).get("topic")
+            sent = [n for n, (_, one) in enumerate(steps) if as_map(one.get("publish")).get("topic") == topic]
+            if topic and sent and min(sent) > place and topic not in judged and "probes" not in scenario:
+                fault = "is the grader's own topic, on which it sends after this"
+                yield ("scenarios", name, "steps", index, "wait", "topic"), fault
+
+
+PATTERN = re.compile(r"\.[*+]|\\[dws]|^/.*/$|^\^.*\$$")
+
+
+def _patterns(criteria: Sequence[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+    """Yield values of fields that look like a pattern: they are compared letter by letter."""
+    for index, criterion in criteria:
+        for key in ("value", "values"):
+            for at, text in texts_in((key,), as_map(criterion.get("with")).get(key)):
+                is_one = criterion.get("check") == "field-equals" and PATTERN.search(text)
+                if is_one and not re.fullmatch(r"(/\w+)+/?", text):
+                    yield ("criteria", index, "with", *at), "is compared letter by letter: it is no pattern"
+
+
+def _required_of_runs(criteria: Sequence[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+    """Yield criteria of files that require one of a run: they are judged without it."""
+    of_runs = {str(criterion.get("id")) for _, criterion in criteria if criterion.get("scenario") is not None}
+    for index, criterion in criteria:
+        for number, name in as_texts(criterion.get("requires")):
+            if criterion.get("scenario") is None and name in of_runs and criterion.get("check") != "manual":
+                fault = f"{name} judges a run, and {criterion.get('id')} files, which no run changes"
+                yield ("criteria", index, "requires", number), fault
+
+
+FAR = 10
+
+
+def _heavy_members(rubric: dict[str, Any], criteria: Sequence[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+    """Yield criteria of a group that weigh more than all others of it together, many times."""
+    places = {str(criterion.get("id")): (index, criterion.get("points")) for index, criterion in criteria}
+    for name, group in as_map(rubric.get("groups")).items():
+        found = [places[one] for _, one in as_texts(as_map(group).get("criteria")) if one in places]
+        weights = [(index, points) for index, points in found if is_number(points)]
+        total = sum(points for _, points in weights)
+        for index, points in weights:
+            if "points" in as_map(group) and points >= FAR * (total - points) > 0:
+                share = 100 * points / total
+                fault = f"points in a group are weights: this one is {share:.0f} % of {name}"
+                yield ("criteria", index, "points"), fault
 
 
 def _words(name: str) -> set[str]:
@@ -202,8 +269,10 @@ def _asked_for_nothing(at: KeyPath, criterion: dict[str, Any], scenario: dict[st
     """Yield numbers of a request that nothing in the run has, where others of the same field come from the run."""
     expect = as_map(criterion.get("with")).get("expect")
     parts = {key: part for key, part in scenario.items() if key not in {"until", "serves"}}
-    sent = {number for _, number in _numbers_in((), parts)}
+    sent = {number for _, number in numbers_in((), parts)}
     sent |= {float(text) for _, text in texts_in((), parts) if re.fullmatch(r"-?\d+(\.\d+)?", text)}
+    if criterion.get("check") == "service-answers" and isinstance(expect, list):
+        yield from _answered_otherwise((*at, "expect"), criterion, scenario)
     if criterion.get("check") == "calls" and isinstance(expect, dict):
         yield from _asked_once_for_nothing((*at, "expect"), expect, sent, str(criterion.get("scenario")))
     if criterion.get("check") != "calls" or not isinstance(expect, list):
@@ -215,6 +284,44 @@ def _asked_for_nothing(at: KeyPath, criterion: dict[str, Any], scenario: dict[st
             (number, value), name = alone[0], criterion.get("scenario")
             fault = f"nothing in {name} has {value:g}, and it has the other numbers that are asked for"
             yield (*at, "expect", number, key), fault
+
+
+def _printed_elsewhere(
+    at: KeyPath, criterion: dict[str, Any], scenarios: Mapping[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield numbers to print that the grader answers in another run only."""
+    name = str(criterion.get("scenario"))
+    here = {number for _, number in numbers_in((), scenarios.get(name, {}))}
+    for key, number in numbers_in(("numbers",), as_map(criterion.get("with")).get("numbers")):
+        others = [
+            other
+            for other, one in scenarios.items()
+            if other != name and number in {answer for _, answer in numbers_in((), one.get("serves"))}
+        ]
+        if others and number not in here and scenarios.get(name, {}).get("serves"):
+            yield (*at, *key), f"{number:g} is what {others[0]} answers, and nothing in {name} has it"
+
+
+def _answered_otherwise(at: KeyPath, criterion: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield the one number of a field of the answers that its request has with another sign or with a digit more, where
+    the requests have all others of that field."""
+    given = as_map(criterion.get("with"))
+    called = [one for _, part, one in services_in(scenario) if part == "request"]
+    asked = [
+        {number for _, number in numbers_in((), one.get("request"))}
+        for one in called
+        if one.get("service") == given.get("service")
+    ]
+    expect = [as_map(one) for one in given["expect"]]
+    for key in dict.fromkeys(key for one in expect for key in one):
+        pairs = enumerate(zip(expect, asked, strict=False))
+        each = [(n, one[key], sent) for n, (one, sent) in pairs if is_number(one.get(key))]
+        alone = [(n, value, sent) for n, value, sent in each if value not in sent]
+        if len(alone) == 1 < len(each):
+            number, value, sent = alone[0]
+            near = next((value / by for by in SHIFTS if round(value / by, 9) in sent), None)
+            if near is not None:
+                yield (*at, number, key), f"nothing in its request is {value:g}, and {near:g} is"
 
 
 def _asked_once_for_nothing(
@@ -237,6 +344,41 @@ def _not_private(scenarios: Mapping[str, dict[str, Any]], handout: str) -> Itera
             if param.count("/") == 1 and re.search(rf"~{re.escape(param[1:])}\b", handout):
                 fault = f"the handout has ~{param[1:]}, which is below the node's own name: /<node>{param}"
                 yield ("scenarios", name, *at, "name"), fault
+
+
+OF_NODES = frozenset({"node-lives", "node-name", "launch-runs", "launch-connects"})
+"""Checks of whether the nodes of a run are there at all."""
+
+
+def _without_requires(criteria: Sequence[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+    """Yield criteria of a run that require no criterion of a run, where another one is about its node: what keeps the
+    node from starting would be charged to whichever of them comes first."""
+    by_id = {str(criterion.get("id")): criterion for _, criterion in criteria}
+    for index, criterion in criteria:
+        name, process = criterion.get("scenario"), as_map(criterion.get("with")).get("process")
+        if name is None or str(criterion.get("check")) in {*OF_NODES, "manual"}:
+            continue
+        nodes = [
+            other
+            for _, other in criteria
+            if other.get("scenario") == name
+            and str(other.get("check")) in OF_NODES
+            and (process is None or as_map(other.get("with")).get("process", process) == process)
+        ]
+        required = _all_required(criterion, by_id)
+        if nodes and not any(by_id[one].get("scenario") for one in required & by_id.keys()):
+            root = nodes[0].get("id")
+            fault = f"where the node does not start, {root} explains it: write requires: [{root}]"
+            yield ("criteria", index, "requires" if "requires" in criterion else "id"), fault
+
+
+def _all_required(criterion: dict[str, Any], by_id: Mapping[str, dict[str, Any]]) -> set[str]:
+    """Return what a criterion requires, and what that requires in turn."""
+    found, new = set[str](), {name for _, name in as_texts(criterion.get("requires"))}
+    while new:
+        found |= new
+        new = {name for one in new for _, name in as_texts(by_id.get(one, {}).get("requires"))} - found
+    return found
 
 
 SENDS = ("publish", "transform", "play", "call", "action", "type")
@@ -338,43 +480,3 @@ def _processes(scenario: dict[str, Any]) -> set[str]:
         for start in starts_of(scenario)
         if start.get("program") is None
     }
-
-
-def _shifted_numbers(index: int, criterion: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
-    """Yield numbers that only this line has, and that the criterion's title or the handout has with another sign, or
-    ten times as large or as small."""
-    about = [str(criterion.get(key, "")) for key in ("title", "hint")]
-    prose = " ".join([*about, str(rubric.get("handout", ""))])
-    said = {float(number) for number in re.findall(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w]|\.\d)", prose)}
-    said_hz = {float(WORDS.get(number.lower(), number)) for number in PER_SECOND.findall(prose)}
-    there = [number for at, number in _numbers_in((), rubric) if not _is_setting(at)]
-    for key in EXPECTED:
-        for at, number in _numbers_in((key,), as_map(criterion.get("with")).get(key)):
-            known = said_hz if key == "rate_hz" else said
-            shifts = SHIFTS[:-1] if key in {"min", "max"} else SHIFTS
-            meant = next((number / by for by in shifts if round(number / by, 9) in known), None)
-            is_round = key != "rate_hz" and re.fullmatch(r"0?\.?0*10*", f"{abs(number):.9g}") is not None
-            if number in said | known or meant is None or is_round or there.count(number) > 1:
-                continue
-            if known is said_hz and len(known) > 1:
-                continue
-            yield (
-                ("criteria", index, "with", *at),
-                f"{number:g} is on no other line, and the rubric's text has {meant:g}",
-            )
-
-
-def _is_setting(path: KeyPath) -> bool:
-    """Return whether a number is about the run or the marks, and not about what a node publishes or prints."""
-    key = next((part for part in reversed(path) if not isinstance(part, int)), "")
-    return bool(
-        re.search(r"_s$|^(?:rate_hz|warp|points|bonus|penalty|at_most|digits|goal|number)$", str(key))
-    )
-
-
-def _numbers_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, float]]:
-    if is_number(value):
-        yield path, float(value)
-    elif isinstance(value, dict | list):
-        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from _numbers_in((*path, key), inner)

@@ -18,6 +18,10 @@ from grader.errors import RubricError
 MAX_DEPTH = 50
 MAX_NUMBER = (1 << 63) - 1
 MAX_NUMBER_LETTERS = 100
+OF_ANY_KIND = frozenset({
+    "value", "values", "expect", "result", "request", "goal", "answer", "answers", "feedback", "params",
+})  # fmt: skip
+"""Keys of values that may be text as well as true or false."""
 TEXT_TAG = "tag:yaml.org,2002:str"
 INT_TAG = "tag:yaml.org,2002:int"
 MERGE_TAG = "tag:yaml.org,2002:merge"
@@ -333,8 +337,8 @@ class _Reader:
             value = self.loader.construct_object(node)
         except (ValueError, OverflowError) as error:
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark) from error
-        if self.form is RUBRIC and isinstance(value, int | float) and (odd := _other_base(node.value)):
-            return self._refuse(path, f"{node.value} is {value:g} in YAML, {odd}", value)
+        if self.form is RUBRIC and (odd := _read_otherwise(node.value, value, path)):
+            return self._refuse(path, odd, value)
         if isinstance(value, int) and abs(value) > MAX_NUMBER:
             return self._refuse(path, f"is too large a number: {node.value[:40]}", 0)
         if value is None or isinstance(value, bool | int | str):
@@ -353,6 +357,15 @@ class _Reader:
     def _refuse(self, path: KeyPath, message: str, stand_in: Value = 0.0) -> Value:
         self.faults.append((path, message))
         return stand_in
+
+
+def _read_otherwise(written: str, value: object, path: KeyPath) -> str:
+    """Return that YAML does not read a value as people do, and how to write it; empty where it does."""
+    if isinstance(value, bool) and written.lower() not in {"true", "false"} and OF_ANY_KIND & {*path}:
+        truth = str(value).lower()
+        return f'{written} is {truth} in YAML: write {truth}, or "{written}" in quotes where it is text'
+    odd = "" if isinstance(value, bool) or not isinstance(value, int | float) else _other_base(written)
+    return f"{written} is {value:g} in YAML, {odd}" if odd else ""
 
 
 def _other_base(written: str) -> str:

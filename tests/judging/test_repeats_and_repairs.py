@@ -69,6 +69,26 @@ def test_one_fault_is_charged_once_and_the_rest_earns_its_share() -> None:
     assert found["executable"].repaired is None
 
 
+@pytest.mark.parametrize("repair", [TABS, TOPIC])
+def test_one_fault_is_charged_once_where_no_criterion_requires_another(repair: Repair) -> None:
+    first = DIED if repair is TABS else {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
+    runs = build_runs({"runs": {"talker": first}, "package": PACKAGE})
+    about = {"repairs": json.dumps([repair.model_dump()])}
+    for name, run in build_runs({"runs": {"talker": GOOD_RUN}, "package": PACKAGE}).items():
+        runs[f"repaired-1/{name}"] = replace(run, metadata={**run.metadata, **about})
+    lost = {
+        free: [
+            one.id
+            for one in judge(
+                rubric(*({**c, "requires": [] if free else c.get("requires", [])} for c in ALL)), runs
+            )
+            if one.points == 0
+        ]
+        for free in (False, True)
+    }
+    assert len(lost[False]) == len(lost[True]) == 1
+
+
 def test_a_sleep_without_brackets_is_charged_to_the_rate() -> None:
     line = "        rate.sleep"
     sleep = TABS.model_copy(update={"kind": "missing-call", "line": 12, "before": line, "after": f"{line}()"})

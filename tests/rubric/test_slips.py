@@ -499,3 +499,60 @@ def _places(value: object) -> Iterator[tuple[Any, Any]]:
     ):
         yield value, key
         yield from _places(value[key])
+
+
+THERMOSTAT = """\
+schema: grader.rubric/1
+id: thermostat
+title: A thermostat
+version: "1"
+package: heating
+handout: >
+  Write a node `thermostat` (scripts/control.py). It hears /celsius, a std_msgs/Float32, and publishes after each on
+  /heater (std_msgs/Bool) whether the heater is on: below 18 degrees it goes on, above 22 off. The line `quit` ends it.
+scenarios:
+  warm:
+    title: Warm and cold
+    start: [{name: control, script: scripts/control.py}]
+    steps:
+      - publish: {topic: /celsius, type: std_msgs/Float32, values: [20, 17, 23]}
+      - type: {process: control, line: quit}
+criteria:
+  - {id: node, title: The node has its name, points: 50, check: node-name, with: {names: [thermostat]}, scenario: warm}
+  - id: heater
+    title: The heater goes on and off
+    points: 50
+    check: field-equals
+    with: {topic: /heater, field: data, values: [false, true, false]}
+    scenario: warm
+    requires: [node]
+"""
+BY_THE_HANDOUT = [
+    ("type: std_msgs/Float32, v", "type: std_msgs/Float64, v",
+     "14: scenarios.warm.steps[0].publish.type: the handout says that /celsius carries std_msgs/Float32"),
+    ("[20, 17, 23]", "[20, 17]", "22: criteria[1].with.values: are 3, and warm sends 2 messages"),
+    ("line: quit", "line: Quit", "15: scenarios.warm.steps[1].type.line: the handout has `quit`"),
+    ("names: [thermostat]", "names: [control]",
+     "17: criteria[0].with.names[0]: is no node of the handout, which has thermostat"),
+    ("    requires: [node]\n", "",
+     "18: criteria[1].id: where the node does not start, node explains it: write requires: [node]"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "warning"), BY_THE_HANDOUT)
+def test_what_the_handout_says_otherwise_is_a_warning(
+    old: str, new: str, warning: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "lab.yaml"
+    path.write_text(THERMOSTAT, encoding="utf-8")
+    assert warnings_of(load_rubric(str(path)), path.name) == []
+    assert old in THERMOSTAT
+    path.write_text(THERMOSTAT.replace(old, new, 1), encoding="utf-8")
+    assert warnings_of(load_rubric(str(path)), path.name) == [f"lab.yaml:{warning}"]
+
+
+def test_the_handout_says_which_type_a_topic_has(tmp_path: Path) -> None:
+    path = tmp_path / "lab.yaml"
+    path.write_text(THERMOSTAT.replace("[false, true, false]", "[0, 1, 0]"), encoding="utf-8")
+    fault = "22: criteria[1].with.field: data of std_msgs/Bool is true or false, not 0"
+    assert faults(path) == [f"lab.yaml:{fault}"]

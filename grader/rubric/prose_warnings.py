@@ -1,0 +1,286 @@
+"""What a title, a hint or the handout says otherwise than the criterion beside it: warnings."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import PurePosixPath
+from typing import Any
+
+from grader.checks.support.fields import is_number
+from grader.rubric.message_fields import said_types
+from grader.rubric.simulators import set_in
+from grader.rubric.spelling import is_slip, texts_in
+from grader.rubric.started import starts_of
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.wording import join_words
+
+WORDS = {
+    "one": 1,
+    "two": 2,
+    "twice": 2,
+    "three": 3,
+    "four": 4,
+    "five": 5,
+    "ten": 10,
+    "twenty": 20,
+    "fifty": 50,
+}
+_NUMBER = rf"\d+(?:\.\d+)?|{'|'.join(WORDS)}"
+PER_SECOND = re.compile(rf"\b({_NUMBER})(?: ?Hz\b|(?: \w+)? (?:a|per) second)", re.IGNORECASE)
+SHIFTS = (10, 100, 1000, 0.1, 0.01, 0.001, -1)
+"""By so much a number is another where a digit is forgotten, the unit is a thousandth, or the sign is missing."""
+EXPECTED = ("value", "values", "numbers", "rate_hz", "result", "expect", "goal", "start", "min", "max",
+            "translation", "tolerance_m", "cause", "effect")  # fmt: skip
+"""Keys of what a criterion asks for, as numbers."""
+PLAIN_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w]|\.\d)")
+PRIMITIVE = re.compile(r"(?:std_msgs/)?([Uu]?[Ii]nt|[Ff]loat)(8|16|32|64)")
+OLD_NAMES = {"byte": "int8", "char": "uint8"}
+SAYS = frozenset({"prints", "logs"})
+
+
+def prose_warnings(rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield what may be a slip in one of the two."""
+    scenarios = {name: as_map(one) for name, one in as_map(rubric.get("scenarios")).items()}
+    handout = str(rubric.get("handout") or "")
+    yield from _sent_otherwise(scenarios, handout)
+    for index, criterion in as_maps(rubric.get("criteria")):
+        at, given, check = (
+            ("criteria", index, "with"),
+            as_map(criterion.get("with")),
+            str(criterion.get("check")),
+        )
+        name = str(criterion.get("scenario"))
+        scenario = scenarios.get(name, {})
+        yield from _shifted_numbers(index, criterion, rubric)
+        yield from _numbers_of_title(index, criterion, scenarios)
+        yield from _other_node(at, check, given, scenario, handout)
+        yield from _other_number(at, check, given, scenario, name)
+        yield from _other_types(at, given, handout)
+        yield from _misspelt_keys(at, given, rubric)
+        if check in {"node-lives", "node-name"}:
+            yield from _unsaid_node(at, given, rubric, handout)
+        if check in SAYS:
+            yield from _other_text(at, given, handout)
+
+
+def _shifted_numbers(index: int, criterion: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield numbers that only this line has, and that the criterion's title or the handout has with another sign, or
+    ten times as large or as small."""
+    about = [str(criterion.get(key, "")) for key in ("title", "hint")]
+    prose = " ".join([*about, str(rubric.get("handout", ""))])
+    said = {float(number) for number in PLAIN_NUMBER.findall(prose)}
+    said_hz = _rates(prose)
+    there = [number for at, number in numbers_in((), rubric) if not _is_setting(at)]
+    own = {number for _, number in numbers_in((), criterion.get("with"))}
+    for key in EXPECTED:
+        for at, number in numbers_in((key,), as_map(criterion.get("with")).get(key)):
+            known = said_hz if key == "rate_hz" else said
+            shifts = SHIFTS[:-1] if at[-1] in {"min", "max"} else SHIFTS
+            meant = next((number / by for by in shifts if round(number / by, 9) in known), None)
+            is_round = key != "rate_hz" and re.fullmatch(r"0?\.?0*10*", f"{abs(number):.9g}") is not None
+            is_opposite = key == "values" and meant in own
+            if number in said | known or meant is None or is_opposite or is_round or there.count(number) > 1:
+                continue
+            if at[-1] != "tolerance" and (known is said or len(known) == 1):
+                fault = f"{number:g} is on no other line, and the rubric's text has {meant:g}"
+                yield ("criteria", index, "with", *at), fault
+
+
+def _rates(text: str) -> set[float]:
+    return {float(WORDS.get(number.lower(), number)) for number in PER_SECOND.findall(text)}
+
+
+def _is_setting(path: KeyPath) -> bool:
+    """Return whether a number is about the run or the marks, and not about what a node publishes or prints."""
+    key = next((part for part in reversed(path) if not isinstance(part, int)), "")
+    return bool(
+        re.search(r"_s$|^(?:rate_hz|warp|points|bonus|penalty|at_most|digits|goal|number)$", str(key))
+    )
+
+
+def numbers_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, float]]:
+    """Yield all numbers in a part of a rubric, each with its place."""
+    if is_number(value):
+        yield path, float(value)
+    elif isinstance(value, dict | list):
+        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from numbers_in((*path, key), inner)
+
+
+def _other_node(
+    at: KeyPath, check: str, given: dict[str, Any], scenario: dict[str, Any], handout: str
+) -> Iterator[Fault]:
+    """Yield the name of a process in place of its node's."""
+    names = [name for _, name in as_texts(given.get("names"))]
+    starts = [start for start in starts_of(scenario) if start.get("name") == given.get("process")]
+    if check not in {"node-lives", "node-name"} or len(names) != 1 or len(starts) != 1 or not handout:
+        return
+    script, name = PurePosixPath(str(starts[0].get("script"))).stem, names[0]
+    quoted = re.findall(r"`[/~]?(\w+)`", handout)
+    if (
+        name == given.get("process")
+        and script != name
+        and script in quoted
+        and not re.search(rf"\b{name}\b", handout)
+    ):
+        fault = f"{name} is what the rubric calls the process, and the handout has `{script}`: is that the node's name?"
+        yield (*at, "names", 0), fault
+
+
+def _unsaid_node(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any], handout: str) -> Iterator[Fault]:
+    """Yield names that the handout gives to the package or to a file alone, and not to a node as it does to others."""
+    nodes = {
+        name for said in re.findall(r"\bnodes? `[^.;:(]*", handout) for name in re.findall(r"`/?(\w+)`", said)
+    }
+    files = " ".join([*packages_in(rubric), *re.findall(r"[\w/]+\.(?:py|cpp)\b", handout)])
+    for number, name in as_texts(given.get("names")):
+        if nodes and name.strip("/") not in nodes and re.search(rf"\b{re.escape(name.strip('/'))}\b", files):
+            fault = (
+                f"is no node of the handout, which has {join_words(sorted(nodes - set(packages_in(rubric))))}"
+            )
+            yield (*at, "names", number), fault
+
+
+def _sent_otherwise(scenarios: Mapping[str, dict[str, Any]], handout: str) -> Iterator[Fault]:
+    """Yield types that the handout says otherwise of the topic on which the grader sends, and lines to type that it has
+    in another case."""
+    quoted = {*re.findall(r"`([^`]+)`", handout)}
+    for name, scenario in scenarios.items():
+        sent: list[tuple[KeyPath, dict[str, Any]]] = [
+            (("probes", n, "type"), probe) for n, probe in as_maps(scenario.get("probes"))
+        ]
+        for n, step in as_maps(scenario.get("steps")):
+            sent.append((("steps", n, "publish", "type"), as_map(step.get("publish"))))
+            line = as_map(step.get("type")).get("line")
+            other = next((one for one in sorted(quoted) if one.lower() == str(line).lower()), "")
+            if other and line not in quoted:
+                yield ("scenarios", name, "steps", n, "type", "line"), f"the handout has `{other}`"
+        for at, one in sent:
+            said = set(said_types(str(one.get("topic")), handout))
+            if said and str(one.get("type")) not in said:
+                fault = f"the handout says that {one['topic']} carries {join_words(sorted(said))}"
+                yield ("scenarios", name, *at), fault
+
+
+def _other_number(
+    at: KeyPath, check: str, given: dict[str, Any], scenario: dict[str, Any], name: str
+) -> Iterator[Fault]:
+    """Yield a value of a field that is named as a parameter of the run, and that the run sets otherwise."""
+    last, value = re.split(r"[.\[]", str(given.get("field")))[-1], given.get("value")
+    if check != "field-equals" or not is_number(value):
+        return
+    for _, one in set_in(scenario):
+        param = str(one.get("name"))
+        if param.rpartition("/")[2] != last or not is_number(one.get("value")):
+            continue
+        is_float = isinstance(one["value"], float) and isinstance(value, int)
+        if one["value"] != value or is_float:
+            no_int = ", which is no whole number for ROS" if one["value"] == value else ""
+            yield (*at, "value"), f"{name} sets {param} to {json.dumps(one['value'])}{no_int}"
+            return
+
+
+def _other_types(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[Fault]:
+    """Yield types of numbers that the handout does not have, where it has another of the same kind and size."""
+    said = {match[0] for match in PRIMITIVE.finditer(handout)}
+    if not said:
+        return
+    asked: list[tuple[KeyPath, object]] = [((*at, "type"), given.get("type"))]
+    asked += [((*at, "fields", key), kind) for key, kind in as_map(given.get("fields")).items()]
+    asked += [
+        ((*at, "topics", key, "type"), as_map(one).get("type"))
+        for key, one in as_map(given.get("topics")).items()
+    ]
+    for path, written in asked:
+        plain, bracket, _ = str(written).partition("[")
+        kind = OLD_NAMES.get(plain, plain)
+        if bracket and plain in said and not re.search(rf"\b{plain}\b.?\[", handout):
+            yield path, f"is a list, and the handout has {plain}"
+        is_number_type = PRIMITIVE.fullmatch(str(kind))
+        if (
+            is_number_type
+            and str(kind) not in said
+            and not (str(kind).partition("/")[2] and _plain(kind) in map(_plain, said))
+        ):
+            near = [one for one in sorted(said) if ("/" in one) == ("/" in str(kind))]
+            if near:
+                yield path, f"the handout has {join_words(near)}, and not {written}"
+
+
+def _plain(kind: object) -> str:
+    return str(kind).rpartition("/")[2].lower()
+
+
+def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield constants and nodes of which a part is one letter off from a word of the handout, and that no other line
+    has."""
+    handout = str(rubric.get("handout") or "")
+    words = set(re.findall(r"\w+", handout))
+    texts = [text for _, text in texts_in((), rubric)]
+    for name, value in as_map(given.get("constants")).items():
+        said = re.search(rf"\b{re.escape(str(name))}\b[^\w,.-]{{0,5}}(-?\d+)\b", handout)
+        if said and is_number(value) and float(said[1]) != value:
+            yield (*at, "constants", name), f"is {value:g}, and the handout has {said[1]}"
+    for key in ("constants", "nodes"):
+        for name in as_map(given.get(key)):
+            for part in filter(None, str(name).split("/")):
+                alike = (one for one in sorted(words) if is_slip(part, one) or one.lower() == part.lower())
+                near = next(alike, "")
+                times = sum(len(re.findall(rf"\b{re.escape(part)}\b", text)) for text in texts)
+                if part not in words and near and times == 1:
+                    yield (
+                        (*at, key, name),
+                        f'{part} is on no other line: did you mean "{near}", as in the handout?',
+                    )
+
+
+def _numbers_of_title(
+    index: int, criterion: dict[str, Any], scenarios: Mapping[str, dict[str, Any]]
+) -> Iterator[Fault]:
+    """Yield numbers of a criterion's title that neither the criterion nor a run has, where they have others; and a rate
+    that is not the title's."""
+    given, title = as_map(criterion.get("with")), str(criterion.get("title"))
+    at, rate_hz = ("criteria", index), given.get("rate_hz")
+    rates = _rates(title)
+    if any(is_number(rate_hz) and round(rate_hz / by, 9) in rates for by in SHIFTS):
+        return  # said elsewhere
+    if rates and is_number(rate_hz) and rate_hz not in rates:
+        said = join_words([f"{one:g}" for one in sorted(rates)])
+        yield (*at, "with", "rate_hz"), f"{rate_hz:g} is not what the title has: {said}"
+        return
+    numbers = [float(one) for one in PLAIN_NUMBER.findall(title)]
+    runs = list(scenarios.values())
+    there = {abs(number) for _, number in numbers_in((), [given, runs])}
+    texts = " ".join(text for _, text in texts_in((), [given, runs]))
+    there |= {abs(float(one)) for one in re.findall(r"\d+(?:\.\d+)?", texts)}
+    is_open = "made_up" in texts or not any(key in given for key in EXPECTED) or "launch" in given
+    own = {number for _, number in numbers_in((), given)}
+    is_open = is_open or any(round(number * by, 9) in own for number in numbers for by in SHIFTS)
+    if len(numbers) == 1 and not rates and not is_open and abs(numbers[0]) not in there:
+        yield (*at, "title"), f"has {numbers[0]:g}, and neither the criterion nor a run has it"
+
+
+def _other_text(at: KeyPath, given: dict[str, Any], handout: str) -> Iterator[Fault]:
+    """Yield a text to print that the handout has with other blanks or signs, or another case."""
+    for key in ("text", "template"):
+        text = given.get(key)
+        if not isinstance(text, str) or not _letters(text):
+            continue
+        pattern = r"[-+]?\d+(?:\.\d+)?".join(map(re.escape, text.split("{number}")))
+        quoted = [re.sub(r"\s+", " ", one) for one in re.findall(r"`([^`]+)`", handout)]
+        alike = [one for one in quoted if _letters(one) == _letters(text) or _is_begun(one, text)]
+        if alike and not re.search(pattern, re.sub(r"\s+", " ", handout)):
+            yield (*at, key), f"the handout has `{alike[0]}`, with other blanks or signs"
+
+
+def _is_begun(said: str, text: str) -> bool:
+    """Return whether a text begins with the words of one that the handout has, but not with its signs."""
+    is_longer = len(said.split()) > 1 and _letters(text).startswith(_letters(said))
+    return is_longer and not text.lower().startswith(said.strip().lower())
+
+
+def _letters(text: str) -> str:
+    """Return the letters of a text alone, all small."""
+    return "".join(re.findall(r"[^\W\d_]", text.replace("{number}", ""))).lower()

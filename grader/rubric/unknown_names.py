@@ -1,0 +1,197 @@
+"""Names in a rubric that nothing else in it knows, or that are all but one that it has: topics, types, nodes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import PurePosixPath
+from typing import Any
+
+from grader.checks.registry import Check
+from grader.checks.support.topics import READ_TOO, SYSTEM_TOPICS
+from grader.rubric.started import starts_of
+from grader.rubric.yaml_lines import Fault, KeyPath, as_map, as_maps, as_texts, packages_in
+from grader.wording import closest, join_words
+
+LIKELY, SURE = 0.6, 0.85
+"""How alike two names have to be: to be suggested, and to be taken for one with a slip."""
+_DIGITS = re.compile(r"\d+")
+_TOPIC = re.compile(r"(?:^|:=)(/[\w/]*\w)")
+
+
+def unknown_names(
+    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
+) -> Iterator[Fault]:
+    """Yield a fault for each of them."""
+    yield from _unknown_topics(rubric, scenarios, checks)
+    yield from _unknown_causes(rubric, scenarios, checks)
+    yield from _misspelt_nodes(rubric, scenarios)
+    yield from _own_types(rubric)
+    yield from _misspelt_scripts(rubric, scenarios)
+
+
+def _unknown_topics(
+    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
+) -> Iterator[Fault]:
+    """Yield topics that a run waits for and that nothing else knows.
+
+    Programs, launch files and checks of the instructor's own may know others: then only a near miss is a fault.
+    """
+    criteria = [criterion for _, criterion in as_maps(rubric.get("criteria"))]
+    named = {topic for criterion in criteria for topic in topics_in(criterion.get("with"))}
+    named |= {topic for criterion in criteria for topic in READ_TOO.get(str(criterion.get("check")), ())}
+    found = [checks.get(str(criterion.get("check"))) for criterion in criteria]
+    own = any(check is None or check.source or "evidence" in check.facts for check in found)
+    for name, scenario in scenarios.items():
+        until = as_map(scenario.get("until"))
+        known = {*named, *SYSTEM_TOPICS}
+        known |= {t for key, part in scenario.items() if key != "until" for t in topics_in(part)}
+        open_ = own or any(start.get("script") is None for start in starts_of(scenario))
+        for at, topic in _waited_for(until):
+            near = _near(topic, named, cutoff=SURE if open_ else LIKELY)
+            if topic.startswith("/") and topic not in known and (near or not open_):
+                meant = f' (did you mean "{near}"?)' if near else ""
+                yield ("scenarios", name, "until", *at), f"no criterion and no probe names {topic}{meant}"
+        steps = [step for _, step in as_maps(scenario.get("steps")) if "wait" not in step]
+        there = {*named, *topics_in(steps)}
+        for at, topic in _waits_in_steps(scenario):
+            near = "" if topic in there else _near(topic, named, cutoff=SURE)
+            if near:
+                yield ("scenarios", name, *at), f'no criterion names {topic} (did you mean "{near}"?)'
+
+
+def _unknown_causes(
+    rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]], checks: Mapping[str, Check]
+) -> Iterator[Fault]:
+    """Yield causes on topics that nothing in the scenario sends on, and that no other criterion names."""
+    for index, criterion, others in with_other_topics(rubric):
+        check, name = checks.get(str(criterion.get("check"))), str(criterion.get("scenario"))
+        scenario = scenarios.get(name, {})
+        sent = {*SYSTEM_TOPICS, *topics_in(scenario), *_of_actions(scenario)}
+        open_ = any(start.get("script") is None for start in starts_of(scenario)) or "recording" in scenario
+        for one in check.references(as_map(criterion.get("with"))) if check else ():
+            at = one.path if isinstance(one.value, str) else (*one.path, "topic")
+            topic = one.value if isinstance(one.value, str) else as_map(one.value).get("topic")
+            if one.to not in {"cause", "heard"} or not isinstance(topic, str) or topic in sent | others:
+                continue
+            near = _near(topic, sent, cutoff=SURE if open_ else LIKELY)
+            if near or not open_:
+                meant = f' (did you mean "{near}"?)' if near else ""
+                fault = f"nothing in {name} sends on {topic}, and no other criterion names it{meant}"
+                yield ("criteria", index, "with", *at), fault
+
+
+def _of_actions(scenario: dict[str, Any]) -> Iterator[str]:
+    """Yield the topics of the actions that the grader offers or asks: `/dock/goal`, `/dock/cancel`, …"""
+    offered = [one.get("action") for _, one in as_maps(scenario.get("serves"))]
+    asked = [as_map(step.get("action")).get("name") for _, step in as_maps(scenario.get("steps"))]
+    for name in filter(None, (*offered, *asked)):
+        yield from (f"{name}/{part}" for part in ("goal", "cancel", "status", "feedback", "result"))
+
+
+def _own_types(rubric: dict[str, Any]) -> Iterator[Fault]:
+    """Yield types of the student's package that are all but one whose file a criterion asks for."""
+    criteria = list(as_maps(rubric.get("criteria")))
+    files = [str(as_map(c.get("with")).get("file")) for _, c in criteria if c.get("check") == "definition"]
+    names, own = {PurePosixPath(file).stem for file in files}, packages_in(rubric)
+    defined = {
+        (
+            str(c.get("package") or next(iter(own), "")),
+            PurePosixPath(str(as_map(c.get("with")).get("file"))).stem,
+        )
+        for _, c in criteria
+        if c.get("check") == "definition"
+    }
+    typed: list[tuple[KeyPath, dict[str, Any]]] = [
+        (("criteria", n, "with"), as_map(c.get("with"))) for n, c in criteria
+    ]
+    for scenario, one in as_map(rubric.get("scenarios")).items():
+        steps = [(n, key, as_map(step[key])) for n, step in as_maps(as_map(one).get("steps")) for key in step]
+        typed += [(("scenarios", scenario, "steps", n, key), given) for n, key, given in steps]
+    for path, given in typed:
+        kind = given.get("type")
+        package, _, name = kind.partition("/") if isinstance(kind, str) else ("", "", "")
+        near = closest(name, names, cutoff=SURE) if package in own and name not in names else ""
+        places = {judged for judged, stem in defined if stem == name}
+        if package in own and places and package not in places:
+            fault = f"a criterion looks for {name} in {join_words(sorted(places))}, and this is {kind}"
+            yield (*path, "type"), f"{fault}: give the criterion package: {package}"
+        if near:
+            yield (*path, "type"), f'no criterion asks for {name} (did you mean "{package}/{near}"?)'
+
+
+def _misspelt_scripts(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield scripts that nothing starts, and that are all but one that is started and that no criterion names."""
+    criteria = list(as_maps(rubric.get("criteria")))
+    paths = {n: as_map(c.get("with")).get("path") for n, c in criteria if c.get("check") == "executable"}
+    named = {n: PurePosixPath(path).name for n, path in paths.items() if isinstance(path, str)}
+    starts = [start for scenario in scenarios.values() for start in starts_of(scenario)]
+    started = {PurePosixPath(script).name for script in values_of(starts, "script")}
+    for index, name in named.items():
+        near = "" if name in started else _near(name, started - {*named.values()}, cutoff=SURE)
+        if near:
+            yield ("criteria", index, "with", "path"), f'no scenario starts {name} (did you mean "{near}"?)'
+
+
+def _misspelt_nodes(rubric: dict[str, Any], scenarios: dict[str, dict[str, Any]]) -> Iterator[Fault]:
+    """Yield private parameters of a node whose name is all but one that a criterion asks for."""
+    asked: dict[str, set[str]] = {}
+    for _, criterion in as_maps(rubric.get("criteria")):
+        names = as_texts(as_map(criterion.get("with")).get("names"))
+        asked.setdefault(str(criterion.get("scenario")), set()).update(n.strip("/") for _, n in names)
+    for name, scenario in scenarios.items():
+        programs = values_of(starts_of(scenario), "program")
+        asked.setdefault(name, set()).update(program.rpartition("/")[2] for program in programs)
+        given: list[tuple[KeyPath, dict[str, Any]]] = [
+            (("params", n), one) for n, one in as_maps(scenario.get("params"))
+        ]
+        given += [
+            (("steps", n, "set_param"), as_map(s.get("set_param"))) for n, s in as_maps(scenario.get("steps"))
+        ]
+        for at, one in given:
+            node, _, private = str(one.get("name", "")).strip("/").partition("/")
+            nodes = asked.get(name, set())
+            near = _near(node, nodes, cutoff=SURE) if private and node not in nodes else ""
+            if near:
+                fault = f'the node is called {near}, and not {node} (did you mean "/{near}/{private}"?)'
+                yield ("scenarios", name, *at, "name"), fault
+
+
+def _waits_in_steps(scenario: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    for index, step in as_maps(scenario.get("steps")):
+        topic = as_map(step.get("wait")).get("topic")
+        if isinstance(topic, str):
+            yield ("steps", index, "wait", "topic"), topic
+
+
+def _waited_for(until: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    for key in ("topics", "connected"):
+        yield from (((key, index), topic) for index, topic in as_texts(until.get(key)))
+    yield from ((("messages", topic), topic) for topic in as_map(until.get("messages")))
+
+
+def with_other_topics(rubric: dict[str, Any]) -> Iterator[tuple[int, dict[str, Any], set[str]]]:
+    """Yield each criterion with its place, and the topics that the others name."""
+    criteria = list(as_maps(rubric.get("criteria")))
+    named = [set(topics_in(criterion.get("with"))) for _, criterion in criteria]
+    for place, (index, criterion) in enumerate(criteria):
+        yield index, criterion, set().union(*named[:place], *named[place + 1 :])
+
+
+def topics_in(value: object) -> Iterator[str]:
+    if isinstance(value, str):
+        yield from _TOPIC.findall(value)
+    elif isinstance(value, Mapping):
+        yield from (topic for key, item in value.items() for topic in (*topics_in(key), *topics_in(item)))
+    elif isinstance(value, list | tuple):
+        yield from (topic for item in value for topic in topics_in(item))
+
+
+def _near(topic: str, named: Iterable[str], *, cutoff: float) -> str:
+    """Return the topic most like it. `/turtle1/pose` and `/turtle2/pose` are two, and not one with a slip."""
+    plain = _DIGITS.sub("", topic)
+    return closest(topic, [name for name in named if _DIGITS.sub("", name) != plain], cutoff=cutoff)
+
+
+def values_of(starts: list[dict[str, Any]], key: str) -> list[str]:
+    return [start[key] for start in starts if isinstance(start.get(key), str)]
