@@ -235,7 +235,8 @@ def publish_lab(path: Path, name: str, *, dry_run: bool, author: str | None) -> 
 
 def print_status(path: Path, *, as_json: bool) -> ExitCode:
     """Print how far each lab is, and what to do next."""
-    found = list(status_of(load_course(path)))
+    course = load_course(path)
+    found = [status_of(course, name) for name in course.course.labs]
     if as_json:
         say_json([{**asdict(one), "deadline": one.deadline and one.deadline.isoformat()} for one in found])
         return ExitCode.PASSED
