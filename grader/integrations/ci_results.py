@@ -16,9 +16,10 @@ from grader.files import atomic_write, make_folder
 from grader.judging.summary import scaled_pass_mark
 from grader.model.result import GradingResult
 from grader.report.forms import FORMS, ReportInput
+from grader.report.losses import arrange
 from grader.report.markdown import render_markdown
 from grader.report.sentences import RUBRIC_FROM
-from grader.report.view import arrange, hidden_ids
+from grader.report.student_view import hidden_ids
 from grader.results import EVIDENCE, RESULT
 from grader.rubric.model import Rubric
 from grader.wording import number

@@ -14,6 +14,7 @@ from rich.text import Text
 from grader.model.result import AppliedOverride, CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
 from grader.report import sentences
+from grader.report.losses import Loss, MissingFile, ReportView, arrange, missing_files, write_files_hint
 from grader.report.sentences import (
     COSTS_NOTHING,
     MINUS,
@@ -28,19 +29,13 @@ from grader.report.sentences import (
 )
 from grader.report.text import line, without_ci_commands
 from grader.report.view import (
-    Loss,
-    MissingFile,
-    ReportView,
-    arrange,
     file_places,
     hint_beside,
-    missing_files,
     not_graded,
     pointed_at,
     points_of,
     see_words,
     without_place,
-    write_files_hint,
 )
 from grader.rubric.model import Rubric
 from grader.wording import number, plural

@@ -13,6 +13,7 @@ from rich.text import Text
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.files import result_text
+from grader.report.losses import arrange
 from grader.report.sentences import points_line
 from grader.report.terminal import (
     NOT_DECIDED,
@@ -24,7 +25,7 @@ from grader.report.terminal import (
     print_report,
 )
 from grader.report.text import line
-from grader.report.view import arrange, points_of
+from grader.report.view import points_of
 from grader.rubric.model import Rubric
 from grader.student.watching import Screen, WatchedResult
 from grader.wording import first_few, number

@@ -17,8 +17,8 @@ from grader.files import atomic_write
 from grader.model.batch import MISSING, ROSTER, BatchRun, CriterionInfo, Entry
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
+from grader.report.losses import Loss, arrange
 from grader.report.sentences import without_sandbox
-from grader.report.view import Loss, arrange
 from grader.untrusted_text import line
 
 REPORT = "report.html"

@@ -20,6 +20,15 @@ from grader.model.verdict import FileCitation, Status
 from grader.report import sentences
 from grader.report.html.figures import Drawer, Drawn, code_places
 from grader.report.html.shell import environment, policy, prose, script, style
+from grader.report.losses import (
+    Loss,
+    MissingFile,
+    ReportView,
+    arrange,
+    missing_file,
+    missing_files,
+    write_files_hint,
+)
 from grader.report.sentences import (
     ADVICE,
     MEANINGS,
@@ -30,19 +39,13 @@ from grader.report.sentences import (
     visible_words,
     without_sandbox,
 )
+from grader.report.student_view import hidden_ids
 from grader.report.text import line
 from grader.report.view import (
-    Loss,
-    MissingFile,
-    ReportView,
-    arrange,
     commands_in,
     file_places,
     headline,
-    hidden_ids,
     hint_beside,
-    missing_file,
-    missing_files,
     not_graded,
     of_points,
     places,
@@ -51,7 +54,6 @@ from grader.report.view import (
     steps,
     where_to_type,
     without_place,
-    write_files_hint,
 )
 from grader.rubric.model import Rubric
 from grader.wording import number
