@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from datetime import datetime
 
-from grader.errors import GraderError
 from grader.evidence.events import PACKAGE_RUN
 from grader.judging.summary import passed
 from grader.model.repair import Repair, place_of
@@ -335,17 +333,6 @@ FAULTS = {
     "grader": "The grader itself is at fault, not you. No points are lost for good: "
     "your teacher can have it graded again.",
 }
-
-
-def blame(kind: str) -> str:
-    """Whose fault an error of this kind is: `submission`, `machine` or `grader`."""
-    return next((found.blame for found in _kinds(GraderError) if found.kind == kind), "grader")
-
-
-def _kinds(error: type[GraderError]) -> Iterator[type[GraderError]]:
-    yield error
-    for below in error.__subclasses__():
-        yield from _kinds(below)
 
 
 def count_points(value: float) -> str:

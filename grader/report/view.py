@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from unicodedata import east_asian_width
 
-from grader.errors import PackageNotFound, SubmissionError
+from grader.errors import GraderError
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation
 from grader.untrusted_text import CITATIONS_MAX, clip, visible
@@ -24,7 +24,18 @@ def not_graded(result: GradingResult) -> bool:
 
 def is_students_fault(result: GradingResult) -> bool:
     """Whether nothing could be graded because of what was submitted, not because of the machine or the grader."""
-    return result.error is not None and result.error.kind in {SubmissionError.kind, PackageNotFound.kind}
+    return result.error is not None and blame(result.error.kind) == "submission"
+
+
+def blame(kind: str) -> str:
+    """Whose fault an error of this kind is: `submission`, `machine` or `grader`."""
+    return next((found.blame for found in _kinds(GraderError) if found.kind == kind), "grader")
+
+
+def _kinds(error: type[GraderError]) -> Iterator[type[GraderError]]:
+    yield error
+    for below in error.__subclasses__():
+        yield from _kinds(below)
 
 
 def points_of(criterion: CriterionResult) -> str:

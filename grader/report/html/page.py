@@ -42,6 +42,7 @@ from grader.report.sentences import (
 from grader.report.student_view import hidden_ids
 from grader.report.text import line
 from grader.report.view import (
+    blame,
     commands_in,
     file_places,
     headline,
@@ -162,7 +163,7 @@ def _head(result: GradingResult, rubric: Rubric, view: ReportView, hidden: int) 
         late=sentences.late_words(result),
         short=sentences.in_short(result, view),
         left_out=visible_words(result, hidden) if graded else "",
-        fault=sentences.FAULTS[sentences.blame(result.error.kind)] if result.error else "",
+        fault=sentences.FAULTS[blame(result.error.kind)] if result.error else "",
         again=f"grader judge evidence --rubric {shlex.quote(result.rubric.id)}"
         if result.error is None
         else "",
