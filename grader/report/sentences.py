@@ -316,15 +316,6 @@ STATES = {
     Status.MANUAL: "not decided yet",
 }
 """The word for each status in whatever people read: the glossary has the same."""
-MEANINGS = {
-    Status.PASS: "reached",
-    Status.PARTIAL: "partly reached",
-    Status.FAIL: "not reached",
-    Status.BLOCKED: "could not be judged because something that it depends on failed",
-    Status.INCONCLUSIVE: "could not be decided this time; no points are lost for good",
-    Status.ERROR: "the grader could not judge it; no points are lost for good",
-    Status.MANUAL: "a person awards these points",
-}
 ADVICE = {Status.FAIL: "How to fix it", Status.PARTIAL: "How to fix it", Status.PASS: "Hint"}
 FAULTS = {
     "submission": "The problem is in what was submitted: fix it and submit it again.",
