@@ -27,11 +27,12 @@ from grader.classes.feedback.send import SentLog
 from grader.classes.gradebook import Book, GradebookRow
 from grader.classes.gradebook.table import BookCriterion
 from grader.classes.overrides import FILE as OVERRIDES
-from grader.classes.overrides import folder_key, read_overrides
+from grader.classes.overrides import read_overrides
 from grader.classes.roster.entries import known_columns
 from grader.classes.roster.table import read_table
 from grader.errors import UsageError
 from grader.files import make_folder
+from grader.intake.names import folder_key
 from grader.judging.settle import settle, unsettled
 from grader.judging.summary import round_half_up, total_fields
 from grader.model.batch import Entry, Roster
@@ -251,20 +252,13 @@ def _lab(marks: LabMarks, row: GradebookRow | None) -> CriterionResult:
     """Return a lab's row as a criterion: open where it is, not published, or not handed in at all."""
     result = row.result if row else None
     known = result is not None and result.status == "graded"
-    return CriterionResult(
+    return CriterionResult.unmeasured(
         id=marks.name,
         title=marks.title,
-        check="",
-        scenario=None,
         status=Status.PASS if known else Status.MANUAL,
         points=result.points if known and result else 0.0,
         max_points=marks.max_points,
         message="" if result else "not handed in",
-        expected="",
-        measured="",
-        hint="",
-        reproduce="",
-        citations=(),
     )
 
 

@@ -82,20 +82,13 @@ def _in_one(criteria: list[CriterionResult]) -> tuple[CriterionResult, ...]:
     if any(c.status.is_open for c in counting):
         status = Status.INCONCLUSIVE
     title = f"{plural(len(counting), 'criterion', 'criteria')} that your course does not show"
-    row = CriterionResult(
+    row = CriterionResult.unmeasured(
         id=NOT_SHOWN,
         title=title,
-        check="",
-        scenario=None,
         status=status,
         points=points,
         max_points=most,
         extra=extra,
         message="" if full else title,
-        expected="",
-        measured="",
-        hint="",
-        reproduce="",
-        citations=(),
     )
     return (row,)

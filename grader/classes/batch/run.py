@@ -24,7 +24,8 @@ from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
 from grader.errors import Busy, GraderError, UsageError
 from grader.files import check_writable, keep_private, make_folder, try_lock
-from grader.intake import safe_name, without_password
+from grader.intake import without_password
+from grader.intake.names import folder_key
 from grader.judging.summary import passed
 from grader.model import SandboxMode
 from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, Entry, Roster, RosterFault, State
@@ -262,7 +263,7 @@ def _gradable(roster: Roster, out: Path) -> Roster:
     for entry in roster.entries:
         if Path(entry.source) == out.absolute():
             continue
-        if safe_name(entry.id).casefold() in RESERVED:
+        if folder_key(entry.id) in RESERVED:
             text = f"id: {entry.id} is the name of one of the batch's own files"
             faults.append(RosterFault(where=entry.where, id=entry.id, text=text))
         else:
@@ -319,11 +320,11 @@ def _select(
     is. `changed`: those with a result, which stays unless the submission, the rubric or the grader has changed. An id:
     that one.
     """
-    names = {safe_name(name).casefold() for name in only if name not in WORDS}
+    names = {folder_key(name) for name in only if name not in WORDS}
     for entry in entries:
         if not only:
             yield entry, False
-        elif safe_name(entry.id).casefold() in names:
+        elif folder_key(entry.id) in names:
             yield entry, True
         elif any(word in only for word in WORDS):
             result = earlier(entry)
@@ -336,9 +337,9 @@ def _select(
 
 def _check_only(entries: Sequence[Entry], only: Sequence[str]) -> None:
     """Raise UsageError for an id that no entry has, with the nearest one."""
-    known = {safe_name(entry.id).casefold(): entry.id for entry in entries}
+    known = {folder_key(entry.id): entry.id for entry in entries}
     for name in only:
-        if name in WORDS or safe_name(name).casefold() in known:
+        if name in WORDS or folder_key(name) in known:
             continue
         near = get_close_matches(name, list(known.values()), n=1)
         hint = f"did you mean {line(near[0], NAME_CHARS)}?" if near else f"an id, or {', '.join(WORDS)}"

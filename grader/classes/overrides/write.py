@@ -19,9 +19,10 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from grader.classes.overrides import SCHEMA_KEY, folder_key, parse
+from grader.classes.overrides import SCHEMA_KEY, parse
 from grader.errors import Busy, RubricError, UsageError
 from grader.files import atomic_write, lock, open_lock, unwritable
+from grader.intake.names import folder_key
 from grader.model.result import BankComment, Override, WrittenOverride
 from grader.model.version import COMMENTS, OVERRIDES
 from grader.rubric.yaml_lines import as_map, compose

@@ -47,7 +47,7 @@ from grader.errors import Busy, GraderError, OutputError, RubricError, UsageErro
 from grader.model.batch import Entry, State
 from grader.model.result import BankComment, GradingResult, Override, WrittenOverride
 from grader.portable import cores
-from grader.report.class_page.submissions import salt_in, words_in
+from grader.report.class_page.submissions import Names, salt_in
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric, load_rubric, read_beside_rubric
 
@@ -192,12 +192,11 @@ class ReviewSession:
         """Return what each submission is called, and the words that most sources have."""
         batch = self.submissions.batch()
         if self._aliases is None or self._aliases[0] is not batch:
-            entries = [item.entry for item in self.submissions.items()]
-            times = Counter(w for e in entries for w in set(words_in(e.source, e.ref or "")))
-            most = max(1, len(entries) // 2)
-            common = frozenset(word for word, count in times.items() if count > most)
+            entries, names = [item.entry for item in self.submissions.items()], Names()
+            for entry in entries:
+                names.add(entry)
             called = aliases([entry.id for entry in entries], salt_in(self.path))
-            self._aliases = (batch, called, common)
+            self._aliases = (batch, called, names.common())
         return self._aliases[1:]
 
     def progress(self) -> Counter[str]:
