@@ -143,7 +143,7 @@ def status_of(course: CourseFile, name: str) -> LabStatus:
 
 
 def _with_next_step(course: CourseFile, batch: BatchFolder, found: LabStatus, *, ready: int) -> LabStatus:
-    steps = {
+    steps = {  # in the order in which they are done
         f"grader course grade {course.path} {found.name}": found.missing or found.to_settle,
         f"grader review {batch.path}": found.open,
         f"grader course publish {course.path} {found.name}": ready
@@ -199,6 +199,7 @@ def students_of(course: CourseFile, marks: tuple[LabMarks, ...]) -> dict[str, En
 
     Raises UsageError where the roster cannot be read.
     """
+    # Backwards, so that of a student who is in several labs the first lab's entry stays.
     in_labs = {key: row.entry for one in reversed(marks) for key, row in one.rows.items()}
     if course.course.roster is None:
         return in_labs

@@ -162,7 +162,7 @@ def _grade_all(batch: _Batch, executor: Executor, watcher: Watcher) -> Iterator[
     options = batch.options
     todo = list(_select(batch.roster.entries, options.only, batch.folder.earlier))
     watcher.planned(len(todo))
-    if todo and not options.cluster:
+    if todo and not options.cluster:  # what is made here is of no use on the machines of a cluster
         prepare(GradeOptions(sandbox=options.sandbox, static_only=options.static_only))
     since = time.time()
     entries = {entry.id: entry for entry, _ in todo}
