@@ -95,19 +95,16 @@ def chart(
     """Return a drawing of lines, each with its name at its end. `labels` and `log` are of the two axes."""
     xs, ys = zip(*(point for points in lines.values() for point in points), strict=True)
     frame = Frame(
-        width=CHART[0],
-        height=CHART[1],
-        x_low=min(xs),
-        x_high=max(xs) * (ROOM**3 if log[0] else 1.2),
-        y_low=min(ys) if log[1] else 0.0,
-        y_high=max(ys) * ROOM,
+        size=CHART,
+        xs=(min(xs), max(xs) * (ROOM**3 if log[0] else 1.2)),
+        ys=(min(ys) if log[1] else 0.0, max(ys) * ROOM),
         log_x=log[0],
         log_y=log[1],
     )
     parts = [element("style", Markup(LOOK)), element("rect", width="100%", height="100%", fill="white")]  # noqa: S704 - ours
     parts += frame.axes(*labels)
     for (line, points), colour, dash in zip(lines.items(), COLOURS, DASHES, strict=False):
-        drawn = [(frame.x(x), frame.y(y)) for x, y in points]
+        drawn = frame.at(points)
         parts.append(
             element("path", d=path(drawn), fill="none", stroke=colour, stroke_width=2, stroke_dasharray=dash)
         )

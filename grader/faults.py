@@ -147,21 +147,16 @@ def error_result(
 def _not_judged(criterion: Criterion, fault: GraderError) -> CriterionResult:
     own = fault.blame == "submission"
     lost = "not judged" if own else "not judged, which is not the submission's fault, so this costs no marks"
-    return CriterionResult(
+    return CriterionResult.unmeasured(
         id=criterion.id,
         title=criterion.title,
         check=criterion.check,
         scenario=criterion.scenario,
         status=Status.ERROR,
-        points=0.0,
         max_points=criterion.points,
         extra=criterion.extra,
         message=f"{lost}: {fault.message}",
-        expected="",
-        measured="",
         hint=fault.hint if own else "grade the submission again",
-        reproduce="",
-        citations=(),
     )
 
 

@@ -10,6 +10,8 @@ from grader.authoring.observe import Observed, Topic, answers_to, heard_template
 from grader.authoring.rubric_draft import (
     ANSWERS_S,
     INTEGER_PROBES,
+    MADE_UP,
+    SENT,
     STRING,
     TEXT_PROBES,
     DraftSheet,
@@ -67,27 +69,13 @@ class Proposal(DraftSheet):
             "manifest", "The manifest names the package and what it needs", "manifest",
             package | ({"dependencies": names} if names else {}), reproduce="cat package.xml",
         )  # fmt: skip
-        self.add(
-            "cmake",
-            "CMakeLists.txt makes it a catkin package",
-            "cmake",
-            package,
-            reproduce="cat CMakeLists.txt",
-        )
-        installed = self._installed_scripts()
-        if installed:
-            parameters: RubricEntry = {"scripts": installed}
-            self.add(
-                "cmake-install", "CMake installs the scripts", "cmake-install", parameters, requires=["cmake"]
-            )
-        self.add(
-            "build",
-            "The package builds",
-            "build",
-            {},
-            requires=["manifest", "cmake"],
-            reproduce="catkin_make",
-        )
+        title = "CMakeLists.txt makes it a catkin package"
+        self.add("cmake", title, "cmake", package, reproduce="cat CMakeLists.txt")
+        if installed := self._installed_scripts():
+            title, parameters = "CMake installs the scripts", {"scripts": installed}
+            self.add("cmake-install", title, "cmake-install", parameters, requires=["cmake"])
+        before = ["manifest", "cmake"]
+        self.add("build", "The package builds", "build", {}, requires=before, reproduce="catkin_make")
 
     def _installed_scripts(self) -> list[str]:
         calls = self._facts.cmake.calls if self._facts.cmake else ()
@@ -108,22 +96,16 @@ class Proposal(DraftSheet):
             why = seen.failed or "no node was registered"
             self.notes.append(f"{script} was not observed ({why}): does it need parameters or another node?")
             return
-        self._scenario(name, script, seen)
+        self._scenario(name, seen)
         node = self._life(name, script, seen, requires)
         for topic in seen.topics:
             self._topic(name, topic, node, self._runs.get(f"{name}-fast"))
         self._words(name, file, seen, node)
         for service, kind in seen.services.items():
             if kind:
-                parameters = {"service": service, "type": kind}
-                self.add(
-                    f"service-{label_of(service)}",
-                    f"{service} is offered",
-                    "service",
-                    parameters,
-                    scenario=name,
-                    requires=[node],
-                )
+                id_, parameters = f"service-{label_of(service)}", {"service": service, "type": kind}
+                title = f"{service} is offered"
+                self.add(id_, title, "service", parameters, scenario=name, requires=[node])
         self._hearing(name, script, seen, requires)
 
     def _words(self, name: str, file: str, seen: Observed, node: str) -> None:
@@ -135,36 +117,35 @@ class Proposal(DraftSheet):
             names = {"names": list(seen.read)}
             self.add(f"{name}-reads", f"{file} shows the parameters", "params-read", names, **needs)
 
-    def _with_params(self, scenario: RubricEntry) -> RubricEntry:
-        """Return the scenario, with the package's own parameters set before it starts."""
-        params = {"params": [{"file": path} for path in self._parts.configs]} if self._parts.configs else {}
-        return {"title": scenario["title"], **params, **scenario}
+    def _alone(self, name: str, words: str, *, clock: str = "", **how: object) -> RubricEntry:
+        """Return a scenario that starts one node, with the package's own parameters set before; `words` follow its
+        file's name in the title."""
+        script = self._parts.nodes[name]
+        scenario: RubricEntry = {"title": f"{PurePosixPath(script).name}{words}"}
+        if self._parts.configs:
+            scenario["params"] = [{"file": path} for path in self._parts.configs]
+        scenario |= {"clock": clock} if clock else {}
+        return {**scenario, "start": [{"name": name, "script": script}], **how}
 
-    def _scenario(self, name: str, script: str, seen: Observed) -> None:
+    def _scenario(self, name: str, seen: Observed) -> None:
         periodic = [t.name for t in seen.topics if t.rate_hz]
         until: RubricEntry = (
             {"window_s": WINDOW_S, "topics": periodic} if periodic else {"alive_s": LIVES_S + 1}
         )
         if seen.ended:
             until = {"quiet_s": 2}
-        title = f"{PurePosixPath(script).name} in real time"
-        start = [{"name": name, "script": script}]
-        self.scenarios[name] = self._with_params({"title": title, "start": start, "until": until})
+        self.scenarios[name] = self._alone(name, " in real time", until=until)
 
     def _life(self, name: str, script: str, seen: Observed, requires: list[str]) -> str:
         anonymous = "required" if seen.anonymous else "allowed"
         named: RubricEntry = {"names": list(seen.nodes[:1]), "anonymous": anonymous}
         run = f"rosrun {self._facts.name} {PurePosixPath(script).name}"
-        if seen.ended:
-            title = f"The node is /{seen.nodes[0]}"
-            return self.add(
-                f"{name}-node", title, "node-name", named, scenario=name, requires=requires, reproduce=run
-            )
-        title = f"/{seen.nodes[0]} stays alive and ends on Ctrl-C"
-        parameters = {"process": name, "min_s": LIVES_S, **named}
-        return self.add(
-            f"{name}-node", title, "node-lives", parameters, scenario=name, requires=requires, reproduce=run
-        )
+        check, title, parameters = "node-name", f"The node is /{seen.nodes[0]}", named
+        if not seen.ended:
+            check, title = "node-lives", f"/{seen.nodes[0]} stays alive and ends on Ctrl-C"
+            parameters = {"process": name, "min_s": LIVES_S, **named}
+        needs: RubricEntry = {"scenario": name, "requires": requires}
+        return self.add(f"{name}-node", title, check, parameters, **needs, reproduce=run)
 
     def _topic(self, name: str, topic: Topic, node: str, fast: Run | None) -> None:
         label = self._label(name, topic)
@@ -190,18 +171,12 @@ class Proposal(DraftSheet):
             hz = f"{topic.name} runs at {topic.rate_hz:g} Hz"
             self.add(f"{label}-rate", hz, "rate", parameters, **needs, reproduce=f"rostopic hz {topic.name}")
         if topic.latched:
-            self.add(
-                f"{label}-latched", f"{topic.name} is latched", "latched", {"topic": topic.name}, **needs
-            )
+            title = f"{topic.name} is latched"
+            self.add(f"{label}-latched", title, "latched", {"topic": topic.name}, **needs)
         if topic.template:
             parameters = {"topic": topic.name, "template": topic.template}
-            self.add(
-                f"{label}-message",
-                f"The messages on {topic.name} tell the time",
-                "message",
-                parameters,
-                **needs,
-            )
+            title = f"The messages on {topic.name} tell the time"
+            self.add(f"{label}-message", title, "message", parameters, **needs)
         if topic.counts_from is not None:
             self._counter(name, topic, [kind, node], fast)
 
@@ -217,28 +192,14 @@ class Proposal(DraftSheet):
         needs: RubricEntry = {"scenario": name, "requires": requires}
         if wrap:
             last, first = wrap
-            script = self._parts.nodes[name]
-            self.scenarios[f"{name}-fast"] = self._with_params(
-                {
-                    "title": f"{PurePosixPath(script).name} with a fast clock, {WRAPS} times around",
-                    "clock": "warped",
-                    "start": [{"name": name, "script": script}],
-                    "until": {"messages": {topic.name: WRAPS * (last - first + 1) + 2}},
-                }
-            )
+            words = f" with a fast clock, {WRAPS} times around"
+            until = {"messages": {topic.name: WRAPS * (last - first + 1) + 2}}
+            self.scenarios[f"{name}-fast"] = self._alone(name, words, clock="warped", until=until)
             needs["scenario"] = f"{name}-fast"
-        start = {**about, "start": topic.counts_from}
-        self.add(
-            f"{label}-start", f"The counter begins with {topic.counts_from}", "counter-start", start, **needs
-        )
-        maximum = {"maximum": wrap[0]} if wrap else {"maximum": 2**31 - 1}
-        self.add(
-            f"{label}-step",
-            "The counter goes up by one",
-            "counter-step",
-            {**about, **maximum, **rate},
-            **needs,
-        )
+        title, start = f"The counter begins with {topic.counts_from}", {**about, "start": topic.counts_from}
+        self.add(f"{label}-start", title, "counter-start", start, **needs)
+        step = {**about, "maximum": wrap[0] if wrap else 2**31 - 1, **rate}
+        self.add(f"{label}-step", "The counter goes up by one", "counter-step", step, **needs)
         if wrap:
             parameters = {**about, "minimum": wrap[1], "maximum": wrap[0], "wraps": WRAPS, **rate}
             title = f"After {wrap[0]} comes {wrap[1]}"
@@ -252,25 +213,13 @@ class Proposal(DraftSheet):
         if not heard:
             return
         scenario = f"{name}-hears"
-        self.scenarios[scenario] = self._with_params(
-            {
-                "title": f"{PurePosixPath(script).name}, with messages made up for this run",
-                "start": [{"name": name, "script": script}],
-                "probes": [_probe(topic, found[topic]) for topic in heard],
-                "until": {"heard": True},
-            }
-        )
+        probes = [_probe(topic, found[topic]) for topic in heard]
+        self.scenarios[scenario] = self._alone(name, MADE_UP, probes=probes, until={"heard": True})
         for topic, template in heard.items():
             parameters = {"topic": topic} | ({"template": template} if template != "{value}" else {})
+            id_ = f"{name}-hears-{label_of(topic)}"
             title = f"{PurePosixPath(script).name} prints what it hears on {topic}"
-            self.add(
-                f"{name}-hears-{label_of(topic)}",
-                title,
-                "hears",
-                parameters,
-                scenario=scenario,
-                requires=requires,
-            )
+            self.add(id_, title, "hears", parameters, scenario=scenario, requires=requires)
 
     def _answers(self, name: str, topic: str) -> set[str]:
         """Return the topics on which a node was seen to answer what it heard on one."""
@@ -291,22 +240,12 @@ class Proposal(DraftSheet):
             steps.append(step_for(topic, kind))
             for answer in sorted(found):
                 parameters = {"cause": {"topic": topic}, "effect": {"topic": answer}, "within_s": ANSWERS_S}
-                file = PurePosixPath(script).name
-                self.add(
-                    f"{name}-answers-{label_of(topic)}-{label_of(answer)}",
-                    f"{file} publishes on {answer} after each message on {topic}",
-                    "reacts",
-                    parameters,
-                    scenario=scenario,
-                    requires=requires,
-                )
+                id_ = f"{name}-answers-{label_of(topic)}-{label_of(answer)}"
+                title = f"{PurePosixPath(script).name} publishes on {answer} after each message on {topic}"
+                self.add(id_, title, "reacts", parameters, scenario=scenario, requires=requires)
         if steps:
             wait = {"wait": {"seconds": ANSWERS_S}}
-            title = f"{PurePosixPath(script).name}, with messages of the grader's"
-            start = [{"name": name, "script": script}]
-            self.scenarios[scenario] = self._with_params(
-                {"title": title, "start": start, "steps": [*steps, wait]}
-            )
+            self.scenarios[scenario] = self._alone(name, SENT, steps=[*steps, wait])
 
     def _launch(self, name: str, launch: str, seen: Observed) -> None:
         file = next(f for f in self._facts.launch_files if PurePosixPath(f.path).name == launch)

@@ -166,6 +166,7 @@ TEXT_PROBES = 8
 INTEGER_PROBES = 9
 STRING = "std_msgs/String"
 ANSWERS_S, MESSAGES = 0.5, 3
+MADE_UP, SENT = ", with messages made up for this run", ", with messages of the grader's"
 SAMPLES: Mapping[str, tuple[bool | float, ...]] = {
     "std_msgs/Float32": (1.5, -2.25, 3.0),
     "std_msgs/Float64": (1.5, -2.25, 3.0),
@@ -204,15 +205,8 @@ def find_parts(folder: Path, facts: PackageFacts) -> Parts:
 
 def first_look(package: str, parts: Parts) -> LoadedRubric:
     """Each node alone, in real time, and each launch file."""
-    scenarios = {
-        name: Scenario(
-            title=f"{PurePosixPath(script).name} in real time",
-            params=parts.params,
-            start=(Start(name=name, script=script),),
-            until=Until(alive_s=WATCH_S, messages={}),
-        )
-        for name, script in parts.nodes.items()
-    }
+    until = Until(alive_s=WATCH_S, messages={})
+    scenarios = {name: _alone(parts, name, " in real time", until=until) for name in parts.nodes}
     for name, launch in parts.launches.items():
         until = Until(alive_s=QUIET_LAUNCH_S, quiet_s=0.0, messages={})
         scenarios[name] = Scenario(title=launch, start=(Start(name=name, launch=launch),), until=until)
@@ -222,39 +216,27 @@ def first_look(package: str, parts: Parts) -> LoadedRubric:
 def second_look(package: str, parts: Parts, seen: Mapping[str, Observed]) -> LoadedRubric | None:
     """Messages for the nodes that listen, and a fast clock for those that count; None where there is nothing to see."""
     scenarios: dict[str, Scenario] = {}
-    for name, script in parts.nodes.items():
-        probes = tuple(p for topic, kind in seen[name].listens.items() if (p := probe_for(topic, kind)))
-        if probes:
-            scenarios[f"{name}-hears"] = Scenario(
-                title=f"{PurePosixPath(script).name}, with messages made up for this run",
-                params=parts.params,
-                start=(Start(name=name, script=script),),
-                probes=probes,
-                until=Until(heard=True, messages={}),
-            )
-        steps = [
-            step_for(topic, kind) for topic, kind in seen[name].listens.items() if not probe_for(topic, kind)
-        ]
-        if steps:
-            scenarios[f"{name}-answers"] = Scenario(
-                title=f"{PurePosixPath(script).name}, with messages of the grader's",
-                params=parts.params,
-                start=(Start(name=name, script=script),),
-                steps=tuple(Step.model_validate(step) for step in (*steps, {"wait": {"seconds": ANSWERS_S}})),
-                until=Until(messages={}),
-            )
-        counting = {
-            topic.name: WARPED_MESSAGES for topic in seen[name].topics if topic.counts_from is not None
-        }
-        if counting:
-            scenarios[f"{name}-fast"] = Scenario(
-                title=f"{PurePosixPath(script).name} with a fast clock",
-                clock="warped",
-                params=parts.params,
-                start=(Start(name=name, script=script),),
-                until=Until(messages=counting),
-            )
+    for name in parts.nodes:
+        listens = seen[name].listens.items()
+        if probes := tuple(p for topic, kind in listens if (p := probe_for(topic, kind))):
+            until = Until(heard=True, messages={})
+            scenarios[f"{name}-hears"] = _alone(parts, name, MADE_UP, probes=probes, until=until)
+        if sent := [step_for(topic, kind) for topic, kind in listens if not probe_for(topic, kind)]:
+            steps = tuple(Step.model_validate(step) for step in (*sent, {"wait": {"seconds": ANSWERS_S}}))
+            scenarios[f"{name}-answers"] = _alone(parts, name, SENT, steps=steps, until=Until(messages={}))
+        counters = [topic.name for topic in seen[name].topics if topic.counts_from is not None]
+        if counters:
+            until = Until(messages=dict.fromkeys(counters, WARPED_MESSAGES))
+            fast = _alone(parts, name, " with a fast clock", clock="warped", until=until)
+            scenarios[f"{name}-fast"] = fast
     return LoadedRubric.to_record(package, scenarios) if scenarios else None
+
+
+def _alone(parts: Parts, name: str, words: str, **how: Any) -> Scenario:  # noqa: ANN401 - fields of the scenario
+    """Return a scenario that starts one node; `words` follow its file's name in the title."""
+    script = parts.nodes[name]
+    title, start = f"{PurePosixPath(script).name}{words}", (Start(name=name, script=script),)
+    return Scenario(title=title, params=parts.params, start=start, **how)
 
 
 def probe_for(topic: str, kind: str) -> Probe | None:

@@ -27,11 +27,12 @@ from grader.classes.feedback.send import SentLog
 from grader.classes.gradebook import Book, GradebookRow
 from grader.classes.gradebook.table import BookCriterion
 from grader.classes.overrides import FILE as OVERRIDES
-from grader.classes.overrides import folder_key, read_overrides
+from grader.classes.overrides import read_overrides
 from grader.classes.roster.entries import known_columns
 from grader.classes.roster.table import read_table
 from grader.errors import UsageError
 from grader.files import make_folder
+from grader.intake.names import folder_key
 from grader.judging.settle import settle, unsettled
 from grader.judging.summary import round_half_up, total_fields
 from grader.model.batch import Entry, Roster
@@ -105,13 +106,8 @@ def with_late_days(roster: Roster, course: CourseFile, name: str) -> Roster:
     return roster.model_copy(update={"entries": entries})
 
 
-def status_of(course: CourseFile) -> Iterator[LabStatus]:
-    """Yield how far each lab is, in the course's order."""
-    for name in course.course.labs:
-        yield _status(course, name)
-
-
-def _status(course: CourseFile, name: str) -> LabStatus:
+def status_of(course: CourseFile, name: str) -> LabStatus:
+    """Return how far the lab is."""
     loaded = load_rubric(course.rubric(name))
     rubric = loaded.rubric
     batch = open_lab(course, name)
@@ -147,7 +143,7 @@ def _status(course: CourseFile, name: str) -> LabStatus:
 
 
 def _with_next_step(course: CourseFile, batch: BatchFolder, found: LabStatus, *, ready: int) -> LabStatus:
-    steps = {
+    steps = {  # in the order in which they are done
         f"grader course grade {course.path} {found.name}": found.missing or found.to_settle,
         f"grader review {batch.path}": found.open,
         f"grader course publish {course.path} {found.name}": ready
@@ -203,6 +199,7 @@ def students_of(course: CourseFile, marks: tuple[LabMarks, ...]) -> dict[str, En
 
     Raises UsageError where the roster cannot be read.
     """
+    # Backwards, so that of a student who is in several labs the first lab's entry stays.
     in_labs = {key: row.entry for one in reversed(marks) for key, row in one.rows.items()}
     if course.course.roster is None:
         return in_labs
@@ -256,20 +253,13 @@ def _lab(marks: LabMarks, row: GradebookRow | None) -> CriterionResult:
     """Return a lab's row as a criterion: open where it is, not published, or not handed in at all."""
     result = row.result if row else None
     known = result is not None and result.status == "graded"
-    return CriterionResult(
+    return CriterionResult.unmeasured(
         id=marks.name,
         title=marks.title,
-        check="",
-        scenario=None,
         status=Status.PASS if known else Status.MANUAL,
         points=result.points if known and result else 0.0,
         max_points=marks.max_points,
         message="" if result else "not handed in",
-        expected="",
-        measured="",
-        hint="",
-        reproduce="",
-        citations=(),
     )
 
 

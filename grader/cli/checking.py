@@ -32,9 +32,10 @@ from grader.intake import safe_name
 from grader.intake.gitdir import write_staged
 from grader.model.progress import Progress, Silence
 from grader.model.result import GitStatus, GradingResult, Point
+from grader.report.losses import arrange
+from grader.report.student_view import hidden_ids, without_hidden
 from grader.report.terminal import fit_encoding, open_console
 from grader.report.text import line
-from grader.report.view import arrange, hidden_ids, without_hidden
 from grader.rubric.find import named_labs
 from grader.rubric.load import LoadedRubric, needs_ros
 from grader.student.git_status import advise, read_environment

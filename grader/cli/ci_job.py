@@ -21,7 +21,6 @@ from grader.faults import fault_of
 from grader.files import temporary_folder
 from grader.integrations.ci_results import (
     OF_CODE,
-    STUDENTS,
     JobResult,
     JobStatus,
     add_forms,
@@ -38,8 +37,9 @@ from grader.integrations.ci_systems import (
 from grader.judging.summary import overall_status, total_fields
 from grader.model.result import GradingResult
 from grader.report.sentences import rubric_words, without_sandbox
+from grader.report.student_view import hidden_ids, without_hidden
 from grader.report.terminal import open_console, print_report
-from grader.report.view import hidden_ids, without_hidden
+from grader.report.view import is_students_fault
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
@@ -94,8 +94,8 @@ def _grade(settings: JobSettings) -> JobResult:
         keep(place, settings.out, rubric.rubric)
     prefix = _prefix(result, Path(source))
     add_forms(settings.out, result, rubric.rubric, prefix, rubric.docs)
-    hidden = len(hidden_ids(rubric.rubric))
-    print_report(result, rubric.rubric, open_console(sys.stdout), hidden=hidden, static=settings.static)
+    hidden, unrun = len(hidden_ids(rubric.rubric)), "--static" if settings.static else ""
+    print_report(result, rubric.rubric, open_console(sys.stdout), hidden=hidden, unrun=unrun)
     return _outcome_of(result, rubric, settings, prefix)
 
 
@@ -134,7 +134,7 @@ def _outcome_of(result: GradingResult, rubric: LoadedRubric, settings: JobSettin
     message, hint = describe_outcome(counted, lab, outcome, static=settings.static)
     if settings.attempts is not None:
         message = f"attempt {settings.attempt} of {settings.attempts}: {message}"
-    students = error is not None and error.kind in STUDENTS
+    students = error is not None and is_students_fault(result)
     return JobResult(
         outcome=outcome,
         fails=outcome in settings.fail_on or (students and JobStatus.BELOW in settings.fail_on),

@@ -162,18 +162,6 @@ COLUMNS = ("lab", "due", "graded", "open", "not graded", "published", "sent")
 
 
 @dataclass(frozen=True, kw_only=True)
-class CourseRequest:
-    """What the command line of `grader course grade` says."""
-
-    jobs: int | None
-    only: Sequence[str]
-    allow_local: Sequence[Path]
-    static: bool
-    sandbox: SandboxMode
-    as_json: bool
-
-
-@dataclass(frozen=True, kw_only=True)
 class WantedBook:
     """What the command line says of a gradebook. `wide`: with a column for each criterion of a class, or each lab of a
     course."""
@@ -186,35 +174,45 @@ class WantedBook:
     drafts: bool
 
 
-def grade_lab(path: Path, name: str, asked: CourseRequest) -> ExitCode:
+def grade_lab(
+    path: Path,
+    name: str,
+    *,
+    jobs: int | None,
+    only: Sequence[str],
+    allow_local: Sequence[Path],
+    static: bool,
+    sandbox: SandboxMode,
+    as_json: bool,
+) -> ExitCode:
     """Grade one lab of a course, print what came of it, and return the exit code."""
     course = load_course(path)
     lab, source = course.lab(name), course.rubric(name)
     loaded = load_rubric(source)
     if lab.roster is None:
         raise UsageError(f"{path}: {name} has no roster", hint="name it there: roster: lab1.csv")
-    out, local = course.results(name), allowed_folders(asked.allow_local, remote_only=False)
+    out, local = course.results(name), allowed_folders(allow_local, remote_only=False)
     roster = read_listed(course.beside(lab.roster), out, local)
 
     def options(folder: Path) -> BatchOptions:
         return BatchOptions(
             out=folder,
-            jobs=asked.jobs or default_jobs(loaded, static=asked.static),
-            sandbox=asked.sandbox,
-            static_only=asked.static,
-            only=asked.only,
+            jobs=jobs or default_jobs(loaded, static=static),
+            sandbox=sandbox,
+            static_only=static,
+            only=only,
             allow_local=tuple(str(one) for one in local.folders),
         )
 
     if lab.attempts is None:
-        return grade_class(roster, source, loaded, options(out), None, as_json=asked.as_json)
+        return grade_class(roster, source, loaded, options(out), None, as_json=as_json)
     graded: list[BatchFolder] = []
     for number, attempts in enumerate(rounds(roster), start=1):
         say_beside(f"attempt {number}: {plural(len(attempts.entries), 'submission')}")
         grade_class(attempts, source, loaded, options(attempt_folder(out, number)), None, as_json=False)
         graded.append(open_batch(attempt_folder(out, number)))
     whole = combine(out, graded, loaded, lab.attempts)
-    print_batch(whole, as_json=asked.as_json)
+    print_batch(whole, as_json=as_json)
     return exit_code(whole.run)
 
 
@@ -235,7 +233,8 @@ def publish_lab(path: Path, name: str, *, dry_run: bool, author: str | None) -> 
 
 def print_status(path: Path, *, as_json: bool) -> ExitCode:
     """Print how far each lab is, and what to do next."""
-    found = list(status_of(load_course(path)))
+    course = load_course(path)
+    found = [status_of(course, name) for name in course.course.labs]
     if as_json:
         say_json([{**asdict(one), "deadline": one.deadline and one.deadline.isoformat()} for one in found])
         return ExitCode.PASSED

@@ -126,14 +126,16 @@ def explained(*, prefix: str, parsed_args: argparse.Namespace, **_asked: object)
     return {**_checks(), **criteria, **{f"{lab}/": "a criterion of this lab" for lab in labs}}
 
 
-def mutants(*, parsed_args: argparse.Namespace, **_asked: object) -> dict[str, str]:
-    """Offer the faulty packages that the named lab's rubric is tested with."""
-    return _mutants(str(getattr(parsed_args, "rubric", "")))
-
-
-def mistakes(*, parsed_args: argparse.Namespace, **_asked: object) -> dict[str, str]:
-    """Offer the faulty packages of the named lab, for `grader example --mistake`."""
-    return _mutants(str(getattr(parsed_args, "lab", "")))
+def mutants(*, parsed_args: argparse.Namespace, named: str, **_asked: object) -> dict[str, str]:
+    """Offer the faulty packages of the lab that the argument `named` names."""
+    path = _labs().get(str(getattr(parsed_args, named, "")))
+    declared = _read(path.parent.parent / "fixtures" / path.name).get("mutants") if path else None
+    found = declared.items() if isinstance(declared, dict) else ()
+    return {
+        str(name): _description(mutant.get("summary"))
+        for name, mutant in found
+        if isinstance(mutant, dict) and mutant.get("expect")
+    }
 
 
 BY_VALUE: dict[str, Completer] = {
@@ -148,7 +150,7 @@ BY_VALUE: dict[str, Completer] = {
     "ID": submissions,
     "LAB": lab_ids,
     "LAB|FILE": labs_and_rubrics,
-    "MUTANT": mutants,
+    "MUTANT": partial(mutants, named="rubric"),
     "N": nothing,
     "N|NAMES": nothing,
     "NAME": nothing,
@@ -166,7 +168,7 @@ BY_VALUE: dict[str, Completer] = {
 
 SPECIAL: dict[tuple[str, str], Completer] = {
     ("grader explain", "name"): explained,
-    ("grader example", "mistake"): mistakes,
+    ("grader example", "mistake"): partial(mutants, named="lab"),
     ("grader record", "script"): partial(paths, endings=(".py",)),
     ("grader record", "launch"): partial(paths, endings=(".launch",)),
     ("grader course grade", "lab"): course_labs,
@@ -190,25 +192,10 @@ def _checks() -> dict[str, str]:
 
 def _criteria(path: Path) -> Iterator[tuple[str, str]]:
     """Return the criteria that students may know of."""
-    for criterion in _entries(path, "criteria"):
-        if criterion.get("visibility", "visible") == "visible":
+    entries = _read(path).get("criteria")
+    for criterion in entries if isinstance(entries, list) else ():
+        if isinstance(criterion, dict) and criterion.get("visibility", "visible") == "visible":
             yield str(criterion.get("id", "")), _description(criterion.get("title"))
-
-
-def _mutants(lab: str) -> dict[str, str]:
-    path = _labs().get(lab)
-    declared = _read(path.parent.parent / "fixtures" / path.name).get("mutants") if path else None
-    found = declared.items() if isinstance(declared, dict) else ()
-    return {
-        str(name): _description(mutant.get("summary"))
-        for name, mutant in found
-        if isinstance(mutant, dict) and mutant.get("expect")
-    }
-
-
-def _entries(path: Path, key: str) -> list[dict[str, Any]]:
-    entries = _read(path).get(key)
-    return [entry for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -211,20 +211,16 @@ def _search_paths() -> DoctorRow:
 
 
 def _user() -> DoctorRow:
-    if user_id() == 0:
-        return DoctorRow(
-            name="user", state="ok", detail="root; students' code runs as an unprivileged user in the sandbox"
-        )
-    return DoctorRow(name="user", state="ok", detail=f"uid {user_id()}")
+    root = "root; students' code runs as an unprivileged user in the sandbox"
+    return DoctorRow(name="user", state="ok", detail=root if user_id() == 0 else f"uid {user_id()}")
 
 
 def _resources() -> Iterator[DoctorRow]:
-    number = cores()
-    yield DoctorRow(
-        name="cores",
-        state="ok" if number >= 2 else "limited",
-        detail=f"{number}" if number >= 2 else "1: runs take turns, and rates may be inconclusive",
-    )
+    if (number := cores()) >= 2:
+        yield DoctorRow(name="cores", state="ok", detail=str(number))
+    else:
+        detail = "1: runs take turns, and rates may be inconclusive"
+        yield DoctorRow(name="cores", state="limited", detail=detail)
     if sys.platform != "win32":
         memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
         yield _amount("memory", memory, MIN_MEMORY_BYTES, "GiB")
@@ -234,9 +230,8 @@ def _resources() -> Iterator[DoctorRow]:
 
 def _amount(name: str, size_bytes: int, least_bytes: int, unit: str) -> DoctorRow:
     enough = size_bytes >= least_bytes
-    detail = f"{size_bytes / GIB:.1f} {unit}" + (
-        "" if enough else f"; {least_bytes / GIB:.0f} GiB is recommended"
-    )
+    detail = f"{size_bytes / GIB:.1f} {unit}"
+    detail += "" if enough else f"; {least_bytes / GIB:.0f} GiB is recommended"
     return DoctorRow(name=name, state="ok" if enough else "limited", detail=detail)
 
 
@@ -256,12 +251,8 @@ def _encoding() -> DoctorRow:
     name = locale.getpreferredencoding(do_setlocale=False)
     if name.lower().replace("-", "") == "utf8":
         return DoctorRow(name="encoding", state="ok", detail=name)
-    return DoctorRow(
-        name="encoding",
-        state="limited",
-        detail=f"{name}: reports use plain characters",
-        fix="export LC_ALL=C.UTF-8",
-    )
+    detail = f"{name}: reports use plain characters"
+    return DoctorRow(name="encoding", state="limited", detail=detail, fix="export LC_ALL=C.UTF-8")
 
 
 def print_rows(rows: Sequence[DoctorRow], stream: IO[str]) -> None:

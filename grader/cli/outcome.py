@@ -82,16 +82,8 @@ def show(
     if as_json:
         say_document(lambda ascii_only: result_text(result, ascii_only=ascii_only))
     else:
-        print_report(
-            result,
-            rubric,
-            open_console(sys.stdout),
-            hidden=hidden,
-            static=static,
-            unrun=unrun,
-            remarks=remarks,
-            full=full,
-        )
+        console = open_console(sys.stdout)
+        print_report(result, rubric, console, hidden=hidden, unrun=unrun, remarks=remarks, full=full)
         _paths(folder)
     if result.error is not None:
         report(GraderError(result.error.message, hint=result.error.hint))

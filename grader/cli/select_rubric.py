@@ -186,9 +186,7 @@ def _is_main(lab: Lab) -> bool:
 
 def _by_name(candidate: Candidate) -> Lab | None:
     rubric = find_rubric_for_package(candidate.name)
-    if rubric is None:
-        return None
-    return Lab(rubric=rubric, package=candidate, why="")
+    return Lab(rubric=rubric, package=candidate, why="") if rubric is not None else None
 
 
 def _by_folder(candidate: Candidate) -> Lab | None:

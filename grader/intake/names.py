@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 import unicodedata
+from functools import lru_cache
 
 from grader.wording import first_few
 
@@ -35,6 +36,12 @@ def safe_name(text: str) -> str:
         return name or "submission"
     digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
     return f"{name[: MAX_NAME - 9].rstrip('.-') or 'submission'}-{digest}"
+
+
+@lru_cache(maxsize=20_000)
+def folder_key(name: str) -> str:
+    """What two names of the same folder have in common: some file systems take `A` for `a`."""
+    return safe_name(name).casefold()
 
 
 def printable(text: str) -> str:

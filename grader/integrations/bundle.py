@@ -230,15 +230,10 @@ def needs_script(needs: Needs) -> bytes:
         unknown += [] if packages else [name]
     if not (apt or pip or unknown):
         return b""
-    lines = [template("needs.sh").decode()]
-    lines += [
-        f"apt-get install -y --no-install-recommends {shlex.join([*apt, *(['python3-pip'] if pip else [])])}\n"
-    ]
-    lines += (
-        [f"PIP_BREAK_SYSTEM_PACKAGES=1 python3 -m pip install --no-cache-dir {shlex.join(pip)}\n"]
-        if pip
-        else []
-    )
+    apt += ["python3-pip"] if pip else []
+    lines = [template("needs.sh").decode(), f"apt-get install -y --no-install-recommends {shlex.join(apt)}\n"]
+    if pip:
+        lines.append(f"PIP_BREAK_SYSTEM_PACKAGES=1 python3 -m pip install --no-cache-dir {shlex.join(pip)}\n")
     lines += [f"echo 'setup: install the ROS package {name} here yourself' >&2\n" for name in unknown]
     return "".join(lines).encode()
 

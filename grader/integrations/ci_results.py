@@ -11,14 +11,16 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from grader.errors import ExitCode, GraderError, OutputError, PackageNotFound, SubmissionError
+from grader.errors import ExitCode, OutputError
 from grader.files import atomic_write, make_folder
 from grader.judging.summary import scaled_pass_mark
 from grader.model.result import GradingResult
 from grader.report.forms import FORMS, ReportInput
+from grader.report.losses import arrange
 from grader.report.markdown import render_markdown
 from grader.report.sentences import RUBRIC_FROM
-from grader.report.view import arrange, hidden_ids
+from grader.report.student_view import hidden_ids
+from grader.report.view import is_students_fault
 from grader.results import EVIDENCE, RESULT
 from grader.rubric.model import Rubric
 from grader.wording import number
@@ -48,8 +50,6 @@ TITLES = {
     JobStatus.NOT_GRADED: "Not graded",
     JobStatus.WRONG_INPUT: "Wrong input",
 }
-STUDENTS = {SubmissionError.kind, PackageNotFound.kind}
-"""The kinds of error that are the student's fault."""
 NO_MARK_LOST = "this is not the submission's fault, and this costs no marks"
 WITH_LINES = ("junit", "code-quality", "sarif")
 """Forms that are rendered once more, or only here, with files as the repository has them."""
@@ -85,16 +85,7 @@ class JobResult:
         """The outcome in a few words; a rubric that the student can change is never a plain pass."""
         judged = self.outcome not in (JobStatus.NOT_GRADED, JobStatus.WRONG_INPUT)
         theirs = judged and self.result.rubric_origin == "submission"
-        return (
-            f"{TITLES[self.outcome]}, by a rubric {RUBRIC_FROM['submission']}"
-            if theirs
-            else TITLES[self.outcome]
-        )
-
-
-def outcome_of_error(error: GraderError) -> JobStatus:
-    """Return the outcome of a job without any result."""
-    return OF_CODE[error.exit_code]
+        return TITLES[self.outcome] + (f", by a rubric {RUBRIC_FROM['submission']}" if theirs else "")
 
 
 def describe_outcome(
@@ -142,7 +133,7 @@ def _describe_error(result: GradingResult) -> tuple[str, str]:
             f"a check of the grader failed; {NO_MARK_LOST}",
             "report it; the submission can be graded again",
         )
-    own = result.error.kind in STUDENTS
+    own = is_students_fault(result)
     return result.error.message if own else f"{result.error.message}; {NO_MARK_LOST}", result.error.hint
 
 

@@ -22,7 +22,7 @@ from typing import cast
 from grader.errors import GraderError, OutputError, SubmissionError, UsageError
 from grader.files import atomic_write
 from grader.intake.names import is_package_name
-from grader.integrations.ci_results import TITLES, JobResult, JobStatus, outcome_of_error, summarize
+from grader.integrations.ci_results import OF_CODE, TITLES, JobResult, JobStatus, summarize
 from grader.model import SandboxMode
 from grader.report.classroom import render_classroom
 from grader.report.findings import EACH_MAX, Severity, github_annotation, render_annotations
@@ -225,7 +225,7 @@ class GitHubRunner:
 
     def tell_error(self, error: GraderError) -> None:
         """Write the same where there is no result. Raises OutputError."""
-        outcome = outcome_of_error(error)
+        outcome = OF_CODE[error.exit_code]
         text = "\n".join(part for part in (error.message, error.hint) if part)
         _print(github_annotation(Severity.ERROR, TITLES[outcome], text))
         self._add(
@@ -316,7 +316,7 @@ class GitLabRunner:
     def tell_error(self, error: GraderError) -> None:
         """Write the outcome where there is no result. Raises OutputError."""
         if not self._out.is_symlink() and (self._out.is_dir() or not self._out.exists()):
-            self._write({"GRADER_STATUS": outcome_of_error(error).value})
+            self._write({"GRADER_STATUS": OF_CODE[error.exit_code].value})
 
     def _write(self, values: dict[str, str]) -> None:
         atomic_write(

@@ -9,6 +9,7 @@ from datetime import date, datetime
 from typing import Annotated, Literal
 
 from pydantic import AliasChoices, AwareDatetime, Field, SerializerFunctionWrapHandler, model_serializer
+from typing_extensions import Self
 
 from grader.model.record import Record
 from grader.model.repair import Repair
@@ -241,6 +242,13 @@ class CriterionResult(Record):
     made_up: dict[str, bool | int | float | str] = Field(default={}, exclude_if=lambda value: not value)
     """The values by which it is judged that were made up for this submission, by their names in the rubric. Only
     there if there are any."""
+
+    @classmethod
+    def unmeasured(cls, **fields: object) -> Self:
+        """Return a row with a message and points, but without anything that a check expected or measured."""
+        # These stand in every row of result.json, so that they have no default: the schema calls them required.
+        nothing = dict.fromkeys(("check", "message", "expected", "measured", "hint", "reproduce"), "")
+        return cls.model_validate({**nothing, "scenario": None, "points": 0.0, "citations": (), **fields})
 
     @property
     def counts(self) -> bool:

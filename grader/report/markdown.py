@@ -11,6 +11,7 @@ from grader.model.figure import Figures, GraphFigure
 from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
 from grader.report import sentences
+from grader.report.losses import Loss, MissingFile, arrange, missing_file, missing_files, write_files_hint
 from grader.report.sentences import (
     NOT_SETTLED,
     STATES,
@@ -25,20 +26,7 @@ from grader.report.sentences import (
     without_sandbox,
 )
 from grader.report.text import line, markdown, markdown_block, markdown_code
-from grader.report.view import (
-    Loss,
-    MissingFile,
-    arrange,
-    commands_in,
-    missing_file,
-    missing_files,
-    not_graded,
-    places,
-    pointed_at,
-    points_of,
-    where_to_type,
-    write_files_hint,
-)
+from grader.report.view import commands_in, not_graded, places, pointed_at, points_of, where_to_type
 from grader.rubric.model import Rubric
 from grader.wording import join_words, number
 

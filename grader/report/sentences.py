@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from datetime import datetime
 
-from grader.errors import GraderError
 from grader.evidence.events import PACKAGE_RUN
 from grader.judging.summary import passed
 from grader.model.repair import Repair, place_of
@@ -20,15 +18,9 @@ from grader.model.result import (
     Note,
 )
 from grader.model.verdict import Status
-from grader.report.view import (
-    Loss,
-    ReportView,
-    hidden_ids,
-    missing_file,
-    not_graded,
-    points_of,
-    without_bit,
-)
+from grader.report.losses import Loss, ReportView, missing_file, without_bit
+from grader.report.student_view import hidden_ids
+from grader.report.view import not_graded, points_of
 from grader.rubric.made_up import as_text
 from grader.rubric.model import Rubric
 from grader.wording import join_words, number, plural
@@ -324,15 +316,6 @@ STATES = {
     Status.MANUAL: "not decided yet",
 }
 """The word for each status in whatever people read: the glossary has the same."""
-MEANINGS = {
-    Status.PASS: "reached",
-    Status.PARTIAL: "partly reached",
-    Status.FAIL: "not reached",
-    Status.BLOCKED: "could not be judged because something that it depends on failed",
-    Status.INCONCLUSIVE: "could not be decided this time; no points are lost for good",
-    Status.ERROR: "the grader could not judge it; no points are lost for good",
-    Status.MANUAL: "a person awards these points",
-}
 ADVICE = {Status.FAIL: "How to fix it", Status.PARTIAL: "How to fix it", Status.PASS: "Hint"}
 FAULTS = {
     "submission": "The problem is in what was submitted: fix it and submit it again.",
@@ -341,17 +324,6 @@ FAULTS = {
     "grader": "The grader itself is at fault, not you. No points are lost for good: "
     "your teacher can have it graded again.",
 }
-
-
-def blame(kind: str) -> str:
-    """Whose fault an error of this kind is: `submission`, `machine` or `grader`."""
-    return next((found.blame for found in _kinds(GraderError) if found.kind == kind), "grader")
-
-
-def _kinds(error: type[GraderError]) -> Iterator[type[GraderError]]:
-    yield error
-    for below in error.__subclasses__():
-        yield from _kinds(below)
 
 
 def count_points(value: float) -> str:

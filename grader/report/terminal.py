@@ -14,6 +14,7 @@ from rich.text import Text
 from grader.model.result import AppliedOverride, CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
 from grader.report import sentences
+from grader.report.losses import Loss, MissingFile, ReportView, arrange, missing_files, write_files_hint
 from grader.report.sentences import (
     COSTS_NOTHING,
     MINUS,
@@ -28,19 +29,13 @@ from grader.report.sentences import (
 )
 from grader.report.text import line, without_ci_commands
 from grader.report.view import (
-    Loss,
-    MissingFile,
-    ReportView,
-    arrange,
     file_places,
     hint_beside,
-    missing_files,
     not_graded,
     pointed_at,
     points_of,
     see_words,
     without_place,
-    write_files_hint,
 )
 from grader.rubric.model import Rubric
 from grader.wording import number, plural
@@ -106,19 +101,16 @@ def print_report(
     console: Console,
     *,
     hidden: int = 0,
-    static: bool = False,
     unrun: str = "",
     remarks: Sequence[RenderableType] = (),
     full: bool = False,
 ) -> None:
     """Print the whole report. `hidden` is how many criteria are left out, `remarks` stand before the losses.
 
-    With `static`, open ones are only counted, as they are where `unrun` says why nothing was run. With `full`, all
-    criteria are listed with what was measured.
+    Where `unrun` says why nothing was run, open ones are only counted. With `full`, all criteria are listed with what
+    was measured.
     """
-    Terminal(console).report(
-        result, rubric, hidden, unrun or ("--static" if static else ""), remarks, full=full
-    )
+    Terminal(console).report(result, rubric, hidden, unrun, remarks, full=full)
 
 
 def render_terminal(result: GradingResult, rubric: Rubric, hidden: int = 0) -> str:
@@ -166,10 +158,7 @@ class Terminal:
         parts += self._section("Advice (costs nothing)", [self._advice(c) for c in view.advice])
         parts += [Text(f"\n{visible_words(result, hidden)}")] if hidden else []
         parts += remarks
-        if unrun:
-            parts += self._unrun(view.open, unrun)
-        else:
-            parts += self.losses(NOT_DECIDED, view.open)
+        parts += self.still_open(view.open, unrun)
         parts += self.losses(TO_FIX, view.lost, sentences.judged_repaired(result))
         parts.append(self._score(result, view))
         emit(self.console, parts)
@@ -213,10 +202,13 @@ class Terminal:
     def _section(self, title: str, parts: list[RenderableType]) -> list[RenderableType]:
         return [Text(f"\n{title}", "bold"), *parts] if parts else []
 
-    def _unrun(self, losses: tuple[Loss, ...], why: str) -> list[RenderableType]:
+    def still_open(self, losses: tuple[Loss, ...], unrun: str) -> list[RenderableType]:
+        """Return what is not decided yet: each, or in one line all that needs a run, where nothing was run."""
+        if not unrun:
+            return self.losses(NOT_DECIDED, losses)
         points = number(sum(loss.points for loss in losses))
         still = f"criteria worth {points} points are not decided yet" if losses else "all is decided"
-        return [Text(f"\nNothing was run ({why}): {still}.")]
+        return [Text(f"\nNothing was run ({unrun}): {still}.")]
 
     def _loss(self, loss: Loss, repaired: Sequence[str]) -> RenderableType:
         """What was lost, as a compiler says it: the criterion and its place, the cause, the line of code, the fix."""

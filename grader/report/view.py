@@ -1,221 +1,20 @@
-"""A result as it is read: losses first, with what they block; and the student's view, without hidden criteria."""
+"""A criterion as it is read: its points, the places that it cites, and its message and hint in pieces."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Iterator
 from unicodedata import east_asian_width
 
-from grader.errors import PackageNotFound, SubmissionError
-from grader.judging.settle import awarded, lateness, status_after_overrides
-from grader.judging.summary import total_fields, total_points
-from grader.model.repair import Repair
+from grader.errors import GraderError
 from grader.model.result import CriterionResult, GradingResult
-from grader.model.verdict import Citation, FileCitation, Status
-from grader.rubric.model import Rubric
+from grader.model.verdict import Citation, FileCitation
 from grader.untrusted_text import CITATIONS_MAX, clip, visible
-from grader.wording import join_words, number, plural
+from grader.wording import number
 
 ON_COPY = re.compile(r"judged on a copy with .*? (?:renamed|repaired): ")
-NAMES, NUMBERS = re.compile(r"/[\w/~]+"), re.compile(r"-?\d+(\.\d+)?")
 PLACE_CHARS = 300
 SOURCE_CHARS = 60
-POINTS_EQUAL = 1e-6
-
-
-@dataclass(frozen=True, kw_only=True)
-class Loss:
-    """A criterion that was not reached, and those that it blocks (directly or through another).
-
-    `alike` are others of the same mistake, or that are open with the same advice: no ROS on a machine leaves a dozen
-    of them.
-    """
-
-    criterion: CriterionResult
-    blocked: tuple[CriterionResult, ...] = ()
-    alike: tuple[CriterionResult, ...] = ()
-
-    @property
-    def points(self) -> float:
-        """What it cost, the blocked ones included."""
-        return sum(c.missing for c in (self.criterion, *self.blocked, *self.alike))
-
-
-@dataclass(frozen=True, kw_only=True)
-class ReportView:
-    """`open`: a person or another run must settle it. `advice`: worth nothing, or reached with a hint."""
-
-    lost: tuple[Loss, ...]
-    open: tuple[Loss, ...]
-    advice: tuple[CriterionResult, ...]
-
-
-def arrange(result: GradingResult, rubric: Rubric | None = None) -> ReportView:
-    """Losses by their cost, the rubric's order where they cost the same. Results of earlier graders need the `rubric`:
-    they do not say what blocked a criterion."""
-    unreached = [c for c in result.criteria if c.status is not Status.PASS]
-    roots = {c.id: root_of(c, result, rubric) for c in unreached}
-    causes = {root for name, root in roots.items() if root != name}
-    causes |= {result.gate.criterion} if result.gate else set()  # the rest counts for less without it
-    losses = [
-        Loss(criterion=c, blocked=tuple(b for b in unreached if b is not c and roots[b.id] == c.id))
-        for c in unreached
-        if c.id in causes or (roots[c.id] == c.id and (c.is_required or (c.counts and c.status.is_open)))
-    ]
-    losses.sort(key=lambda loss: -loss.points)
-    told = {c.id for loss in losses for c in (loss.criterion, *loss.blocked)}
-    told |= awarded(result.overrides).keys()
-    return ReportView(
-        lost=_told_once([loss for loss in losses if not loss.criterion.status.is_open]),
-        open=_fold([loss for loss in losses if loss.criterion.status.is_open]),
-        advice=tuple(c for c in result.criteria if c.id not in told and _advises(c)),
-    )
-
-
-def _advises(criterion: CriterionResult) -> bool:
-    """What costs nothing and could not be judged is not advice."""
-    return not criterion.status.is_open and bool(criterion.hint or criterion.status is not Status.PASS)
-
-
-def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
-    """One entry for all that one mistake costs: those with the same advice for the same line, or else in the same
-    words, and those of the same repairs. What costs most in all comes first."""
-    asked_first = sorted(
-        losses, key=lambda loss: not (loss.criterion.repaired and loss.criterion.repaired.charged)
-    )
-    charged = {
-        one: used.repairs
-        for loss in asked_first[::-1]
-        if (used := loss.criterion.repaired) and used.charged
-        for one in used.repairs
-    }
-    folded = _fold(asked_first, partial(_mistake, charged=charged))
-    return tuple(sorted(_fold_one_edit(folded), key=lambda loss: -loss.points))
-
-
-INSTALL = "cmake-install"
-CANNOT = "cannot be run"
-"""Words of the messages of such scripts."""
-NOT_STARTED = ("not-executable", "cannot-be-run")
-"""The mistakes in a script that the build would make up for if CMakeLists.txt installed it."""
-
-
-def _fold_one_edit(losses: Sequence[Loss]) -> Iterator[Loss]:
-    """Yield one entry for scripts that one `chmod` makes executable, or that the build does once they are installed."""
-    scripts = {
-        loss.criterion.id: loss.criterion.mistake
-        for loss in losses
-        if loss.criterion.mistake and loss.criterion.mistake.kind in NOT_STARTED
-    }
-    install = next((loss for loss in losses if loss.criterion.check == INSTALL), None)
-    installed = [i for i, found in scripts.items() if install and found.name in install.criterion.message]
-    bits = [i for i, found in scripts.items() if i not in installed and found.kind == "not-executable"]
-    for first, names in ((install.criterion.id if install else "", installed), ("".join(bits[:1]), bits[1:])):
-        folded = next((loss for loss in losses if loss.criterion.id == first), None)
-        others = [loss for loss in losses if loss.criterion.id in names]
-        if folded is not None and others:
-            criterion = _joined(folded.criterion, [loss.criterion for loss in others])
-            alike = tuple(c for loss in others for c in (loss.criterion, *loss.alike))
-            blocked = tuple(c for loss in (folded, *others) for c in loss.blocked)
-            joined = Loss(criterion=criterion, blocked=blocked, alike=(*folded.alike, *alike))
-            losses = [joined if loss is folded else loss for loss in losses if loss not in others]
-    yield from losses
-
-
-def _joined(criterion: CriterionResult, scripts: Sequence[CriterionResult]) -> CriterionResult:
-    """Return the criterion of an edit that also makes these scripts executable, with what it does for them."""
-    found = [one.mistake for one in scripts if one.mistake]
-    paths = [one.name for one in found]
-    if criterion.check == INSTALL:
-        reasons: dict[str, list[str]] = {}
-        for path, one in zip(paths, scripts, strict=True):
-            reasons.setdefault(one.message.partition("; ")[0].removeprefix(f"{path} "), []).append(path)
-        why = [f"{join_words(of)} {reason}" for reason, of in reasons.items() if CANNOT in reason]
-        then = f"makes {join_words(paths)} executable"
-        if why:
-            then = f"makes {'programs' if len(paths) > 1 else 'a program'} of {join_words(paths)}"
-        message, hint = "; ".join([criterion.message, *why]), f"{criterion.hint}; the build then {then}"
-        return criterion.model_copy(update={"message": message, "hint": hint})
-    own = criterion.mistake.name if criterion.mistake else ""
-    hint = criterion.hint.replace(own, " ".join([own, *paths]))
-    return criterion.model_copy(update={"message": without_bit([own, *paths]), "hint": hint})
-
-
-def without_bit(paths: Sequence[str]) -> str:
-    """`src/a.py and src/b.py are not executable`."""
-    return f"{join_words(paths)} {'are' if len(paths) > 1 else 'is'} not executable"
-
-
-def _mistake(loss: Loss, charged: Mapping[Repair, tuple[Repair, ...]]) -> Hashable:
-    """`charged` says of a repair with which others it is charged."""
-    criterion = loss.criterion
-    if missing_file(criterion):
-        return missing_file
-    used = criterion.repaired
-    if used is not None and (used.charged or criterion.points >= used.share * criterion.full - POINTS_EQUAL):
-        costly = min(used.repairs, key=lambda one: one not in charged)
-        return used.repairs if used.charged else charged.get(costly, used.repairs)
-    lines = tuple(c for c in criterion.citations if isinstance(c, FileCitation) and c.line is not None)
-    if not criterion.hint:
-        return criterion.id
-    said = NUMBERS.sub("", ON_COPY.sub("", criterion.message))
-    if said.startswith("/"):  # how a topic behaves: of two topics, one loop is the reason
-        said = NAMES.sub("", said)
-    return criterion.hint, lines or (criterion.check, said)
-
-
-def missing_file(criterion: CriterionResult) -> str:
-    """Return the path of the file that has to be written for the criterion; empty where that is not its fault."""
-    found = criterion.mistake
-    return found.name if found is not None and found.kind == "file-missing" else ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class MissingFile:
-    """`says` is what else is known of it, `holds` what the criterion expects of it."""
-
-    path: str
-    criterion: CriterionResult
-    says: str
-    holds: str
-
-
-def missing_files(loss: Loss) -> list[MissingFile]:
-    """Return the files that one entry of losses asks to write."""
-    found = []
-    for criterion in (loss.criterion, *loss.alike):
-        if path := missing_file(criterion):
-            _, _, says = criterion.message.partition("; ")
-            name = re.escape(path.rpartition("/")[2])
-            holds = re.sub(rf"^(\S*/)?{name}[,:]? ", "", criterion.expected)
-            found.append(MissingFile(path=path, criterion=criterion, says=says, holds=holds))
-    return found
-
-
-def write_files_hint(files: Sequence[MissingFile]) -> str:
-    """Return what to do about several missing files: what follows the first one's path goes for all."""
-    _, _, then = files[0].criterion.hint.partition(files[0].path)
-    return f"write these files{then.replace(' it', ' them')}"
-
-
-def _fold(
-    losses: list[Loss],
-    key: Callable[[Loss], Hashable] = lambda loss: (loss.criterion.status, loss.criterion.hint),
-) -> tuple[Loss, ...]:
-    """One entry for all that have the same key."""
-    groups: dict[Hashable, list[Loss]] = {}
-    for loss in losses:
-        groups.setdefault(key(loss), []).append(loss)
-    return tuple(
-        replace(
-            first,
-            blocked=tuple(c for loss in (first, *others) for c in loss.blocked),
-            alike=tuple(loss.criterion for loss in others),
-        )
-        for first, *others in groups.values()
-    )
 
 
 def not_graded(result: GradingResult) -> bool:
@@ -225,24 +24,18 @@ def not_graded(result: GradingResult) -> bool:
 
 def is_students_fault(result: GradingResult) -> bool:
     """Whether nothing could be graded because of what was submitted, not because of the machine or the grader."""
-    return result.error is not None and result.error.kind in {SubmissionError.kind, PackageNotFound.kind}
+    return result.error is not None and blame(result.error.kind) == "submission"
 
 
-def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric | None) -> str:
-    """The id of the criterion that a blocked one comes down to; its own id for any other."""
-    by_id = {c.id: c for c in result.criteria}
-    if criterion.blocked_by in by_id:
-        return criterion.blocked_by
-    requires = {c.id: c.requires for c in rubric.criteria} if rubric else {}
-    seen = {criterion.id}
-    while criterion.status is Status.BLOCKED:
-        unmet = [by_id[i] for i in requires.get(criterion.id, ()) if i in by_id and i not in seen]
-        cause = next((c for c in unmet if c.status.is_lost), None)
-        if cause is None:
-            break
-        seen.add(cause.id)
-        criterion = cause
-    return criterion.id
+def blame(kind: str) -> str:
+    """Whose fault an error of this kind is: `submission`, `machine` or `grader`."""
+    return next((found.blame for found in _kinds(GraderError) if found.kind == kind), "grader")
+
+
+def _kinds(error: type[GraderError]) -> Iterator[type[GraderError]]:
+    yield error
+    for below in error.__subclasses__():
+        yield from _kinds(below)
 
 
 def points_of(criterion: CriterionResult) -> str:
@@ -270,8 +63,11 @@ def places(criterion: CriterionResult) -> list[str]:
 
 def file_places(criterion: CriterionResult) -> list[str]:
     """Those of `places` that are files of the student's: `src/talker.py:17`."""
-    cited = [c for c in criterion.citations[:CITATIONS_MAX] if isinstance(c, FileCitation)]
-    return [clip(_place(citation), PLACE_CHARS) for citation in cited]
+    return [clip(_place(citation), PLACE_CHARS) for citation in _cited_files(criterion)]
+
+
+def _cited_files(criterion: CriterionResult) -> list[FileCitation]:
+    return [c for c in criterion.citations[:CITATIONS_MAX] if isinstance(c, FileCitation)]
 
 
 def hint_beside(criterion: CriterionResult, place: str) -> str:
@@ -431,9 +227,8 @@ TAB = " " * 4
 def pointed_at(criterion: CriterionResult, chars: int = SOURCE_CHARS) -> list[tuple[str, str]]:
     """Each line of a file whose text is known, behind its number, and carets below what is meant:
     `12 | print "hello"` and `   |       ^`."""
-    cited = [c for c in criterion.citations[:CITATIONS_MAX] if isinstance(c, FileCitation)]
     found = []
-    for citation in cited:
+    for citation in _cited_files(criterion):
         if citation.line is not None and (place := caret(citation, chars)):
             number = str(citation.line)
             text, below = place
@@ -475,94 +270,3 @@ def _place(citation: Citation) -> str:
     if citation.from_ns is not None and citation.to_ns is not None and citation.to_ns > citation.from_ns:
         stretch = f", {(citation.to_ns - citation.from_ns) / 1e9:.1f} s"
     return f"{citation.evidence} {citation.topic}{stretch}"
-
-
-def hidden_ids(rubric: Rubric) -> frozenset[str]:
-    """The ids of the criteria that `grader check` does not show."""
-    return frozenset(c.id for c in rubric.criteria if c.visibility == "hidden")
-
-
-def without_hidden(result: GradingResult, rubric: Rubric) -> GradingResult:
-    """The result as if the hidden criteria were not in the rubric: points, maximum, status and what being late costs
-    follow, and what people decided about hidden criteria is left out."""
-    hidden = hidden_ids(rubric)
-    shown = tuple(c for c in result.criteria if c.id not in hidden)
-    if len(shown) == len(result.criteria):
-        return result
-    decided = tuple(o for o in result.overrides if o.criterion not in hidden)
-    visible = rubric.model_copy(update={"criteria": tuple(c for c in rubric.criteria if c.id not in hidden)})
-    points = total_points(visible, shown)
-    late = lateness(points, visible, result.late) if result.late else None
-    update = {
-        **total_fields(visible, shown),
-        "criteria": shown,
-        "overrides": decided,
-        "late": late,
-        "points": late.points if late else points,
-        "max_points": round(sum(c.max_points for c in shown), 6),
-        "status": status_after_overrides(result, shown, awarded(decided)),
-    }
-    return result.model_copy(update=update)
-
-
-NOT_SHOWN = "not-shown"
-"""The id of the row that stands for all hidden criteria."""
-
-
-def for_student(result: GradingResult, hidden: frozenset[str]) -> GradingResult:
-    """Return a published result as its student may read it: with the points that count.
-
-    All criteria of the ids in `hidden` are one row with points and without words, and nothing speaks to those who mark.
-    """
-    unseen = [c for c in result.criteria if c.id in hidden]
-    shown = [_unlink(c, hidden) for c in result.criteria if c.id not in hidden]
-    runs = {c.scenario for c in unseen} - {c.scenario for c in shown}
-    gate = result.gate
-    update = {
-        "criteria": (*shown, *_in_one(unseen)),
-        "overrides": tuple(
-            o.model_copy(update={"changed": False}) for o in result.overrides if o.criterion not in hidden
-        ),
-        "notes": tuple(note for note in result.notes if note.scenario not in runs),
-        "gate": gate.model_copy(update={"criterion": NOT_SHOWN})
-        if gate and gate.criterion in hidden
-        else gate,
-    }
-    return result.model_copy(update=update)
-
-
-def _unlink(criterion: CriterionResult, hidden: frozenset[str]) -> CriterionResult:
-    if criterion.blocked_by not in hidden:
-        return criterion
-    return criterion.model_copy(update={"blocked_by": NOT_SHOWN})
-
-
-def _in_one(criteria: list[CriterionResult]) -> tuple[CriterionResult, ...]:
-    """Return one row for these criteria; none where they are worth nothing."""
-    counting = [c for c in criteria if c.counts]
-    if not counting:
-        return ()
-    points, most = (round(sum(p), 6) for p in zip(*((c.points, c.max_points) for c in counting), strict=True))
-    extra = 0.0 if most else round(sum(c.extra for c in counting), 6)
-    full = points >= sum(c.full for c in counting)
-    status = Status.PASS if full else Status.PARTIAL if points > 0 else Status.FAIL
-    if any(c.status.is_open for c in counting):
-        status = Status.INCONCLUSIVE
-    title = f"{plural(len(counting), 'criterion', 'criteria')} that your course does not show"
-    row = CriterionResult(
-        id=NOT_SHOWN,
-        title=title,
-        check="",
-        scenario=None,
-        status=status,
-        points=points,
-        max_points=most,
-        extra=extra,
-        message="" if full else title,
-        expected="",
-        measured="",
-        hint="",
-        reproduce="",
-        citations=(),
-    )
-    return (row,)

@@ -13,9 +13,9 @@ from rich.text import Text
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.files import result_text
+from grader.report.losses import arrange
 from grader.report.sentences import points_line
 from grader.report.terminal import (
-    NOT_DECIDED,
     TO_FIX,
     Terminal,
     emit,
@@ -24,7 +24,7 @@ from grader.report.terminal import (
     print_report,
 )
 from grader.report.text import line
-from grader.report.view import arrange, points_of
+from grader.report.view import points_of
 from grader.rubric.model import Rubric
 from grader.student.watching import Screen, WatchedResult
 from grader.wording import first_few, number
@@ -59,7 +59,8 @@ class TerminalScreen(Screen):
         static: bool = False,
         clock: Callable[[], datetime] = lambda: datetime.now().astimezone(),
     ) -> None:
-        self._package, self._rubric, self._hidden, self._static = package, rubric, hidden, static
+        self._package, self._rubric, self._hidden = package, rubric, hidden
+        self._unrun = "--static" if static else ""
         self._console = open_console(stream)
         self._clock = clock
         self._at = clock()
@@ -68,7 +69,7 @@ class TerminalScreen(Screen):
 
     def begin(self, saved: tuple[str, ...]) -> None:
         self._at = self._clock()
-        doing = "looking at the files" if self._static else "running everything"
+        doing = "looking at the files" if self._unrun else "running everything"
         self._say(f"{self._saved_text(saved)}: {doing} … {ENDS}" if saved else f"{doing} … {ENDS}")
 
     def restart(self) -> None:
@@ -85,9 +86,11 @@ class TerminalScreen(Screen):
         self._ended = True
         if result.error is not None:
             self._emit([Text(f"Could not be graded: {self._show(result.error.message)}", "red")])
-            self._emit(self._details([("hint", result.error.hint)]))
+            if result.error.hint:
+                hint = Text(f"hint: {self._show(result.error.hint)}", "dim")
+                self._emit([Padding(hint, (0, 0, 0, INDENT))])
         elif self._last is None:
-            print_report(result, self._rubric, self._console, hidden=self._hidden, static=self._static)
+            print_report(result, self._rubric, self._console, hidden=self._hidden, unrun=self._unrun)
         else:
             self._emit(self._short(result, self._last))
         self._last = result if result.error is None else self._last
@@ -106,17 +109,9 @@ class TerminalScreen(Screen):
             yield Text(f"{words}: {names}", CHANGES[words])
         if not changed:
             yield Text("as before", "dim")
-        if not self._static:
-            yield from Terminal(self._console).losses(NOT_DECIDED, view.open)
-        elif view.open:
-            points = number(sum(loss.points for loss in view.open))
-            yield Text(f"\nNothing was run (--static): criteria worth {points} points are not decided yet.")
+        if view.open:
+            yield from Terminal(self._console).still_open(view.open, self._unrun)
         yield from Terminal(self._console).losses(TO_FIX, view.lost)
-
-    def _details(self, rows: Iterable[tuple[str, str]]) -> Iterable[RenderableType]:
-        for name, words in rows:
-            if words:
-                yield Padding(Text(f"{name}: {self._show(words)}", "dim"), (0, 0, 0, INDENT))
 
     def _saved_text(self, saved: tuple[str, ...]) -> str:
         """`saved src/talker.py at 12:03:04`."""

@@ -32,7 +32,7 @@ from grader.model.progress import Progress
 from grader.model.result import GradingResult, SubmissionInfo
 from grader.package.facts import read_files
 from grader.package.reading import LEFT_OUT
-from grader.report.view import without_hidden
+from grader.report.student_view import without_hidden
 from grader.rubric.load import LoadedRubric
 
 POLL_S = 0.25

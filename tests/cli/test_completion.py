@@ -17,7 +17,6 @@ from grader.cli.completion import (
     completing_parser,
     explained,
     lab_ids,
-    mistakes,
     mutants,
     paths,
     submissions,
@@ -141,14 +140,14 @@ def test_a_rubric_that_is_no_rubric_offers_checks_only(tmp_path, text):
 
 
 def test_mutants_are_those_of_the_lab():
-    offered = mutants(parsed_args=argparse.Namespace(rubric=LAB))
+    offered = mutants(parsed_args=argparse.Namespace(rubric=LAB), named="rubric")
     assert "talker-crlf" in offered
-    assert mutants(parsed_args=argparse.Namespace(rubric="own.yaml")) == {}
+    assert mutants(parsed_args=argparse.Namespace(rubric="own.yaml"), named="rubric") == {}
 
 
 @pytest.mark.full
 def test_every_mistake_that_is_offered_is_one(tmp_path, capsys):
-    offered = mistakes(parsed_args=argparse.Namespace(lab=LAB))
+    offered = mutants(parsed_args=argparse.Namespace(lab=LAB), named="lab")
     assert offered
     for number, name in enumerate(offered):
         assert run(["example", LAB, str(tmp_path / str(number)), "--mistake", name]) == 0, (

@@ -295,7 +295,6 @@ def test_mirrors_are_fetched_ahead(server, monkeypatch):
     log = fetches(server, monkeypatch)
     with prefetch(iter(entries), threads=3, fetched_since=since, patience=AT_ONCE) as ahead:
         assert ahead.wait(600)
-        assert (ahead.fetched, ahead.failed) == (4, 5)
         assert log.read_text().split().count("fetch") == 3
         log.write_text("")
         for name in ("a", "b", "c"):

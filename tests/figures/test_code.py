@@ -43,7 +43,7 @@ def test_marks_far_apart_are_two() -> None:
     assert [f.marked for f in code(TEXT, 10, 150)] == [(10,), (150,)]
 
 
-@pytest.mark.parametrize("mark", [None, 0, -3, 201, 10**30])
+@pytest.mark.parametrize("mark", [None, 0, -3, 201])
 def test_no_such_line(mark: int | None) -> None:
     assert code(TEXT, mark) == []
 

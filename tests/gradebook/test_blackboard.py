@@ -30,10 +30,14 @@ def filled(
 
 
 @pytest.mark.parametrize(
-    ("mark", "encoding"),
-    [(b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"), (b"\xef\xbb\xbf", "utf-8"), (b"", "utf-8")],
+    ("mark", "encoding", "delimiter"),
+    [
+        (b"\xff\xfe", "utf-16-le", "\t"),
+        (b"\xfe\xff", "utf-16-be", ","),
+        (b"\xef\xbb\xbf", "utf-8", "\t"),
+        (b"", "utf-8", ","),
+    ],
 )
-@pytest.mark.parametrize("delimiter", ["\t", ","])
 def test_the_download_stays_as_it_is(tmp_path: Path, mark: bytes, encoding: str, delimiter: str) -> None:
     text = DOWNLOAD.replace("\t", delimiter)
     rows = [row("AL1", 87.5), row("x", 100, name="Zoe\u0308 Ångstro\u0308m"), row("y", 1, Username="zz")]

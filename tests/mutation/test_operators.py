@@ -153,14 +153,14 @@ def test_at_least_15_operators_fit_each_lab(solutions):
 
 
 def silent():
-    """Only the mistake."""
+    return []
 
 
 def test_an_operator_has_to_say_what_it_does():
     with pytest.raises(ValueError, match="twice"):
-        operator("bit-removed", each=lambda _: ())(silent)
-    with pytest.raises(ValueError, match="says too little"):
-        operator("new-one", each=lambda _: ())(silent)
+        operator("bit-removed", each=lambda _: (), fits="every script")(silent)
+    with pytest.raises(ValueError, match="no docstring"):
+        operator("new-one", each=lambda _: (), fits="every script")(silent)
     assert "new-one" not in OPERATORS
 
 

@@ -222,7 +222,8 @@ def test_where_it_cannot_be_written(tmp_path):
 def test_a_writer_that_does_not_end_is_told_of(tmp_path, monkeypatch):
     path = file(tmp_path)
     monkeypatch.setattr(write, "WAIT_S", 0.05)
-    with write._hold_lock(path.resolve()), pytest.raises(Busy, match="another program is writing"):
+    held = write.hold_lock(path.resolve().with_name(f".{path.name}.lock"), path)
+    with held, pytest.raises(Busy, match="another program is writing"):
         write_override(path, "bob", "style", None)
     write_override(path, "bob", "style", None)
     assert "bob" not in path.read_text()

@@ -1,7 +1,7 @@
 """Operators: named functions, each making one kind of mistake wherever it fits a correct package.
 
 A new operator is a function with `@operator` in the module of `operators/` for its kind of file; the page of operators
-is made of its docstring (`make reference`). Its test is a faulty package of a lab in `fixtures/`.
+is made of them (`make reference`). Its test is a faulty package of a lab in `fixtures/`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from typing import Any, TypeVar
 from grader.authoring.mutation.solution import Change, Site, Solution
 from grader.model.record import Record
 
-FITS = "Fits "
 Finder = Callable[[Solution], Iterable[tuple[Any, ...]]]
 Function = TypeVar("Function", bound=Callable[..., Change])
 
@@ -61,28 +60,22 @@ class Operator:
 OPERATORS: dict[str, Operator] = {}
 
 
-def operator(name: str, *, each: Finder, params: type[Record] = NoParams) -> Callable[[Function], Function]:
-    """Put a function into `OPERATORS`. Its docstring's first line is the mistake, a line `Fits …` where it fits.
+def operator(
+    name: str, *, each: Finder, fits: str, params: type[Record] = NoParams
+) -> Callable[[Function], Function]:
+    """Put a function into `OPERATORS`. Its docstring says the student's mistake.
 
     `each` finds where the operator may fit: it yields a `CodePlace` and what is there. The function is called with
     what is there, and with the parameters if it has any. It returns the change, or nothing where it does not fit.
-    Raises ValueError for a name that is taken and for a docstring that lacks one of the two lines.
+    Raises ValueError for a name that is taken and for a function without a docstring.
     """
 
     def register(function: Function) -> Function:
-        mistake, *rest = (inspect.getdoc(function) or "").splitlines() or [""]
-        fits = next((line.removeprefix(FITS) for line in rest if line.startswith(FITS)), "")
-        if name in OPERATORS or not mistake or not fits:
-            raise ValueError(
-                f"operator {name}: {'twice' if name in OPERATORS else 'its docstring says too little'}"
-            )
+        mistake = inspect.getdoc(function)
+        if name in OPERATORS or not mistake:
+            raise ValueError(f"operator {name}: {'twice' if name in OPERATORS else 'it has no docstring'}")
         OPERATORS[name] = Operator(
-            name=name,
-            each=each,
-            function=function,
-            params=params,
-            mistake=mistake.rstrip("."),
-            fits=fits.rstrip("."),
+            name=name, each=each, function=function, params=params, mistake=mistake.rstrip("."), fits=fits
         )
         return function
 

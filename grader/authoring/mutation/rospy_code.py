@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from grader.authoring.mutation.solution import CodePlace, Solution
 from grader.authoring.mutation.source_edits import Function, Script
@@ -72,12 +73,9 @@ def text_literal(script: Script, node: ast.AST | None) -> ast.Constant | None:
     return found if whole else None
 
 
-def publishers(script: Script) -> list[Endpoint]:
-    return [e for call in calls(script, "Publisher") if (e := _endpoint(script, call))]
-
-
-def subscribers(script: Script) -> list[Endpoint]:
-    return [e for call in calls(script, "Subscriber") if (e := _endpoint(script, call))]
+def endpoints(script: Script, *kinds: str) -> list[Endpoint]:
+    """Return the script's endpoints of these kinds, `Publisher` and `Subscriber`, one kind after the other."""
+    return [e for kind in kinds for call in calls(script, kind) if (e := _endpoint(script, call))]
 
 
 def _endpoint(script: Script, call: ast.Call) -> Endpoint | None:
@@ -89,18 +87,15 @@ def _endpoint(script: Script, call: ast.Call) -> Endpoint | None:
     if isinstance(statement, ast.AnnAssign):
         target = ast.unparse(statement.target)
     subscribes = last_name(call.func) == "Subscriber"
+    topic = str(name.value)
     return Endpoint(
         call=call,
-        topic=global_name(str(name.value)),
+        topic=topic if topic.startswith(("/", "~")) else f"/{topic}",
         name=name,
         type=argument(call, 1, "data_class"),
         target=target,
         callback=_function(script, argument(call, 2, "callback")) if subscribes else None,
     )
-
-
-def global_name(name: str) -> str:
-    return name if name.startswith(("/", "~")) else f"/{name}"
 
 
 def _function(script: Script, node: ast.AST | None) -> Function | ast.Lambda | None:
@@ -119,34 +114,24 @@ def each_script(solution: Solution) -> Iterator[tuple[CodePlace, Script]]:
     return ((script_place(script), script) for script in solution.scripts)
 
 
-def each_publisher(solution: Solution) -> Iterator[tuple[CodePlace, Script, Endpoint]]:
-    """Find the publishers."""
-    return _each_endpoint(solution, publishers)
-
-
-def each_subscriber(solution: Solution) -> Iterator[tuple[CodePlace, Script, Endpoint]]:
-    """Find the subscribers."""
-    return _each_endpoint(solution, subscribers)
-
-
-def each_endpoint(solution: Solution) -> Iterator[tuple[CodePlace, Script, Endpoint]]:
-    """Find the publishers and subscribers."""
-    return _each_endpoint(solution, lambda script: [*publishers(script), *subscribers(script)])
-
-
-def _each_endpoint(
-    solution: Solution, find: Callable[[Script], list[Endpoint]]
+def each_endpoint(
+    solution: Solution, kinds: Sequence[str] = ("Publisher", "Subscriber")
 ) -> Iterator[tuple[CodePlace, Script, Endpoint]]:
+    """Find the publishers and subscribers."""
     for script in solution.scripts:
-        for endpoint in find(script):
+        for endpoint in endpoints(script, *kinds):
             yield script_place(script, endpoint.call, topic=endpoint.topic), script, endpoint
+
+
+each_publisher = partial(each_endpoint, kinds=["Publisher"])
+each_subscriber = partial(each_endpoint, kinds=["Subscriber"])
 
 
 def publish_calls(script: Script, publisher: Endpoint) -> list[ast.Call]:
     """`pub.publish(…)` by the publisher's own name; of an only publisher, by whatever name."""
     found = [c for c in calls(script, "publish") if isinstance(c.func, ast.Attribute)]
     own = [c for c in found if publisher.target and ast.unparse(c.func.value) == publisher.target]  # type: ignore[attr-defined]
-    return own or (found if len(publishers(script)) == 1 else [])
+    return own or (found if len(endpoints(script, "Publisher")) == 1 else [])
 
 
 def message_name(callback: Function | ast.Lambda) -> str:
@@ -234,11 +219,6 @@ def sources(script: Script, publisher: Endpoint) -> list[ast.expr]:
         names |= new
         found += [a.value for a in assignments(script, new) if a.value is not None and a.value not in found]
     return found
-
-
-def source_names(script: Script, publisher: Endpoint) -> set[str]:
-    """The variables that what is published depends on."""
-    return {name for value in sources(script, publisher) for name in names_in(value)}
 
 
 # ---- counters
@@ -335,4 +315,5 @@ def _constants(nodes: Iterable[ast.AST], least: float = -math.inf) -> list[ast.C
 
 def counted_names(script: Script, publisher: Endpoint) -> set[str]:
     """The variables that are published and counted up."""
-    return {name for name in source_names(script, publisher) if _steps(script, name)}
+    read = {name for value in sources(script, publisher) for name in names_in(value)}
+    return {name for name in read if _steps(script, name)}

@@ -10,8 +10,8 @@ from grader import __version__
 from grader.classes.gradebook import Book, GradebookRow
 from grader.errors import UsageError
 from grader.files import whole_file
-from grader.intake import safe_name
-from grader.model.batch import MISSING, ROSTER, UNPUBLISHED, BatchRun, CriterionInfo, Entry
+from grader.intake.names import folder_key, safe_name
+from grader.model.batch import MISSING, ROSTER, UNPUBLISHED, BatchRun, Entry
 from grader.model.result import (
     NO_TIME,
     CriterionResult,
@@ -74,14 +74,14 @@ class BatchFolder:
         graded come last. One without a result has one of status `error` here, which says so."""
         known = set()
         for entry in self.run.entries:
-            known.add(safe_name(entry.id).casefold())
+            known.add(folder_key(entry.id))
             result = self.earlier(entry)
             yield GradebookRow(
                 entry=entry, result=result or self.empty_result(entry, MISSING, "not graded yet")
             )
         for fault in self.run.faults:
-            if fault.id is not None and safe_name(fault.id).casefold() not in known:
-                known.add(safe_name(fault.id).casefold())
+            if fault.id is not None and folder_key(fault.id) not in known:
+                known.add(folder_key(fault.id))
                 entry = Entry(
                     id=fault.id,
                     source="",
@@ -102,30 +102,21 @@ class BatchFolder:
             status="error",
             points=0.0,
             max_points=self.run.max_points,
-            criteria=tuple(map(_not_judged, self.run.criteria)),
+            criteria=tuple(
+                CriterionResult.unmeasured(
+                    id=criterion.id,
+                    title=criterion.title,
+                    status=Status.ERROR,
+                    max_points=criterion.max_points,
+                    extra=criterion.extra,
+                    message="not judged",
+                )
+                for criterion in self.run.criteria
+            ),
             environment=EnvironmentInfo(grader=__version__, ros="", python="", sandbox=""),
             timing=NO_TIME,
             error=ErrorInfo(kind=kind, message=message, hint=HINTS[kind]),
         )
-
-
-def _not_judged(criterion: CriterionInfo) -> CriterionResult:
-    return CriterionResult(
-        id=criterion.id,
-        title=criterion.title,
-        check="",
-        scenario=None,
-        status=Status.ERROR,
-        points=0.0,
-        max_points=criterion.max_points,
-        extra=criterion.extra,
-        message="not judged",
-        expected="",
-        measured="",
-        hint="",
-        reproduce="",
-        citations=(),
-    )
 
 
 def write_run(folder: Path, run: BatchRun) -> None:

@@ -279,31 +279,24 @@ def _copy(folder: Path, results: Results) -> None:
         raise OutputError(f"cannot copy {folder}: {error}") from error
 
 
-@dataclass(frozen=True, kw_only=True)
-class Rewriting:
-    """A result that is to be written into a submission's folder, with its reports."""
-
-    folder: Path
-    result: GradingResult
-
-
-def rewrite_all(jobs: Sequence[Rewriting], rubric: LoadedRubric, count: int) -> Iterator[WrittenReports]:
-    """Do as `rewrite` for each, `count` at a time; yield each as it comes. A faulty one stops no other."""
+def rewrite_all(results: Mapping[Path, GradingResult], rubric: LoadedRubric, count: int) -> Iterator[str]:
+    """Do as `rewrite` for each folder's result, `count` at a time. Yield for each an empty string, or why it could not
+    be written; a faulty one stops no other."""
     return run_each(
         partial(_try_rewrite, rubric),
-        jobs,
-        min(count, len(jobs)),
-        ended=lambda job, error: _writing_ended(job.folder, error),
+        list(results.items()),
+        min(count, len(results)),
+        ended=lambda job, error: _writing_ended(job[0], error).error,
     )
 
 
-def _try_rewrite(rubric: LoadedRubric, job: Rewriting) -> WrittenReports:
+def _try_rewrite(rubric: LoadedRubric, job: tuple[Path, GradingResult]) -> str:
     """In a worker."""
     try:
-        rewrite(job.folder, job.result, rubric.rubric, rubric.docs)
+        rewrite(*job, rubric.rubric, rubric.docs)
     except GraderError as error:
-        return WrittenReports(folder=job.folder, error=error.message, hint=error.hint)
-    return WrittenReports(folder=job.folder, rubric_digest=job.result.rubric.digest)
+        return error.message
+    return ""
 
 
 def figures_in(folder: Path, result: GradingResult, rubric: Rubric) -> Figures | None:

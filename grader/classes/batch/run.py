@@ -24,7 +24,8 @@ from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
 from grader.errors import Busy, GraderError, UsageError
 from grader.files import check_writable, keep_private, make_folder, try_lock
-from grader.intake import safe_name, without_password
+from grader.intake import without_password
+from grader.intake.names import folder_key
 from grader.judging.summary import passed
 from grader.model import SandboxMode
 from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, Entry, Roster, RosterFault, State
@@ -37,24 +38,19 @@ from grader.rubric.model import Rubric
 from grader.untrusted_text import line
 
 GRADEBOOK, RESULTS, INDEX = "gradebook.csv", "results.jsonl", "index.html"
-RESERVED = frozenset(
-    {
-        *(
-            RUN,
-            GRADEBOOK,
-            RESULTS,
-            INDEX,
-            OVERRIDES,
-            BANK,
-            "similarity.json",
-            "similarity.csv",
-            "changes.csv",
-        ),
-        *("published.jsonl", "sent.jsonl", "feedback", "mails"),
-    }
+OWN_FILES = (
+    RUN,
+    GRADEBOOK,
+    RESULTS,
+    INDEX,
+    OVERRIDES,
+    BANK,
+    "changes.csv",
+    "similarity.csv",
+    "similarity.json",
 )
-
-
+RESERVED = frozenset({*OWN_FILES, "published.jsonl", "sent.jsonl", "feedback", "mails"})
+"""No submission may be called so: its folder of results would lie there."""
 FAILED, INCONCLUSIVE, CHANGED = "failed", "inconclusive", "changed"
 WORDS = (FAILED, INCONCLUSIVE, CHANGED)
 NAME_CHARS = 80
@@ -166,7 +162,7 @@ def _grade_all(batch: _Batch, executor: Executor, watcher: Watcher) -> Iterator[
     options = batch.options
     todo = list(_select(batch.roster.entries, options.only, batch.folder.earlier))
     watcher.planned(len(todo))
-    if todo and not options.cluster:
+    if todo and not options.cluster:  # what is made here is of no use on the machines of a cluster
         prepare(GradeOptions(sandbox=options.sandbox, static_only=options.static_only))
     since = time.time()
     entries = {entry.id: entry for entry, _ in todo}
@@ -267,7 +263,7 @@ def _gradable(roster: Roster, out: Path) -> Roster:
     for entry in roster.entries:
         if Path(entry.source) == out.absolute():
             continue
-        if safe_name(entry.id).casefold() in RESERVED:
+        if folder_key(entry.id) in RESERVED:
             text = f"id: {entry.id} is the name of one of the batch's own files"
             faults.append(RosterFault(where=entry.where, id=entry.id, text=text))
         else:
@@ -324,11 +320,11 @@ def _select(
     is. `changed`: those with a result, which stays unless the submission, the rubric or the grader has changed. An id:
     that one.
     """
-    names = {safe_name(name).casefold() for name in only if name not in WORDS}
+    names = {folder_key(name) for name in only if name not in WORDS}
     for entry in entries:
         if not only:
             yield entry, False
-        elif safe_name(entry.id).casefold() in names:
+        elif folder_key(entry.id) in names:
             yield entry, True
         elif any(word in only for word in WORDS):
             result = earlier(entry)
@@ -341,9 +337,9 @@ def _select(
 
 def _check_only(entries: Sequence[Entry], only: Sequence[str]) -> None:
     """Raise UsageError for an id that no entry has, with the nearest one."""
-    known = {safe_name(entry.id).casefold(): entry.id for entry in entries}
+    known = {folder_key(entry.id): entry.id for entry in entries}
     for name in only:
-        if name in WORDS or safe_name(name).casefold() in known:
+        if name in WORDS or folder_key(name) in known:
             continue
         near = get_close_matches(name, list(known.values()), n=1)
         hint = f"did you mean {line(near[0], NAME_CHARS)}?" if near else f"an id, or {', '.join(WORDS)}"

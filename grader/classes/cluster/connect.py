@@ -23,14 +23,7 @@ from grader.installable import install_extra
 from grader.ros_env import INSTALL_HINT
 
 CONNECT_S = 15.0
-LOGGERS = (
-    "distributed",
-    "distributed.client",
-    "distributed.scheduler",
-    "distributed.nanny",
-    "tornado",
-    "asyncio",
-)
+LOGGERS = (*(f"distributed{part}" for part in ("", ".client", ".scheduler", ".nanny")), "tornado", "asyncio")
 TLS = tuple(f"DASK_DISTRIBUTED__COMM__TLS__{name}" for name in ("CA_FILE", "CLIENT__CERT", "CLIENT__KEY"))
 LOCAL = "local"
 ENCRYPTED = ("tls", "wss")
@@ -211,13 +204,8 @@ class Recruits:
         self._threads: dict[str, int] = {}
         self._answers: SimpleQueue[tuple[str, Answer]] = SimpleQueue()
         self.changed = threading.Event()
-        self._client, self._exchange, self._batch, self._needs, self._say = (
-            client,
-            exchange,
-            batch,
-            needs,
-            say,
-        )
+        self._client, self._exchange, self._batch = client, exchange, batch
+        self._needs, self._say = needs, say
 
     @property
     def address(self) -> str:

@@ -16,9 +16,10 @@ from typing import Any, BinaryIO, cast
 from urllib.parse import urlsplit
 
 from grader.classes.batch.job import GradingJob, SubmissionOutcome
-from grader.errors import HostError, PackageNotFound, SubmissionError, UsageError
+from grader.errors import HostError, UsageError
 from grader.files import make_folder
 from grader.model.record import Record
+from grader.report.view import blame
 
 TOKEN_BYTES = 8
 CHUNK_BYTES = 1 << 20
@@ -28,7 +29,6 @@ ENTRIES = 10_000
 LEVEL = 1  # evidence is compressed already
 OWN_MEMORY = ("memory", "local+memory")
 HELLO = "hello"
-BLAME_SUBMISSION = (SubmissionError.kind, PackageNotFound.kind)
 
 
 class Parcel(Record):
@@ -62,7 +62,7 @@ class Report(Record):
 
 def is_machines(outcome: SubmissionOutcome) -> bool:
     """Return whether it is an error that is not the submission's."""
-    return outcome.status == "error" and outcome.kind not in BLAME_SUBMISSION
+    return outcome.status == "error" and blame(outcome.kind) != "submission"
 
 
 class Exchange:

@@ -47,11 +47,10 @@ def versions() -> dict[str, str]:
 async def describe(exchange: str, word: str) -> dict[str, str]:
     """Return who this worker is: its `versions`, `host`, `ros` (empty for none) and `kept_out`: what keeps it from the
     exchange (empty for nothing)."""
-    return await asyncio.to_thread(_describe, exchange, word)
+    return await asyncio.to_thread(_describe, exchange, word)  # Dask's own loop must not wait for a slow disk
 
 
 def _describe(exchange: str, word: str) -> dict[str, str]:
-
     _Code.digest = _digest_code()
     ros = kept_out = ""
     with suppress(GraderError):
@@ -188,8 +187,6 @@ class _Processes:
     @contextmanager
     def borrow(self, batch: str) -> Iterator[Worker]:
         """A process for one job; one that was interrupted is not used again."""
-        from grader.workers import Worker  # noqa: PLC0415 - the module loads little
-
         with self._changed:
             process = self._idle.pop() if self._idle else Worker(WorkerLimits(idle_s=IDLE_S))
             self._busy[process] = batch

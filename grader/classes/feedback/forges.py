@@ -110,6 +110,7 @@ class Comments(Sender):
             try:
                 return self._make(feedback, path)
             except NoAnswer as error:
+                # The forge may have made it all the same: without a look, the student could get it twice.
                 look = True
                 if not left:
                     raise Unsure(
@@ -128,6 +129,7 @@ class Comments(Sender):
             except Refused as error:
                 if error.status not in (404, 410):
                     raise
+                # The issue is gone: the feedback goes into a new one.
         return self.open_issue(path, feedback.subject, body)
 
     def _find_comment(self, feedback: Feedback, path: str) -> str:

@@ -30,7 +30,8 @@ from grader.model.version import PUBLISHED as FORMAT
 from grader.model.version import UPDATE
 from grader.report.files import result_bytes
 from grader.report.forms import FORMS, ReportInput
-from grader.report.view import for_student, is_students_fault, not_graded
+from grader.report.student_view import for_student
+from grader.report.view import is_students_fault, not_graded
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric
 from grader.wording import did_you_mean, join_words, number, plural
@@ -190,11 +191,11 @@ def publish(folder: BatchFolder, rubric: LoadedRubric, how: Publishing) -> tuple
         done: list[Publication] = []
         try:
             write = partial(_try_freeze, rubric)
-            for frozen in run_each(write, jobs.items(), min(how.jobs, len(jobs)), ended=_worker_ended):
-                if frozen.error:
-                    steps[frozen.place] = replace(steps[frozen.place], why=frozen.error, failed=True)
+            for place, error in run_each(write, jobs.items(), min(how.jobs, len(jobs)), ended=_worker_ended):
+                if error:
+                    steps[place] = replace(steps[place], why=error, failed=True)
                 else:
-                    done.append(jobs[frozen.place].publication)
+                    done.append(jobs[place].publication)
         finally:
             _append(folder.path / FILE, sorted(done, key=[j.publication for j in jobs.values()].index))
     return tuple(steps)
@@ -219,12 +220,6 @@ class Freezing:
     into: Path
     changes: tuple[str, ...]
     hidden: frozenset[str]
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Frozen:
-    place: int
-    error: str = ""
 
 
 def _job(folder: BatchFolder, published: Published, how: Publishing, step: PublishStep) -> Freezing:
@@ -263,20 +258,20 @@ def history_words(history: Sequence[Publication]) -> tuple[str, ...]:
     return tuple(f"{one.at:%Y-%m-%d}: {change}" for one in history for change in one.changes)
 
 
-def _worker_ended(job: tuple[int, Freezing], error: WorkerEnded) -> _Frozen:
-    return _Frozen(place=job[0], error=f"the process that wrote its reports {error.reason}")
+def _worker_ended(job: tuple[int, Freezing], error: WorkerEnded) -> tuple[int, str]:
+    return job[0], f"the process that wrote its reports {error.reason}"
 
 
-def _try_freeze(rubric: LoadedRubric, job: tuple[int, Freezing]) -> _Frozen:
-    """In a worker."""
+def _try_freeze(rubric: LoadedRubric, job: tuple[int, Freezing]) -> tuple[int, str]:
+    """In a worker: return the job's place, and why it could not be done, empty if it was."""
     place, wanted = job
     try:
         freeze(rubric, wanted)
     except GraderError as error:
-        return _Frozen(place=place, error=error.message)
+        return place, error.message
     except Exception as error:  # noqa: BLE001 - whatever it is, the others are published
-        return _Frozen(place=place, error=f"internal error: {type(error).__name__}: {error}")
-    return _Frozen(place=place)
+        return place, f"internal error: {type(error).__name__}: {error}"
+    return place, ""
 
 
 def freeze(rubric: LoadedRubric, job: Freezing) -> None:

@@ -55,6 +55,8 @@ class MirrorFolder:
     def mirror(self) -> Path:
         return self.folder / "mirror.git"
 
+    # Read and written by hand: names of refs may hold bytes that are no UTF-8, which pydantic refuses.
+
     def state(self) -> MirrorState | None:
         """None where the mirror is not complete."""
         try:
@@ -70,7 +72,6 @@ class MirrorFolder:
         beside = self.folder / "state.json.new"
         beside.write_text(json.dumps(data), encoding="utf-8")
         beside.replace(self.folder / "state.json")
-
         (self.folder / "failure.json").unlink(missing_ok=True)
 
     def failure(self) -> NetworkFailure | None:

@@ -178,6 +178,7 @@ def choose_commit(
 def _last(tip: Commit, rest: Iterator[Commit], time: datetime) -> tuple[ChosenCommit | None, Commit]:
     """Return the newest commit that is not dated after `time` (None if there is none), and the oldest one looked at."""
     commit, later_ones = tip, 0
+    # In the branch's order, not sorted by date: a wrong clock must not bring an older state of the work before a newer.
     while commit.at > time:
         following = next(rest, None)
         if following is None:

@@ -27,7 +27,7 @@ from grader.classes.fetching.mirror import (
     patiently,
     place_name,
 )
-from grader.errors import GraderError, SubmissionError
+from grader.errors import SubmissionError
 from grader.files import temporary_folder
 from grader.intake import unreadable
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
@@ -279,11 +279,9 @@ STOP_S = 0.5
 
 
 class Prefetch:
-    """How far it came: `fetched` mirrors are up to date, `failed` are not (those who grade will say why)."""
+    """Threads that bring mirrors up to date; those who grade say why one could not be."""
 
     def __init__(self, entries: Iterable[Entry], since: float, patience: Patience) -> None:
-        self.fetched = 0
-        self.failed = 0
         self._entries = iter(entries)
         self._since = since
         self._patience = replace(patience, sleep=self._sleep)
@@ -324,27 +322,18 @@ class Prefetch:
                 entry = next(self._entries, None)
             if entry is None:
                 return
-            good: bool | None = False
             with suppress(Exception):  # whatever it is, those who grade meet it again and say so
-                good = self._fetch(entry, room)
-            with self._lock:
-                self.fetched += good is True
-                self.failed += good is False
+                self._fetch(entry, room)
 
-    def _fetch(self, entry: Entry, room: Path) -> bool | None:
-        """Return whether the mirror is up to date; None where none is needed, or none can be kept."""
+    def _fetch(self, entry: Entry, room: Path) -> None:
         source = source_of(entry)
         folder = cache_folder() if source.remote else None
-        if folder is None:
-            return None
+        if folder is None:  # what is on this machine needs no mirror, and without a cache none can be kept
+            return
         tidy_now_and_then(folder)
         request = FetchRequest(source=source, since=self._since, patience=self._patience)
-        try:
-            with locked(folder / place_name(source)) as place:
-                bring_up_to_date(place, request, room)
-        except (GraderError, GitFailed, GivenUp, OSError):
-            return False
-        return True
+        with locked(folder / place_name(source)) as place:
+            bring_up_to_date(place, request, room)
 
 
 @contextmanager

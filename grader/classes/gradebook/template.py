@@ -143,13 +143,13 @@ def _fill(work: _Work, record: TemplateRow, mark: Mark) -> None:
         record.cells += [""] * (place + 1 - len(record.cells))
         there = record.value(place).strip()
         if points is None:
-            if there not in {"", "-"}:
+            if there not in {"", "-"}:  # Moodle's sign for no grade
                 work.remarks.append(f"{mark.entry.id}: {there} is there already, and stays")
         elif work.platform == "canvas" and there.upper() in KEPT:
             work.remarks.append(
                 f"{mark.entry.id}: {there} stays, the {number_text(points)} points are left out"
             )
-        elif _number(there) != points:
+        elif _number(there) != points:  # `87.50` that is right stays as it is written
             record.cells[place] = work.sheet.written(number_text(points), record.cells[place])
 
 
@@ -160,7 +160,7 @@ def _unmatched_remarks(
     for place, (record, identity) in enumerate(zip(students, theirs, strict=True)):
         fields = _fields(record, work)
         named = [fields[name] for name, kind in work.known.items() if kind != "section" and fields.get(name)]
-        if place not in taken and identity.name != "test student":
+        if place not in taken and identity.name != "test student":  # whom Canvas puts into every course
             yield f"{', '.join(named) or 'a row without a name'}: in {work.sheet.path.name}, without a submission here"
 
 
@@ -195,6 +195,7 @@ def find_column(
         for place, name in enumerate(header)
         if name not in known and not _OTHER.search(name) and meant & _titles(name, platform)
     ]
+    # Moodle exports one item as points, percentage and letter, each a column: points go where points are.
     near = [place for place in near if _REAL.search(header[place])] or near if len(near) > 1 else near
     found = exact or near
     if len(found) > 1:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from grader.classes.gradebook.platforms import Platform, marks_of, new_import_file, remarks_of, wanted_columns
 from grader.classes.gradebook.table import (
@@ -29,11 +29,7 @@ if TYPE_CHECKING:
     from xlsxwriter.format import Format
     from xlsxwriter.worksheet import Worksheet
 
-PLATFORMS: Mapping[GradebookFormat, Platform] = {
-    "canvas": "canvas",
-    "moodle": "moodle",
-    "blackboard": "blackboard",
-}
+PLATFORMS: Mapping[GradebookFormat, Platform] = {name: name for name in get_args(Platform)}
 
 
 def write_gradebook(
@@ -61,7 +57,7 @@ def write_gradebook(
                 f"--form {form} has every criterion and needs no template",
                 hint="--template, --per-criterion and --column are for canvas, moodle and blackboard",
             )
-        _write_plain(book, rows, target, form)
+        PLAIN[form](book, rows, target)
         return ()
     marks = marks_of(book, rows, per_criterion=per_criterion)
     wanted = wanted_columns(book, column, per_criterion=per_criterion)
@@ -80,15 +76,6 @@ def write_gradebook(
     return (*remarks, *more)
 
 
-def _write_plain(book: Book, rows: Iterable[GradebookRow], target: Path, form: GradebookFormat) -> None:
-    if form == "csv":
-        write_csv(book, rows, target)
-    elif form == "jsonl":
-        write_jsonl(rows, target)
-    else:
-        write_workbook(book, rows, target)
-
-
 OPTIONAL = {
     name for name, field in GradingResult.model_fields.items() if not (field.is_required() or field.default)
 }
@@ -102,7 +89,7 @@ def write_csv(book: Book, rows: Iterable[GradebookRow], target: Path) -> None:
         file.writelines(csv_line(list(cells(book, row))) for row in rows)
 
 
-def write_jsonl(rows: Iterable[GradebookRow], target: Path) -> None:
+def write_jsonl(_book: Book, rows: Iterable[GradebookRow], target: Path) -> None:
     """A line is what `result.json` says (`grader.result/1`), and what the roster says of it under `roster`."""
     with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
         file.writelines(json_line(row) for row in rows)
@@ -184,3 +171,10 @@ def _write(sheet: Worksheet, number: int, row: Sequence[Cell], form: Format | No
             sheet.write_string(number, column, visible_text(cell), form)
         elif isinstance(cell, int | float):
             sheet.write_number(number, column, cell, form)
+
+
+PLAIN: Mapping[GradebookFormat, Callable[[Book, Iterable[GradebookRow], Path], None]] = {
+    "csv": write_csv,
+    "jsonl": write_jsonl,
+    "xlsx": write_workbook,
+}

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from grader.errors import RubricError
-from grader.intake.names import safe_name
+from grader.intake.names import folder_key
 from grader.model.result import COMMENT_CHARS, BankComment, CommentId, Override, WrittenOverride
 from grader.model.version import COMMENTS, OVERRIDES
 from grader.rubric.fault_words import model_faults, shown
@@ -90,12 +90,6 @@ def parse(raw: bytes, name: str) -> Source:
 @lru_cache(maxsize=2)
 def _parse(raw: bytes) -> Source:
     return source_of(raw, FILE, FORM)
-
-
-@lru_cache(maxsize=20_000)
-def folder_key(name: str) -> str:
-    """What two names of the same folder of results have in common."""
-    return safe_name(name).casefold()
 
 
 class _Reading:

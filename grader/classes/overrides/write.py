@@ -5,6 +5,7 @@ The text is changed in place by cutting and inserting pieces (`Splice`): writing
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import time
@@ -18,9 +19,10 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from grader.classes.overrides import SCHEMA_KEY, folder_key, parse
+from grader.classes.overrides import SCHEMA_KEY, parse
 from grader.errors import Busy, RubricError, UsageError
 from grader.files import atomic_write, lock, open_lock, unwritable
+from grader.intake.names import folder_key
 from grader.model.result import BankComment, Override, WrittenOverride
 from grader.model.version import COMMENTS, OVERRIDES
 from grader.rubric.yaml_lines import as_map, compose
@@ -47,7 +49,8 @@ def write_overrides(path: Path, changes: Iterable[OverrideChange]) -> None:
     changed here, OutputError where it cannot be written, Busy where another writer does not come to its end.
     """
     path = path.resolve()
-    with _hold_lock(path):
+    # The lock is a file beside it, which stays: another writer may be waiting for it.
+    with hold_lock(path.with_name(f".{path.name}.lock"), path, wait_s=WAIT_S):
         raw = _read(path)
         mode = path.stat().st_mode & 0o777 if path.exists() else None
         wanted = {(name, criterion): given for name, criterion, given in changes}  # of two for one, the last
@@ -59,23 +62,23 @@ def write_overrides(path: Path, changes: Iterable[OverrideChange]) -> None:
 
 
 @contextmanager
-def _hold_lock(path: Path) -> Iterator[None]:
-    """Hold the file beside it that all writers lock; it stays, because another one may be waiting for it."""
+def hold_lock(file: Path, path: Path, *, wait_s: float = math.inf) -> Iterator[None]:
+    """Hold `file`, which all lock that write `path`. Raises OutputError, or Busy if another does for so long."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = open_lock(path.with_name(f".{path.name}.lock"), public=True)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = open_lock(file, public=True)
     except OSError as error:
         raise unwritable(path, error) from error
     try:
         with suppress(OSError):  # a file system without locks: its users must not write at the same time
-            _wait(descriptor, path)
+            _wait(descriptor, path, wait_s)
         yield
     finally:
         os.close(descriptor)
 
 
-def _wait(descriptor: int, path: Path) -> None:
-    until = time.monotonic() + WAIT_S
+def _wait(descriptor: int, path: Path, wait_s: float) -> None:
+    until = time.monotonic() + wait_s
     while not lock(descriptor):
         if time.monotonic() > until:
             raise Busy(f"another program is writing {path}", hint="wait until it has ended, then try again")

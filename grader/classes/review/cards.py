@@ -23,7 +23,6 @@ from grader.model.result import (
     WrittenOverride,
 )
 from grader.model.verdict import Status
-from grader.report.sentences import SIGNS
 from grader.rubric.model import Rubric
 from grader.wording import number
 
@@ -76,10 +75,6 @@ class Card:
     def together(self) -> str:
         """The word of all that were decided with it in one go."""
         return self.decided.written.together if self.decided else ""
-
-    @property
-    def sign(self) -> str:
-        return SIGNS[self.criterion.status]
 
     @property
     def awarded(self) -> bool:

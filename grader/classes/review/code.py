@@ -166,6 +166,7 @@ def _words(words: Iterable[str]) -> str:
     return rf"(?P<word>\b(?:{'|'.join(words)})\b)"
 
 
+# Not Pygments: `similarity` has to interrupt its patterns where a text keeps them busy, which a server's thread cannot.
 _HASH = r"(?P<comment>#[^\n]*)"
 _PYTHON = re.compile("|".join([_HASH, _LONG, _STRING, _words(kwlist), _NUMBER]), re.DOTALL)
 _CPP = re.compile(

@@ -5,19 +5,18 @@ Two people may decide about the same criterion: each decision names the one it w
 
 from __future__ import annotations
 
-import os
 import secrets
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
-from grader.classes.batch.renew_results import Rewriting, Settler, rewrite, rewrite_all
+from grader.classes.batch.renew_results import Settler, rewrite, rewrite_all
 from grader.classes.batch.run import GRADEBOOK, hold_folder, ids_of, write_books
 from grader.classes.feedback.publish import read_published
 from grader.classes.overrides import COMMENTS_FILE as BANK
@@ -31,7 +30,7 @@ from grader.classes.overrides import (
     resolve,
     resolve_all,
 )
-from grader.classes.overrides.write import write_override, write_overrides
+from grader.classes.overrides.write import hold_lock, write_override, write_overrides
 from grader.classes.review.background import BackgroundWriter, Pace
 from grader.classes.review.student_requests import Requests, read_requests, request_files, waiting
 from grader.classes.review.submissions import (
@@ -45,11 +44,10 @@ from grader.classes.review.submissions import (
     stamp_of,
 )
 from grader.errors import Busy, GraderError, OutputError, RubricError, UsageError
-from grader.files import open_lock, unwritable, wait_for_lock
 from grader.model.batch import Entry, State
 from grader.model.result import BankComment, GradingResult, Override, WrittenOverride
 from grader.portable import cores
-from grader.report.class_page.submissions import salt_in, words_in
+from grader.report.class_page.submissions import Names, salt_in
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric, load_rubric, read_beside_rubric
 
@@ -92,7 +90,6 @@ class ReviewSession:
 
     def __init__(self, path: Path, rubric: LoadedRubric, pace: Pace) -> None:
         self.path, self.rubric = path, rubric
-        self._docs = rubric.docs
         self.submissions = Submissions(path)
         self.background = BackgroundWriter(self._follow, pace)
         self._saving, self._writing, self._guard = threading.Lock(), threading.Lock(), threading.Lock()
@@ -195,12 +192,11 @@ class ReviewSession:
         """Return what each submission is called, and the words that most sources have."""
         batch = self.submissions.batch()
         if self._aliases is None or self._aliases[0] is not batch:
-            entries = [item.entry for item in self.submissions.items()]
-            times = Counter(w for e in entries for w in set(words_in(e.source, e.ref or "")))
-            most = max(1, len(entries) // 2)
-            common = frozenset(word for word, count in times.items() if count > most)
+            entries, names = [item.entry for item in self.submissions.items()], Names()
+            for entry in entries:
+                names.add(entry)
             called = aliases([entry.id for entry in entries], salt_in(self.path))
-            self._aliases = (batch, called, common)
+            self._aliases = (batch, called, names.common())
         return self._aliases[1:]
 
     def progress(self) -> Counter[str]:
@@ -235,9 +231,8 @@ class ReviewSession:
                 if mark(now) != seen:
                     raise Conflict(now)
                 write_override(self.path / FILE, name, criterion, wanted)
-        with self._guard:
-            self._pending.add(item.key)
-            self._books_behind = True
+        self._note_behind({item.key})
+        # Before the background hears of it: else both would write the submission's files.
         waits = self._settled_soon(item) if soon else FOLLOWS
         self.background.changed()
         return waits
@@ -276,7 +271,8 @@ class ReviewSession:
         self, items: Sequence[ListedSubmission], criterion: str, wanted: WrittenOverride | None
     ) -> None:
         write_overrides(self.path / FILE, [(item.entry.id, criterion, wanted) for item in items])
-        self._follow_soon({item.key for item in items})
+        self._note_behind({item.key for item in items})
+        self.background.changed()
 
     def save_comment(self, criterion: str, name: str, comment: BankComment) -> int:
         """Put a comment into `comments.yaml`, or change it there for all that have it; return how many have it."""
@@ -288,14 +284,14 @@ class ReviewSession:
                 for item in self.submissions.items()
                 if (one := written.get(item.entry.id, {}).get(criterion)) and name in one.comments
             }
-            self._follow_soon(having)
+            self._note_behind(having)
+            self.background.changed()
         return len(having)
 
-    def _follow_soon(self, keys: set[str]) -> None:
+    def _note_behind(self, keys: set[str]) -> None:
         with self._guard:
             self._pending |= keys
             self._books_behind = True
-        self.background.changed()
 
     def result(self, item: ListedSubmission, overrides: Overrides) -> GradingResult | None:
         """Return a submission's result as it counts with these overrides; None where it has none."""
@@ -345,12 +341,12 @@ class ReviewSession:
         the class's lock."""
         with self._guard:
             self._pending -= keys  # first: who decides from here on puts it back
-        why, wanted = "", list[Rewriting]()
+        why, wanted = "", dict[Path, GradingResult]()
         try:
             overrides = self.overrides()
             for item in filter(None, map(self.submissions.item, sorted(keys))):
                 now, why = self._settle_result(item, overrides)
-                wanted += [Rewriting(folder=self.path / item.key, result=now)] if now else []
+                wanted |= {self.path / item.key: now} if now else {}
             self._rewrite(wanted)
         except BaseException:
             with self._guard:
@@ -360,17 +356,17 @@ class ReviewSession:
             self._being_written = 0
         return why
 
-    def _rewrite(self, wanted: Sequence[Rewriting]) -> None:
+    def _rewrite(self, wanted: Mapping[Path, GradingResult]) -> None:
         """Write these results; many by processes beside this one, so that pages do not wait for them."""
         if len(wanted) <= FEW:
-            for one in wanted:
-                rewrite(one.folder, one.result, self.rubric.rubric, self._docs)
+            for folder, result in wanted.items():
+                rewrite(folder, result, self.rubric.rubric, self.rubric.docs)
             return
         self._being_written = len(wanted)
         faults = []
-        for written in rewrite_all(wanted, self.rubric, cores()):
+        for fault in rewrite_all(wanted, self.rubric, cores()):
             self._being_written -= 1
-            faults += [written.error] if written.error else []
+            faults += [fault] if fault else []
         if faults:
             raise OutputError(faults[0])
 
@@ -475,16 +471,6 @@ def same(one: Override | None, other: Override | None) -> bool:
     return one.model_copy(update={"date": None}) == other.model_copy(update={"date": None})
 
 
-@contextmanager
-def hold_review(path: Path) -> Iterator[None]:
+def hold_review(path: Path) -> AbstractContextManager[None]:
     """Hold what all reviews of a class hold while they compare and write: another process may review it, too."""
-    try:
-        descriptor = open_lock(path / LOCK, public=True)
-    except OSError as error:
-        raise unwritable(path / LOCK, error) from error
-    try:
-        with suppress(OSError):  # a file system without locks: its users must not write at the same time
-            wait_for_lock(descriptor)
-        yield
-    finally:
-        os.close(descriptor)
+    return hold_lock(path / LOCK, path / LOCK)

@@ -21,9 +21,9 @@ from pathlib import Path
 from grader.classes.batch.folder import BatchFolder
 from grader.classes.feedback.forges import Comments
 from grader.classes.feedback.mail import addresses
-from grader.classes.overrides import folder_key
 from grader.errors import NotSent
 from grader.files import atomic_write, read_untrusted
+from grader.intake.names import folder_key
 from grader.model.batch import Entry
 from grader.model.result import Override
 from grader.results import read_result

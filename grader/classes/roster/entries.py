@@ -18,7 +18,7 @@ from urllib.parse import unquote
 
 from grader.classes.roster.table import RosterRow, Table
 from grader.errors import GraderError, SubmissionError, UsageError
-from grader.intake.names import brief, encodable, is_package_name, safe_name
+from grader.intake.names import brief, encodable, folder_key, is_package_name
 from grader.intake.source import parse_source
 from grader.model.batch import Entry, Roster, RosterFault
 
@@ -218,13 +218,13 @@ class FoundEntry:
 
 def gather(file: Path, found: Sequence[FoundEntry], *, columns: tuple[str, ...] = ()) -> Roster:
     """The first of those that share an id stays; each later one is a fault that says where the first is."""
-    times = Counter(_key(one.id) for one in found)
+    keys = [folder_key(one.id) if one.id else "" for one in found]
+    times = Counter(keys)
     first: dict[str, str] = {}
     entries: list[Entry] = []
     again: list[Entry] = []
     faults: list[RosterFault] = []
-    for one in found:
-        key = _key(one.id)
+    for key, one in zip(keys, found, strict=True):
         wrong = [*one.faults, *id_faults(one.id)]
         sound = not wrong
         is_again = bool(key) and key in first
@@ -260,11 +260,6 @@ def id_faults(submission_id: str) -> Iterator[str]:
 def columns_of(entries: Iterable[Entry | None]) -> tuple[str, ...]:
     """Return the names of all further columns, in the order in which they turn up."""
     return tuple(dict.fromkeys(name for entry in entries if entry for name in entry.extra))
-
-
-def _key(submission_id: str) -> str:
-    """Two ids that would share one folder of results are one, on file systems that take `A` for `a`, too."""
-    return safe_name(submission_id).casefold() if submission_id else ""
 
 
 REQUIRED = ("id", "source")

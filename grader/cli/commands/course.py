@@ -59,9 +59,12 @@ def grade(
     return classes.grade_lab(
         course,
         lab,
-        classes.CourseRequest(
-            jobs=jobs, only=only, allow_local=allow_local, static=static, sandbox=sandbox, as_json=as_json
-        ),
+        jobs=jobs,
+        only=only,
+        allow_local=allow_local,
+        static=static,
+        sandbox=sandbox,
+        as_json=as_json,
     )
 
 

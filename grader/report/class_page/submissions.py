@@ -17,8 +17,8 @@ from grader.files import atomic_write
 from grader.model.batch import MISSING, ROSTER, BatchRun, CriterionInfo, Entry
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
+from grader.report.losses import Loss, arrange
 from grader.report.sentences import without_sandbox
-from grader.report.view import Loss, arrange
 from grader.untrusted_text import line
 
 REPORT = "report.html"
@@ -354,16 +354,20 @@ class Names:
         self._sources: Counter[str] = Counter()
         self._count = 0
 
-    def add(self, entry: Entry, commit: str | None) -> None:
+    def add(self, entry: Entry, commit: str | None = None) -> None:
         """One submission's."""
         self._count += 1
         self._own.update(words_in(entry.id, entry.name, entry.group, commit or ""))
         self._sources.update(set(words_in(entry.source, entry.ref or "")))
 
-    def told(self) -> frozenset[str]:
-        """Return the words that could tell someone: of sources not those that most have (`home`, `submissions`)."""
+    def common(self) -> frozenset[str]:
+        """Return the words that most sources have: `home`, `submissions`."""
         most = max(1, self._count // 2)
-        return frozenset(self._own).union(word for word, times in self._sources.items() if times <= most)
+        return frozenset(word for word, times in self._sources.items() if times > most)
+
+    def told(self) -> frozenset[str]:
+        """Return the words that could tell someone."""
+        return frozenset(self._own).union(self._sources.keys() - self.common())
 
 
 def withoutwords_in(text: str, words: frozenset[str]) -> str:

@@ -376,7 +376,7 @@ def path_figures(run: Run, params: PathParams) -> Iterator[PathFigure]:
         reached=course.reached,
         first=0 if way.added else 1,
         strayed=None if course.strayed is None else kept.index(course.strayed),
-        messages=sum(len(c.messages) for c in run.channels if c.topic == params.topic and not c.by_grader),
+        messages=_taken_from(run, params.topic),
     )
 
 
@@ -427,8 +427,13 @@ def _place_figure(
         walls=tuple(tuple(map(_spot, wall[:CORNERS_MAX])) for wall in shown[:SIDES_MAX]),
         wrong=None if wrong is None else kept.index(wrong),
         says="",
-        messages=sum(len(c.messages) for c in run.channels if c.topic == params.topic and not c.by_grader),
+        messages=_taken_from(run, params.topic),
     )
+
+
+def _taken_from(run: Run, topic: str) -> int:
+    """How many messages of the submission the run holds of a topic: more than a figure has points."""
+    return sum(len(c.messages) for c in run.channels if c.topic == topic and not c.by_grader)
 
 
 def _spot(point: tuple[float, float]) -> tuple[float, float]:

@@ -59,9 +59,9 @@ class Drawn:
     same; then nothing else is drawn. `late` says whether some row was heard late. `left_out` says what is not shown,
     of a console after `gap_at` lines."""
 
-    name: str
-    kind: str
     title: str
+    name: str = ""
+    kind: str = ""
     words: str = ""
     points: int = 0
     plots: Sequence[Markup] = ()
@@ -92,30 +92,27 @@ class Drawer:
         """The figure made ready, or where it was drawn before."""
         earlier = next((drawn for seen, drawn in self._seen if seen == figure), None)
         if earlier is not None:
-            return Drawn(name="", kind=figure.kind, title=earlier.title, same_as=earlier.name)
+            return Drawn(title=earlier.title, kind=figure.kind, same_as=earlier.name)
         name = f"figure-{len(self._seen) + 1}"
         try:
-            drawn = self._draw(figure, name)
+            drawn = (
+                self._console(figure)
+                if isinstance(figure, ConsoleFigure)
+                else DRAWN[figure.kind](figure, name)
+            )
         except Exception:  # noqa: BLE001 - no report hangs on a picture
-            drawn = Drawn(name=name, kind=figure.kind, title="This picture could not be drawn")
-        drawn = replace(drawn, title=clip(drawn.title, TITLE_CHARS))
+            drawn = Drawn(title="This picture could not be drawn")
+        drawn = replace(drawn, name=name, kind=figure.kind, title=clip(drawn.title, TITLE_CHARS))
         self._seen.append((figure, drawn))
         return drawn
 
-    def _draw(self, figure: Figure, name: str) -> Drawn:
-        if isinstance(figure, ConsoleFigure):
-            return self._console(figure, name)
-        return DRAWN[figure.kind](figure, name)
-
-    def _console(self, figure: ConsoleFigure, name: str) -> Drawn:
+    def _console(self, figure: ConsoleFigure) -> Drawn:
         first, last = self._room(figure.lines)
         shown = [*figure.lines[:first], *figure.lines[len(figure.lines) - last :]]
         errors = sum(printed.stream == "stderr" for printed in figure.lines)
         left = figure.left_out + len(figure.lines) - len(shown)
         lines = plural(len(figure.lines) + figure.left_out, "line")
         return Drawn(
-            name=name,
-            kind="console",
             title=f"What was printed: {lines}, {errors or 'none'} of them on stderr",
             points=len(shown),
             rows=shown,
@@ -139,8 +136,6 @@ class Drawer:
 
 def _rate(figure: RateFigure, name: str) -> Drawn:
     return Drawn(
-        name=name,
-        kind="rate",
         title=f"The rate of {figure.topic}, published by {figure.publisher}",
         words=rate_words(figure),
         points=len(figure.gaps_s),
@@ -152,8 +147,6 @@ def _rate(figure: RateFigure, name: str) -> Drawn:
 
 def _counter(figure: CounterFigure, name: str) -> Drawn:
     return Drawn(
-        name=name,
-        kind="counter",
         title=f"The numbers on {figure.topic}, published by {figure.publisher}",
         words=counter_words(figure),
         points=len(figure.values),
@@ -168,7 +161,7 @@ def _thinned_text(shown: int, there: int) -> str:
     return f"{shown} of {there} messages are shown." if there > shown else ""
 
 
-def _draw_heard(figure: HeardFigure, name: str) -> Drawn:
+def _draw_heard(figure: HeardFigure, _name: str) -> Drawn:
     missed = [row for row in figure.rows if row.heard is None]
     rows = _first(figure.rows, missed)
     if len(missed) == len(rows) or all(row.other_words for row in rows):
@@ -180,8 +173,6 @@ def _draw_heard(figure: HeardFigure, name: str) -> Drawn:
     if figure.out_of_order:
         said += " All of them came, but not in the order in which they were sent."
     return Drawn(
-        name=name,
-        kind="heard",
         title="What was sent to your listener, and what it printed",
         words=said,
         points=len(rows),
@@ -207,8 +198,6 @@ def _graph(figure: GraphFigure, name: str) -> Drawn:
     words += f" Not connected to any topic: {', '.join(alone[:10])}." if alone else ""
     faults = [f"In red: {'; '.join(graph_faults(figure))}."] if figure.wrong else []
     return Drawn(
-        name=name,
-        kind="graph",
         title="Nodes and topics, as rqt_graph draws them",
         words=words,
         points=len(figure.nodes) + len(figure.topics),
@@ -219,12 +208,10 @@ def _graph(figure: GraphFigure, name: str) -> Drawn:
     )
 
 
-def _code(figure: CodeFigure, name: str) -> Drawn:
+def _code(figure: CodeFigure, _name: str) -> Drawn:
     lines = [str(i) for i in figure.marked[:5]]
     marked = f"line{'s' if len(lines) > 1 else ''} {join_words(lines)}"
     return Drawn(
-        name=name,
-        kind="code",
         title=f"{figure.file}, {marked}" if lines else figure.file,
         points=len(figure.lines),
         rows=[
@@ -255,8 +242,6 @@ def _parts(text: str, column: int | None, end: int | None) -> tuple[str, str, st
 def _path(figure: PathFigure, name: str) -> Drawn:
     plot = path_plot(figure, name)
     return Drawn(
-        name=name,
-        kind="path",
         title=f"The path of {figure.topic}, seen from above",
         words=path_words(figure),
         points=len(figure.points),
@@ -267,8 +252,6 @@ def _path(figure: PathFigure, name: str) -> Drawn:
 
 def _place(figure: PlaceFigure, name: str) -> Drawn:
     return Drawn(
-        name=name,
-        kind="place",
         title=f"Where the robot was, seen from above: {figure.topic}",
         words=f"{figure.says} {'Thick lines are walls. ' if figure.walls else ''}It began at the small circle.",
         points=len(figure.points),
@@ -279,8 +262,6 @@ def _place(figure: PlaceFigure, name: str) -> Drawn:
 
 def _timeline(figure: TimelineFigure, name: str) -> Drawn:
     return Drawn(
-        name=name,
-        kind="timeline",
         title="What happened, and when",
         words=timeline_words(figure),
         points=len(figure.lanes),
@@ -334,7 +315,7 @@ class Happened:
     at_s: float
     who: str
     says: str
-    wrong: bool
+    wrong: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -373,10 +354,8 @@ def timeline_plot(figure: TimelineFigure, name: str) -> Markup:
     scale = WIDE / (figure.length_s or 1.0)
     high = LANE * len(figure.lanes)
     lanes = [part for i, lane in enumerate(figure.lanes) for part in _lane(lane, i * LANE, scale)]
-    rules = [
-        element("line", x1=0, x2=WIDE, y1=i * LANE, y2=i * LANE, class_="grid")
-        for i in range(len(figure.lanes) + 1)
-    ]
+    tops = (i * LANE for i in range(len(figure.lanes) + 1))
+    rules = [element("line", x1=0, x2=WIDE, y1=y, y2=y, class_="grid") for y in tops]
     return element(
         "svg",
         element("title", escaped("What happened in this run, and when"), id=f"{name}-title"),
@@ -448,9 +427,9 @@ BEGINS = {"process": "started", "node": "registered with the master", "log": "",
 
 def _heard_bars(lane: Lane) -> Iterator[Happened]:
     first, last = lane.stretches[0], lane.stretches[-1]
-    yield Happened(at_s=first.from_s, who=_who(lane), says="first message", wrong=False)
+    yield Happened(at_s=first.from_s, who=_who(lane), says="first message")
     if last.to_s > first.from_s:
-        yield Happened(at_s=last.to_s, who=_who(lane), says="last message", wrong=False)
+        yield Happened(at_s=last.to_s, who=_who(lane), says="last message")
 
 
 def _who(lane: Lane) -> str:

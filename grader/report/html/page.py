@@ -20,29 +20,27 @@ from grader.model.verdict import FileCitation, Status
 from grader.report import sentences
 from grader.report.html.figures import Drawer, Drawn, code_places
 from grader.report.html.shell import environment, policy, prose, script, style
-from grader.report.sentences import (
-    ADVICE,
-    MEANINGS,
-    SIGNS,
-    STATES,
-    is_own_fault,
-    lost_words,
-    visible_words,
-    without_sandbox,
-)
-from grader.report.text import line
-from grader.report.view import (
+from grader.report.losses import (
     Loss,
     MissingFile,
     ReportView,
     arrange,
+    missing_file,
+    missing_files,
+    write_files_hint,
+)
+from grader.report.sentences import (
+    is_own_fault,
+    lost_words,
+)
+from grader.report.student_view import hidden_ids
+from grader.report.text import line
+from grader.report.view import (
+    blame,
     commands_in,
     file_places,
     headline,
-    hidden_ids,
     hint_beside,
-    missing_file,
-    missing_files,
     not_graded,
     of_points,
     places,
@@ -51,42 +49,9 @@ from grader.report.view import (
     steps,
     where_to_type,
     without_place,
-    write_files_hint,
 )
 from grader.rubric.model import Rubric
 from grader.wording import number
-
-
-@dataclass(frozen=True, kw_only=True)
-class Part:
-    """A part of the bar, in percent."""
-
-    kind: str
-    share: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Head:
-    """What stands at the top, in words. `when` says whether it came in time, `late` all that is known of that, below.
-    `again` is the command that judges it again."""
-
-    score: str
-    status: str
-    verdict: str
-    graded: bool
-    bar: tuple[Part, ...]
-    bar_words: str
-    mark_at: float | None
-    pass_mark: str
-    unwalled: str
-    students_rubric: str
-    when: str
-    late: tuple[str, ...]
-    short: str
-    left_out: str
-    fault: str
-    again: str
-    changes: tuple[str, ...] = ()
 
 
 def render_html(
@@ -103,7 +68,12 @@ def render_html(
     `docs` has the sections of the checks' docstrings, `changes` what has changed since it was first published.
     """
     view = arrange(result, rubric)
-    head = replace(_head(result, rubric, view, hidden), changes=changes)
+    head = {
+        **_head(result, rubric, hidden, len(view.lost)),
+        "view": view,
+        "hidden": hidden,
+        "changes": changes,
+    }
     page = ""
     for detail in DETAILS:
         made = Maker(result, rubric, figures or Figures(), docs or {}, detail).page(view)
@@ -119,7 +89,7 @@ def load_template() -> Template:
     return environment().get_template("report.html")
 
 
-def _render(result: GradingResult, rubric: Rubric, head: Head, page: Page, limit: int) -> str:
+def _render(result: GradingResult, rubric: Rubric, head: Mapping[str, object], page: Page, limit: int) -> str:
     ours = script("report.js")
     return load_template().render(
         result=result,
@@ -136,35 +106,25 @@ def _render(result: GradingResult, rubric: Rubric, head: Head, page: Page, limit
     )
 
 
-def _head(result: GradingResult, rubric: Rubric, view: ReportView, hidden: int) -> Head:
-    graded = not not_graded(result)
-    status, verdict = sentences.verdict(result, rubric, hidden, len(view.lost))
-    score = (
-        f"{number(result.points)} of {sentences.count_points(result.max_points)}" if graded else "Not graded"
-    )
-    mark = rubric.pass_mark
-    return Head(
-        score=score,
-        status=status,
-        verdict=verdict,
-        graded=graded,
-        bar=_bar(result),
-        bar_words=_bar_words(result),
-        mark_at=100 * mark / rubric.max_points
-        if mark is not None and not hidden and rubric.max_points
-        else None,
-        pass_mark=sentences.pass_mark(result, rubric, hidden),
-        unwalled=without_sandbox(result.environment.sandbox),
-        students_rubric=sentences.students_rubric(result),
-        when=sentences.when_words(result),
-        late=sentences.late_words(result),
-        short=sentences.in_short(result, view),
-        left_out=visible_words(result, hidden) if graded else "",
-        fault=sentences.FAULTS[sentences.blame(result.error.kind)] if result.error else "",
-        again=f"grader judge evidence --rubric {shlex.quote(result.rubric.id)}"
-        if result.error is None
-        else "",
-    )
+def _head(result: GradingResult, rubric: Rubric, hidden: int, to_fix: int) -> dict[str, object]:
+    """Return what stands at the top beside the `sentences`: `bar` has the parts of a bar in percent, and `again` is the
+    command that judges it again."""
+    graded, mark, error = not not_graded(result), rubric.pass_mark, result.error
+    status, verdict = sentences.verdict(result, rubric, hidden, to_fix)
+    points = f"{number(result.points)} of {sentences.count_points(result.max_points)}"
+    whole, parts = result.max_points or 1.0, _parts(result)
+    has_mark = mark is not None and not hidden and rubric.max_points
+    return {
+        "score": points if graded else "Not graded",
+        "status": status,
+        "verdict": verdict,
+        "graded": graded,
+        "bar": {kind: min(100.0, 100 * part / whole) for kind, part in parts.items()},
+        "bar_words": ", ".join(f"{number(p)} {kind}" for kind, p in parts.items() if p or kind != "open"),
+        "mark_at": 100 * (mark or 0.0) / rubric.max_points if has_mark else None,
+        "fault": sentences.FAULTS[blame(error.kind)] if error else "",
+        "again": "" if error else f"grader judge evidence --rubric {shlex.quote(result.rubric.id)}",
+    }
 
 
 def _parts(result: GradingResult) -> dict[str, float]:
@@ -172,19 +132,6 @@ def _parts(result: GradingResult) -> dict[str, float]:
     still = sum(c.max_points - c.points for c in result.criteria if c.status.is_open)
     lost = result.max_points - result.points - still
     return {"reached": result.points, "lost": max(lost, 0.0), "open": still}
-
-
-def _bar(result: GradingResult) -> tuple[Part, ...]:
-    whole = result.max_points or 1.0
-    return tuple(
-        Part(kind=kind, share=min(100.0, 100 * part / whole)) for kind, part in _parts(result).items()
-    )
-
-
-def _bar_words(result: GradingResult) -> str:
-    return ", ".join(
-        f"{number(part)} {kind}" for kind, part in _parts(result).items() if part or kind != "open"
-    )
 
 
 def _sections(result: GradingResult, page: Page) -> Iterator[tuple[str, str]]:
@@ -239,8 +186,8 @@ DETAILS = (
 @dataclass(frozen=True, kw_only=True)
 class Card:
     """One criterion. `anchor` is its id on the page. `message` is what it says first and `rest` what else. `lost` says
-    what it cost, with what it holds back; `advice` is the title of its hint, which has steps. `seen` is how to see it:
-    texts, and which of them are commands. `code` are the lines that it cites, `figures` what was measured, the most
+    what it cost, with what it holds back; its hint has steps. `seen` is how to see it: texts, and which of them are
+    commands. `code` are the lines that it cites, `figures` what was measured, the most
     telling first.
     `repaired` were judged with its fault repaired. `files` are those that have to be written."""
 
@@ -249,10 +196,6 @@ class Card:
     message: str
     rest: str
     hidden: bool
-    advice: str
-    sign: str
-    state: str
-    meaning: str
     points: str
     of: str
     lost: str = ""
@@ -402,10 +345,6 @@ class Maker:
             message=criterion.message,
             rest="",
             hidden=criterion.id in self._hidden,
-            advice=ADVICE.get(criterion.status, "What to do"),
-            sign=SIGNS[criterion.status],
-            state=STATES[criterion.status],
-            meaning=MEANINGS[criterion.status],
             points=points_of(criterion),
             of=of_points(criterion),
         )

@@ -14,6 +14,7 @@ from grader.report.html.svg import (
     RIGHT,
     TOP,
     Frame,
+    Point,
     dots,
     drawing,
     element,
@@ -87,7 +88,7 @@ def _step(figure: CounterFigure, i: int) -> str:
     return f"{number(figure.values[i - 1])} → {value}" if i else f"{value} comes first"
 
 
-def _plot(figure: CounterFigure, name: str, shown: range, size: tuple[float, float], title: str) -> Markup:
+def _plot(figure: CounterFigure, name: str, shown: range, size: Point, title: str) -> Markup:
     values = [float(max(-FAR, min(FAR, figure.values[i]))) for i in shown]
     times = [figure.times_s[i] for i in shown]
     low, high = min(values), max(values)
@@ -96,15 +97,12 @@ def _plot(figure: CounterFigure, name: str, shown: range, size: tuple[float, flo
     pad = (high - low) * 0.14 or 1.0
     died = _visible_ends(figure.died, times[0], times[-1])
     frame = Frame(
-        width=size[0],
-        height=size[1],
-        x_low=times[0],
-        x_high=max(times[-1], *(at for at, _ in died), times[0] + TINY_S),
-        y_low=low - (pad if low != 0 else 0),
-        y_high=high + pad,
+        size=size,
+        xs=(times[0], max(times[-1], *(at for at, _ in died), times[0] + TINY_S)),
+        ys=(low - (pad if low != 0 else 0), high + pad),
         log_y=_has_dwarfed(values),
     )
-    points = [(frame.x(t), frame.y(v)) for t, v in zip(times, values, strict=True)]
+    points = frame.at(zip(times, values, strict=True))
     at = dict(zip(shown, points, strict=True))
     few = len(points) <= MANY
     named = len(points) <= 2 * AROUND + 1
@@ -140,15 +138,21 @@ def _deaths(died: Sequence[tuple[float, str]], frame: Frame) -> Iterator[Markup]
     """Where a process ended by itself: nothing comes after that."""
     for at, words in died:
         x = frame.x(at)
-        end = "end" if x > (LEFT + frame.right) / 2 else "start"
         yield element("line", x1=x, x2=x, y1=TOP, y2=frame.bottom, class_="died")
-        yield text(x + (-6 if end == "end" else 6), frame.bottom - 8, words, class_="alarm", text_anchor=end)
+        yield _beside(x, frame.bottom - 8, words, 6, most=(LEFT + frame.right) / 2, class_="alarm")
 
 
-def _whole(figure: CounterFigure, at: dict[int, tuple[float, float]]) -> Iterator[list[tuple[float, float]]]:
+def _beside(x: float, y: float, words: str, gap: float, *, most: float, class_: str = "label") -> Markup:
+    """Return words beside a place: to its right, or to its left where it lies right of `most`."""
+    if x > most:
+        return text(x - gap, y, words, class_, text_anchor="end")
+    return text(x + gap, y, words, class_, text_anchor="start")
+
+
+def _whole(figure: CounterFigure, at: dict[int, Point]) -> Iterator[list[Point]]:
     """The points in pieces, broken where values between them are left out."""
     numbers = figure.numbers or range(len(figure.values))
-    piece: list[tuple[float, float]] = []
+    piece: list[Point] = []
     for i, point in at.items():
         if piece and numbers[i] != numbers[i - 1] + 1:
             yield piece
@@ -157,7 +161,7 @@ def _whole(figure: CounterFigure, at: dict[int, tuple[float, float]]) -> Iterato
     yield piece
 
 
-def _wraps(figure: CounterFigure, frame: Frame, at: dict[int, tuple[float, float]]) -> Iterator[Markup]:
+def _wraps(figure: CounterFigure, frame: Frame, at: dict[int, Point]) -> Iterator[Markup]:
     for i in figure.wraps:
         if i not in at:
             continue
@@ -165,11 +169,10 @@ def _wraps(figure: CounterFigure, frame: Frame, at: dict[int, tuple[float, float
         yield element("line", x1=x, x2=x, y1=TOP, y2=frame.bottom, class_="wrap")
         yield element("path", d=f"M{x:.1f} {y - 6:.1f}l5 6l-5 6l-5 -6z", class_="wrap-mark")
         if len(figure.wraps) <= LABELS_MAX // 2 and i not in figure.wrong:
-            end = "end" if x > frame.right - 90 else "start"
-            yield text(x + (-5 if end == "end" else 5), TOP - 7, f"wrap {_step(figure, i)}", text_anchor=end)
+            yield _beside(x, TOP - 7, f"wrap {_step(figure, i)}", 5, most=frame.right - 90)
 
 
-def _wrong(figure: CounterFigure, frame: Frame, at: dict[int, tuple[float, float]]) -> Iterator[Markup]:
+def _wrong(figure: CounterFigure, frame: Frame, at: dict[int, Point]) -> Iterator[Markup]:
     for index, i in enumerate(figure.wrong[:LABELS_MAX], start=1):
         if i not in at:
             continue
@@ -177,9 +180,8 @@ def _wrong(figure: CounterFigure, frame: Frame, at: dict[int, tuple[float, float
         yield element("circle", cx=x, cy=y, r=10, class_="wrong")
         turns = i == 0 or abs(figure.values[i] - figure.values[i - 1]) != 1
         words = f"#{index}: {_step(figure, i)}" if turns and len(figure.wrong) <= TEXTS_MAX else f"#{index}"
-        end = "end" if x > frame.right - 110 else "start"
         above = y - 24 if y - 24 > TOP else y + 28
-        yield text(x + (-8 if end == "end" else 8), above, words, class_="alarm", text_anchor=end)
+        yield _beside(x, above, words, 8, most=frame.right - 110, class_="alarm")
 
 
 SIDE = 340.0
@@ -192,18 +194,19 @@ def path_plot(figure: PathFigure, name: str) -> Markup | None:
     if len(figure.points) < 2 and not figure.corners:
         return None
     frame, scale = _frame((*figure.points, *figure.corners), figure.tolerance_m)
-    corners = [(frame.x(x), frame.y(y)) for x, y in figure.corners]
+    corners = frame.at(figure.corners)
     children = frame.axes("metres", "metres")
     if len(corners) > 1:
         room = max(2 * figure.tolerance_m * scale, 2.0)
         children.append(element("path", d=path(corners), class_="room", stroke_width=room))
         children.append(element("path", d=path(corners), class_="way"))
-    taken = [(frame.x(x), frame.y(y)) for x, y in figure.points]
+    taken = frame.at(figure.points)
     children.append(element("path", d=path(taken), class_="line strong-line"))
     children += _corners(figure, corners)
     children += _mark_point(figure.strayed, taken, "leaves it here")
-    size = (frame.width, frame.height)
-    return drawing(name, size, f"The path of {figure.topic}, seen from above", path_words(figure), *children)
+    return drawing(
+        name, frame.size, f"The path of {figure.topic}, seen from above", path_words(figure), *children
+    )
 
 
 def path_words(figure: PathFigure) -> str:
@@ -221,52 +224,41 @@ def place_plot(figure: PlaceFigure, name: str) -> Markup:
     goal = [figure.goal] if figure.goal else []
     around = [spot for line in figure.walls for spot in line]
     frame, scale = _frame((*figure.points, *figure.area, *around, *goal), figure.tolerance_m)
-
-    def drawn(line: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-        return [(frame.x(x), frame.y(y)) for x, y in line]
-
-    taken = drawn(figure.points)
+    taken = frame.at(figure.points)
     children = frame.axes("metres", "metres")
     if figure.area:
-        children.append(element("path", d=path(drawn((*figure.area, figure.area[0]))), class_="way"))
-    for x, y in drawn(goal):
+        children.append(element("path", d=path(frame.at((*figure.area, figure.area[0]))), class_="way"))
+    for x, y in frame.at(goal):
         children.append(element("circle", cx=x, cy=y, r=max(figure.tolerance_m * scale, 4), class_="goal"))
-    lines = "".join(path(drawn(line)) if len(line) > 1 else dots(drawn(line)) for line in figure.walls)
+    lines = "".join((path if len(line) > 1 else dots)(frame.at(line)) for line in figure.walls)
     if lines:
         children.append(element("path", d=lines, class_="wall"))
     children.append(element("path", d=path(taken), class_="line strong-line"))
     children.append(element("circle", cx=taken[0][0], cy=taken[0][1], r=4, class_="corner"))
     children += _mark_point(figure.wrong, taken, "here")
-    size = (frame.width, frame.height)
-    return drawing(
-        name, size, f"Where the robot was, seen from above: {figure.topic}", figure.says, *children
-    )
+    title = f"Where the robot was, seen from above: {figure.topic}"
+    return drawing(name, frame.size, title, figure.says, *children)
 
 
-def _frame(spots: Sequence[tuple[float, float]], room: float) -> tuple[Frame, float]:
+def _frame(spots: Sequence[Point], room: float) -> tuple[Frame, float]:
     """The frame, and how many pixels a metre has in it."""
     x_low, x_high = _edges([x for x, _ in spots], room)
     y_low, y_high = _edges([y for _, y in spots], room)
     wide, high = x_high - x_low, y_high - y_low
     scale = SIDE / max(high, wide / WIDEST)
-    frame = Frame(
-        width=LEFT + RIGHT + max(wide * scale, SIDE / 2),
-        height=TOP + BOTTOM + max(high * scale, SIDE / 4),
-        x_low=x_low,
-        x_high=x_low + max(wide, SIDE / 2 / scale),
-        y_low=y_low,
-        y_high=y_low + max(high, SIDE / 4 / scale),
-    )
-    return frame, scale
+    # A path along a wall is nearly a line: its plot is still half as wide, and a quarter as high, as a square one.
+    size = (LEFT + RIGHT + max(wide * scale, SIDE / 2), TOP + BOTTOM + max(high * scale, SIDE / 4))
+    xs, ys = (x_low, x_low + max(wide, SIDE / 2 / scale)), (y_low, y_low + max(high, SIDE / 4 / scale))
+    return Frame(size=size, xs=xs, ys=ys), scale
 
 
-def _edges(values: list[float], room: float) -> tuple[float, float]:
+def _edges(values: list[float], room: float) -> Point:
     low, high = min(values), max(values)
     pad = max(room, 0.08 * (high - low), 0.05)
     return low - pad, high + pad
 
 
-def _corners(figure: PathFigure, corners: list[tuple[float, float]]) -> Iterator[Markup]:
+def _corners(figure: PathFigure, corners: list[Point]) -> Iterator[Markup]:
     for i, (x, y) in enumerate(corners):
         passed = i < figure.reached
         yield element("circle", cx=x, cy=y, r=5, class_="corner passed" if passed else "corner")
@@ -274,14 +266,12 @@ def _corners(figure: PathFigure, corners: list[tuple[float, float]]) -> Iterator
             yield text(x + 8, y - 8, "start" if i == 0 and not figure.first else f"{i + figure.first}")
 
 
-def _mark_point(index: int | None, taken: list[tuple[float, float]], words: str) -> Iterator[Markup]:
+def _mark_point(index: int | None, taken: list[Point], words: str) -> Iterator[Markup]:
     if index is None:
         return
     x, y = taken[index]
     yield element("circle", cx=x, cy=y, r=10, class_="wrong")
-    right = max(spot[0] for spot in taken)
-    end = "end" if x > right - 90 else "start"
-    yield text(x + (-13 if end == "end" else 13), y + 4, words, class_="alarm", text_anchor=end)
+    yield _beside(x, y + 4, words, 13, most=max(spot[0] for spot in taken) - 90, class_="alarm")
 
 
 OVER_TIME = (460.0, 230.0)
@@ -349,25 +339,17 @@ def _over_time(figure: RateFigure, name: str) -> Markup:
     died = _visible_ends(figure.died, begin, last)
     highest = max(figure.high_hz, figure.mean_hz or 0.0)
     log = max(rates) > TOO_FAR * highest
-    frame = Frame(
-        width=OVER_TIME[0],
-        height=OVER_TIME[1],
-        x_low=begin,
-        x_high=max(last, *(at for at, _ in died), last),
-        y_low=0,
-        y_high=(1.5 if log else 1.2) * max(highest, *rates),
-        log_y=log,
-    )
-    across = (frame.x_low, frame.x_high)
-    children = [_hatching(name)]
-    children.append(frame.box(across, (figure.low_hz, figure.high_hz), class_="band"))
+    end = max(last, *(at for at, _ in died), last)
+    top = (1.5 if log else 1.2) * max(highest, *rates)
+    frame = Frame(size=OVER_TIME, xs=(begin, end), ys=(0, top), log_y=log)
+    children = [_hatching(name), frame.box(frame.xs, (figure.low_hz, figure.high_hz), class_="band")]
     children += [
-        frame.box(stretch, (0, frame.y_high), fill=f"url(#{name}-late)", class_="late")
+        frame.box(stretch, frame.ys, fill=f"url(#{name}-late)", class_="late")
         for stretch in figure.late
-        if stretch[1] > begin and stretch[0] < frame.x_high
+        if stretch[1] > begin and stretch[0] < end
     ]
     children += frame.axes("seconds since the run began", "Hz")
-    points = [(frame.x(t), frame.y(r)) for t, r in zip(figure.times_s, rates, strict=True)]
+    points = frame.at(zip(figure.times_s, rates, strict=True))
     children.append(element("path", d=dots(points), class_="dots"))
     children.append(
         text(LEFT + 5, frame.y(figure.high_hz) - 5, f"{_allowed_text(figure)} passes", class_="good")
@@ -382,15 +364,7 @@ def _flood(figure: RateFigure, name: str) -> Markup:
     hz = [count / figure.slice_s for count in figure.counts]
     begin = max(0.0, figure.times_s[0] - figure.gaps_s[0])
     end = begin + figure.slice_s * len(hz)
-    frame = Frame(
-        width=OVER_TIME[0],
-        height=OVER_TIME[1],
-        x_low=begin,
-        x_high=end,
-        y_low=0,
-        y_high=4 * max(hz),
-        log_y=True,
-    )
+    frame = Frame(size=OVER_TIME, xs=(begin, end), ys=(0, 4 * max(hz)), log_y=True)
     children = frame.axes("seconds since the run began", "messages a second")
     children += [
         frame.box(
@@ -415,7 +389,7 @@ def _mean(frame: Frame, mean_hz: float | None) -> list[Markup]:
         return []
     y = frame.y(mean_hz)
     return [
-        element("line", x1=frame.x(frame.x_low), x2=frame.right, y1=y, y2=y, class_="mean"),
+        element("line", x1=LEFT, x2=frame.right, y1=y, y2=y, class_="mean"),
         text(
             frame.right - 4,
             y - 7 if y > 2 * TOP else y + 17,
@@ -442,15 +416,7 @@ def _histogram(figure: RateFigure, name: str) -> Markup:
     counts = [0] * BINS
     for gap in figure.gaps_s:
         counts[min(bisect_right(edges, gap * 1000) - 1, BINS - 1)] += 1
-    frame = Frame(
-        width=HISTOGRAM[0],
-        height=HISTOGRAM[1],
-        x_low=0,
-        x_high=longest_ms,
-        y_low=0,
-        y_high=1.15 * max(counts),
-        log_x=log,
-    )
+    frame = Frame(size=HISTOGRAM, xs=(0, longest_ms), ys=(0, 1.15 * max(counts)), log_x=log)
     children = _gap_bounds(figure, frame)
     children += frame.axes("milliseconds from message to message", "messages")
     children += [
@@ -472,6 +438,6 @@ def _gap_bounds(figure: RateFigure, frame: Frame) -> list[Markup]:
     low, high = figure.gap_low_s * 1000, figure.gap_high_s * 1000
     edges = (frame.x(low), frame.x(high))
     return [
-        frame.box((low, high), (0, frame.y_high), class_="band"),
+        frame.box((low, high), frame.ys, class_="band"),
         *(element("line", x1=x, x2=x, y1=TOP, y2=frame.bottom, class_="bound") for x in edges),
     ]

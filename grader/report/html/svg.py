@@ -12,6 +12,7 @@ from grader.report.text import html, line
 from grader.wording import number
 
 TEXT_CHARS = 80
+Point = tuple[float, float]
 
 
 def element(name: str, *children: Markup, **attributes: str | float) -> Markup:
@@ -31,12 +32,12 @@ def escaped(words: str) -> Markup:
     return Markup(html(line(words, TEXT_CHARS)))  # noqa: S704 - escaped
 
 
-def path(points: Iterable[tuple[float, float]]) -> str:
+def path(points: Iterable[Point]) -> str:
     """Return a line through the points, for `d`."""
     return "M" + "L".join(f"{short(x)} {short(y)}" for x, y in points)
 
 
-def dots(points: Iterable[tuple[float, float]]) -> str:
+def dots(points: Iterable[Point]) -> str:
     """A dot at each point, for the `d` of a path with round ends."""
     return "".join(f"M{short(x)} {short(y)}h0" for x, y in points)
 
@@ -88,58 +89,51 @@ TINY = 1e-12
 
 @dataclass(frozen=True, kw_only=True)
 class Frame:
-    """`width` and `height` in pixels of the drawing; the other values are those at its edges.
+    """`size` is the drawing's width and height in pixels, `xs` and `ys` are the lowest and highest values at its edges.
 
     An axis may be logarithmic, for values among which some dwarf the others: see `to_log`.
     """
 
-    width: float
-    height: float
-    x_low: float
-    x_high: float
-    y_low: float
-    y_high: float
+    size: Point
+    xs: Point
+    ys: Point
     log_x: bool = False
     log_y: bool = False
 
     @property
     def right(self) -> float:
-        return self.width - RIGHT
+        return self.size[0] - RIGHT
 
     @property
     def bottom(self) -> float:
-        return self.height - BOTTOM
+        return self.size[1] - BOTTOM
 
     def x(self, value: float) -> float:
         """Return the pixel of a value; one outside of the frame lies on its edge."""
-        return LEFT + _share(value, self.x_low, self.x_high, log=self.log_x) * (self.right - LEFT)
+        return LEFT + _share(value, self.xs, log=self.log_x) * (self.right - LEFT)
 
     def y(self, value: float) -> float:
         """As `x`, from the bottom up."""
-        share = _share(value, self.y_low, self.y_high, log=self.log_y)
-        return self.bottom - share * (self.bottom - TOP)
+        return self.bottom - _share(value, self.ys, log=self.log_y) * (self.bottom - TOP)
 
-    def box(self, x: tuple[float, float], y: tuple[float, float], **attributes: str | float) -> Markup:
+    def at(self, points: Iterable[Point]) -> list[Point]:
+        """Return the pixels of points."""
+        return [(self.x(x), self.y(y)) for x, y in points]
+
+    def box(self, xs: Point, ys: Point, **attributes: str | float) -> Markup:
         """Return a rectangle between values, at least a pixel wide and high."""
-        left, right = self.x(x[0]), self.x(x[1])
-        top, bottom = self.y(y[1]), self.y(y[0])
-        return element(
-            "rect",
-            x=left,
-            y=top,
-            width=max(right - left, 1.0),
-            height=max(bottom - top, 1.0),
-            **attributes,
-        )
+        (left, bottom), (right, top) = self.at(zip(xs, ys, strict=True))
+        wide, high = max(right - left, 1.0), max(bottom - top, 1.0)
+        return element("rect", x=left, y=top, width=wide, height=high, **attributes)
 
     def axes(self, x_label: str, y_label: str) -> list[Markup]:
         """Lines across at the ticks, their numbers, and what they are numbers of."""
         parts = []
-        for value in (log_ticks if self.log_y else ticks)(self.y_low, self.y_high):
+        for value in (log_ticks if self.log_y else ticks)(*self.ys):
             y = self.y(value)
             parts.append(element("line", x1=LEFT, x2=self.right, y1=y, y2=y, class_="grid"))
             parts.append(text(LEFT - 6, y + 4, number(value), text_anchor="end"))
-        for value in (log_ticks if self.log_x else ticks)(self.x_low, self.x_high):
+        for value in (log_ticks if self.log_x else ticks)(*self.xs):
             x = self.x(value)
             parts.append(element("line", x1=x, x2=x, y1=self.bottom, y2=self.bottom + 4, class_="axis"))
             parts.append(text(x, self.bottom + 17, number(value), text_anchor="middle"))
@@ -148,7 +142,7 @@ class Frame:
             f"{label} (logarithmic)" if log else label
             for label, log in ((x_label, self.log_x), (y_label, self.log_y))
         )
-        parts.append(text(self.right, self.height - 6, x_label, text_anchor="end"))
+        parts.append(text(self.right, self.size[1] - 6, x_label, text_anchor="end"))
         parts.append(text(2, 13, y_label))
         return parts
 
@@ -163,9 +157,8 @@ def from_log(value: float) -> float:
     return math.copysign(10 ** abs(value) - 1, value)
 
 
-def _share(value: float, low: float, high: float, *, log: bool) -> float:
-    if log:
-        value, low, high = to_log(value), to_log(low), to_log(high)
+def _share(value: float, edges: Point, *, log: bool) -> float:
+    value, low, high = map(to_log, (value, *edges)) if log else (value, *edges)
     return min(max((value - low) / ((high - low) or 1.0), 0.0), 1.0)
 
 

@@ -21,8 +21,9 @@ from grader.model.result import ErrorInfo, GradingResult, Lateness, Note
 from grader.model.verdict import FileCitation, Mistake, Status
 from grader.report.html.page import BYTES_MAX, render_html
 from grader.report.html.shell import policy, script
-from grader.report.sentences import FAULTS, MINUS, blame
+from grader.report.sentences import FAULTS, MINUS
 from grader.report.text import line, visible
+from grader.report.view import blame
 from tests.report.hostile import CRITERIA, result, rubric
 from tests.report.html.made import SCRIPT, code, console, figures, graph, hostile_figures
 from tests.report.nasty import STEERING

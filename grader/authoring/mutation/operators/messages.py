@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import PurePosixPath
 
@@ -15,9 +16,9 @@ from grader.authoring.mutation.rospy_code import (
     Counter,
     each_publisher,
     each_subscriber,
+    endpoints,
     find_counter,
     message_name,
-    publishers,
     script_place,
     sources,
     speech,
@@ -52,12 +53,9 @@ def _calls(values: list[ast.expr]) -> list[ast.Call]:
     return list(dict.fromkeys(n for value in values for n in ast.walk(value) if isinstance(n, ast.Call)))
 
 
-@operator("message-altered", each=_messages)
+@operator("message-altered", each=_messages, fits="every publisher whose messages are made from a text")
 def message_altered(script: Script, values: list[ast.expr]) -> list[TextEdit]:
-    """Misspells the message.
-
-    Fits every publisher whose messages are made from a text.
-    """
+    """Misspells the message."""
     for text in (text for value in values for text in texts_in(value)):
         misspelt = misspelt_literal(script.source(text))
         if misspelt != script.source(text):
@@ -65,22 +63,18 @@ def message_altered(script: Script, values: list[ast.expr]) -> list[TextEdit]:
     return []
 
 
-@operator("message-constant-time", each=_messages)
+@operator("message-constant-time", each=_messages, fits="every publisher whose messages carry the time")
 def message_constant_time(script: Script, values: list[ast.expr]) -> list[TextEdit]:
-    """Sends the same time again and again.
-
-    Fits every publisher whose messages carry the time.
-    """
+    """Sends the same time again and again."""
     constants = SECONDS | TIMES
     return [script.replace(c, constants[s]) for c in _calls(values) if (s := script.source(c)) in constants]
 
 
-@operator("message-nanoseconds", each=_messages)
+@operator(
+    "message-nanoseconds", each=_messages, fits="every publisher whose messages carry the time in seconds"
+)
 def message_nanoseconds(script: Script, values: list[ast.expr]) -> list[TextEdit]:
-    """Sends the time in nanoseconds, not in seconds.
-
-    Fits every publisher whose messages carry the time in seconds.
-    """
+    """Sends the time in nanoseconds, not in seconds."""
     in_seconds = {*SECONDS, *(f"{time}.to_sec()" for time in TIMES)}
     return [script.replace(c, NANOSECONDS) for c in _calls(values) if script.source(c) in in_seconds]
 
@@ -104,12 +98,9 @@ def _stamps(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Assign]
                 yield script_place(script), script, line
 
 
-@operator("stamp-not-set", each=_stamps)
+@operator("stamp-not-set", each=_stamps, fits="every line that sets one")
 def stamp_not_set(script: Script, line: ast.Assign) -> list[TextEdit]:
-    """Never sets the stamp of the header.
-
-    Fits every line that sets one.
-    """
+    """Never sets the stamp of the header."""
     return [script.remove(line)]
 
 
@@ -124,12 +115,13 @@ def _frames(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.expr, a
                 yield script_place(script, child=child), script, first.value, second.value
 
 
-@operator("frames-swapped", each=_frames)
+@operator(
+    "frames-swapped",
+    each=_frames,
+    fits="every transform whose `child_frame_id` is set in the line behind its `frame_id`",
+)
 def frames_swapped(script: Script, parent: ast.expr, child: ast.expr) -> list[TextEdit]:
-    """Swaps parent and child of a transform.
-
-    Fits every transform whose `child_frame_id` is set in the line behind its `frame_id`.
-    """
+    """Swaps parent and child of a transform."""
     return [script.replace(parent, script.source(child)), script.replace(child, script.source(parent))]
 
 
@@ -141,12 +133,9 @@ def _preempts(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Call]
                 yield script_place(script), script, call
 
 
-@operator("preempt-not-heeded", each=_preempts)
+@operator("preempt-not-heeded", each=_preempts, fits="every call of `is_preempt_requested()`")
 def preempt_not_heeded(script: Script, call: ast.Call) -> list[TextEdit]:
-    """Goes on with an action's goal that was cancelled.
-
-    Fits every call of `is_preempt_requested()`.
-    """
+    """Goes on with an action's goal that was cancelled."""
     return [script.replace(call, "False")]
 
 
@@ -160,12 +149,13 @@ def _fields(solution: Solution) -> Iterator[tuple[CodePlace, str, InterfaceField
                     yield CodePlace(path=path, at={"file": path, "field": field.name}), text, field
 
 
-@operator("field-other-type", each=_fields)
+@operator(
+    "field-other-type",
+    each=_fields,
+    fits="every field of a `.msg`, `.srv` or `.action` file that is a number of a usual type",
+)
 def field_other_type(text: str, field: InterfaceField) -> list[TextEdit]:
-    """Gives a field of its own message another type.
-
-    Fits every field of a `.msg`, `.srv` or `.action` file that is a number of a usual type.
-    """
+    """Gives a field of its own message another type."""
     start = text.index(field.type, len("".join(text.splitlines(keepends=True)[: field.line - 1])))
     other = OTHER_TYPES.get(field.type)
     return [TextEdit(start, start + len(field.type), other)] if other else []
@@ -189,7 +179,7 @@ class EarlyParams(Record):
 def _counters(solution: Solution) -> Iterator[tuple[CodePlace, Script, Counter]]:
     """Find the integer topics that are fed by a counter."""
     for script in solution.scripts:
-        for publisher in publishers(script):
+        for publisher in endpoints(script, "Publisher"):
             counter = find_counter(script, publisher)
             if counter is not None:
                 yield script_place(script, topic=publisher.topic), script, counter
@@ -205,57 +195,55 @@ def _set(script: Script, constants: list[ast.Constant], number: int) -> list[Tex
     return [script.replace(c, str(number)) for c in {script.span(c): c for c in constants}.values()]
 
 
-@operator("counter-from-one", each=_counters)
+@operator(
+    "counter-from-one", each=_counters, fits="every integer topic that is fed by a counter with a first value"
+)
 def counter_from_one(script: Script, counter: Counter) -> list[TextEdit]:
-    """Begins to count at 1.
-
-    Fits every integer topic that is fed by a counter with a first value.
-    """
+    """Begins to count at 1."""
     return _set(script, counter.starts, 1)
 
 
-@operator("counter-skips", each=_counters, params=ByParams)
+@operator(
+    "counter-skips", each=_counters, params=ByParams, fits="every integer topic that is fed by a counter"
+)
 def counter_skips(script: Script, counter: Counter, params: ByParams) -> list[TextEdit]:
-    """Counts in steps that are too large.
-
-    Fits every integer topic that is fed by a counter.
-    """
+    """Counts in steps that are too large."""
     return _add(script, counter.steps, params.by)
 
 
-@operator("reset-early", each=_counters, params=EarlyParams)
+@operator(
+    "reset-early",
+    each=_counters,
+    params=EarlyParams,
+    fits="every counter with a limit that is written as a number",
+)
 def reset_early(script: Script, counter: Counter, params: EarlyParams) -> list[TextEdit]:
-    """Goes back to the beginning too early.
-
-    Fits every counter with a limit that is written as a number.
-    """
+    """Goes back to the beginning too early."""
     return _add(script, counter.limits, -params.by)
 
 
-@operator("reset-late", each=_counters, params=ByParams)
+@operator(
+    "reset-late",
+    each=_counters,
+    params=ByParams,
+    fits="every counter with a limit that is written as a number",
+)
 def reset_late(script: Script, counter: Counter, params: ByParams) -> list[TextEdit]:
-    """Goes back to the beginning too late.
-
-    Fits every counter with a limit that is written as a number.
-    """
+    """Goes back to the beginning too late."""
     return _add(script, counter.limits, params.by)
 
 
-@operator("reset-to-one", each=_counters)
+@operator("reset-to-one", each=_counters, fits="every counter that is set back, or taken modulo a number")
 def reset_to_one(script: Script, counter: Counter) -> list[TextEdit]:
-    """Goes back to 1.
-
-    Fits every counter that is set back, or taken modulo a number.
-    """
+    """Goes back to 1."""
     return _back_to(script, counter, 1)
 
 
-@operator("wrap-to-minus-128", each=_counters)
+@operator(
+    "wrap-to-minus-128", each=_counters, fits="every counter that is set back, or taken modulo a number"
+)
 def wrap_to_minus_128(script: Script, counter: Counter) -> list[TextEdit]:
-    """Goes on at -128, as an 8-bit integer of C does.
-
-    Fits every counter that is set back, or taken modulo a number.
-    """
+    """Goes on at -128, as an 8-bit integer of C does."""
     return _back_to(script, counter, -128)
 
 
@@ -268,12 +256,11 @@ def _back_to(script: Script, counter: Counter, number: int) -> list[TextEdit]:
     return edits
 
 
-@operator("never-reset", each=_counters)
+@operator(
+    "never-reset", each=_counters, fits="every counter that is set back by an `if`, or taken modulo a number"
+)
 def never_reset(script: Script, counter: Counter) -> list[TextEdit]:
-    """Never goes back to the beginning.
-
-    Fits every counter that is set back by an `if`, or taken modulo a number.
-    """
+    """Never goes back to the beginning."""
     edits = [script.replace(modulo, script.source(modulo.left)) for modulo in counter.modulos]
     for test in counter.tests:
         if isinstance(test, ast.If):
@@ -302,19 +289,33 @@ def _sets_back(block: list[ast.stmt]) -> bool:
 # ---- listeners
 
 
+@dataclass(frozen=True, kw_only=True)
+class Hearing:
+    """A subscriber's callback, the name of its message, and its statements that print or log."""
+
+    script: Script
+    callback: Function
+    message: str
+    said: list[ast.Expr]
+
+    def replace_data(self, text: str) -> list[TextEdit]:
+        """Put `text` where the callback reads the message's data."""
+        reads = (n for n in ast.walk(self.callback) if isinstance(n, ast.Attribute))
+        data = f"{self.message}.data"
+        return [self.script.replace(node, text) for node in reads if self.script.source(node) == data]
+
+
 def _callbacks(*types: str) -> Finder:
-    """Return a finder of subscribers (of these types only, if any) with a callback that is a function of the script.
+    """Return a finder of subscribers (of these types only, if any) with a callback that is a function of the script."""
 
-    With the callback come the name of its message and the statements that print or log.
-    """
-
-    def find(solution: Solution) -> Iterator[tuple[CodePlace, Script, Function, str, list[ast.Expr]]]:
+    def find(solution: Solution) -> Iterator[tuple[CodePlace, Hearing]]:
         for place, script, subscriber in each_subscriber(solution):
             callback = subscriber.callback
             message = message_name(callback) if isinstance(callback, Function) else ""
             if isinstance(callback, Function) and message and (not types or subscriber.type_name in types):
                 there = script_place(script, callback, topic=str(place.at["topic"]))
-                yield there, script, callback, message, speech(script, callback)
+                said = speech(script, callback)
+                yield there, Hearing(script=script, callback=callback, message=message, said=said)
 
     return find
 
@@ -323,95 +324,75 @@ any_callback = _callbacks()
 integer_callback = _callbacks(*INTEGER_TYPES)
 
 
-def _replace_data(script: Script, callback: Function, message: str, text: str) -> list[TextEdit]:
-    """Put `text` where the callback reads the message's data."""
-    data = f"{message}.data"
-    reads = [n for n in ast.walk(callback) if isinstance(n, ast.Attribute) and script.source(n) == data]
-    return [script.replace(node, text) for node in reads]
+@operator("listener-silent", each=any_callback, fits="every subscriber whose callback prints or logs")
+def listener_silent(heard: Hearing) -> list[TextEdit]:
+    """Prints nothing of what it hears."""
+    return [heard.script.replace(statement, "pass") for statement in heard.said]
 
 
-@operator("listener-silent", each=any_callback)
-def listener_silent(
-    script: Script, _callback: Function, _message: str, said: list[ast.Expr]
-) -> list[TextEdit]:
-    """Prints nothing of what it hears.
-
-    Fits every subscriber whose callback prints or logs.
-    """
-    return [script.replace(statement, "pass") for statement in said]
-
-
-@operator("listener-constant", each=any_callback)
-def listener_constant(
-    script: Script, _callback: Function, _message: str, said: list[ast.Expr]
-) -> list[TextEdit]:
-    """Prints that it heard something, and not what.
-
-    Fits every subscriber whose callback prints or logs.
-    """
-    named = [(s, s.value.func) for s in said if isinstance(s.value, ast.Call)]
-    return [script.replace(s, f"{script.source(function)}('I heard a message')") for s, function in named]
+@operator("listener-constant", each=any_callback, fits="every subscriber whose callback prints or logs")
+def listener_constant(heard: Hearing) -> list[TextEdit]:
+    """Prints that it heard something, and not what."""
+    named = [(s, s.value.func) for s in heard.said if isinstance(s.value, ast.Call)]
+    return [
+        heard.script.replace(s, f"{heard.script.source(function)}('I heard a message')")
+        for s, function in named
+    ]
 
 
-@operator("listener-drops-zero", each=integer_callback)
-def listener_drops_zero(
-    script: Script, _callback: Function, message: str, said: list[ast.Expr]
-) -> list[TextEdit]:
-    """Prints every number but 0.
-
-    Fits every subscriber of integers whose callback prints or logs.
-    """
-    return [script.wrap([s], f"if {message}.data:") for s in said if script.can_wrap([s])]
-
-
-@operator("listener-drops-negative", each=integer_callback)
-def listener_drops_negative(
-    script: Script, callback: Function, message: str, _said: object
-) -> list[TextEdit]:
-    """Prints a number without its sign.
-
-    Fits every subscriber of integers whose callback reads the message's data.
-    """
-    return _replace_data(script, callback, message, f"abs({message}.data)")
+@operator(
+    "listener-drops-zero",
+    each=integer_callback,
+    fits="every subscriber of integers whose callback prints or logs",
+)
+def listener_drops_zero(heard: Hearing) -> list[TextEdit]:
+    """Prints every number but 0."""
+    return [
+        heard.script.wrap([s], f"if {heard.message}.data:") for s in heard.said if heard.script.can_wrap([s])
+    ]
 
 
-@operator("listener-off-by-one", each=integer_callback)
-def listener_off_by_one(script: Script, callback: Function, message: str, _said: object) -> list[TextEdit]:
-    """Prints each number plus one.
-
-    Fits every subscriber of integers whose callback reads the message's data.
-    """
-    return _replace_data(script, callback, message, f"({message}.data + 1)")
-
-
-@operator("listener-drops-some", each=any_callback)
-def listener_drops_some(
-    script: Script, _callback: Function, _message: str, said: list[ast.Expr]
-) -> list[TextEdit]:
-    """Prints every second message only.
-
-    Fits every subscriber whose callback prints or logs.
-    """
-    return every_second_time(script, [s for s in said if script.block(s) is script.block(said[0])])
+@operator(
+    "listener-drops-negative",
+    each=integer_callback,
+    fits="every subscriber of integers whose callback reads the message's data",
+)
+def listener_drops_negative(heard: Hearing) -> list[TextEdit]:
+    """Prints a number without its sign."""
+    return heard.replace_data(f"abs({heard.message}.data)")
 
 
-@operator("listener-late", each=any_callback)
-def listener_late(script: Script, callback: Function, message: str, said: list[ast.Expr]) -> list[TextEdit]:
-    """Prints each message only when the next one comes, so that the last is lost.
+@operator(
+    "listener-off-by-one",
+    each=integer_callback,
+    fits="every subscriber of integers whose callback reads the message's data",
+)
+def listener_off_by_one(heard: Hearing) -> list[TextEdit]:
+    """Prints each number plus one."""
+    return heard.replace_data(f"({heard.message}.data + 1)")
 
-    Fits every subscriber whose callback prints or logs.
-    """
-    if not said or not script.has_lines(callback.body[0]):
+
+@operator("listener-drops-some", each=any_callback, fits="every subscriber whose callback prints or logs")
+def listener_drops_some(heard: Hearing) -> list[TextEdit]:
+    """Prints every second message only."""
+    return every_second_time(
+        heard.script, [s for s in heard.said if heard.script.block(s) is heard.script.block(heard.said[0])]
+    )
+
+
+@operator("listener-late", each=any_callback, fits="every subscriber whose callback prints or logs")
+def listener_late(heard: Hearing) -> list[TextEdit]:
+    """Prints each message only when the next one comes, so that the last is lost."""
+    if not heard.said or not heard.script.has_lines(heard.callback.body[0]):
         return []
-    wait = (f"waiting.append({message})", "if len(waiting) < 2:", f"{script.unit}return")
-    lines = (*wait, f"{message} = waiting.pop(0)")
-    return [script.preamble("waiting = []"), script.before(callback.body[0], *lines)]
+    wait = (f"waiting.append({heard.message})", "if len(waiting) < 2:", f"{heard.script.unit}return")
+    lines = (*wait, f"{heard.message} = waiting.pop(0)")
+    return [heard.script.preamble("waiting = []"), heard.script.before(heard.callback.body[0], *lines)]
 
 
-@operator("callback-error", each=any_callback)
-def callback_error(script: Script, callback: Function, message: str, _said: object) -> list[TextEdit]:
-    """Misspells the message's variable in the callback.
-
-    Fits every subscriber whose callback reads the message's data.
-    """
-    return _replace_data(script, callback, message, f"the_{message}.data")
+@operator(
+    "callback-error", each=any_callback, fits="every subscriber whose callback reads the message's data"
+)
+def callback_error(heard: Hearing) -> list[TextEdit]:
+    """Misspells the message's variable in the callback."""
+    return heard.replace_data(f"the_{heard.message}.data")

@@ -49,32 +49,23 @@ def _is_anonymous(call: ast.Call) -> bool:
     return keyword is not None and isinstance(keyword.value, ast.Constant) and bool(keyword.value.value)
 
 
-@operator("name-changed", each=_init_nodes)
+@operator("name-changed", each=_init_nodes, fits="every script with a node whose name is written out")
 def name_changed(script: Script, call: ast.Call) -> list[TextEdit]:
-    """Gives the node another name.
-
-    Fits every script with a node whose name is written out.
-    """
+    """Gives the node another name."""
     name = text_literal(script, argument(call, 0, "name"))
     return [script.replace(name, repr(f"my_{name.value!s}"))] if name is not None else []
 
 
-@operator("not-anonymous", each=_init_nodes)
+@operator("not-anonymous", each=_init_nodes, fits="every script with an anonymous node")
 def not_anonymous(script: Script, call: ast.Call) -> list[TextEdit]:
-    """Leaves out `anonymous=True`.
-
-    Fits every script with an anonymous node.
-    """
+    """Leaves out `anonymous=True`."""
     keyword = _anonymous(call)
     return [script.replace(keyword.value, "False")] if keyword is not None and _is_anonymous(call) else []
 
 
-@operator("made-anonymous", each=_init_nodes)
+@operator("made-anonymous", each=_init_nodes, fits="every script with a node that is not anonymous")
 def made_anonymous(script: Script, call: ast.Call) -> list[TextEdit]:
-    """Makes the node anonymous where its plain name is asked for.
-
-    Fits every script with a node that is not anonymous.
-    """
+    """Makes the node anonymous where its plain name is asked for."""
     keyword = _anonymous(call)
     if _is_anonymous(call) or argument(call, 0, "name") is None:
         return []
@@ -102,23 +93,22 @@ def _lives(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.While | 
             yield script_place(script, node), script, node
 
 
-@operator("node-ends-by-itself", each=_lives, params=EndsParams)
+@operator(
+    "node-ends-by-itself",
+    each=_lives,
+    params=EndsParams,
+    fits="every script with a loop until shutdown or a spin",
+)
 def node_ends_by_itself(script: Script, life: ast.While | ast.Expr, params: EndsParams) -> list[TextEdit]:
-    """Lets the node come to its end: a loop that is counted, or no rospy.spin().
-
-    Fits every script with a loop until shutdown or a spin.
-    """
+    """Lets the node come to its end: a loop that is counted, or no rospy.spin()."""
     if isinstance(life, ast.Expr):
         return [script.remove(life)]
     return [TextEdit(script.span(life)[0], script.span(life.test)[1], f"for _ in range({params.turns})")]
 
 
-@operator("ctrl-c-swallowed", each=_lives)
+@operator("ctrl-c-swallowed", each=_lives, fits="every script with a loop until shutdown or a spin")
 def ctrl_c_swallowed(script: Script, life: ast.While | ast.Expr) -> list[TextEdit]:
-    """Catches every exception and goes on, so that Ctrl-C does not end the node.
-
-    Fits every script with a loop until shutdown or a spin.
-    """
+    """Catches every exception and goes on, so that Ctrl-C does not end the node."""
     unit = script.unit
     if isinstance(life, ast.While):
         if not script.can_wrap(life.body):
@@ -132,12 +122,9 @@ def ctrl_c_swallowed(script: Script, life: ast.While | ast.Expr) -> list[TextEdi
     return [script.before(life, *lines), script.remove(life)]
 
 
-@operator("traceback-on-exit", each=_lives)
+@operator("traceback-on-exit", each=_lives, fits="every script with a loop until shutdown or a spin")
 def traceback_on_exit(script: Script, life: ast.While | ast.Expr) -> list[TextEdit]:
-    """Uses an undefined variable once the node has been told to end.
-
-    Fits every script with a loop until shutdown or a spin.
-    """
+    """Uses an undefined variable once the node has been told to end."""
     wrong = "print('stopped after', turns_so_far)"
     return [script.after(life, wrong)] if script.has_lines(life) else []
 
@@ -170,45 +157,33 @@ def _first_words(script: Script, call: ast.Call) -> str:
     return script.source(call.args[0])[:TEXT_LIMIT]
 
 
-@operator("log-level", each=_logs, params=LevelParams)
+@operator("log-level", each=_logs, params=LevelParams, fits="every call of rospy's logging")
 def log_level(script: Script, _statement: ast.Expr, call: ast.Call, params: LevelParams) -> list[TextEdit]:
-    """Logs at another level.
-
-    Fits every call of rospy's logging.
-    """
+    """Logs at another level."""
     if last_name(call.func) not in LOGS or not isinstance(call.func, ast.Attribute):
         return []
     return [script.replace(call.func, f"{script.source(call.func.value)}.{LEVELS[params.level]}")]
 
 
-@operator("log-text", each=_logs)
+@operator("log-text", each=_logs, fits="every line that prints or logs a text")
 def log_text(script: Script, _statement: ast.Expr, call: ast.Call) -> list[TextEdit]:
-    """Misspells what it prints or logs.
-
-    Fits every line that prints or logs a text.
-    """
+    """Misspells what it prints or logs."""
     texts = [t for a in call.args for t in texts_in(a)]
     return [script.replace(text, misspelt_literal(script.source(text))) for text in texts[:1]]
 
 
-@operator("print-instead-of-log", each=_logs)
+@operator("print-instead-of-log", each=_logs, fits="every call of rospy's logging")
 def print_instead_of_log(script: Script, _statement: ast.Expr, call: ast.Call) -> list[TextEdit]:
-    """Prints where it should log.
-
-    Fits every call of rospy's logging.
-    """
+    """Prints where it should log."""
     if last_name(call.func) not in LOGS or call.keywords:
         return []
     words, *values = [script.source(a) for a in call.args]
     return [script.replace(call, f"print({words} % ({', '.join(values)},))" if values else f"print({words})")]
 
 
-@operator("log-dropped", each=_logs)
+@operator("log-dropped", each=_logs, fits="every line that prints or logs")
 def log_dropped(script: Script, statement: ast.Expr, _call: ast.Call) -> list[TextEdit]:
-    """Does not print or log this.
-
-    Fits every line that prints or logs.
-    """
+    """Does not print or log this."""
     return [script.replace(statement, "pass")]
 
 
@@ -226,12 +201,9 @@ def _if_broken(script: Script, *edits: TextEdit) -> list[TextEdit]:
     return []
 
 
-@operator("python2-print", each=each_script)
+@operator("python2-print", each=each_script, fits="every Python script that prints or logs something")
 def python2_print(script: Script) -> list[TextEdit]:
-    """Prints as Python 2 does.
-
-    Fits every Python script that prints or logs something.
-    """
+    """Prints as Python 2 does."""
     for statement in speech(script):
         call = statement.value
         words = script.source(call.args[0]) if isinstance(call, ast.Call) and call.args else "'here'"
@@ -239,12 +211,9 @@ def python2_print(script: Script) -> list[TextEdit]:
     return []
 
 
-@operator("tabs-and-spaces", each=each_script)
+@operator("tabs-and-spaces", each=each_script, fits="every Python script with a block of two lines")
 def tabs_and_spaces(script: Script) -> list[TextEdit]:
-    """Mixes tabs and spaces.
-
-    Fits every Python script with a block of two lines.
-    """
+    """Mixes tabs and spaces."""
     return next((edits for s in script.of(ast.stmt) if (edits := _with_other_indentation(script, s))), [])
 
 
@@ -261,24 +230,22 @@ def _with_other_indentation(script: Script, statement: ast.stmt) -> list[TextEdi
     return _if_broken(script, edit)
 
 
-@operator("typographic-quote", each=each_script)
+@operator("typographic-quote", each=each_script, fits="every Python script with a text as an argument")
 def typographic_quote(script: Script) -> list[TextEdit]:
-    """Copies a text with its quotes from a PDF.
-
-    Fits every Python script with a text as an argument.
-    """
+    """Copies a text with its quotes from a PDF."""
     for text in (given for call in script.of(ast.Call) for given in call.args):
         if isinstance(text, ast.Constant) and isinstance(text.value, str) and script.source(text)[0] in "'\"":
             return _if_broken(script, script.replace(text, OPEN_QUOTE + str(text.value) + CLOSE_QUOTE))
     return []
 
 
-@operator("no-break-space", each=each_script)
+@operator(
+    "no-break-space",
+    each=each_script,
+    fits="every Python script with an assignment that has spaces around its sign",
+)
 def no_break_space(script: Script) -> list[TextEdit]:
-    """Copies a line from a PDF, with a space that Python does not accept.
-
-    Fits every Python script with an assignment that has spaces around its sign.
-    """
+    """Copies a line from a PDF, with a space that Python does not accept."""
     for statement in script.of(ast.Assign):
         _, end = script.span(statement.targets[-1])
         if script.text[end : end + 3] == " = ":
@@ -286,12 +253,9 @@ def no_break_space(script: Script) -> list[TextEdit]:
     return []
 
 
-@operator("syntax-error", each=each_script)
+@operator("syntax-error", each=each_script, fits="every Python script that has one of them")
 def syntax_error(script: Script) -> list[TextEdit]:
-    """Forgets the colon after `def`, `class` or `while`.
-
-    Fits every Python script that has one of them.
-    """
+    """Forgets the colon after `def`, `class` or `while`."""
     for node in script.of(ast.stmt):
         if isinstance(node, Function | ast.ClassDef | ast.While):
             colon = script.text.rfind(":", script.span(node)[0], script.span(node.body[0])[0])
@@ -299,22 +263,16 @@ def syntax_error(script: Script) -> list[TextEdit]:
     return []
 
 
-@operator("missing-module", each=each_script)
+@operator("missing-module", each=each_script, fits="every Python script that imports rospy")
 def missing_module(script: Script) -> list[TextEdit]:
-    """Imports messages of a package that does not exist.
-
-    Fits every Python script that imports rospy.
-    """
+    """Imports messages of a package that does not exist."""
     imports = [n for n in script.of(ast.Import) if any(a.name == "rospy" for a in n.names)]
     return [script.after(statement, "from beginner_tutorials.msg import Num") for statement in imports[:1]]
 
 
-@operator("asks-for-input", each=each_script)
+@operator("asks-for-input", each=each_script, fits="every Python script that makes a node")
 def asks_for_input(script: Script) -> list[TextEdit]:
-    """Waits for someone to press Enter before it makes its node.
-
-    Fits every Python script that makes a node.
-    """
+    """Waits for someone to press Enter before it makes its node."""
     for call in calls(script, "init_node"):
         statement = script.statement(call)
         sound = argument(call, 0, "name") is not None and script.has_lines(statement)

@@ -56,31 +56,28 @@ class OtherTypeParams(Record):
     to: str = ""
 
 
-@operator("topic-misspelt", each=each_endpoint)
+@operator(
+    "topic-misspelt", each=each_endpoint, fits="every publisher and subscriber whose topic is written out"
+)
 def topic_misspelt(script: Script, endpoint: Endpoint) -> list[TextEdit]:
-    """Misspells the topic.
-
-    Fits every publisher and subscriber whose topic is written out.
-    """
+    """Misspells the topic."""
     return [script.replace(endpoint.name, repr(misspelt_name(str(endpoint.name.value))))]
 
 
-@operator("topic-capital", each=each_endpoint)
+@operator(
+    "topic-capital", each=each_endpoint, fits="every publisher and subscriber whose topic is written out"
+)
 def topic_capital(script: Script, endpoint: Endpoint) -> list[TextEdit]:
-    """Writes the topic with a capital letter.
-
-    Fits every publisher and subscriber whose topic is written out.
-    """
+    """Writes the topic with a capital letter."""
     head, slash, tail = str(endpoint.name.value).rpartition("/")
     return [script.replace(endpoint.name, repr(f"{head}{slash}{tail[:1].upper()}{tail[1:]}"))]
 
 
-@operator("private-topic", each=each_endpoint)
+@operator(
+    "private-topic", each=each_endpoint, fits="every publisher and subscriber whose topic is written out"
+)
 def private_topic(script: Script, endpoint: Endpoint) -> list[TextEdit]:
-    """Puts the topic into the node's private namespace.
-
-    Fits every publisher and subscriber whose topic is written out.
-    """
+    """Puts the topic into the node's private namespace."""
     name = str(endpoint.name.value).lstrip("/~")
     return [script.replace(endpoint.name, repr(f"~{name}")), *_node_first(script, endpoint)]
 
@@ -95,33 +92,29 @@ def _node_first(script: Script, endpoint: Endpoint) -> list[TextEdit]:
     return [script.before(made, script.source(later[0])), script.remove(later[0])]
 
 
-@operator("publisher-dropped", each=each_publisher)
+@operator("publisher-dropped", each=each_publisher, fits="every publisher that is kept in a variable")
 def publisher_dropped(script: Script, publisher: Endpoint) -> list[TextEdit]:
-    """Removes a publisher that should stay.
-
-    Fits every publisher that is kept in a variable.
-    """
+    """Removes a publisher that should stay."""
     statements = [script.statement(call) for call in publish_calls(script, publisher)]
     if not publisher.target or not all(isinstance(s, ast.Expr) for s in statements):
         return []
     return [script.remove(script.statement(publisher.call)), *(script.replace(s, "pass") for s in statements)]
 
 
-@operator("subscriber-dropped", each=each_subscriber)
+@operator("subscriber-dropped", each=each_subscriber, fits="every subscriber")
 def subscriber_dropped(script: Script, subscriber: Endpoint) -> list[TextEdit]:
-    """Removes a subscriber that should stay.
-
-    Fits every subscriber.
-    """
+    """Removes a subscriber that should stay."""
     return [script.remove(script.statement(subscriber.call))]
 
 
-@operator("other-type", each=each_endpoint, params=OtherTypeParams)
+@operator(
+    "other-type",
+    each=each_endpoint,
+    params=OtherTypeParams,
+    fits="every publisher and subscriber of a number or a text of std_msgs",
+)
 def other_type(script: Script, endpoint: Endpoint, params: OtherTypeParams) -> list[TextEdit]:
-    """Takes another message type.
-
-    Fits every publisher and subscriber of a number or a text of std_msgs.
-    """
+    """Takes another message type."""
     to = params.to or OTHER_TYPES.get(endpoint.type_name, "")
     if not to or endpoint.type is None:
         return []
@@ -168,12 +161,13 @@ def _import(script: Script, kind: ast.expr, to: str) -> list[TextEdit] | None:
     return None
 
 
-@operator("publish-half", each=each_publisher)
+@operator(
+    "publish-half",
+    each=each_publisher,
+    fits="every publisher whose messages are sent by a statement of their own",
+)
 def publish_half(script: Script, publisher: Endpoint) -> list[TextEdit]:
-    """Publishes this topic in every second turn only, its counter with it.
-
-    Fits every publisher whose messages are sent by a statement of their own.
-    """
+    """Publishes this topic in every second turn only, its counter with it."""
     sent = [script.statement(call) for call in publish_calls(script, publisher)]
     if len(sent) != 1 or not isinstance(sent[0], ast.Expr):
         return []
@@ -186,12 +180,13 @@ def _assigns(statement: ast.stmt, names: set[str]) -> bool:
     return any(isinstance(n, Assignment) and targets(n) & names for n in ast.walk(statement))
 
 
-@operator("published-twice", each=each_publisher)
+@operator(
+    "published-twice",
+    each=each_publisher,
+    fits="every publisher whose messages are sent by a statement of their own",
+)
 def published_twice(script: Script, publisher: Endpoint) -> list[TextEdit]:
-    """Publishes each message twice.
-
-    Fits every publisher whose messages are sent by a statement of their own.
-    """
+    """Publishes each message twice."""
     sent = [script.statement(call) for call in publish_calls(script, publisher)][:1]
     own = [s for s in sent if isinstance(s, ast.Expr) and script.has_lines(s)]
     return [script.after(statement, script.source(statement)) for statement in own]
@@ -306,21 +301,25 @@ def _calls_in(script: Script, statements: Sequence[ast.stmt]) -> Iterator[ast.Ca
                     waiting.append(called)
 
 
-@operator("other-rate", each=_paces, params=RateParams)
+@operator(
+    "other-rate",
+    each=_paces,
+    params=RateParams,
+    fits="every script with a rate, a timer, or a sleep in a loop",
+)
 def other_rate(script: Script, pace: Pace, params: RateParams) -> list[TextEdit]:
-    """Publishes at another rate.
-
-    Fits every script with a rate, a timer, or a sleep in a loop.
-    """
+    """Publishes at another rate."""
     return [script.replace(pace.node, pace.times(params.factor))]
 
 
-@operator("burst", each=_turns, params=BurstParams)
+@operator(
+    "burst",
+    each=_turns,
+    params=BurstParams,
+    fits="every script with a rate, a timer, or a sleep in a loop that publishes",
+)
 def burst(script: Script, pace: Pace, turn: list[ast.stmt], params: BurstParams) -> list[TextEdit]:
-    """Sends many messages at once and then none for long, with the right number in the mean.
-
-    Fits every script with a rate, a timer, or a sleep in a loop that publishes.
-    """
+    """Sends many messages at once and then none for long, with the right number in the mean."""
     slower = script.replace(pace.node, pace.times(1 / params.count))
     return [slower, script.wrap(turn, f"for _ in range({params.count}):")]
 
@@ -331,11 +330,8 @@ def _rate_sleeps(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Ex
             yield script_place(script, statement), script, statement
 
 
-@operator("sleep-without-brackets", each=_rate_sleeps)
+@operator("sleep-without-brackets", each=_rate_sleeps, fits="every script with a statement rate.sleep()")
 def sleep_without_brackets(script: Script, statement: ast.Expr) -> list[TextEdit]:
-    """Names rate.sleep but does not call it, so that the loop floods its topics.
-
-    Fits every script with a statement rate.sleep().
-    """
+    """Names rate.sleep but does not call it, so that the loop floods its topics."""
     call = statement.value
     return [script.replace(statement, script.source(call.func))] if isinstance(call, ast.Call) else []
