@@ -214,8 +214,9 @@ def concerns(
     seen = f"{found[criterion.id].message} {found[criterion.id].measured}"
     if repair.kind == "file-name" and PurePosixPath(repair.before).name in seen:
         return True
-    if found[criterion.id].blocked_by:
-        return any(_asks_for(found[name], repair) for name in criterion.requires)
+    if root := found[criterion.id].blocked_by:
+        asking = criterion.requires if repair.kind in NAMES else (root,)
+        return any(_asks_for(found[name], repair) for name in asking)
     return repair.kind not in OF_BUILDS and _asks_for(found[criterion.id], repair)
 
 
@@ -336,7 +337,8 @@ def _charges(
     needs: Mapping[str, tuple[Repair, ...]],
 ) -> dict[Repair, set[str]]:
     """Return for each repair the criterion that asks for what was wrong: one of the files, else by its name where a
-    name was wrong, else the first that failed by itself, and not for its name. What others require comes first."""
+    name was wrong, else the first that failed by itself, at best in that file, and not for its name. What others
+    require comes first."""
     charges: dict[Repair, set[str]] = {}
     misnamed: set[str] = set()
     by_id = {c.id: c for c in rubric.criteria}
@@ -360,8 +362,9 @@ def _charges(
         possible = [c for c in criteria if repair in needs[c.id]]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
+        citing = [c for c in failing if _cites(first[c.id], repair)]
         builds = [c for c in possible if repair.kind in OF_BUILDS and c.check == BUILD]
-        counting = [c.id for c in (*builds, *named, *failing, *possible) if c.points > 0]
+        counting = [c.id for c in (*builds, *named, *citing, *failing, *possible) if c.points > 0]
         other = [name for name in counting if name not in misnamed]
         charges[repair] = set((counting if named else other or counting)[:1])
         misnamed |= charges[repair] if named else set()

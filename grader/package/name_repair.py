@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import re
 from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 
@@ -64,6 +65,63 @@ def with_self(text: str) -> Iterator[Step]:
 OF_SELF = "a method's own object is called `self`, and not `%s`"
 
 
+def with_methods(text: str) -> Iterator[Step]:
+    """`def _init_(self):` of a class whose objects get their attributes there, and `def run():` of a method that is
+    called on an object."""
+    tree, lines = tree_of(text), text.split("\n")
+    nodes = nodes_in(tree)
+    made = {one.func.id for one in nodes if isinstance(one, ast.Call) and isinstance(one.func, ast.Name)}
+    read = {one.attr for one in nodes if isinstance(one, ast.Attribute)}
+    on_objects = {
+        one.attr for one in nodes if isinstance(one, ast.Attribute) and not _is_class(one.value, tree)
+    }
+    for one in (n for n in tree.body if isinstance(n, ast.ClassDef) and n.name in made):
+        methods = [m for m in one.body if isinstance(m, ast.FunctionDef) and not m.decorator_list]
+        named = {m.name for m in methods}
+        for method in methods:
+            at = method.lineno - 1
+            head = re.match(r"(\s*def\s+)(\w+)(\s*\(\s*)", lines[at])
+            if head is None:
+                continue
+            before, name, bracket = head.groups()
+            if name in ALMOST_INIT and not {"__init__"} & named and name not in read:
+                line, why = f"{before}__init__{bracket}{lines[at][head.end() :]}", OF_INIT % name
+            elif _lacks_self(method, on_objects):
+                comma = ", " if method.args.args else ""
+                line, why = f"{head[0]}self{comma}{lines[at][head.end() :]}", WITHOUT_SELF % name
+            else:
+                continue
+            after = "\n".join([*lines[:at], line, *lines[at + 1 :]])
+            for step in step_to("argument", method.lineno, text, after, why):
+                yield step
+                yield from with_methods(step["text"])
+                return
+
+
+ALMOST_INIT = frozenset(
+    ["_init_", "_init__", "__init_", "_init", "init", "init__", "__init", "__int__", "__inti__", "__ini__"]
+)
+OF_INIT = "Python calls the method `__init__` of a new object, and never `%s`"
+WITHOUT_SELF = "`%s` is called on an object, and takes no `self`"
+
+
+def _is_class(node: ast.expr, tree: ast.Module) -> bool:
+    """Return whether a name is that of a class of the script's own."""
+    return isinstance(node, ast.Name) and any(
+        isinstance(one, ast.ClassDef) and one.name == node.id for one in tree.body
+    )
+
+
+def _lacks_self(method: ast.FunctionDef, on_objects: Collection[str]) -> bool:
+    """Return whether a method that is used on an object takes no argument, or uses a `self` that it does not take."""
+    taken = [one.arg for one in (*method.args.posonlyargs, *method.args.args)]
+    used = {n.id for n in nodes_in(method) if isinstance(n, ast.Name)}
+    is_called = method.name in {*on_objects, "__init__"}
+    return (
+        is_called and method.args.vararg is None and (not taken or ("self" in used and "self" not in taken))
+    )
+
+
 def with_names(text: str) -> Iterator[Step]:
     """`true`, `rospu` and `Sting`: a name that nothing in the file has, and one alone is nearly the same."""
     tree, lines = tree_of(text), text.split("\n")
@@ -82,6 +140,7 @@ def with_names(text: str) -> Iterator[Step]:
     for block in blocks:
         own = shared | (bound_in(ast.Module([block], [])) if isinstance(block, ast.FunctionDef) else set())
         missing = [n for n in nodes_in(block) if isinstance(n, ast.Name) and n.id not in known]
+        missing += _read_for_themselves(block, shared)
         stated = (n.value for n in nodes_in(block) if isinstance(n, ast.Expr))
         alone = {n.id for n in stated if isinstance(n, ast.Name) and is_one_edit(n.id.lower(), "pass")}
         for name in dict.fromkeys(n.id for n in missing):
@@ -97,6 +156,18 @@ def with_names(text: str) -> Iterator[Step]:
                     yield step
                     yield from with_names(text)
                     return
+
+
+def _read_for_themselves(block: ast.stmt, shared: Collection[str]) -> Iterator[ast.Name]:
+    """Yield `talker` of `talker = talker()` where nothing else is called so, and a class `Talker` is there."""
+    nodes = nodes_in(block)
+    stored = [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    for one in (n for n in nodes if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)):
+        made, target = one.value.func, one.targets[0]  # type: ignore[attr-defined] # it is a call
+        own = isinstance(made, ast.Name) and isinstance(target, ast.Name) and made.id == target.id
+        others = {name for name in shared if name != getattr(made, "id", "")}
+        if own and stored.count(made.id) == 1 and any(made.id.lower() == name.lower() for name in others):
+            yield made
 
 
 def _is_guard(node: ast.stmt) -> bool:

@@ -28,7 +28,7 @@ from grader.package.call_repair import (
 )
 from grader.package.import_repair import with_classes, with_imports, with_message_classes, with_modules
 from grader.package.member_repair import with_members
-from grader.package.name_repair import bound_in, meant_by, with_names, with_self
+from grader.package.name_repair import bound_in, meant_by, with_methods, with_names, with_self
 from grader.package.syntax_repair import (
     Step,
     as_python3,
@@ -102,6 +102,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             lambda t: with_members(t, ROSPY),
             _with_quotes,
             with_names,
+            with_methods,
             _with_attributes,
             with_message_classes,
             with_values_called,

@@ -744,6 +744,33 @@ CASES = {
         "src/numeric_pub.py should be called talker.py",
         wanted=asking(does=((TALKER, "publisher", "/numeric_chatter"), (TALKER, "node-name", "talker"))),
     ),
+    "encoding-of-no-name": Case(
+        swapped(TALKER, ("import rospy\n", "# -*- coding: uft-8 -*-\nimport rospy\n")), ["python-syntax"],
+        "line 2 of src/talker.py: Python knows no encoding uft-8", after={TALKER: "# -*- coding: utf-8 -*-\n"},
+    ),
+    "message-and-module-imported-at-once": Case(
+        swapped(TALKER, ("import rospy\nfrom std_msgs.msg import Int8\n", "import rospy, std_msgs.msg.Int8\n")),
+        ["missing-import"], "messages are not imported from std_msgs.msg.Int8", after={TALKER: SCRIPT},
+    ),
+    "method-of-the-class-itself": Case(
+        swapped(TALKER, ("def main():", "class T:\n    def half():\n        return 5\n\ntool = T()\n\ndef main():"),
+                ("publish(1)", "publish(T.half())")), [],
+    ),
+    "sleeps-by-the-class": Case(
+        swapped(TALKER, ("        rate.sleep()", "        rospy.Rate.sleep(0.1)")), ["missing-call"],
+        "needs a Rate that was made", after={TALKER: "rospy.sleep(0.1)"},
+    ),
+    "text-added-to-its-place": Case(
+        swapped(TALKER, ("rate.sleep()", "rate.sleep()\n        rospy.loginfo('at %s' + rospy.get_name())")),
+        ["missing-call"], "and not `+`", after={TALKER: "rospy.loginfo('at %s' % rospy.get_name())"},
+    ),
+    "text-added-to-a-text-with-a-place": Case(
+        swapped(TALKER, ("rate.sleep()", "rate.sleep()\n        print('at ' + '%s' % rospy.get_name())")), [],
+    ),
+    "comment-that-ends-otherwise": Case(
+        {LAUNCHED: LAUNCH.replace("<launch>\n", "<launch>\n  <!-- the talker --!>\n")}, ["launch-syntax"],
+        "a comment ends with `-->`", after={LAUNCHED: "  <!-- the talker -->\n"},
+    ),
     "nothing": Case({}, []),
 }  # fmt: skip
 

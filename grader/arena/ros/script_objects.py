@@ -299,6 +299,25 @@ def queue_sizes(tree):
                 yield slip(one.value.lineno, "queue-size", "`queue_size` is a string", fix=fix)
 
 
+ENDING = ("signal_shutdown", "exit", "quit", "_exit")
+"""Calls that end the node."""
+
+
+def ending_callbacks(tree):
+    """Callbacks of topics that end the node at the first message."""
+    functions = functions_in(tree)
+    for node in walk(tree):
+        given = argument(node, 2, "callback") if called_name(node) == "Subscriber" else []
+        own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
+        for one in own.body if own is not None else ():
+            if isinstance(one, ast.Expr) and called_name(one.value) in ENDING:
+                message = "the callback `%s` ends the node on line %d, at the first message" % (
+                    own.name,
+                    one.lineno,
+                )
+                yield slip(one.lineno, "loop-left", message, fix="delete line %d" % one.lineno)
+
+
 def takes(function, bound):
     """Return with how many values a function can be called at least and at most; of a method without `self`."""
     given = function.args.posonlyargs + function.args.args
