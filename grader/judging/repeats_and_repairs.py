@@ -359,7 +359,7 @@ def _charges(
         own = [c for c in rubric.criteria if repair.kind == "node-name" and _names(c, repair)]
         if any(first[c.id].status.is_lost and c.id not in better for c in own):
             continue  # the criterion of the name says by itself what is wrong with it
-        possible = [c for c in criteria if repair in needs[c.id]]
+        possible = [c for c in criteria if repair in needs[c.id] and _may_ask_for(first[c.id], repair)]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
         citing = [c for c in failing if _cites(first[c.id], repair)]
@@ -369,6 +369,12 @@ def _charges(
         charges[repair] = set((counting if named else other or counting)[:1])
         misnamed |= charges[repair] if named else set()
     return charges
+
+
+def _may_ask_for(found: Verdict, repair: Repair) -> bool:
+    """Return whether a criterion can be lost by what was repaired: by what keeps a script from being started only where
+    that script is named."""
+    return repair.kind not in DONE_BEFORE_RUNS or PurePosixPath(repair.file).name in found.message
 
 
 def _seeks(found: Verdict, repair: Repair) -> bool:
