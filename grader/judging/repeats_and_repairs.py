@@ -52,6 +52,8 @@ OF_SYNTAX = {"python-syntax", "launch-syntax"}
 """Of a line that could not be read, the copy shows for the first time what it says."""
 AT_ANY_RATE = {"node-name", "node-lives", "topic-type"}
 """Checks of runs that a loop which does not sleep passes too."""
+OF_ANY_WORDS = AT_ANY_RATE | {"rate", "connected", "launch-connects", "launch-runs"}
+"""Checks of runs that a node passes whatever it says."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 OF_PACKAGES = {MANIFEST, CMAKE}
 GENERATION = re.compile(
@@ -203,7 +205,9 @@ def concerns(
     """
     if criterion.scenario is not None:
         sleeps = repair.before.endswith(".sleep") and repair.after == f"{repair.before}()"
-        return not (sleeps and criterion.check in AT_ANY_RATE) and is_used_by(
+        words = repair.kind == "missing-call" and repair.before.replace("+", "%", 1) == repair.after
+        of_others = AT_ANY_RATE if sleeps else OF_ANY_WORDS if words else set[str]()
+        return criterion.check not in of_others and is_used_by(
             rubric.scenarios[criterion.scenario], repair, rubric, built=built, launched=launched
         )
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:

@@ -601,7 +601,7 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
         return f"`{made[1]}` is the service's type, and its response has another type", fix
     frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
     wants_text = "must be of type bytes or an ascii string" in found.message
-    if not wants_text and "must be an integer type" not in found.message:
+    if not wants_text and "integer type" not in found.message:
         return None
     kind, other = ("string", "numbers") if wants_text else ("whole number", "strings")
     sent = next(iter(_calls(frame.source, "publish")), None)
