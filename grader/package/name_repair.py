@@ -12,7 +12,7 @@ import re
 from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 
-from grader.package.syntax_repair import Step, edited, nodes_in, span_of, step_to, tree_of
+from grader.package.syntax_repair import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
 from grader.wording import is_one_edit
 
 OF_PYTHON = (
@@ -69,57 +69,56 @@ def with_methods(text: str) -> Iterator[Step]:
     """`def _init_(self):` of a class whose objects get their attributes there, and `def run():` of a method that is
     called on an object."""
     tree, lines = tree_of(text), text.split("\n")
-    nodes = nodes_in(tree)
-    made = {one.func.id for one in nodes if isinstance(one, ast.Call) and isinstance(one.func, ast.Name)}
-    read = {one.attr for one in nodes if isinstance(one, ast.Attribute)}
-    on_objects = {
-        one.attr for one in nodes if isinstance(one, ast.Attribute) and not _is_class(one.value, tree)
-    }
-    for one in (n for n in tree.body if isinstance(n, ast.ClassDef) and n.name in made):
-        methods = [m for m in one.body if isinstance(m, ast.FunctionDef) and not m.decorator_list]
-        named = {m.name for m in methods}
-        for method in methods:
-            at = method.lineno - 1
-            head = re.match(r"(\s*def\s+)(\w+)(\s*\(\s*)", lines[at])
-            if head is None:
-                continue
-            before, name, bracket = head.groups()
-            if name in ALMOST_INIT and not {"__init__"} & named and name not in read:
-                line, why = f"{before}__init__{bracket}{lines[at][head.end() :]}", OF_INIT % name
-            elif _lacks_self(method, on_objects):
-                comma = ", " if method.args.args else ""
-                line, why = f"{head[0]}self{comma}{lines[at][head.end() :]}", WITHOUT_SELF % name
-            else:
-                continue
-            after = "\n".join([*lines[:at], line, *lines[at + 1 :]])
-            for step in step_to("argument", method.lineno, text, after, why):
-                yield step
-                yield from with_methods(step["text"])
-                return
+    for method, beside, read in _methods_of_objects(tree):
+        at = method.lineno - 1
+        head = re.match(r"(\s*def\s+)(\w+)(\s*\(\s*)", lines[at])
+        if head is None:
+            continue
+        before, name, bracket = head.groups()
+        line, why = lines[at], ""
+        if _is_meant_as_init(method, beside) and name not in read:
+            line, why = f"{before}__init__{bracket}{line[head.end() :]}", OF_INIT % name
+        elif name in {*read, "__init__"} and _lacks_self(method):
+            comma = ", " if method.args.args else ""
+            line, why = f"{head[0]}self{comma}{line[head.end() :]}", WITHOUT_SELF % name
+        after = "\n".join([*lines[:at], line, *lines[at + 1 :]])
+        for step in step_to("argument", method.lineno, text, after, why):
+            yield step
+            yield from with_methods(step["text"])
+            return
 
 
-ALMOST_INIT = frozenset(
-    ["_init_", "_init__", "__init_", "_init", "init", "init__", "__init", "__int__", "__inti__", "__ini__"]
-)
 OF_INIT = "Python calls the method `__init__` of a new object, and never `%s`"
 WITHOUT_SELF = "`%s` is called on an object, and takes no `self`"
 
 
-def _is_class(node: ast.expr, tree: ast.Module) -> bool:
-    """Return whether a name is that of a class of the script's own."""
-    return isinstance(node, ast.Name) and any(
-        isinstance(one, ast.ClassDef) and one.name == node.id for one in tree.body
-    )
+def _methods_of_objects(tree: ast.Module) -> Iterator[tuple[ast.FunctionDef, set[str], set[str]]]:
+    """Yield the methods of classes of which the script makes objects, with the names of all of the class's methods, and
+    those that are read of its objects."""
+    nodes = nodes_in(tree)
+    for one in (n for n in tree.body if isinstance(n, ast.ClassDef)):
+        made = {id(n) for n in nodes if isinstance(n, ast.Call) and last_name(n.func) == one.name}
+        values = ((n.targets[0], n.value) for n in nodes if isinstance(n, ast.Assign))
+        objects = {ast.unparse(target) for target, value in values if id(value) in made} | {"self"}
+        methods = [m for m in one.body if isinstance(m, ast.FunctionDef) and not m.decorator_list]
+        names = {m.name for m in methods}
+        parts = (n for n in nodes if isinstance(n, ast.Attribute))
+        read = {n.attr for n in parts if id(n.value) in made or ast.unparse(n.value) in objects}
+        yield from ((method, names, read) for method in methods if made)
 
 
-def _lacks_self(method: ast.FunctionDef, on_objects: Collection[str]) -> bool:
-    """Return whether a method that is used on an object takes no argument, or uses a `self` that it does not take."""
-    taken = [one.arg for one in (*method.args.posonlyargs, *method.args.args)]
+def _is_meant_as_init(method: ast.FunctionDef, beside: Collection[str]) -> bool:
+    """Return whether a method has nearly the name `__init__`, which its class lacks, and gives objects attributes."""
+    near = method.name.replace("_", "").lower() in ("init", "int", "inti", "ini")
+    stores = any(isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store) for n in nodes_in(method))
+    return near and stores and "__init__" not in beside
+
+
+def _lacks_self(method: ast.FunctionDef) -> bool:
+    """Return whether a method takes no argument, or uses a `self` that it does not take."""
+    taken = {one.arg for one in (*method.args.posonlyargs, *method.args.args)}
     used = {n.id for n in nodes_in(method) if isinstance(n, ast.Name)}
-    is_called = method.name in {*on_objects, "__init__"}
-    return (
-        is_called and method.args.vararg is None and (not taken or ("self" in used and "self" not in taken))
-    )
+    return method.args.vararg is None and (not taken or ("self" in used and "self" not in taken))
 
 
 def with_names(text: str) -> Iterator[Step]:

@@ -756,6 +756,14 @@ CASES = {
         swapped(TALKER, ("def main():", "class T:\n    def half():\n        return 5\n\ntool = T()\n\ndef main():"),
                 ("publish(1)", "publish(T.half())")), [],
     ),
+    "method-of-the-name-of-a-function-of-rospys": Case(
+        swapped(TALKER, ("def main():", "class T:\n    def sleep():\n        return 5\n\ntool = T()\n\ndef main():"),
+                ("publish(1)", "publish(T.sleep())")), [],
+    ),
+    "method-that-makes-a-number-of-an-object": Case(
+        swapped(TALKER, ("def main():", "class T:\n    def __int__(self):\n        return 5\n\nt = T()\n\ndef main():"),
+                ("publish(1)", "publish(int(t))")), [],
+    ),
     "sleeps-by-the-class": Case(
         swapped(TALKER, ("        rate.sleep()", "        rospy.Rate.sleep(0.1)")), ["missing-call"],
         "needs a Rate that was made", after={TALKER: "rospy.sleep(0.1)"},
