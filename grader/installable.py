@@ -149,7 +149,13 @@ TWICE = {"apriltag", "dynamixel_sdk", "serial"}
 
 
 def no_package_of_ros(name: str) -> tuple[str, str] | None:
-    """Return why `find_package` cannot find a known name with any ROS 1, and what to do; None for any other name."""
+    """Return why `find_package` cannot find a known name with any ROS 1, or one with a sign at its end, and what to do;
+    None for any other name."""
+    if name[-1:] in {",", ";", ".", ":"}:
+        why = (
+            f"find_package(…) names {name[:-1]} with a `{name[-1]}` behind it, and only blanks part its names"
+        )
+        return why, f"write {name[:-1]} instead of {name}"
     if name in ROS_2:
         return f"it needs {name}, which is from ROS 2", f"take {name} out: this lab is for ROS 1"
     if known_packages().get(name) and name not in TWICE and is_python_module(name):

@@ -764,6 +764,18 @@ CASES = {
         swapped(TALKER, ("def main():", "class T:\n    def __int__(self):\n        return 5\n\nt = T()\n\ndef main():"),
                 ("publish(1)", "publish(int(t))")), [],
     ),
+    "spin-outside-of-its-function": Case(
+        {TALKER: "import rospy\nfrom std_msgs.msg import Int8\n\ndef main():\n    rospy.init_node('talker')\n"
+                 "    rospy.Subscriber('numeric_chatter', Int8, print)\nrospy.spin()\n\nmain()\n"},
+        ["shebang", "missing-call"], "start line 7 with 4 spaces", after={TALKER: "print)\n    rospy.spin()\n"},
+    ),
+    "loop-outside-of-its-function": Case(
+        swapped(TALKER, ("    while", "while"), ("        pub", "    pub"), ("        rate", "    rate")),
+        ["missing-call"], "start line 9 with 4 spaces and lines 10 and 11 with 8 spaces", after={TALKER: SCRIPT},
+    ),
+    "spin-at-the-end-of-a-script": Case(
+        {TALKER: SCRIPT.replace("\nmain()\n", "\nrospy.init_node('a')\nrospy.spin()\n")}, [],
+    ),
     "sleeps-by-the-class": Case(
         swapped(TALKER, ("        rate.sleep()", "        rospy.Rate.sleep(0.1)")), ["missing-call"],
         "needs a Rate that was made", after={TALKER: "rospy.sleep(0.1)"},

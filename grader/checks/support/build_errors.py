@@ -603,7 +603,7 @@ def _not_catkin(found: re.Match[str], package: PackageFacts, _lines: Sequence[st
 
 
 _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]], ...] = (
-    (r'Could not find a package configuration file provided by "([\w-]+)"', _missing_package),
+    (r'Could not find a package configuration file provided by "([\w-]+[,;.:]?)"', _missing_package),
     (r'By not providing "Find([\w-]+)\.cmake"', _missing_library),
     (r"Could NOT find ([\w-]+) \(missing:", _missing_library),
     (r"(add_\w+_files)\(\) directory not found: (\S+)", _missing_folder),
