@@ -158,6 +158,7 @@ def callbacks(tree):
     """Functions that ROS calls with another number of values than they take, and those that are called where the
     function itself is meant.
     """
+    yield from ending_callbacks(tree)
     functions = functions_in(tree)
     for node in walk(tree):
         name = called_name(node)

@@ -40,7 +40,6 @@ from script_names import (
 )  # fmt: skip
 from script_objects import (
     callbacks,
-    ending_callbacks,
     hidden_names,
     object_slips,
     queue_sizes,
@@ -72,7 +71,7 @@ def slips(tree):
         misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice,
         publishes_twice, callbacks, waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops,
         clock_values, counter_slips, counter_starts, without_effect, assigned_late, hidden_names, subscribed_again,
-        imports, taken_off, unstarted_servers, wrong_values, ending_callbacks,
+        imports, taken_off, unstarted_servers, wrong_values,
     )  # fmt: skip
     for find in finders:
         found += find(tree)
@@ -483,7 +482,7 @@ def deaf(loop, within):
     fixes = (
         [ASKS, *ends]
         if isinstance(loop, ast.While) or within
-        else ["write `if rospy.is_shutdown(): break` in it"]
+        else ["write `if rospy.is_shutdown(): break` below the `for` on line %d" % loop.lineno]
     )
     return slip(loop.lineno, "deaf", "the %s whether the node should end" % named, fix="; then ".join(fixes))
 
