@@ -186,6 +186,10 @@ _HABITS = (
     _Habit(r"^\s*(?:public\s+|private\s+|static\s+)*(void|function|func|fun|fn|sub|define|int|float|double|bool|string)"
            r"\s+\w+\s*\(.*\)", "a function begins with `def`, not with `{0}`",
            "", ((r"^(\s*)(?:public\s+|private\s+|static\s+)*\w+\s+(\w+\s*\(.*?\))\s*[:{]?$", r"\1def \2:"),)),
+    _Habit(r"^\s*def\s+\w+\s*:$", "the brackets `()` behind the name of the function are missing",
+           "", ((r"(\w)\s*:$", r"\1():"),)),
+    _Habit(r"^\s*[\w.]+\.(set_param|publish|sleep)\(.*\)\s*=(?!=)", "`{0}` gets its values in its brackets, not by `=`",
+           "", ((r"\(\s*\)\s*=\s*(.*)$", r"(\1)"), (r"\)\s*=(?!=)\s*(.*)$", r", \1)"))),
     _Habit(r"\bnew\s+[A-Za-z_]", "Python has no `new`", "leave it out", ((r"\bnew\s+", ""),)),
     _Habit(rf"^\s*(?!(?i:{_RESERVED}|print)\b)({_TYPES})\s+[A-Za-z_]\w*\s*(;*$|=[^=])",
            "a name has no type in Python", "leave `{0}` out, and give it a value",
@@ -490,6 +494,8 @@ def _with_quote(line: str, message: str, column: int | None) -> Iterator[str]:
     if other is None:
         return
     begin = line.index(quote, at) + 1
+    if re.search(r"[(,=]\s*[A-Za-z_]\w*(\.\w+)+$", line[:at]):  # `msg.data'`
+        yield line[:at] + line[at + 1 :]
     if opened := re.search(r"(?:[(,]|=)\s*(?=[^(),=\s\"'][^(),=\"']*$)", line[:at]):
         yield f"{line[: opened.end()]}{quote}{line[opened.end() :]}"
     for found in re.finditer(other, line[begin:]):

@@ -390,9 +390,22 @@ def _page(
         return slip.verdict(quoted(run))
     if absence := refusal(run, package):
         return absence.verdict(absence.why)
-    slip = _unread_variable(package, build, file, params)
+    slip = _misspelt_program(package, file, run, params) or _unread_variable(package, build, file, params)
     hint = f"{slip.file}: {slip.fix}" if slip else hint
     return failed(f"the script opens nothing in {params.program}{_words(package, file, run)}", hint=hint)
+
+
+NOT_FOUND = re.compile(r"/(?P<file>[^/\s]+): line (?P<line>\d+): (?P<name>\S+): command not found")
+
+
+def _misspelt_program(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams) -> Slip | None:
+    """Return the line of a shell script that calls the program by a slip of its name."""
+    paths = {PurePosixPath(path).name: path for path in _shell_scripts(package, file)}
+    for found in filter(None, (NOT_FOUND.search(without_colours(c.line)) for _, c in run.console)):
+        if found["file"] in paths and near_names(params.program, [found["name"]]):
+            fix = f"on line {found['line']}, write {params.program} instead of {found['name']}"
+            return Slip(paths[found["file"]], int(found["line"]), "", fix)
+    return None
 
 
 def _unread_variable(package: PackageFacts, build: Run, file: LaunchFile, params: OpensParams) -> Slip | None:

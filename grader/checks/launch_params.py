@@ -153,7 +153,7 @@ def _other_tag(
         return None
     name = PurePosixPath(params.file).name
     for number, line in enumerate(build.file_lines(file.path), start=1):
-        tag = re.search(r"<(param|include|rosparam)\b", line)
+        tag = re.search(r"<(?!node\b)([a-z][\w-]*)", line)
         if tag is not None and name in line:
             why = f"<{tag[1]}> does not load {params.file}"
             right = f'<rosparam file="$(find {package.name})/{params.file}" command="load"/>'

@@ -226,7 +226,7 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
         deaf = next((s for s in package.slips if s.kind == "deaf" and s.file == one.start.script), None)
         if deaf is not None:
             return failed(f"{message}: {deaf.message}", hint=deaf.fix, citations=(deaf.place,))
-        if excuse := _locked_up(one, run):
+        if excuse := _locked_up(one, run) or _asleep(one, package):
             return excuse
         hint = IN_A_LOOP + both("; a bare `except:` in the loop swallows the Ctrl-C", "")
         return failed(message, hint=hint).once()  # no line of the script is known to be why
@@ -237,6 +237,23 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     end = explain_traceback(own[-1], package)
     message = f"{_script(one)} ends on Ctrl-C with a traceback: {end.cause}"
     return failed(message, hint=end.hint or IN_A_LOOP, citations=end.citations)
+
+
+LONG_SLEEP_HZ = 0.5
+"""A loop of a lower rate can sleep for as long as Ctrl-C is waited for."""
+
+
+def _asleep(one: Life, package: PackageFacts) -> Verdict | None:
+    """Return that the node slept on after Ctrl-C, where its loop sleeps for long: its rate is judged elsewhere."""
+    rates = [s for s in package.slips if s.kind == "rate-number" and s.file == one.start.script]
+    slow = min(rates, key=lambda s: float(s.message), default=None)
+    if slow is None or float(slow.message) >= LONG_SLEEP_HZ:
+        return None
+    pause = seconds(round(1e9 / float(slow.message)))
+    slept = (
+        f"line {slow.line} lets it sleep for {pause} at a time, also after Ctrl-C, so its end is not counted"
+    )
+    return passed(f"{_script(one)} is one node and stayed alive; {slept}")
 
 
 def _locked_up(one: Life, run: Run) -> Verdict | None:

@@ -8,11 +8,13 @@ from pathlib import PurePosixPath
 
 from grader.checks.registry import ProcessName, check
 from grader.checks.support.parameters import (
+    INDENT,
     Key,
     absolute_name,
     describe_missing,
     duplicate_advice,
     explain_yaml,
+    explain_yaml_column,
     explain_yaml_line,
     keys_of,
     lines_of,
@@ -130,7 +132,9 @@ def _error(run: Run, one: Life, path: str, build: Run) -> Verdict | None:
     lines = [line.line for _, line in run.lines(one.name) if line.line.strip()]
     words = explain_yaml(lines)
     if words is not None and words.line is not None:
-        words = explain_yaml_line(text_of(build, path), words.line) or words
+        text = text_of(build, path)
+        column = explain_yaml_column(text, words.line) if words.hint == INDENT else None
+        words = explain_yaml_line(text, words.line) or column or words
     if words is not None:
         cited = (FileCitation(file=path, line=words.line),)
         return failed(f"{path} does not load: {words.why}", hint=words.hint, citations=cited)

@@ -18,6 +18,7 @@ from grader.checks.support.parameters import params_on_server, resolved_param, w
 from grader.checks.support.processes import PublishedTopic, life_of, lives, observed_until_ns, slips_of
 from grader.checks.support.text import LOOP, both, loop_rate
 from grader.checks.support.topics import (
+    SYSTEM_TOPICS,
     Sender,
     call_in_comment,
     cite,
@@ -31,7 +32,7 @@ from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import LaunchParam, PackageFacts, PythonSlip
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
-from grader.wording import hertz, plural, seconds, significant
+from grader.wording import hertz, join_words, plural, seconds, significant
 
 FLOOD_FACTOR = 5
 FLOOD_HZ = 500.0
@@ -275,7 +276,19 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     if slip is not None:
         return failed(f"{message}: {slip.message}", hint=slip.fix, citations=(slip.place,))
     hint = f"publish in a loop `{LOOP}`, not a fixed number of times"
+    if others := _goes_on(found, run, params):
+        message += f" and goes on publishing on {others}"
+        hint = f"publish on {params.topic} in the loop that publishes on {others} too"
     return failed(message, hint=hint).once()
+
+
+def _goes_on(found: Rhythm, run: Run, params: RateParams) -> str:
+    """Return the topics on which the same node publishes half of the time and longer after this one fell silent."""
+    callers = {c.callerid for c in run.student_channels(params.topic)}
+    since_ns = found.times_ns[-1] + found.tail_ns // 2
+    own = (c for c in run.student_channels() if c.callerid in callers and c.topic not in SYSTEM_TOPICS)
+    after = [c.topic for c in own if c.messages and c.messages[-1].log_time_ns > since_ns]
+    return join_words(topic for topic in dict.fromkeys(after) if topic != params.topic)
 
 
 def _asked_slow(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:

@@ -18,6 +18,7 @@ from grader.checks.support.launch import not_executable
 from grader.checks.support.launch_slips import node_slip, own_script
 from grader.checks.support.scripts import BACKUPS, PYTHON, SYNTAX, installed, is_product, names_script
 from grader.checks.support.text import RATE_SLOT, TYPE_SLOT, VALUE_SLOT, in_language
+from grader.installable import noetic_messages
 from grader.judging.facts import SOURCES, Facts, language_of
 from grader.model.package import LaunchFile, PackageFacts
 from grader.model.result import CriterionResult
@@ -63,8 +64,15 @@ def _points(package: PackageFacts) -> Iterator[_Point]:
             told = "" if hint == fault.advice else f"; {hint}"
             text = f"{file.path} has a syntax error: {why}{told}"
             yield _Point(FileCitation(file=file.path), text)
+    known = noetic_messages()
+    no_messages = {
+        (s.file, f"write {s.name} instead of ")
+        for s in package.slips
+        if s.kind == "unused-import" and s.name not in known.get(s.message, {s.name: ()})
+    }
     for slip in package.slips:
-        if slip.kind == "misspelt" and not is_product(slip.file):
+        is_right = any(slip.file == file and slip.fix.startswith(fix) for file, fix in no_messages)
+        if slip.kind == "misspelt" and not is_right and not is_product(slip.file):
             text = f"{slip.file}, line {slip.line}: `{slip.name}` is not defined anywhere: {slip.message}"
             yield _Point(slip.place, text)
     for launch in package.launch_files:

@@ -122,9 +122,19 @@ def _imports_again(fix: str, hint: str) -> bool:
     return bool(code) and fix.endswith("at the top") and all(f"`{one}`" in hint for one in code)
 
 
+def _is_said(fix: str, hint: str) -> bool:
+    """Return whether the hint has a further fix already: in the same words, with its line in front, or by giving the
+    method another name that nothing calls."""
+    line = re.match(r"write (`.+`) on (line \d+)\b", fix)
+    uncalled = re.match(r"call `(?:.*\.)?(\w+)\(\)`, which nothing", fix)
+    before = line is not None and f"on {line[2]}, write {line[1]}" in hint
+    renamed = uncalled is not None and f"instead of `{uncalled[1]}`" in hint
+    return fix.removeprefix("publish ") in hint or before or renamed
+
+
 def _with_later(verdict: Verdict, later: Iterable[str], retyped: Mapping[str, tuple[str, str]]) -> Verdict:
     hint, said = verdict.hint, in_language(verdict.hint, "python")
-    new = [one for one in dict.fromkeys(later) if one.removeprefix("publish ") not in said]
+    new = [one for one in dict.fromkeys(later) if not _is_said(one, said)]
     told = [one for one in new if not _imports_again(one, hint)]
     if not told or not hint:
         return verdict

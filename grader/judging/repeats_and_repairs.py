@@ -52,6 +52,8 @@ OF_SYNTAX = {"python-syntax", "launch-syntax"}
 """Of a line that could not be read, the copy shows for the first time what it says."""
 AT_ANY_RATE = {"node-name", "node-lives", "topic-type"}
 """Checks of runs that a loop which does not sleep passes too."""
+OF_ANY_WORDS = AT_ANY_RATE | {"rate", "connected", "launch-connects", "launch-runs"}
+"""Checks of runs that a node passes whatever it says."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 OF_PACKAGES = {MANIFEST, CMAKE}
 GENERATION = re.compile(
@@ -203,7 +205,9 @@ def concerns(
     """
     if criterion.scenario is not None:
         sleeps = repair.before.endswith(".sleep") and repair.after == f"{repair.before}()"
-        return not (sleeps and criterion.check in AT_ANY_RATE) and is_used_by(
+        words = repair.kind == "missing-call" and repair.before.replace("+", "%", 1) == repair.after
+        of_others = AT_ANY_RATE if sleeps else OF_ANY_WORDS if words else set[str]()
+        return criterion.check not in of_others and is_used_by(
             rubric.scenarios[criterion.scenario], repair, rubric, built=built, launched=launched
         )
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
@@ -214,8 +218,9 @@ def concerns(
     seen = f"{found[criterion.id].message} {found[criterion.id].measured}"
     if repair.kind == "file-name" and PurePosixPath(repair.before).name in seen:
         return True
-    if found[criterion.id].blocked_by:
-        return any(_asks_for(found[name], repair) for name in criterion.requires)
+    if root := found[criterion.id].blocked_by:
+        asking = criterion.requires if repair.kind in NAMES else (root,)
+        return any(_asks_for(found[name], repair) for name in asking)
     return repair.kind not in OF_BUILDS and _asks_for(found[criterion.id], repair)
 
 
@@ -336,7 +341,8 @@ def _charges(
     needs: Mapping[str, tuple[Repair, ...]],
 ) -> dict[Repair, set[str]]:
     """Return for each repair the criterion that asks for what was wrong: one of the files, else by its name where a
-    name was wrong, else the first that failed by itself, and not for its name. What others require comes first."""
+    name was wrong, else the first that failed by itself, at best in that file, and not for its name. What others
+    require comes first."""
     charges: dict[Repair, set[str]] = {}
     misnamed: set[str] = set()
     by_id = {c.id: c for c in rubric.criteria}
@@ -357,15 +363,22 @@ def _charges(
         own = [c for c in rubric.criteria if repair.kind == "node-name" and _names(c, repair)]
         if any(first[c.id].status.is_lost and c.id not in better for c in own):
             continue  # the criterion of the name says by itself what is wrong with it
-        possible = [c for c in criteria if repair in needs[c.id]]
+        possible = [c for c in criteria if repair in needs[c.id] and _may_ask_for(first[c.id], repair)]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
+        citing = [c for c in failing if _cites(first[c.id], repair)]
         builds = [c for c in possible if repair.kind in OF_BUILDS and c.check == BUILD]
-        counting = [c.id for c in (*builds, *named, *failing, *possible) if c.points > 0]
+        counting = [c.id for c in (*builds, *named, *citing, *failing, *possible) if c.points > 0]
         other = [name for name in counting if name not in misnamed]
         charges[repair] = set((counting if named else other or counting)[:1])
         misnamed |= charges[repair] if named else set()
     return charges
+
+
+def _may_ask_for(found: Verdict, repair: Repair) -> bool:
+    """Return whether a criterion can be lost by what was repaired: by what keeps a script from being started only where
+    that script is named."""
+    return repair.kind not in DONE_BEFORE_RUNS or PurePosixPath(repair.file).name in found.message
 
 
 def _seeks(found: Verdict, repair: Repair) -> bool:

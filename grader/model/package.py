@@ -289,10 +289,11 @@ class PythonSlip(Record):
     back before one is added. `never-called`: a function that makes a node, publishes or waits, and that nothing
     calls; `main-guard`: `__name__` is compared with another word than `__main__`. `never-reached`: an endless loop
     before the first `publish(…)`; `spin-in-loop`: a loop that publishes and waits in `spin()`; `loop-left`: a loop
-    that ends in its first turn, or after a number of them; `sleep-outside`: a loop whose `sleep()` is outside it;
-    `sleep-twice`: a loop that waits twice in each turn; `publish-twice`: one that publishes on one topic more than
-    once in each turn. `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it
-    should only be named, that takes another number of values than ROS passes, or that does not exist.
+    that ends in its first turn, or after a number of them, or a callback that ends the node; `sleep-outside`: a loop
+    whose `sleep()` is outside it; `sleep-twice`: a loop that waits twice in each turn; `publish-twice`: one that
+    publishes on one topic more than once in each turn. `callback-called`, `callback-values`, `callback-missing`: a
+    callback that is called where it should only be named, that takes another number of values than ROS passes, or
+    that does not exist.
     `callback-waits`: a topic's or service's callback that sleeps, or never ends. `queue-size`: a queue size that is a
     text, with which rospy sends nothing. `clock-value`: the values of the topic `message` are read from a clock, and
     nothing is counted. `deaf`: why the node goes on after Ctrl-C. `outside-method`: a call in a class, but outside

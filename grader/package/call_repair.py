@@ -12,10 +12,12 @@ import ast
 import builtins
 import re
 from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 from itertools import chain, pairwise
 from typing import Literal, NamedTuple, TypeGuard
 
 from grader.package.member_repair import with_place
+from grader.package.name_repair import bound_in
 from grader.package.syntax_repair import (
     Step,
     edited,
@@ -197,6 +199,7 @@ def _wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
     """Yield what calls of rospy's are given in another form than they take it."""
     types, of_rospy = _imported(tree, "msg"), _imported(tree, "rospy")
     functions = {one.name for one in tree.body if isinstance(one, ast.FunctionDef)}
+    methods = {f"self.{n.name}" for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
     values = [(t, n.value) for n in nodes_in(tree) if isinstance(n, ast.Assign) for t in n.targets]
     rates = {ast.unparse(target) for target, value in values if _called(value) == "Rate"}
     of_numbers = {
@@ -205,7 +208,13 @@ def _wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
     yield from _published_nothing(tree)
     for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call)):
         name = _called(call)
-        if name == "sleep" and isinstance(call.func, ast.Attribute) and ast.unparse(call.func.value) in rates:
+        if ast.unparse(call.func) == "rospy.Rate.sleep" and call.args and _is_number(call.args[0]):
+            yield Argument(
+                [(call.func, "rospy.sleep")], "`Rate.sleep` needs a Rate that was made, as in `rate.sleep()`"
+            )
+        elif (
+            name == "sleep" and isinstance(call.func, ast.Attribute) and ast.unparse(call.func.value) in rates
+        ):
             if call.args:
                 yield Argument(
                     [(call, f"{ast.unparse(call.func)}()")], "a Rate already knows how long to sleep"
@@ -219,6 +228,7 @@ def _wrong_arguments(tree: ast.Module) -> Iterator[Argument]:
             yield from _type_of_topic(call, types, functions) if name in {"Publisher", "Subscriber"} else ()
             yield from _numbers(call, name)
             yield from _callback(call, name, functions)
+            yield from _subscribed(call, name, functions | methods)
             yield from _without_quotes(call, name, functions)
 
 
@@ -285,17 +295,31 @@ def _names_beside(function: ast.FunctionDef, call: ast.Call) -> set[str]:
 
 
 def _published_nothing(tree: ast.Module) -> Iterator[Argument]:
-    """Yield `publish()` where its function gives a value to one name and does nothing with it, or its block to one."""
+    """Yield `publish()`, or a `publish(x)` of a name that is given no value anywhere, where its function gives a value
+    to one name and does nothing with it, or its block to one that nothing else publishes."""
+    known = {name for one in tree.body for name in bound_in(ast.Module([one], []))} | set(dir(builtins))
     for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
         names = [n for n in nodes_in(function) if isinstance(n, ast.Name)]
         read = {n.id for n in names if isinstance(n.ctx, ast.Load)}
         unread = {n.id for n in names if isinstance(n.ctx, ast.Store)} - read
-        calls = [n for n in nodes_in(function) if _called(n) == "publish" and isinstance(n, ast.Call)]
-        beside = _names_beside(function, calls[0]) if len(calls) == 1 else set()
+        published = [n for n in nodes_in(function) if isinstance(n, ast.Call) and _called(n) == "publish"]
+        calls = [n for n in published if not n.keywords and _gives_nothing(n, known)]
+        others = {ast.unparse(given) for n in published if n not in calls for given in n.args}
+        beside = _names_beside(function, calls[0]) - others if len(calls) == 1 else set()
         meant = unread if len(unread) == 1 else beside
-        if len(meant) == len(calls) == 1 and not calls[0].args and not calls[0].keywords:
-            edit = (calls[0], f"{ast.unparse(calls[0].func)}({meant.pop()})")
-            yield Argument([edit], "there is nothing to publish in the brackets")
+        if len(meant) == len(calls) == 1:
+            name, given = meant.pop(), calls[0].args
+            why = f"nothing gives `{ast.unparse(given[0])}` a value" if given else NOTHING_PUBLISHED
+            yield Argument([(calls[0], f"{ast.unparse(calls[0].func)}({name})")], why)
+
+
+NOTHING_PUBLISHED = "there is nothing to publish in the brackets"
+
+
+def _gives_nothing(call: ast.Call, known: AbstractSet[str]) -> bool:
+    """Return whether a call has no argument, or just one name that is given no value anywhere."""
+    first = call.args[0] if len(call.args) == 1 else None
+    return not call.args or (isinstance(first, ast.Name) and first.id not in known and "*" not in known)
 
 
 def _logged(call: ast.Call) -> Iterator[Argument]:
@@ -395,6 +419,15 @@ def _callback(call: ast.Call, name: str, functions: set[str]) -> Iterator[Argume
         for one in given:
             if _is_text(one) and one.value in functions:
                 yield Argument([(one, one.value)], f"'{one.value}' is a string, not a function")
+
+
+def _subscribed(call: ast.Call, name: str, functions: set[str]) -> Iterator[Argument]:
+    """Of `Publisher('x', String, on_x)`, which is given a callback."""
+    given = ast.unparse(call.args[2]) if name == "Publisher" and len(call.args) > 2 else ""
+    if given in functions:
+        meant = ast.unparse(call.func).replace("Publisher", "Subscriber")
+        why = f"a Publisher takes no callback: `{given}` is called by a Subscriber"
+        yield Argument([(call.func, meant)], why)
 
 
 def _without_quotes(call: ast.Call, name: str, functions: set[str]) -> Iterator[Argument]:

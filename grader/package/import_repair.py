@@ -122,16 +122,20 @@ def with_classes(text: str, types: list[str]) -> Iterator[Step]:
 
 
 def _with_class_imported(text: str, node: ast.Import, known: dict[str, set[str]]) -> Iterator[Step]:
-    parts = node.names[0].name.split(".")
-    package, module, name = parts if len(parts) == 3 else ("", "", "")
-    lines, at = text.split("\n"), node.lineno - 1
-    if len(node.names) > 1 or node.names[0].asname or module != "msg" or name not in known.get(package, ()):
+    tree, lines, at = tree_of(text), text.split("\n"), node.lineno - 1
+    for one in node.names:
+        parts = one.name.split(".")
+        package, module, name = parts if len(parts) == 3 else ("", "", "")
+        if one.asname or module != "msg" or name not in known.get(package, ()):
+            continue
+        used = any(isinstance(n, ast.Attribute) and ast.unparse(n) == one.name for n in nodes_in(tree))
+        right = f"import {package}.msg" if used else f"from {package}.msg import {name}"
+        after = re.sub(rf"import\s+{re.escape(one.name)}\b", right, lines[at], count=1)
+        if others := [ast.unparse(ast.Import([other])) for other in node.names if other is not one]:
+            blanks = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
+            after = "\n".join(blanks + line for line in (*others, right))
+        yield from step_to("module", at + 1, text, with_line(lines, at, after), one.name)
         return
-    whole = f"{package}.msg.{name}"
-    used = any(isinstance(n, ast.Attribute) and ast.unparse(n) == whole for n in nodes_in(tree_of(text)))
-    right = f"import {package}.msg" if used else f"from {package}.msg import {name}"
-    after = re.sub(rf"import\s+{re.escape(whole)}\b", right, lines[at], count=1)
-    yield from step_to("module", at + 1, text, with_line(lines, at, after), whole)
 
 
 def _with_inner_module(text: str, node: ast.Import) -> Iterator[Step]:

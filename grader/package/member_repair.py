@@ -242,15 +242,25 @@ def _lost_values(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str
 
 
 def _lost_places(text: str, _names: Collection[str]) -> Iterator[tuple[Edit, str]]:
-    """Yield `"hello world s" % x` and `"hello world %s" & x`."""
-    lines = text.split("\n")
-    for node in (n for n in nodes_in(tree_of(text)) if isinstance(n, ast.BinOp)):
+    """Yield `"hello world s" % x`, `"hello world %s" & x` and `"hello world %s" + x`."""
+    tree, lines = tree_of(text), text.split("\n")
+    calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call) and len(n.args) > 1]
+    with_values = {id(n) for one in calls for n in nodes_in(one.args[0])}
+    with_values |= {
+        id(n.left) for n in nodes_in(tree) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Mod)
+    }
+    for node in (n for n in nodes_in(tree) if isinstance(n, ast.BinOp)):
         left, span = node.left, span_of(lines, node.left)
         if not isinstance(left, ast.Constant) or not isinstance(left.value, str) or span is None:
             continue
         line, start, end = span
         if isinstance(node.op, ast.BitAnd) and "%" in left.value and (at := lines[line].find("&", end)) >= 0:
             yield ((line, at, at + 1), "%"), "`%` belongs between a string and its values, and not `&`"
+        plain = isinstance(node.right, ast.Name | ast.Attribute | ast.Call)
+        added = isinstance(node.op, ast.Add) and plain and id(node) not in with_values
+        alone = re.fullmatch(r"[^%]*%s\W*", left.value)
+        if added and alone and (at := lines[line].find("+", end)) >= 0:
+            yield ((line, at, at + 1), "%"), "`%` belongs between a string and its values, and not `+`"
         doubled = lines[line][start:end].replace("%%", "%")
         if isinstance(node.op, ast.Mod) and re.fullmatch(r"[^%]*%%[sdf][^%]*", left.value):
             yield (span, doubled), "`%%` is a plain `%`, and no place for a value"

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import ast
 import builtins
+import re
 from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 
-from grader.package.syntax_repair import Step, edited, nodes_in, span_of, step_to, tree_of
+from grader.package.syntax_repair import Step, edited, last_name, nodes_in, span_of, step_to, tree_of
 from grader.wording import is_one_edit
 
 OF_PYTHON = (
@@ -64,6 +65,62 @@ def with_self(text: str) -> Iterator[Step]:
 OF_SELF = "a method's own object is called `self`, and not `%s`"
 
 
+def with_methods(text: str) -> Iterator[Step]:
+    """`def _init_(self):` of a class whose objects get their attributes there, and `def run():` of a method that is
+    called on an object."""
+    tree, lines = tree_of(text), text.split("\n")
+    for method, beside, read in _methods_of_objects(tree):
+        at = method.lineno - 1
+        head = re.match(r"(\s*def\s+)(\w+)(\s*\(\s*)", lines[at])
+        if head is None:
+            continue
+        before, name, bracket = head.groups()
+        line, why = lines[at], ""
+        if _is_meant_as_init(method, beside) and name not in read:
+            line, why = f"{before}__init__{bracket}{line[head.end() :]}", OF_INIT % name
+        elif name in {*read, "__init__"} and _lacks_self(method):
+            comma = ", " if method.args.args else ""
+            line, why = f"{head[0]}self{comma}{line[head.end() :]}", WITHOUT_SELF % name
+        after = "\n".join([*lines[:at], line, *lines[at + 1 :]])
+        for step in step_to("argument", method.lineno, text, after, why):
+            yield step
+            yield from with_methods(step["text"])
+            return
+
+
+OF_INIT = "Python calls the method `__init__` of a new object, and never `%s`"
+WITHOUT_SELF = "`%s` is called on an object, and takes no `self`"
+
+
+def _methods_of_objects(tree: ast.Module) -> Iterator[tuple[ast.FunctionDef, set[str], set[str]]]:
+    """Yield the methods of classes of which the script makes objects, with the names of all of the class's methods, and
+    those that are read of its objects."""
+    nodes = nodes_in(tree)
+    for one in (n for n in tree.body if isinstance(n, ast.ClassDef)):
+        made = {id(n) for n in nodes if isinstance(n, ast.Call) and last_name(n.func) == one.name}
+        values = ((n.targets[0], n.value) for n in nodes if isinstance(n, ast.Assign))
+        objects = {ast.unparse(target) for target, value in values if id(value) in made} | {"self"}
+        methods = [m for m in one.body if isinstance(m, ast.FunctionDef) and not m.decorator_list]
+        names = {m.name for m in methods}
+        parts = (n for n in nodes if isinstance(n, ast.Attribute))
+        read = {n.attr for n in parts if id(n.value) in made or ast.unparse(n.value) in objects}
+        yield from ((method, names, read) for method in methods if made)
+
+
+def _is_meant_as_init(method: ast.FunctionDef, beside: Collection[str]) -> bool:
+    """Return whether a method has nearly the name `__init__`, which its class lacks, and gives objects attributes."""
+    near = method.name.replace("_", "").lower() in ("init", "int", "inti", "ini")
+    stores = any(isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store) for n in nodes_in(method))
+    return near and stores and "__init__" not in beside
+
+
+def _lacks_self(method: ast.FunctionDef) -> bool:
+    """Return whether a method takes no argument, or uses a `self` that it does not take."""
+    taken = {one.arg for one in (*method.args.posonlyargs, *method.args.args)}
+    used = {n.id for n in nodes_in(method) if isinstance(n, ast.Name)}
+    return method.args.vararg is None and (not taken or ("self" in used and "self" not in taken))
+
+
 def with_names(text: str) -> Iterator[Step]:
     """`true`, `rospu` and `Sting`: a name that nothing in the file has, and one alone is nearly the same."""
     tree, lines = tree_of(text), text.split("\n")
@@ -82,6 +139,7 @@ def with_names(text: str) -> Iterator[Step]:
     for block in blocks:
         own = shared | (bound_in(ast.Module([block], [])) if isinstance(block, ast.FunctionDef) else set())
         missing = [n for n in nodes_in(block) if isinstance(n, ast.Name) and n.id not in known]
+        missing += _read_for_themselves(block, shared)
         stated = (n.value for n in nodes_in(block) if isinstance(n, ast.Expr))
         alone = {n.id for n in stated if isinstance(n, ast.Name) and is_one_edit(n.id.lower(), "pass")}
         for name in dict.fromkeys(n.id for n in missing):
@@ -97,6 +155,18 @@ def with_names(text: str) -> Iterator[Step]:
                     yield step
                     yield from with_names(text)
                     return
+
+
+def _read_for_themselves(block: ast.stmt, shared: Collection[str]) -> Iterator[ast.Name]:
+    """Yield `talker` of `talker = talker()` where nothing else is called so, and a class `Talker` is there."""
+    nodes = nodes_in(block)
+    stored = [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    for one in (n for n in nodes if isinstance(n, ast.Assign) and isinstance(n.value, ast.Call)):
+        made, target = one.value.func, one.targets[0]  # type: ignore[attr-defined] # it is a call
+        own = isinstance(made, ast.Name) and isinstance(target, ast.Name) and made.id == target.id
+        others = {name for name in shared if name != getattr(made, "id", "")}
+        if own and stored.count(made.id) == 1 and any(made.id.lower() == name.lower() for name in others):
+            yield made
 
 
 def _is_guard(node: ast.stmt) -> bool:

@@ -75,6 +75,7 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
     (r"Missing parentheses in call to '(\w+)'", "`{0}` has no brackets, as in Python 2", "write `{0}(...)`"),
     (r"multiple exception types", "this is Python 2", "write `except Error as name:`"),
     (r"leading zeros in decimal", "a number may not begin with 0", "write 777, or 0o777 for an octal one"),
+    (r"expected '\('", "the brackets `()` behind the name of the function are missing"),
     (r"expected ':'", "a colon `:` is missing at the end of the line"),
     (r"'(.)' was never closed", "the bracket `{0}` is opened on this line and never closed"),
     (r"unmatched '(.)'",

@@ -28,7 +28,7 @@ from grader.package.call_repair import (
 )
 from grader.package.import_repair import with_classes, with_imports, with_message_classes, with_modules
 from grader.package.member_repair import with_members
-from grader.package.name_repair import bound_in, meant_by, with_names, with_self
+from grader.package.name_repair import bound_in, meant_by, with_methods, with_names, with_self
 from grader.package.syntax_repair import (
     Step,
     as_python3,
@@ -102,6 +102,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             lambda t: with_members(t, ROSPY),
             _with_quotes,
             with_names,
+            with_methods,
             _with_attributes,
             with_message_classes,
             with_values_called,
@@ -111,6 +112,7 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
             with_arguments,
             with_globals,
             with_lines_turned,
+            _with_lines_inside,
             _with_start,
             _with_main,
             _with_spin,
@@ -253,6 +255,30 @@ def _with_start(text: str) -> Iterator[Step]:
 
 BLANK_LINES = 2
 """So many stand between a function and what comes after it (PEP 8)."""
+
+
+def _with_lines_inside(text: str) -> Iterator[Step]:
+    """`rospy.spin()`, or a loop, right below the function that makes the node, and outside of it."""
+    tree, lines = tree_of(text), text.split("\n")
+    shared = {name for one in tree.body for name in bound_in(ast.Module([one], [])) if _is_plain(one)}
+    for function, below in pairwise(tree.body):
+        if not isinstance(function, ast.FunctionDef) or below.lineno != (function.end_lineno or 0) + 1:
+            continue
+        calls = {last_name(n.func) for n in nodes_in(function) if isinstance(n, ast.Call)}
+        own = bound_in(ast.Module([function], [])) - shared
+        used = {n.id for n in nodes_in(below) if isinstance(n, ast.Name)}
+        spins = isinstance(below, ast.Expr) and ast.unparse(below.value) == "rospy.spin()"
+        loops = isinstance(below, ast.While) and bool(own & used)
+        if "init_node" in calls and not calls & LOOPED and (spins or loops):
+            first, end = below.lineno - 1, below.end_lineno or below.lineno
+            moved = [" " * function.body[-1].col_offset + line for line in lines[first:end]]
+            after = "\n".join([*lines[:first], *moved, *lines[end:]])
+            yield from step_to("inside", below.lineno, text, after, function.name)
+            return
+
+
+def _is_plain(statement: ast.stmt) -> bool:
+    return not isinstance(statement, ast.FunctionDef | ast.ClassDef)
 
 
 def _with_main(text: str) -> Iterator[Step]:

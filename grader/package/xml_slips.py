@@ -74,7 +74,7 @@ _PATTERNS = (
     (r"(=\s*([\"'])[^\"'<>]+)\2(?=\2)", r"\1", "a quote is there twice"),
     (r"(=\s*)([\"'])(?=\2[^\"'<>\s/?])", r"\1", "a quote is there twice"),
     (r"^(\s*)<?(?:[^\w\s]|_){1,6}(?=(?:(?!-->|<).)*-->\s*$)", r"\1<!--", "a comment begins with `<!--`"),
-    (r"^(\s*<!--(?:(?!--).)*?)\s*[-_<>=.]{1,4}\s*$", r"\1 -->", "a comment ends with `-->`"),
+    (r"^(\s*<!--(?:(?!--).)*?)\s*[-_<>=.!]{1,5}\s*$", r"\1 -->", "a comment ends with `-->`"),
     (r"-{3,}(?=>)|(?<=<!)-{3,}", "--", "a comment is written between `<!--` and `-->`"),
     (r"\\>", "/>", "the tag ends with `/>`, and not with `\\>`"),
     (r"<\\(NAMES)>", r"</\1>", "a closing tag begins with `</`, and not with `<\\`"),

@@ -45,7 +45,7 @@ from std_msgs.msg import Int8
         (6, "pub.publish('a')", "NameError: name 'pub' is not defined",
          "on line 6, write self.pub instead of pub; write `from std_msgs.msg import String` at the top"),
         (6, "talker.run()", "TypeError: run() takes 0 positional arguments but 1 was given",
-         "write `def run(self):`"),
+         "make it `def run(self):`"),
         (6, 'pub = rospy.Publisher(String, "chatter", queue_size=10)',
          "ValueError: topic name is not a non-empty string",
          'write `pub = rospy.Publisher("chatter", String, queue_size=10)`'),

@@ -744,6 +744,53 @@ CASES = {
         "src/numeric_pub.py should be called talker.py",
         wanted=asking(does=((TALKER, "publisher", "/numeric_chatter"), (TALKER, "node-name", "talker"))),
     ),
+    "encoding-of-no-name": Case(
+        swapped(TALKER, ("import rospy\n", "# -*- coding: uft-8 -*-\nimport rospy\n")), ["python-syntax"],
+        "line 2 of src/talker.py: Python knows no encoding uft-8", after={TALKER: "# -*- coding: utf-8 -*-\n"},
+    ),
+    "message-and-module-imported-at-once": Case(
+        swapped(TALKER, ("import rospy\nfrom std_msgs.msg import Int8\n", "import rospy, std_msgs.msg.Int8\n")),
+        ["missing-import"], "messages are not imported from std_msgs.msg.Int8", after={TALKER: SCRIPT},
+    ),
+    "method-of-the-class-itself": Case(
+        swapped(TALKER, ("def main():", "class T:\n    def half():\n        return 5\n\ntool = T()\n\ndef main():"),
+                ("publish(1)", "publish(T.half())")), [],
+    ),
+    "method-of-the-name-of-a-function-of-rospys": Case(
+        swapped(TALKER, ("def main():", "class T:\n    def sleep():\n        return 5\n\ntool = T()\n\ndef main():"),
+                ("publish(1)", "publish(T.sleep())")), [],
+    ),
+    "method-that-makes-a-number-of-an-object": Case(
+        swapped(TALKER, ("def main():", "class T:\n    def __int__(self):\n        return 5\n\nt = T()\n\ndef main():"),
+                ("publish(1)", "publish(int(t))")), [],
+    ),
+    "spin-outside-of-its-function": Case(
+        {TALKER: "import rospy\nfrom std_msgs.msg import Int8\n\ndef main():\n    rospy.init_node('talker')\n"
+                 "    rospy.Subscriber('numeric_chatter', Int8, print)\nrospy.spin()\n\nmain()\n"},
+        ["shebang", "missing-call"], "start line 7 with 4 spaces", after={TALKER: "print)\n    rospy.spin()\n"},
+    ),
+    "loop-outside-of-its-function": Case(
+        swapped(TALKER, ("    while", "while"), ("        pub", "    pub"), ("        rate", "    rate")),
+        ["missing-call"], "start line 9 with 4 spaces and lines 10 and 11 with 8 spaces", after={TALKER: SCRIPT},
+    ),
+    "spin-at-the-end-of-a-script": Case(
+        {TALKER: SCRIPT.replace("\nmain()\n", "\nrospy.init_node('a')\nrospy.spin()\n")}, [],
+    ),
+    "sleeps-by-the-class": Case(
+        swapped(TALKER, ("        rate.sleep()", "        rospy.Rate.sleep(0.1)")), ["missing-call"],
+        "needs a Rate that was made", after={TALKER: "rospy.sleep(0.1)"},
+    ),
+    "text-added-to-its-place": Case(
+        swapped(TALKER, ("rate.sleep()", "rate.sleep()\n        rospy.loginfo('at %s' + rospy.get_name())")),
+        ["missing-call"], "and not `+`", after={TALKER: "rospy.loginfo('at %s' % rospy.get_name())"},
+    ),
+    "text-added-to-a-text-with-a-place": Case(
+        swapped(TALKER, ("rate.sleep()", "rate.sleep()\n        print('at ' + '%s' % rospy.get_name())")), [],
+    ),
+    "comment-that-ends-otherwise": Case(
+        {LAUNCHED: LAUNCH.replace("<launch>\n", "<launch>\n  <!-- the talker --!>\n")}, ["launch-syntax"],
+        "a comment ends with `-->`", after={LAUNCHED: "  <!-- the talker -->\n"},
+    ),
     "nothing": Case({}, []),
 }  # fmt: skip
 

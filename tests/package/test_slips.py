@@ -108,6 +108,8 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node(LOOP + "        p.publish(1)\n        rospy.spin()\n") + CALLED,
          [("spin-in-loop", 6, "stops at the spin()")]),
         (node(LOOP + "        p.publish(1)\n        break\n") + CALLED, [("loop-left", 6, "at the break on line 6")]),
+        ("def heard(msg):\n    rospy.signal_shutdown('x')\nrospy.Subscriber('x', A, heard)\nrospy.spin()\n",
+         [("loop-left", 2, "the callback `heard` ends the node on line 2, at the first message")]),
         (node("    for i in range(9):\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "write `while not rospy.is_shutdown():` on line 4")]),
         (node("    for i in range(9):\n        p.publish(i)\n") + CALLED, [("loop-left", 4, "put it inside a `while")]),

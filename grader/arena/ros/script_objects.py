@@ -158,6 +158,7 @@ def callbacks(tree):
     """Functions that ROS calls with another number of values than they take, and those that are called where the
     function itself is meant.
     """
+    yield from ending_callbacks(tree)
     functions = functions_in(tree)
     for node in walk(tree):
         name = called_name(node)
@@ -297,6 +298,25 @@ def queue_sizes(tree):
                 size = one.value.value[:TEXT_LIMIT]
                 fix = "write `queue_size=%s`, without quotes" % (size or "10")
                 yield slip(one.value.lineno, "queue-size", "`queue_size` is a string", fix=fix)
+
+
+ENDING = ("signal_shutdown", "exit", "quit", "_exit")
+"""Calls that end the node."""
+
+
+def ending_callbacks(tree):
+    """Callbacks of topics that end the node at the first message."""
+    functions = functions_in(tree)
+    for node in walk(tree):
+        given = argument(node, 2, "callback") if called_name(node) == "Subscriber" else []
+        own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
+        for one in own.body if own is not None else ():
+            if isinstance(one, ast.Expr) and called_name(one.value) in ENDING:
+                message = "the callback `%s` ends the node on line %d, at the first message" % (
+                    own.name,
+                    one.lineno,
+                )
+                yield slip(one.lineno, "loop-left", message, fix="delete line %d" % one.lineno)
 
 
 def takes(function, bound):

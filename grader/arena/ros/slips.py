@@ -482,7 +482,7 @@ def deaf(loop, within):
     fixes = (
         [ASKS, *ends]
         if isinstance(loop, ast.While) or within
-        else ["write `if rospy.is_shutdown(): break` in it"]
+        else ["write `if rospy.is_shutdown(): break` below the `for` on line %d" % loop.lineno]
     )
     return slip(loop.lineno, "deaf", "the %s whether the node should end" % named, fix="; then ".join(fixes))
 

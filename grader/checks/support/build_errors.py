@@ -15,10 +15,11 @@ from grader.checks.support.text import near_names, shown
 from grader.installable import (
     LIBRARIES,
     ON_THE_MACHINE,
-    ROS_2,
+    PLACEHOLDERS,
     exists_somewhere,
     install_hint,
     known_packages,
+    no_package_of_ros,
     noetic_messages,
 )
 from grader.model.message_definitions import meant_type
@@ -160,20 +161,13 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
         why = f"find_package(…) reads {name} as the name of a package: the keyword is COMPONENTS"
         return Explained(why, f"write COMPONENTS instead of {name}")
     if slips := _misspelt_components(package):
-        wrong, right = (
-            join_words(slips),
-            "; ".join(f"write {new} instead of {old}" for old, new in slips.items()),
-        )
-        what = (
-            "there is no package of that name" if len(slips) == 1 else "there are no packages of these names"
-        )
+        right = "; ".join(f"write {new} instead of {old}" for old, new in slips.items())
+        what = "is no package of that name" if len(slips) == 1 else "are no packages of these names"
         declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
         too = "; in package.xml too" if declared.intersection(slips) else ""
-        return Explained(f"find_package(…) names {wrong}, and {what}", f"{right}{too}")
-    if explained := _of_submission(name, (package, *package.also)):
+        return Explained(f"find_package(…) names {join_words(slips)}, and there {what}", f"{right}{too}")
+    if explained := _of_submission(name, (package, *package.also)) or _of_no_package(name):
         return explained
-    if name in ROS_2:
-        return Explained(f"it needs {name}, which is from ROS 2", f"take {name} out: this lab is for ROS 1")
     placeholder = re.fullmatch(r"dep(end)?\d", name) is not None
     own = {package.name, *(one.name for one in package.also)}
     if name in known_packages() or (not near and not placeholder and exists_somewhere(name, own)):
@@ -188,6 +182,11 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
     why = f"find_package(…) names {name}, but there is no package of that name"
     example = ": it is only a placeholder in the help text of catkin_create_pkg" if placeholder else ""
     return Explained(f"{why}{example}", hint)
+
+
+def _of_no_package(name: str) -> Explained | None:
+    told = no_package_of_ros(name)
+    return Explained(*told) if told else None
 
 
 def _missing_library(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
@@ -521,21 +520,19 @@ def _no_semicolon_above(found: re.Match[str], _package: PackageFacts, lines: Seq
 
 
 def _no_brace(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    return Explained(
-        f"{found.string}: a `}}` is missing",
-        "write a `}` for each `{`; the indentation shows where one is missing",
-    )
+    hint = "write a `}` for each `{`; the indentation shows where one is missing"
+    return Explained(f"{found.string}: a `}}` is missing", hint)
 
 
 def _explain_undeclared(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     name, near = found[1], found[2]
     if name in STANDARD:
         return Explained(found.string, f"write std::{name}, and #include <{STANDARD[name]}> at the top")
+    if re.fullmatch(r"_[1-9]", name):
+        return Explained(f"{found.string}: not every ROS has it", PLACEHOLDERS.format(name), of_machine=True)
     declare = f"declare {name} above that line, or include the header that does"
-    return Explained(
-        found.string,
-        f"write {near} there, if that is what you mean; otherwise {declare}" if near else declare,
-    )
+    hint = f"write {near} there, if that is what you mean; otherwise {declare}" if near else declare
+    return Explained(found.string, hint)
 
 
 def _no_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -606,7 +603,7 @@ def _not_catkin(found: re.Match[str], package: PackageFacts, _lines: Sequence[st
 
 
 _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]], ...] = (
-    (r'Could not find a package configuration file provided by "([\w-]+)"', _missing_package),
+    (r'Could not find a package configuration file provided by "([\w-]+[,;.:]?)"', _missing_package),
     (r'By not providing "Find([\w-]+)\.cmake"', _missing_library),
     (r"Could NOT find ([\w-]+) \(missing:", _missing_library),
     (r"(add_\w+_files)\(\) directory not found: (\S+)", _missing_folder),

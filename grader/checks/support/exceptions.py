@@ -237,7 +237,7 @@ def _call(message: str, source: str) -> Meaning | None:
     if given and int(given[3]) == int(given[2]) + 1 and f".{given[1]}(" in source:
         method = given[1]
         taken = "self, …" if int(given[2]) else "self"
-        return f"`{method}` is called on an object, and takes no `self`", f"write `def {method}({taken}):`"
+        return f"`{method}` is called on an object, and takes no `self`", f"make it `def {method}({taken}):`"
     if (lacks := _TOO_FEW.match(message)) and re.search(rf"\b{lacks[1]}\(", source):
         name, values = lacks.groups()
         hint = f"put {values} into its brackets, or remove the call: ROS calls a callback by itself"
@@ -601,7 +601,7 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
         return f"`{made[1]}` is the service's type, and its response has another type", fix
     frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
     wants_text = "must be of type bytes or an ascii string" in found.message
-    if not wants_text and "must be an integer type" not in found.message:
+    if not wants_text and "integer type" not in found.message:
         return None
     kind, other = ("string", "numbers") if wants_text else ("whole number", "strings")
     sent = next(iter(_calls(frame.source, "publish")), None)

@@ -49,6 +49,7 @@ NO_PACKAGE = r"Resource not found: (\S+)"
 NO_FILE = r"file does not exist \[([^\[\]\n]+)\]"
 BAD_FILE = r"error loading <rosparam> tag"
 IGNORE = "CATKIN_IGNORE"
+YAML = {".yaml", ".yml"}
 _NO_LAUNCH_FILE = "is neither a launch file in package"
 NOT_STARTED = r"Unable to launch \[([^\s\[\]]+)-\d+\]"
 # what roslaunch says when it starts nothing, what it means, and what to do ({0}: the pattern's group)
@@ -174,6 +175,8 @@ def refusal(run: Run, package: PackageFacts | None = None) -> Absence | None:
             if package is not None and pattern == NO_FILE and (meant := _file_meant(package, words[0])):
                 fix = f"write $(find {package.name})/{meant}"
             said = f"roslaunch starts nothing: {why.format(*words)}"
+            if package is not None and pattern == NO_PACKAGE and near_names(words[0], [package.name]):
+                return Absence(f"{said}: this one is called {package.name}", f"write $(find {package.name})")
             cited = _declared(words[0], package) if pattern == _UNSET.pattern and package is not None else ()
             return Absence(said, fix, citations=cited, refused=pattern, about="".join(words[:1]))
     return None
@@ -203,8 +206,9 @@ def explain_by_refused_launch(
 
 def _file_meant(package: PackageFacts, name: str) -> str:
     """Return the path of the only file of that kind, or of the one that is spelt alike; "" for none."""
-    kind = PurePosixPath(name).suffix
-    names = {n: p for n, p in paths_by_name(package).items() if PurePosixPath(n).suffix == kind}
+    kinds = {PurePosixPath(name).suffix}
+    kinds |= YAML if kinds <= YAML else set()
+    names = {n: p for n, p in paths_by_name(package).items() if PurePosixPath(n).suffix in kinds}
     near = near_names(name, names) or (tuple(names) if len(names) == 1 else ())
     return names[near[0]] if near else ""
 

@@ -239,8 +239,8 @@ def later_fixes(file: LaunchFile, script: str) -> Iterator[str]:
 def illegal_name(node: LaunchNode) -> Slip | None:
     """Return a name at which roslaunch only warns, and which other tools stumble over."""
     name = node.name or ""
-    if not name or UNRESOLVED in name or re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
-        return None  # that a name is missing is said elsewhere
+    if not name or "/" in name or UNRESOLVED in name or re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
+        return None  # that a name is missing, or that roslaunch refuses it, is said elsewhere
     why = f'name="{name}" is not a legal name in ROS, and other tools fail on it'
     return _slip(node, why, "begin it with a letter, and use letters, digits and _ only")
 

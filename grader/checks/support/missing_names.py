@@ -191,7 +191,14 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
     """Return what a module is meant by one that is not there: a class, one of Python 3, one that is spelt alike."""
     message = found.message
     if inner := _IN_MODULE.search(message):
-        return f"{inner[2]} is a class in {inner[1]}", f"write `from {inner[1]} import {inner[2]}`"
+        own = f"write `from {inner[1]} import {inner[2]}`"
+        source = found.own_frames[-1].source if found.own_frames else ""
+        hint = (
+            f"{own} on a line of its own, and take {inner[1]}.{inner[2]} out of this one"
+            if "," in source
+            else own
+        )
+        return f"{inner[2]} is a class in {inner[1]}", hint
     asked, wanted = NO_MODULE.search(message), _FROM_PACKAGE.search(message)
     if asked and (known := _module_of_others(asked[1], package)):
         return known

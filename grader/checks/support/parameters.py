@@ -6,6 +6,7 @@ Maps are taken apart into their leaves (`/details/name/first`).
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import PurePosixPath
@@ -21,7 +22,7 @@ from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchNode, LaunchParam, PackageFacts
 from grader.model.verdict import EvidenceCitation, FileCitation, Verdict
-from grader.wording import there_is
+from grader.wording import plural, there_is
 
 SYSTEM = (
     "/rosdistro",
@@ -38,10 +39,10 @@ YAML_LINES_MAX = 2_000
 _YAML_KEY = re.compile(r"^( *)[\"']?([A-Za-z]\w{0,99})[\"']?\s*:(?:\s|$)")
 _PLACE = re.compile(r"line (\d+), column (\d+)")
 _IN_LINE = "line {line} has a tab after a name or a value, which YAML does not accept"
-_INDENT = "indent with spaces only, two per level"
+INDENT = "indent with spaces only, two per level"
 # what is printed, what it means ({line}: where), and what to do
 _CAUSES = (
-    (r"found character '\\t'", "line {line} is indented with a tab, which YAML does not accept", _INDENT),
+    (r"found character '\\t'", "line {line} is indented with a tab, which YAML does not accept", INDENT),
     (r"cannot marshal None", "a name has no value: nothing follows it, and nothing is indented below it",
      "write a value after the name; what belongs to a name is indented by two spaces more than the name"),
     (r"exceeds XML-RPC limits|Overflow Error", "a number is larger than 2147483647, the largest that ROS can hold",
@@ -52,7 +53,7 @@ _CAUSES = (
     (r"scanning a quoted scalar|found unexpected end of stream", "a closing quote is missing near line {line}",
      'close every " on its own line'),
     (r"expected <block end>|unindent does not match|expected ',' or '[\]}}]'|could not find expected ':'",
-     "line {line} does not line up with those above it: names of one level begin in the same column", _INDENT),
+     "line {line} does not line up with those above it: names of one level begin in the same column", INDENT),
     (r"cannot start any token", "line {line} has a character that needs quotes", 'write the value in "quotes"'),
     (r"can only be set to a dictionary", "it holds no `name: value`", "write `details:` and its values below it"),
     (r"UnicodeDecodeError|codec can't decode|special characters are not allowed", "it is not saved as UTF-8",
@@ -392,6 +393,22 @@ def explain_yaml_line(text: str, until: int) -> Words | None:
             why, right = found
             return Words(f"line {number} {why}", f"line {number}: write `{right}`", number)
     return None
+
+
+def explain_yaml_column(text: str, line: int) -> Words | None:
+    """Return which of two names, that at the line or the one above it, begins in a column that no other name has; None
+    where that is not plain."""
+    keys = yaml_keys(text)
+    at = next((i for i, key in enumerate(keys) if key.line == line and i), None)
+    if at is None or keys[at].indent == keys[at - 1].indent:
+        return None
+    columns = Counter(key.indent for i, key in enumerate(keys) if i not in (at, at - 1))
+    odd, other = sorted((keys[at], keys[at - 1]), key=lambda key: columns[key.indent])
+    if columns[odd.indent] or not columns[other.indent]:
+        return None
+    spaces = plural(other.indent, "space")
+    why = f"line {odd.line} does not line up with line {other.line}: names of one level begin in the same column"
+    return Words(why, f"begin line {odd.line} with {spaces}, as line {other.line} does", odd.line)
 
 
 def _indent(line: str) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import PurePosixPath
@@ -62,8 +63,28 @@ def _repair_bytes(files: Files, script: SourceFile) -> None:
         _add_bytes(files, "line-ends", script.path, data, message=message, fix=f"dos2unix {script.path}")
     text = as_text(data)
     files.put(script.path, text)
+    if text is not None and script.python:
+        _repair_cookie(files, script, text)
     if text is not None and script.shebang_problem:
         _repair_shebang(files, script, text)
+
+
+def _repair_cookie(files: Files, script: SourceFile, text: str) -> None:
+    """Write `utf-8` in place of an encoding that Python does not know."""
+    lines = text.split("\n")
+    for at, line in enumerate(lines[:2]):
+        named = COOKIE.match(line)
+        if named is None:
+            continue
+        try:
+            codecs.lookup(named[1])
+        except LookupError:
+            changed = line[: named.start(1)] + "utf-8" + line[named.end(1) :]
+            message = f"line {at + 1} of {script.path}: Python knows no encoding {named[1]}"
+            files.change(
+                "python-syntax", script.path, "\n".join([*lines[:at], changed, *lines[at + 1 :]]), message
+            )
+        return
 
 
 def _add_bytes(files: Files, kind: RepairKind, file: str, data: bytes, *, message: str, fix: str) -> None:

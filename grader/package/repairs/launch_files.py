@@ -49,11 +49,9 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
     for launch, node in nodes:
         kind = node.type or ""
         if kind and kind not in programs and (node.pkg in ours or is_near(node.pkg or "", own)):
-            near = (
-                [f"{kind}.py"]
-                if f"{kind}.py" in scripts
-                else [s for s in sorted(scripts) if is_near(kind, s)]
-            )
+            plain = PurePosixPath(kind).name
+            there = [one for one in (f"{kind}.py", plain, f"{plain}.py") if one in scripts]
+            near = there or [s for s in sorted(scripts) if is_near(kind, s)]
             for right in near[:1]:
                 _set_attribute(files, launch.path, node.line, ("type", kind, right), kind="launch-type")
     _repair_nodes(files, package, wanted)

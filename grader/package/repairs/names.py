@@ -224,7 +224,9 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
     for role in ROLES:
         asked = asked_of.get(role, branches)
         given = [name for name in names if name.role == role]
-        used = {_resolve(name, node) for name in given}
+        # of a topic that the script has too, one of nearly the name is another one
+        alike_roles = TOPIC_ROLES if role in TOPIC_ROLES else {role}
+        used = {_resolve(name, node) for name in names if name.role in alike_roles}
         absent = [
             w for w in asked if _bare(w, role) not in used and not _is_of_other_role(file, role, w, wanted)
         ]

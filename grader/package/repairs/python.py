@@ -35,11 +35,11 @@ ATTEMPTS = 3
 Cause = Literal[
     "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
     "old-name", "module", "import", "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument",
-    "unbound", "kept", "guard", "start", "main", "spin", "line", "twice", "turned",
+    "unbound", "kept", "guard", "inside", "start", "main", "spin", "line", "twice", "turned",
 ]  # fmt: skip
 CALLS = (
     "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "kept", "guard",
-    "start", "main", "spin",
+    "inside", "start", "main", "spin",
 )  # fmt: skip
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "import"), "missing-import"),
@@ -319,7 +319,7 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     )
     if cause == "quotes":
         fix = _rewritten(before, after)
-    if cause in {"tabs", "level"}:
+    if cause in {"tabs", "level", "inside"}:
         fix = _required_indentation(before, after, fix)
     return said, fix if cause != "old-name" or word == "raw_input" else ""
 
@@ -355,6 +355,8 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "twice": ("{place}: the line above is there twice", "delete line {line}"),
     "turned": ("lines {line} and {below} of {file} are the wrong way round", "write line {below} above line {line}"),
     "start": ("{place}: the lines from here on belong to {calls}, so nothing runs them", ""),
+    "inside": ("{place}: from here on the lines are outside of {calls}, which makes the node",
+     "change the indentation: "),
     "main": ("{place}: nothing calls {calls}", "add `if __name__ == '__main__':`, and {calls} below it"),
     "spin": ("{file} ends as soon as it has subscribed, because nothing keeps it running",
      "write {word} as the last line of the code that makes the node"),
