@@ -86,7 +86,10 @@ def correct_paths(files: Files, package: PackageFacts) -> None:
     own = [f.path for f in package.files if is_own(f.path)]
     for call in reversed(calls_of(files, INSTALL, "add_executable", "add_library")):  # places above stay
         moved: list[tuple[Token, str]] = []
-        for token in words_of(call):
+        words = words_of(call)
+        for token in (
+            words if call.identifier.lower() == INSTALL else words[1:]
+        ):  # a target may be called mean.cpp
             path = PurePosixPath(_plain(token.value))
             copies = [one for one in own if PurePosixPath(one).name == path.name]
             is_file = path.suffix in (".py", *CPP) and "$" not in str(path)
