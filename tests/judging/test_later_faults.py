@@ -241,6 +241,39 @@ def test_a_question_in_a_script_that_does_not_compile_is_named() -> None:
     assert any(told in hint for hint in found.values())
 
 
+def test_what_keeps_a_loop_from_sleeping_is_named_before_it_runs() -> None:
+    made, loop = "    rate = rospy.Rate(10)\n", "    while not rospy.is_shutdown():\n        pub.publish(x)\n"
+    wait = f"; then let the loop of {FILE} wait: `rate = rospy.Rate(10)` above it, `rate.sleep()` in it"
+    told = {
+        made + loop: f"; then call `rate.sleep()` each time around the loop of {FILE}",
+        loop: wait,
+        f"    rate = 10  # Hz\n{loop}        rate.sleep()\n": (
+            f"; then write `rate = rospy.Rate(10)` on line 1 of {FILE}: only a Rate can sleep"
+        ),
+    }
+    for source, end in told.items():
+        assert hint_of("node", DIES, [NODE | ROOT, RATE | {"requires": ["node"]}], source=source).endswith(
+            end
+        )
+    for source in (
+        f"{made}{loop}        rate.sleep()\n",
+        f"    rospy.Timer(d, send)\n{loop}",
+        "    pub.publish(x)\n",
+    ):
+        assert "then" not in hint_of(
+            "node", DIES, [NODE | ROOT, RATE | {"requires": ["node"]}], source=source
+        )
+
+
+def test_a_callback_that_is_not_there_is_named_with_the_subscriber_that_has_it() -> None:
+    deaf = {"processes": [STARTED], "subscribers": {"/left": ["/talker"], "/right": ["/talker"]}}
+    slips = [slip("subscriber", "left", 6), slip("subscriber", "right", 7)]
+    lab = [HEARS | {"requires": []}]
+    hint = hint_of("hears", deaf, lab, *slips, source="def on_left(msg): pass\n")
+    assert hint.endswith("; then write `def callback(msg):` above it, which prints 'I heard <message>'")
+    assert "def callback" not in hint_of("hears", deaf, lab, *slips, source="def callback(msg): pass\n")
+
+
 def test_what_a_machine_lacks_does_not_hide_what_is_the_students() -> None:
     console = {
         **DIES["console"][0],
