@@ -204,11 +204,13 @@ class Later:
 
     def _names(self) -> Iterator[str]:
         """Names that are not there, of which an `except` is not reached, and functions that nothing calls."""
+        told: set[tuple[str, int]] = set()
         for slip in self._of("misspelt", "undefined"):
             caught = self._text_of(slip).lstrip().startswith("except")
             if (one := name_slip(slip, self._package)) is not None and not caught:
+                told.add((slip.file, slip.line))
                 yield one.fix
-        for file, line in sorted(self._asked()):
+        for file, line in sorted(self._asked() - told):
             yield f"write a value in the code where line {line} of {file} asks for input"
         for slip in self._of("never-called"):
             yield f"call `{slip.name}()`, which nothing in {slip.file} calls"
@@ -227,13 +229,12 @@ class Later:
         if "input" in f"{self._verdict.message} {self._verdict.hint}":
             return set()
         files = [one for one in map(self._package.file, self._paths) if one is not None and one.python_fault]
-        asked = {(slip.file, slip.line) for slip in self._of("input")} | {
+        return {(slip.file, slip.line) for slip in self._of("input")} | {
             (one.path, number)
             for one in files
             for number, line in enumerate(self._build.file_lines(one.path) if self._build else (), 1)
             if ASKS.match(line[:LINE_CHARS])
         }
-        return asked - {(one.path, one.python_fault.line) for one in files if one.python_fault}
 
     def _rate(self) -> Iterator[str]:
         hz, numbers = float(str(self._wanted["rate_hz"])), self._of("rate-number")
@@ -258,6 +259,8 @@ class Later:
             plain = PLAIN_NUMBER.match(line)
             if plain and any(re.search(rf"\b{plain[1]}\.sleep\(", one) for one in lines):
                 yield f"write `{plain[1]} = rospy.Rate({hz})` on line {number} of {path}: only a Rate can sleep"
+        for number in _spins_in_loops(lines):
+            yield f"delete `rospy.spin()` on line {number} of {path}, at which the loop stands still"
         if not self._lacks_words("sleep") or not any(LOOPS.match(line) for line in lines):
             return
         if rate:
@@ -418,6 +421,19 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     if topic := wanted.get("topic"):
         renaming = find_renaming(package, nodes, str(topic))
         yield from [f"in {file.path} {renaming.fix}"] if renaming else []
+
+
+def _spins_in_loops(lines: Iterable[str]) -> Iterator[int]:
+    """Yield the numbers of the lines on which a loop waits until its node ends."""
+    loop = None
+    for number, line in enumerate(lines, 1):
+        depth = len(line) - len(line.lstrip())
+        if LOOPS.match(line):
+            loop = depth
+        elif line.strip() and loop is not None and depth <= loop:
+            loop = None
+        elif loop is not None and line.strip().startswith("rospy.spin()"):
+            yield number
 
 
 def is_other_rate(slip: PythonSlip, hz: float) -> bool:
