@@ -29,7 +29,7 @@ ROS_2 = {
     "rosidl_runtime_py",
 }
 """No machine for ROS 1 has these."""
-OF_ROS = {"dynamic_reconfigure", "genmsg", "rosgraph_msgs", "rosunit"}
+OF_ROS = {"genmsg", "rosgraph_msgs", "rosunit"}
 """Packages of ROS that Debian has for Python alone."""
 NOTHING_TO_DO = "nothing for you to do: "
 ON_THE_MACHINE = f"{NOTHING_TO_DO}tell your instructor. On the grading machine: "
