@@ -31,6 +31,8 @@ ROS_2 = {
 """No machine for ROS 1 has these."""
 OF_ROS = {"genmsg", "rosgraph_msgs", "rosunit"}
 """Packages of ROS that Debian has for Python alone."""
+CMAKE_TOO = {"apriltag", "casadi", "dlib", "dynamixel_sdk", "keyboard", "pigpio", "serial", "torch", "zmq"}
+"""Modules of Python whose names packages of ROS or of CMake have too."""
 NOTHING_TO_DO = "nothing for you to do: "
 ON_THE_MACHINE = f"{NOTHING_TO_DO}tell your instructor. On the grading machine: "
 """How every hint begins that only the instructor can follow: grading again changes nothing before."""
@@ -138,6 +140,11 @@ def is_python_module(name: str) -> bool:
     return name not in OF_ROS and all(
         one.startswith((PIP, "python3-")) for one in known_packages().get(name, ("",))
     )
+
+
+def is_no_package(name: str) -> bool:
+    """Return whether it is a known module of Python, and nothing that `find_package(…)` finds has its name."""
+    return is_python_module(name) and name not in CMAKE_TOO
 
 
 def install_hint(

@@ -401,6 +401,11 @@ CASES = {
     "command": Case(swapped(CMAKELISTS, ("catkin_package", "catkin_pakage")), ["build-line"], "no command catkin_p"),
     "project": Case(swapped(CMAKELISTS, ("project(lab)", "project(xyz)")), ["build-line"], "project(xyz)"),
     "no-project": Case(swapped(CMAKELISTS, ("project(lab)\n", "")), ["build-line"], "does not call project(…)"),
+    "modules-in-find-package": Case(
+        {CMAKELISTS: CMAKE.replace("rospy)", "mediapipe rospy numpy serial)")}, ["build-line"],
+        "line 3 of CMakeLists.txt: find_package(…) names mediapipe and numpy, and no package of ROS is called so",
+        after={CMAKELISTS: " rospy  serial)"},
+    ),
     "late-project": Case(
         {CMAKELISTS: CMAKE.replace("project(lab)\n", "") + "project(lab)\n"},
         ["build-line"],

@@ -18,7 +18,7 @@ from grader.installable import (
     ROS_2,
     exists_somewhere,
     install_hint,
-    is_python_module,
+    is_no_package,
     known_packages,
     noetic_messages,
 )
@@ -28,8 +28,6 @@ from grader.model.verdict import FileCitation
 from grader.wording import join_words, numbers_text, there_is
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
-CATKIN_TOO = ("apriltag", "dynamixel_sdk", "serial")
-"""Names of Python modules that are those of ROS packages too."""
 ONE_EDIT = 0.88
 SLIPS_OF_COMPONENTS = ("COMPONENT", "COMPONENETS", "COMPONETS", "COMPONENTES", "Components", "components")
 SLIP = 0.8
@@ -174,7 +172,7 @@ def _of_no_ros(name: str, package: PackageFacts) -> Explained | None:
     """Explain a name of ROS 2's or of a Python module's; None for any other."""
     if name in ROS_2:
         return Explained(f"it needs {name}, which is from ROS 2", f"take {name} out: this lab is for ROS 1")
-    if not is_python_module(name) or name in CATKIN_TOO:
+    if not is_no_package(name):
         return None
     where = "find_package(…) and package.xml" if _is_declared(name, package) else "find_package(…)"
     why = f"find_package(…) names {name}, which is a Python module and no package of ROS"
