@@ -798,6 +798,19 @@ def test_files_that_several_calls_name_without_their_folder(tmp_path: Path) -> N
     assert "add_library(two src/two.cpp)\n" in text
 
 
+def test_a_letter_in_the_name_of_a_file_that_cmake_names(tmp_path: Path) -> None:
+    scripts = "src/talker.py src/hepler.py src/node2.py"
+    line = f"catkin_install_python(PROGRAMS {scripts} DESTINATION ${{CATKIN_PACKAGE_BIN_DESTINATION}})"
+    files = {
+        **swapped(CMAKELISTS, ("catkin_package()\n", f"catkin_package()\n{line}\n")),
+        "src/node1.py": SCRIPT,
+    }
+    repair_all(package(tmp_path, {**files, "src/helper.py": "x = 1\n"}))
+    text = (tmp_path / "lab" / CMAKELISTS).read_text()
+    assert "PROGRAMS src/talker.py src/helper.py " in text
+    assert "node" not in text
+
+
 def test_a_program_may_be_called_as_its_source(tmp_path: Path) -> None:
     calls = "add_executable(mean.cpp src/mean.cpp)\ntarget_link_libraries(mean.cpp ${catkin_LIBRARIES})\n"
     files = swapped(CMAKELISTS, ("catkin_package()\n", f"catkin_package()\n{calls}"))
