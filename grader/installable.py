@@ -29,15 +29,13 @@ ROS_2 = {
     "rosidl_runtime_py",
 }
 """No machine for ROS 1 has these."""
-OF_ROS = {"dynamic_reconfigure", "genmsg", "rosgraph_msgs", "rosunit"}
+OF_ROS = {"genmsg", "rosgraph_msgs", "rosunit"}
 """Packages of ROS that Debian has for Python alone."""
+CMAKE_TOO = {"apriltag", "casadi", "dlib", "dynamixel_sdk", "keyboard", "pigpio", "serial", "torch", "zmq"}
+"""Modules of Python whose names packages of ROS or of CMake have too."""
 NOTHING_TO_DO = "nothing for you to do: "
 ON_THE_MACHINE = f"{NOTHING_TO_DO}tell your instructor. On the grading machine: "
 """How every hint begins that only the instructor can follow: grading again changes nothing before."""
-PLACEHOLDERS = (
-    f"{ON_THE_MACHINE}use Ubuntu's ROS Noetic; or write boost::placeholders::{{}}, which any ROS has"
-)
-"""What to do about the `_1` of `boost::bind`: Debian's ROS does not bring it into every file, as Noetic does."""
 _PREFIX = re.compile(r"/opt/ros/([a-z]+)\b")
 
 
@@ -144,24 +142,9 @@ def is_python_module(name: str) -> bool:
     )
 
 
-TWICE = {"apriltag", "dynamixel_sdk", "serial"}
-"""Modules of Python of which ROS has a package of the same name."""
-
-
-def no_package_of_ros(name: str) -> tuple[str, str] | None:
-    """Return why `find_package` cannot find a known name with any ROS 1, or one with a sign at its end, and what to do;
-    None for any other name."""
-    if name[-1:] in {",", ";", ".", ":"}:
-        why = (
-            f"find_package(…) names {name[:-1]} with a `{name[-1]}` behind it, and only blanks part its names"
-        )
-        return why, f"write {name[:-1]} instead of {name}"
-    if name in ROS_2:
-        return f"it needs {name}, which is from ROS 2", f"take {name} out: this lab is for ROS 1"
-    if known_packages().get(name) and name not in TWICE and is_python_module(name):
-        why = f"find_package(…) names {name}, which is a Python module and no package of ROS"
-        return why, f"take {name} out of find_package(…): `import {name}` in a script is enough"
-    return None
+def is_no_package(name: str) -> bool:
+    """Return whether it is a known module of Python, and nothing that `find_package(…)` finds has its name."""
+    return is_python_module(name) and name not in CMAKE_TOO
 
 
 def install_hint(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Sequence
+from itertools import chain
 
 LISTED_MAX = 6
 PART_CHARS_MIN = 3
@@ -38,11 +39,11 @@ def plural(count: float, noun: str, more: str = "") -> str:
     return f"{number(count)} {noun if count == 1 else more or noun + 's'}"
 
 
-def join_words(names: Iterable[str], last: str = "and") -> str:
-    """Return `a, b and c`, at most six of them and how many more there are."""
+def join_words(names: Iterable[str], last: str = "and", most: int = LISTED_MAX) -> str:
+    """Return `a, b and c`, so many of them at most and how many more there are."""
     items = list(names)
-    if len(items) > LISTED_MAX:
-        items = [*items[:LISTED_MAX], f"{len(items) - LISTED_MAX} more"]
+    if len(items) > most:
+        items = [*items[:most], f"{len(items) - most} more"]
     return " ".join([", ".join(items[:-1]), last, items[-1]]) if len(items) > 1 else "".join(items)
 
 
@@ -64,7 +65,10 @@ def shorten(text: str, chars_max: int) -> str:
 
 
 ROLES = (
-    ("talker", "publisher", "pub", "pubs", "sender", "emitter", "speaker", "publicador", "emisor"),
+    (
+        *("talker", "publisher", "pub", "pubs", "sender", "emitter", "speaker", "broadcaster"),
+        *("publicador", "emisor"),
+    ),
     (
         *("listener", "subscriber", "sub", "subs", "receiver", "hearer"),
         *("suscriptor", "subscriptor", "receptor", "oyente"),
@@ -72,18 +76,30 @@ ROLES = (
     ("server", "service"),
 )
 """Words for the same kind of node in the names of scripts."""
+ROLE_CUTOFF = 0.85
+"""How like one of these words a slip of it is: `suscriber`, `reciever`."""
 PARTS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 
 
 def has_role_of(one: str, other: str) -> bool:
     """Return whether two scripts are called by different words for the same kind of node, "talker" and
-    "publisher". By the same word they are two that a lab asks for."""
-    given, wanted = ({part.casefold() for part in PARTS.findall(_stem(path))} for path in (one, other))
+    "publisher", or "suscriber". By the same word they are two that a lab asks for."""
+    given, wanted = ({_role(part) for part in PARTS.findall(_stem(path))} for path in (one, other))
     return any(
         word in wanted and given & {*words} - {word} and word not in given
         for words in ROLES
         for word in words
     )
+
+
+def is_role(stem: str) -> bool:
+    """Return whether a script's name, without its suffix, is the word for a kind of node and nothing else."""
+    return _role(stem) in chain(*ROLES)
+
+
+def _role(part: str) -> str:
+    """Return the word for a kind of node that this part of a name is, or nearly is; else the part itself."""
+    return closest(part, chain(*ROLES), cutoff=ROLE_CUTOFF) or part.casefold()
 
 
 def _stem(path: str) -> str:

@@ -7,8 +7,8 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import NoParams, check
-from grader.checks.support.build_errors import FIRST_ERROR_HINT, UNKNOWN_COMMAND, explain_error_of_build
-from grader.checks.support.build_output import first_error
+from grader.checks.support.build_errors import UNKNOWN_COMMAND, explain_error_of_build
+from grader.checks.support.build_output import FIRST_ERROR_HINT, first_error
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.launch import IGNORE
 from grader.checks.support.processes import Life, lives

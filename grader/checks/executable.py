@@ -207,7 +207,8 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     hint = add_hint(package, path)
     if meant:
         moved, named = move_hint(package, meant[0], path), _where_named(package, meant[0])
-        hint = f"{moved}{named}" if movable else f"{hint}, or {moved} if that is meant to be it{named}"
+        plain = len(movable) == 1 or PurePosixPath(meant[0]).name == wanted.name
+        hint = f"{moved}{named}" if plain else f"{hint}, or {moved} if that is meant to be it{named}"
     kind: MistakeKind = "file-elsewhere" if meant else "file-missing"
     if not movable and (elsewhere := package.hints_on(wanted.name)):
         where, _, hint = elsewhere[0].partition(": ")

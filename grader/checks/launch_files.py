@@ -135,12 +135,17 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
         return unjudged(message, hint=hint).lost_by("file-missing", script)
     meant = (_slip_for(package, node, name) for node in file.brings if _is_meant(node, name))
     slip = next(filter(None, meant), None)
-    if slip is None and (built := starts_built(package, file, name)):
+    built = starts_built(package, file, name)
+    if slip is None and built:
         message = (
             f"{file.path} has no <node> for {name}: line {built[0].line} starts {built[0].type}, which is C++"
         )
         cited = (FileCitation(file=built[0].file, line=built[0].line),)
         return failed(message, hint="; ".join(built_fixes(package, file, name)), citations=cited)
+    if slip and any(
+        node.line == slip.line for node in built
+    ):  # what the program is shows once roslaunch starts it
+        slip = slip._replace(fix="; ".join((slip.fix, *built_fixes(package, file, name))))
     return slip.verdict() if slip else _no_node(file, package.name, name)
 
 

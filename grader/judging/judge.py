@@ -51,7 +51,7 @@ from grader.judging.cited_lines import (
     show_lines,
 )
 from grader.judging.facts import NOT_RUN, Facts, try_facts, views_of
-from grader.judging.later_faults import add_later_faults
+from grader.judging.later_faults import add_later_faults, is_other_rate
 from grader.judging.repeats_and_repairs import (
     apply_repaired_copy,
     drop_unrepeated_losses,
@@ -195,7 +195,10 @@ def _seen_elsewhere(
     if run is None or not isinstance(topic, str) or criterion.parameters.get("topic") != topic:
         return None
     package = facts.package_of(criterion)
-    if criterion.check == "rate" and package and any(s.kind == "rate-number" for s in package.slips):
+    asked = [s for s in package.slips if s.kind == "rate-number"] if package else []
+    if criterion.check == "rate" and any(
+        is_other_rate(one, float(str(criterion.parameters["rate_hz"]))) for one in asked
+    ):
         return None  # the script tells it, however briefly the run was watched
     known = {text for one in rubric.criteria for text in texts_in(one.parameters)}
     sent = {c.topic: plain_type(c.type) for c in run.student_channels() if c.messages}

@@ -50,6 +50,8 @@ ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
 OF_LINE = re.compile(r"on line \d+, write (?P<code>`while .*?`)")
 """A fix that says how its slip's own line is written."""
 SLEEPS_FOR = re.compile(r"[^#'\"]*\brospy\.sleep\(\s*\)")
+LOOPS = re.compile(r"\s*while\b.*:")
+PLAIN_NUMBER = re.compile(r"\s*(\w+)\s*=\s*[\d.]+\s*(?:#|$)")
 MAKES_RATE = re.compile(r"\s*([\w.]+)\s*=\s*rospy\.Rate\(")
 OF_LAUNCHES = ("launch-runs", "launch-connects")
 OF_TOPICS = ("hears", "topic-type")
@@ -105,7 +107,7 @@ def _moved_script(verdict: Verdict) -> tuple[str, str] | None:
     """Return the only script that is told to become the one that is missing, and the path of that one."""
     if verdict.mistake is None or verdict.mistake.kind != "file-elsewhere":
         return None
-    moved = re.findall(rf"\bmv (\S+\.py) {re.escape(verdict.mistake.name)}(?!\S)", verdict.hint)
+    moved = re.findall(rf"\bmv (\S+\.py) {re.escape(verdict.mistake.name)}(?![^\s;])", verdict.hint)
     return (moved[0], verdict.mistake.name) if len(moved) == 1 else None
 
 
@@ -152,7 +154,7 @@ def _with_later(verdict: Verdict, later: Iterable[str], retyped: Mapping[str, tu
         hint = hint.replace(NOTHING_TO_DO, "For the rest, ", 1)
         hint = f"{join_words(told)}. {hint[:1].upper()}{hint[1:]}"
         return verdict.model_copy(update={"hint": hint})
-    return verdict.model_copy(update={"hint": f"{hint}; then {join_words(told)}"})
+    return verdict.model_copy(update={"hint": f"{hint}; then {join_words(told, most=len(told))}"})
 
 
 class Later:
@@ -212,11 +214,13 @@ class Later:
 
     def _names(self) -> Iterator[str]:
         """Names that are not there, of which an `except` is not reached, and functions that nothing calls."""
+        told: set[tuple[str, int]] = set()
         for slip in self._of("misspelt", "undefined"):
             caught = self._text_of(slip).lstrip().startswith("except")
             if (one := name_slip(slip, self._package)) is not None and not caught:
+                told.add((slip.file, slip.line))
                 yield one.fix
-        for file, line in sorted(self._asked()):
+        for file, line in sorted(self._asked() - told):
             yield f"write a value in the code where line {line} of {file} asks for input"
         for slip in self._of("never-called"):
             yield f"call `{slip.name}()`, which nothing in {slip.file} calls"
@@ -247,17 +251,32 @@ class Later:
         pauses = [one for one in numbers if one.name]
         if len(pauses) == 1 and self._lacks_words(".sleep()"):  # no Rate is ever slept by
             numbers = pauses
-        if len(numbers) == 1 and abs(float(numbers[0].message) - hz) > RATE_SHARE * hz:
+        if len(numbers) == 1 and is_other_rate(numbers[0], hz):
             yield f"make it {significant(hz)} Hz on {_line(numbers[0])}, which asks for {numbers[0].message} Hz"
         for slip in self._of("not-called"):
             if "sleep" in slip.name:
                 yield f"on {_line(slip)}, {slip.fix}"
         for path in sorted(self._paths) if not self._ran else ():
             lines = [line[:LINE_CHARS] for line in self._build.file_lines(path)] if self._build else []
-            rate = next((found[1] for line in lines if (found := MAKES_RATE.match(line))), "")
-            for number, line in enumerate(lines, 1) if rate else ():
-                if SLEEPS_FOR.match(line):
-                    yield f"write `{rate}.sleep()` on line {number} of {path}: rospy.sleep() needs a time"
+            yield from self._rate_of_lines(path, lines, significant(hz))
+
+    def _rate_of_lines(self, path: str, lines: Sequence[str], hz: str) -> Iterator[str]:
+        """Yield what keeps the loop of a script that never ran from sleeping."""
+        rate = next((found[1] for line in lines if (found := MAKES_RATE.match(line))), "")
+        for number, line in enumerate(lines, 1):
+            if rate and SLEEPS_FOR.match(line):
+                yield f"write `{rate}.sleep()` on line {number} of {path}: rospy.sleep() needs a time"
+            plain = PLAIN_NUMBER.match(line)
+            if plain and any(re.search(rf"\b{plain[1]}\.sleep\(", one) for one in lines):
+                yield f"write `{plain[1]} = rospy.Rate({hz})` on line {number} of {path}: only a Rate can sleep"
+        for number in _spins_in_loops(lines):
+            yield f"delete `rospy.spin()` on line {number} of {path}, at which the loop stands still"
+        if not self._lacks_words("sleep") or not any(LOOPS.match(line) for line in lines):
+            return
+        if rate:
+            yield f"call `{rate}.sleep()` each time around the loop of {path}"
+        elif self._lacks_words("Timer("):
+            yield f"let the loop of {path} wait: `rate = rospy.Rate({hz})` above it, `rate.sleep()` in it"
 
     def _node_name(self) -> Iterator[str]:
         own, names = self._of("node-name"), list(texts_in(self._wanted.get("names")))
@@ -323,6 +342,9 @@ class Later:
         if other and (elsewhere or (not told and f"/{types[0].message}" not in self._verdict.message)):
             yield self._retype("subscribe with", sent[0], types[0])
         template, said = str(self._wanted.get("template", VALUE)), self._of("prints")
+        if len(heard) > 1 and ", callback)" in self._verdict.hint and self._lacks_words("def callback("):
+            yield f"write `def callback(msg):` above it, which prints '{in_words(template)}'"
+            return
         said = [one for one in said if SAID_DATA in one.message]
         unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
         if not unheard or template == VALUE or any(says(one.message, template) for one in said):
@@ -409,6 +431,24 @@ def _later_in_launch(criterion: Criterion, package: PackageFacts, facts: Facts) 
     if topic := wanted.get("topic"):
         renaming = find_renaming(package, nodes, str(topic))
         yield from [f"in {file.path} {renaming.fix}"] if renaming else []
+
+
+def _spins_in_loops(lines: Iterable[str]) -> Iterator[int]:
+    """Yield the numbers of the lines on which a loop waits until its node ends."""
+    loop = None
+    for number, line in enumerate(lines, 1):
+        depth = len(line) - len(line.lstrip())
+        if LOOPS.match(line):
+            loop = depth
+        elif line.strip() and loop is not None and depth <= loop:
+            loop = None
+        elif loop is not None and line.strip().startswith("rospy.spin()"):
+            yield number
+
+
+def is_other_rate(slip: PythonSlip, hz: float) -> bool:
+    """Return whether the rate that a script asks for is plainly not the lab's."""
+    return abs(float(slip.message) - hz) > RATE_SHARE * hz
 
 
 def _line(slip: PythonSlip) -> str:

@@ -61,6 +61,7 @@ GENERATION = re.compile(
 )
 """Where these are wrong in CMakeLists.txt, a build can succeed that makes nothing of the package's own definitions, or
 another program."""
+INSTALLING = re.compile(r"\bcatkin_install_python\b|\bPROGRAMS\b")
 NUMBER = re.compile(r"\d+(\.\d+)?")
 
 Runs = dict[str, Run]
@@ -176,7 +177,17 @@ def apply_repaired_copy(
             else _share(placed, told, share)
         )
         uses[criterion.id] = Repaired(repairs=told, share=share, charged=bool(charged))
-    return verdicts, uses
+    installing = {c.id for c in rubric.criteria if c.check == INSTALL}
+    return {i: _at_new_paths(v, repairs) if i in installing else v for i, v in verdicts.items()}, uses
+
+
+def _at_new_paths(verdict: Verdict, repairs: Iterable[Repair]) -> Verdict:
+    """Return the verdict with a hint that names the scripts that are to be renamed where they lie then."""
+    hint = verdict.hint
+    for one in repairs:
+        name = re.escape(PurePosixPath(one.after).name) if one.kind == "file-name" else ""
+        hint = re.sub(rf"(?<![\w./-])(?:[\w.-]+/)*{name}(?![\w.-])", one.after, hint) if name else hint
+    return verdict.model_copy(update={"hint": hint})
 
 
 def _without_others(verdict: Verdict, others: Sequence[Repair]) -> Verdict:
@@ -201,7 +212,8 @@ def concerns(
     cites the file. What the files of the build lack stays lost, though: the criteria of these files ask for just that.
 
     `found` is what each criterion came to without the repair, `built` whether what is run was built without it, or
-    needs no build; `builds`, whether the package as handed in was: its build needs no further line of the manifest.
+    needs no build; `builds`, whether the package as handed in was: its build needs no further line of the manifest, and
+    none that only installs scripts, which the criterion of installing asks for.
     """
     if criterion.scenario is not None:
         sleeps = repair.before.endswith(".sleep") and repair.after == f"{repair.before}()"
@@ -214,7 +226,7 @@ def concerns(
         wrong = _words(repair.before) - _words(repair.after)
         return bool(wrong & _words(found[criterion.id].message)) or _cites(found[criterion.id], repair)
     if repair.kind in OF_BUILDS and (criterion.check == BUILD or is_unmade(found[criterion.id])):
-        return repair.kind != "manifest-line" or not builds
+        return not builds or not (repair.kind == "manifest-line" or _only_installs(repair))
     seen = f"{found[criterion.id].message} {found[criterion.id].measured}"
     if repair.kind == "file-name" and PurePosixPath(repair.before).name in seen:
         return True
@@ -222,6 +234,11 @@ def concerns(
         asking = criterion.requires if repair.kind in NAMES else (root,)
         return any(_asks_for(found[name], repair) for name in asking)
     return repair.kind not in OF_BUILDS and _asks_for(found[criterion.id], repair)
+
+
+def _only_installs(repair: Repair) -> bool:
+    added = "\n".join({*repair.after.split("\n")} - {*repair.before.split("\n")})
+    return INSTALLING.search(added) is not None and not GENERATION.search(added)
 
 
 def is_unmade(found: Verdict | CriterionResult) -> bool:

@@ -46,6 +46,8 @@ OF_ROS = {
     "rostopic",
 }  # fmt: skip
 """Modules that there are, whose names begin like that of another one."""
+MODULES_OF_MESSAGES = ("point_cloud2",)
+"""Modules beside the `msg` of a package of messages, called nearly like a class."""
 MODULES = frozenset({"math", "os", "random", "rospy", "sys", "time"})
 
 
@@ -84,8 +86,9 @@ def with_modules(text: str, types: list[str]) -> Iterator[Step]:
 
 def _is_near_one(name: str, known: Collection[str]) -> bool:
     """Return whether it is one of the classes, or a slip in one, which `with_classes` puts right."""
+    slips = known if name not in MODULES_OF_MESSAGES else ()
     return name in known or any(
-        is_one_edit(name.lower(), one.lower()) or name.lower() == one.lower() for one in known
+        is_one_edit(name.lower(), one.lower()) or name.lower() == one.lower() for one in slips
     )
 
 

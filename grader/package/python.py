@@ -111,6 +111,7 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
     (COMMENTED_OUT, "this line begins the block below it, and is commented out", "delete its `#`"),
     (r"unexpected EOF",
      "the file ends in the middle of something (a bracket, or a block without a body)", "complete its last lines"),
+    (r"C\+\+ in a file", "the whole file is C++, and its name ends with .py", "write this node in Python, not in C++"),
     (r"too many nested|overflow|too complex|recursion|^$", "the file is nested too deep for Python"),
 )  # fmt: skip
 

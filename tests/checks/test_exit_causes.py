@@ -124,6 +124,8 @@ from std_msgs.msg import Int8
          "publish a string here, `str(…)`; numbers go to the publisher of their own topic"),
         (6, "counter += 1", "TypeError: unsupported operand type(s) for +=: 'Int8' and 'int'",
          "write `counter.data` instead of `counter`"),
+        (6, "rate.sleep()", "AttributeError: 'int' object has no attribute 'sleep'",
+         "make it with `rospy.Rate(…)`, which takes how many times a second the loop runs"),
         (6, "rate.sleep()", "AttributeError: 'Duration' object has no attribute 'sleep'",
          "make it with `rospy.Rate(…)`, which takes how many times a second the loop runs"),
         (6, "now = time.time()", "AttributeError: 'builtin_function_or_method' object has no attribute 'time'",

@@ -10,7 +10,18 @@ from grader.checks import CHECKS
 from grader.judging import judge
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status, Verdict, partial
-from tests.judging.rubrics import ALL, CHATTER, EXECUTABLE, GOOD_RUN, NODE, PACKAGE, RATE, SCENARIO, rubric
+from tests.judging.rubrics import (
+    ALL,
+    CHATTER,
+    EXECUTABLE,
+    GOOD_RUN,
+    NODE,
+    PACKAGE,
+    RATE,
+    SCENARIO,
+    SCRIPT,
+    rubric,
+)
 from tests.support.timeline import build_runs
 
 DIED = {"processes": [{"name": "talker", "exit_s": 0.3, "exit_code": 1}], "outcome": "ended"}
@@ -304,6 +315,16 @@ def test_what_was_seen_of_a_call_is_no_reason_for_a_program_that_prints_nothing(
         {"runs": {"talker": GOOD_RUN}, "package": PACKAGE}, other, {**says, "requires": ["other"]}
     )
     assert statuses(found) == {"other": "fail", "says": "fail"}
+
+
+def test_a_loop_that_does_not_sleep_is_named_on_another_topic_too() -> None:
+    flood = {**GOOD_RUN, "topics": [{"topic": "/blabla", "count": 6000, "rate_hz": 1000}]}
+    asked = {"file": SCRIPT["path"], "line": 5, "kind": "rate-number"}
+    for number, status in (("10", "fail"), ("2", "blocked")):
+        package = {**PACKAGE, "slips": [{**asked, "message": number}]}
+        found = results({"runs": {"talker": flood}, "package": package})
+        assert found["rate"].status.value == status
+        assert ("the loop does not sleep" in found["rate"].message) == (status == "fail")
 
 
 @pytest.mark.parametrize(

@@ -241,6 +241,47 @@ def test_a_question_in_a_script_that_does_not_compile_is_named() -> None:
     assert any(told in hint for hint in found.values())
 
 
+MADE = "    rate = rospy.Rate(10)\n"
+LOOP = "    while not rospy.is_shutdown():\n        pub.publish(x)\n"
+SLEEPS = "        rate.sleep()\n"
+
+
+@pytest.mark.parametrize(
+    ("source", "told"),
+    [
+        (MADE + LOOP, f"; then call `rate.sleep()` each time around the loop of {FILE}"),
+        (LOOP, f"; then let the loop of {FILE} wait: `rate = rospy.Rate(10)` above it, `rate.sleep()` in it"),
+        (f"    rate = 10  # Hz\n{LOOP}{SLEEPS}",
+         f"; then write `rate = rospy.Rate(10)` on line 1 of {FILE}: only a Rate can sleep"),
+        (f"{MADE}{LOOP}        rospy.spin()\n{SLEEPS}",
+         f"; then delete `rospy.spin()` on line 4 of {FILE}, at which the loop stands still"),
+        (f"{MADE}{LOOP}{SLEEPS}    rospy.spin()\n", ""),
+        (f"    rospy.Timer(d, send)\n{LOOP}", ""),
+        ("    pub.publish(x)\n", ""),
+    ],
+)  # fmt: skip
+def test_what_keeps_a_loop_from_sleeping_is_named_before_it_runs(source: str, told: str) -> None:
+    hint = hint_of("node", DIES, [NODE | ROOT, RATE | {"requires": ["node"]}], source=source)
+    assert hint.endswith(told)
+    assert ("then" in hint) == bool(told)
+
+
+def test_a_callback_that_is_not_there_is_named_with_the_subscriber_that_has_it() -> None:
+    deaf = {"processes": [STARTED], "subscribers": {"/left": ["/talker"], "/right": ["/talker"]}}
+    slips = [slip("subscriber", "left", 6), slip("subscriber", "right", 7)]
+    lab = [HEARS | {"requires": []}]
+    hint = hint_of("hears", deaf, lab, *slips, source="def on_left(msg): pass\n")
+    assert hint.endswith("; then write `def callback(msg):` above it, which prints 'I heard <message>'")
+    assert "def callback" not in hint_of("hears", deaf, lab, *slips, source="def callback(msg): pass\n")
+
+
+def test_a_question_that_is_not_there_in_python_3_is_told_once() -> None:
+    asks = slip("undefined", "raw_input", 3, name="raw_input")
+    hint = hint_of("node", DIES, TALKER, asks, slip("input", "raw_input", 3), source=LACKS)
+    assert "on line 3, remove `raw_input(…)`" in hint
+    assert "asks for input" not in hint
+
+
 def test_what_a_machine_lacks_does_not_hide_what_is_the_students() -> None:
     console = {
         **DIES["console"][0],

@@ -427,6 +427,45 @@ def test_a_line_of_the_build_is_charged_to_a_build_that_another_fault_blocks() -
     assert build.hint == f"CMakeLists.txt line 1: write `{line.after}`"
 
 
+def test_a_line_that_only_installs_scripts_costs_no_build_that_worked() -> None:
+    """Another file has another name, and is told to be installed where it lies then."""
+    renamed = Repair(
+        kind="file-name",
+        file="src/numeric_talkr.py",
+        before="src/numeric_talkr.py",
+        after="src/numeric_talker.py",
+        message="src/numeric_talkr.py should be called numeric_talker.py",
+        fix="git mv src/numeric_talkr.py src/numeric_talker.py",
+    )
+    line = Repair(
+        kind="build-line",
+        file="CMakeLists.txt",
+        line=9,
+        before="catkin_package()",
+        after=f"catkin_package()\ncatkin_install_python(PROGRAMS {renamed.after} DESTINATION lib/lab1)",
+        message=f"CMakeLists.txt does not install {renamed.after}",
+        fix="write catkin_install_python(…)",
+    )
+    wanted = "scripts/numeric_talker.py"
+    asked = rubric(
+        {"id": "install", "check": "cmake-install", "with": {"scripts": [wanted]}},
+        {"id": "talker", "check": "executable", "with": {"path": wanted}},
+        {"id": "build", "check": "build", "with": {"scripts": [wanted]}, "requires": ["install", "talker"]},
+    )
+    script = {"path": renamed.before, "executable": True, "shebang": "#!/usr/bin/env python3"}
+    calls = [["find_package", "catkin", "REQUIRED"], ["catkin_package"]]
+    runs = built({"manifest": {}, "cmake": {"calls": calls}, "files": [script]}, exit_code=0)
+    calls.append(["catkin_install_python", "PROGRAMS", renamed.after, "DESTINATION", "lib/lab1"])
+    right = {"manifest": {}, "cmake": {"calls": calls}, "files": [{**script, "path": renamed.after}]}
+    copy = built(right, exit_code=0)["package"]
+    about = {**copy.metadata, "repairs": json.dumps([renamed.model_dump(), line.model_dump()])}
+    found = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
+    install, talker, build = found
+    assert (install.points, talker.points, build.points) == (0, 0, build.max_points)
+    assert f"PROGRAMS {renamed.after} DESTINATION" in install.hint
+    assert wanted not in install.hint
+
+
 def built(package: dict[str, Any], *, exit_code: int, said: Sequence[str] = ()) -> dict[str, Run]:
     made = {"name": "catkin_make", "role": "build", "exit_s": 3, "exit_code": exit_code}
     console = [{"process": "catkin_make", "stream": "stderr", "lines": [*said]}] if said else []

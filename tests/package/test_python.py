@@ -49,6 +49,12 @@ CASES = {
     "indent_missing": ("if 1:\nx = 1\n", 2, "must be indented"),
     "indent_more": ("x = 1\n  y = 2\n", 2, "further than the one above"),
     "indent_less": ("if 1:\n    x = 1\n  y = 2\n", 3, "matches none of the lines above"),
+    "cpp": (
+        '\n#include "ros/ros.h"\n/* a node */\nint main(int argc, char **argv) {\n}\n',
+        2,
+        "the whole file is C++",
+    ),
+    "cpp_comment": ("# include the ros header\nx = 1 // two\ny = (\n", 3, "never closed"),
     "merge": ("def f():\n    x = 1\n<<<<<<< HEAD\n    y = 1\n", 3, "merge markers"),
     "return": ("return 1\n", 1, "outside every function"),
     "plus": ("x++\n", 1, "x += 1"),

@@ -285,6 +285,10 @@ CASES = {
                "not imported from std_msg"),
     "no-msg": Case(swapped(TALKER, ("from std_msgs.msg", "from std_msgs")), ["missing-import"],
                "not imported from std_msgs"),
+    "module-beside-messages": Case(
+        swapped(TALKER, ("from std_msgs.msg import Int8",
+                         "from sensor_msgs import point_cloud2\nfrom std_msgs.msg import Int8")), [],
+    ),
     "class-imported": Case(swapped(TALKER, ("from std_msgs.msg import Int8", "import std_msgs.msg.Int8")),
                        ["missing-import"], "not imported from std_msgs.msg.Int8"),
     "braces": Case(swapped(TALKER, ("def main():", "def main() {"), ("\nmain()", "}\n\nmain()")), ["python-syntax"],
@@ -397,6 +401,11 @@ CASES = {
     "command": Case(swapped(CMAKELISTS, ("catkin_package", "catkin_pakage")), ["build-line"], "no command catkin_p"),
     "project": Case(swapped(CMAKELISTS, ("project(lab)", "project(xyz)")), ["build-line"], "project(xyz)"),
     "no-project": Case(swapped(CMAKELISTS, ("project(lab)\n", "")), ["build-line"], "does not call project(…)"),
+    "modules-in-find-package": Case(
+        {CMAKELISTS: CMAKE.replace("rospy)", "mediapipe rospy numpy serial)")}, ["build-line"],
+        "line 3 of CMakeLists.txt: find_package(…) names mediapipe and numpy, and no package of ROS is called so",
+        after={CMAKELISTS: " rospy  serial)"},
+    ),
     "late-project": Case(
         {CMAKELISTS: CMAKE.replace("project(lab)\n", "") + "project(lab)\n"},
         ["build-line"],
@@ -834,6 +843,25 @@ def test_files_that_several_calls_name_without_their_folder(tmp_path: Path) -> N
     text = (folder / CMAKELISTS).read_text()
     assert "add_executable(one src/one.cpp)\n" in text
     assert "add_library(two src/two.cpp)\n" in text
+
+
+def test_a_letter_in_the_name_of_a_file_that_cmake_names(tmp_path: Path) -> None:
+    scripts = "src/talker.py src/hepler.py src/node2.py"
+    line = f"catkin_install_python(PROGRAMS {scripts} DESTINATION ${{CATKIN_PACKAGE_BIN_DESTINATION}})"
+    files = {
+        **swapped(CMAKELISTS, ("catkin_package()\n", f"catkin_package()\n{line}\n")),
+        "src/node1.py": SCRIPT,
+    }
+    repair_all(package(tmp_path, {**files, "src/helper.py": "x = 1\n"}))
+    text = (tmp_path / "lab" / CMAKELISTS).read_text()
+    assert "PROGRAMS src/talker.py src/helper.py " in text
+    assert "node" not in text
+
+
+def test_a_program_may_be_called_as_its_source(tmp_path: Path) -> None:
+    calls = "add_executable(mean.cpp src/mean.cpp)\ntarget_link_libraries(mean.cpp ${catkin_LIBRARIES})\n"
+    files = swapped(CMAKELISTS, ("catkin_package()\n", f"catkin_package()\n{calls}"))
+    assert repair_all(package(tmp_path, {**files, "src/mean.cpp": "int main() {}\n"})) == ()
 
 
 def test_lines_that_may_be_meant_otherwise_are_left_alone(tmp_path: Path) -> None:

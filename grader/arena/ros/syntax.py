@@ -45,6 +45,7 @@ COMMENTED = re.compile(r"\s*#[#\s]*((?:if|while|for|def|class|try|with)\b.*:)\s*
 REFUSED_LIMIT = 20
 OF_NAMES = ("node-name", "publisher", "publisher-type", "subscriber", "subscriber-type", "rate-number")
 MARKER = re.compile(r"(<<<<<<<|=======|>>>>>>>|\|\|\|\|\|\|\|)( |$)")
+CPP = re.compile(rb"^#include\s*[<\"].*?^(int|void)\s+\w+\s*\(", re.MULTILINE | re.DOTALL)
 ENCODINGS = (SyntaxError, LookupError, UnicodeDecodeError)
 
 
@@ -238,6 +239,9 @@ def undecodable(data):
 
 
 def syntax_fault(error, data):
+    cpp = CPP.search(data)
+    if cpp is not None:
+        return fault("SyntaxError", data.count(b"\n", 0, cpp.start()) + 1, None, "C++ in a file for Python")
     encoding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
     lines = io.StringIO(data.decode(encoding), newline=None).read().split("\n")
     line = getattr(error, "lineno", None)

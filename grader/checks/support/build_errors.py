@@ -7,19 +7,19 @@ import re
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from pathlib import PurePosixPath
-from typing import NamedTuple
 
-from grader.checks.support.build_output import BuildError, folder_names
+from grader.checks.support.build_output import FIRST_ERROR_HINT, BuildError, Explained, folder_names
+from grader.checks.support.cpp_errors import CPP_ERRORS, call_below, programs_without
 from grader.checks.support.scripts import OF_FILES, OF_INTERFACES, cmake_calls, installed
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
     LIBRARIES,
     ON_THE_MACHINE,
-    PLACEHOLDERS,
+    ROS_2,
     exists_somewhere,
     install_hint,
+    is_no_package,
     known_packages,
-    no_package_of_ros,
     noetic_messages,
 )
 from grader.model.message_definitions import meant_type
@@ -34,7 +34,6 @@ SLIP = 0.8
 """How alike a name is that is written for one that every machine has: `pospy` for `rospy`."""
 UNKNOWN_COMMAND = "Unknown CMake command"
 BACKSLASH = 'bad character with text "\\"'
-FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error that it prints"
 _QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
 """As compilers and linkers write them."""
 CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
@@ -47,26 +46,6 @@ OF_TARGETS = (
 )
 OF_CATKIN = ("catkin_package", "catkin_install_python", "catkin_python_setup")
 """Commands that `find_package(catkin …)` defines."""
-STANDARD = {
-    **dict.fromkeys(("cout", "cin", "cerr", "endl"), "iostream"),
-    **dict.fromkeys(("string", "to_string", "stoi"), "string"),
-    **{name: name for name in ("vector", "map")},
-}
-"""Names of C++'s standard library that are written without `std::`, with their headers."""
-
-
-class Explained(NamedTuple):
-    """The error in a student's words, and what to do; `of_machine`: the grading machine lacks something; `place`: the
-    line that is wrong, where that is not the one that the build names; `lacks`: the package that it lacks; `by_itself`:
-    a command that CMake does not know, and no line of catkin's own is why; `uncalled`: a command to call."""
-
-    why: str
-    hint: str
-    of_machine: bool = False
-    place: FileCitation | None = None
-    lacks: str = ""
-    by_itself: bool = False
-    uncalled: str = ""
 
 
 def explain_error_of_build(error: BuildError, package: PackageFacts, lines: Sequence[str]) -> Explained:
@@ -166,7 +145,7 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
         declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
         too = "; in package.xml too" if declared.intersection(slips) else ""
         return Explained(f"find_package(…) names {join_words(slips)}, and there {what}", f"{right}{too}")
-    if explained := _of_submission(name, (package, *package.also)) or _of_no_package(name):
+    if explained := _of_submission(name, (package, *package.also)) or _of_no_ros(name, package):
         return explained
     placeholder = re.fullmatch(r"dep(end)?\d", name) is not None
     own = {package.name, *(one.name for one in package.also)}
@@ -184,9 +163,22 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
     return Explained(f"{why}{example}", hint)
 
 
-def _of_no_package(name: str) -> Explained | None:
-    told = no_package_of_ros(name)
-    return Explained(*told) if told else None
+def _of_no_ros(name: str, package: PackageFacts) -> Explained | None:
+    """Explain a name of ROS 2's or of a Python module's, or one with a sign behind it; None for any other."""
+    if name[-1:] in {",", ";", ".", ":"}:
+        why = f"find_package(…) names {name[:-1]} with a `{name[-1]}` behind it, and only blanks part its names"
+        return Explained(why, f"write {name[:-1]} instead of {name}")
+    if name in ROS_2:
+        return Explained(f"it needs {name}, which is from ROS 2", f"take {name} out: this lab is for ROS 1")
+    if not is_no_package(name):
+        return None
+    where = "find_package(…) and package.xml" if _is_declared(name, package) else "find_package(…)"
+    why = f"find_package(…) names {name}, which is a Python module and no package of ROS"
+    return Explained(why, f"take {name} out of {where}: a script imports it without that")
+
+
+def _is_declared(name: str, package: PackageFacts) -> bool:
+    return package.manifest is not None and any(one.name == name for one in package.manifest.dependencies)
 
 
 def _missing_library(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
@@ -243,7 +235,7 @@ def _calls_of_targets(package: PackageFacts, made: Sequence[CMakeCall], absent: 
 
 
 def _sources(call: CMakeCall) -> list[str]:
-    return [word for word in call.args if posixpath.splitext(word)[1] in CPP_SUFFIXES]
+    return [word for word in call.args[1:] if posixpath.splitext(word)[1] in CPP_SUFFIXES]
 
 
 def no_types(package: PackageFacts) -> Explained | None:
@@ -299,9 +291,8 @@ def _unfound_dependency(found: re.Match[str], package: PackageFacts, _lines: Seq
     why = f"generate_messages(…) names {name}, and find_package(catkin …) does not"
     manifest = package.manifest
     kinds = ("build_depend", "run_depend") if manifest is not None and manifest.format == 1 else ("depend",)
-    declared = manifest is not None and any(d.name == name for d in manifest.dependencies)
     lines = join_words(f"<{kind}>{name}</{kind}>" for kind in kinds)
-    more = "" if declared else f"; in package.xml, add {lines}"
+    more = "" if _is_declared(name, package) else f"; in package.xml, add {lines}"
     return Explained(why, f"write {name} after COMPONENTS in the find_package(…){where}{more}")
 
 
@@ -475,13 +466,13 @@ def _unwaited(package: PackageFacts, text: str, what: str, targets: str, lines: 
         one = _missing_dependency(warned, package, lines)
         return one._replace(why=f"{text}: {one.why}, so a parallel build (-j) sometimes fails")
     why = f"{text}: nothing makes it wait for {what}, so a parallel build (-j) sometimes fails"
-    waiting = _programs_without(package, "add_dependencies")
+    waiting = programs_without(package, "add_dependencies")
     fixes = [
         f"below the add_executable(…) on line {call.line}, write add_dependencies({call.args[0]} {targets})"
         for call in cmake_calls(package, "add_executable")
         if call.args and call.args[0] in waiting
     ]
-    other = f"write {_call_below('<program>', 'add_dependencies', targets)}"
+    other = f"write {call_below('<program>', 'add_dependencies', targets)}"
     return Explained(why, "; ".join(fixes[:FIXES_MAX]) or other)
 
 
@@ -502,78 +493,6 @@ def _missing_link(found: re.Match[str], _package: PackageFacts, _lines: Sequence
     why = f"it is linked with the library {found[1]}, which this grading machine lacks"
     hint = f"{ON_THE_MACHINE}install the library {found[1]}, then grade again"
     return Explained(why, hint, of_machine=True)
-
-
-def _no_semicolon(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    where = f"of the statement before `{found[2]}`" if found[1] else "of that line"
-    return Explained(f"{found.string}: a `;` is missing", f"write a `;` at the end {where}")
-
-
-def _no_semicolon_above(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
-    """Where what the compiler did not expect begins its line, the statement above has no end."""
-    place = re.search(r":(\d+):", found.string)
-    source = re.compile(rf"\s*{place[1]} \|\s*{re.escape(found[1])}") if place else None
-    if source is None or not any(source.match(line) for line in lines):
-        return Explained(found.string, FIRST_ERROR_HINT)
-    hint = f"write a `;` at the end of the last line of code above line {place[1] if place else ''}"
-    return Explained(f"{found.string}: a `;` is missing above it", hint)
-
-
-def _no_brace(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    hint = "write a `}` for each `{`; the indentation shows where one is missing"
-    return Explained(f"{found.string}: a `}}` is missing", hint)
-
-
-def _explain_undeclared(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    name, near = found[1], found[2]
-    if name in STANDARD:
-        return Explained(found.string, f"write std::{name}, and #include <{STANDARD[name]}> at the top")
-    if re.fullmatch(r"_[1-9]", name):
-        return Explained(f"{found.string}: not every ROS has it", PLACEHOLDERS.format(name), of_machine=True)
-    declare = f"declare {name} above that line, or include the header that does"
-    hint = f"write {near} there, if that is what you mean; otherwise {declare}" if near else declare
-    return Explained(found.string, hint)
-
-
-def _no_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    """A service's type has two parts, and nothing else."""
-    near = near_names(found[2], ("Request", "Response"))
-    hint = f"write {found[1]}::{near[0]}" if near else f"look up the name of that part of {found[1]}"
-    return Explained(f"there is no {found[2]} in {found[1]}", hint)
-
-
-def _no_member(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    return Explained(found.string, f"write {found[2]} in place of {found[1]}")
-
-
-def _explain_unlinked(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    if found[1] == "main":
-        why = "a program has no `main` function"
-        return Explained(why, "write `int main(int argc, char **argv)` in one of its sources")
-    name = found[1].partition("(")[0]
-    alone = _programs_without(package, "target_link_libraries") if name.startswith("ros::") else []
-    program = alone[0] if alone else "<program>"
-    own = "" if alone else "; a function of your own needs its .cpp file in add_executable(…)"
-    why = f"{name} is used, but nothing that is linked defines it"
-    return Explained(
-        why, f"write {_call_below(program, 'target_link_libraries', '${catkin_LIBRARIES}')}{own}"
-    )
-
-
-def _programs_without(package: PackageFacts, command: str) -> list[str]:
-    """Return the programs that no such command is called for."""
-    named = {call.args[0] for call in cmake_calls(package, command) if call.args}
-    made = [call.args[0] for call in cmake_calls(package, "add_executable") if call.args]
-    return [program for program in made if program not in named]
-
-
-def _call_below(program: str, command: str, words: str) -> str:
-    return f"{command}({program} {words}) below its add_executable(…)"
-
-
-def _main_twice(_found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    why = "two sources of one program have a `main` function"
-    return Explained(why, "write a separate add_executable(…) for each program")
 
 
 def _unknown_command(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -637,14 +556,6 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"(?<![\w+/.-])(\w+)/(\w+)\.h: No such file or directory", _header_race),
     (r"cannot find -l(\S+?)(?::|$)", _missing_link),
     (r"([\w+./-]+): No such file or directory", _missing_header),
-    (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
-    (r"expected initializer before '([^']+)'", _no_semicolon_above),
-    (r"expected '}' at end of input", _no_brace),
-    (r"'([^']+)' was not declared in this scope(?:; did you mean '([^']+)')?", _explain_undeclared),
-    (r"'([^']+)::(\w+)' has not been declared", _no_type),
     (r"'(\w+)' has not been declared", _half_written),
-    (r"'([^']+)' is not a member of .*; did you mean '([^']+)'", _no_member),
-    (r"has no member named '([^']+)'; did you mean '([^']+)'", _no_member),
-    (r"undefined reference to '([^']+)", _explain_unlinked),
-    (r"multiple definition of 'main", _main_twice),
+    *CPP_ERRORS,
 )

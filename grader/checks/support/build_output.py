@@ -23,6 +23,7 @@ _CALLER = re.compile(r"^\s+(?P<file>[^:()]+):(?P<line>\d+) \(\w+\)$")
 CALL_STACK = "Call Stack (most recent call first):"
 CALLERS_MAX = 40
 SYSTEM = ("/usr/", "/opt/")
+FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error that it prints"
 
 
 class BuildError(NamedTuple):
@@ -34,6 +35,20 @@ class BuildError(NamedTuple):
     kind: str
     text: str
     place: FileCitation | None
+
+
+class Explained(NamedTuple):
+    """The error in a student's words, and what to do; `of_machine`: the grading machine lacks something; `place`: the
+    line that is wrong, where that is not the one that the build names; `lacks`: the package that it lacks; `by_itself`:
+    a command that CMake does not know, and no line of catkin's own is why; `uncalled`: a command to call."""
+
+    why: str
+    hint: str
+    of_machine: bool = False
+    place: FileCitation | None = None
+    lacks: str = ""
+    by_itself: bool = False
+    uncalled: str = ""
 
 
 def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | None:

@@ -477,13 +477,12 @@ def _future(message: str, source: str, _marked: tuple[int, int] | None) -> Meani
 def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
     if (action := re.match(r"'(\w+)Action' object has no attribute", message)) and "send_goal" in source:
         goal = f"{action[1]}Goal"
-        return (
-            f"`{action[1]}Action` is the type of the action, and a goal is a `{goal}`",
-            f"make it with `{goal}(…)`",
-        )
-    if message == "'Duration' object has no attribute 'sleep'":
+        cause = f"`{action[1]}Action` is the type of the action, and a goal is a `{goal}`"
+        return cause, f"make it with `{goal}(…)`"
+    if found := re.match(r"'(Duration|int|float)' object has no attribute 'sleep'", message):
         hint = "make it with `rospy.Rate(…)`, which takes how many times a second the loop runs"
-        return "a Duration is a length of time, and only a Rate sleeps", hint
+        what = "a Duration is a length of time" if found[1] == "Duration" else "this is a plain number"
+        return f"{what}, and only a Rate sleeps", hint
     if (twice := _IN_ITSELF.search(message)) and re.search(rf"\b{twice[1]}\.{twice[1]}\b", source):
         name = twice[1]
         cause = f"`from {name} import {name}` makes `{name}` what is in the module, and not the module"

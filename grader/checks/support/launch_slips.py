@@ -110,17 +110,17 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
     seen = f"; {there_is(dict.fromkeys([*near, *others]))}" if near or others else ""
     files = {file.path: file for file in package.launch_files}
     if starting := full or guessed:
-        built = {n.type: one for one in programs for n in starts_built(package, files[starting[0]], one)}
-        called = sorted((programs - {*built.values()}) | {str(kind) for kind in built})
+        called = sorted(_called_in(package, files[starting[0]], one) for one in programs)
         which = "which" if starting == others else f"and {join_words(starting)}"
         seen += f", {which} {'each start' if len(starting) > 1 else 'starts'} {join_words(called)}"
     parts = {} if full else _parts_started(started)
     if parts:
         alone = [*parts] == others
+        begun = {path: _called_in(package, files[path], name) for path, name in parts.items()}
         seen += (
-            f", which starts {parts[others[0]]}"
+            f", which starts {begun[others[0]]}"
             if alone and len(others) == 1
-            else f", and {join_words(f'{path} starts {name}' for path, name in parts.items())}"
+            else f", and {join_words(f'{path} starts {name}' for path, name in begun.items())}"
         )
     movable = [p for p in near if can_be_moved(p, launch) and (not wanted or started.get(p, wanted))]
     movable += full[:1] if len(full) == 1 else []
@@ -144,6 +144,11 @@ def starts_built(package: PackageFacts, file: LaunchFile, script: str) -> list[L
     stem = PurePosixPath(script).stem
     is_built = stem != script and any(one.is_called(stem) for one in programs(package))
     return [node for node in file.nodes if is_built and node.type == stem]
+
+
+def _called_in(package: PackageFacts, file: LaunchFile, script: str) -> str:
+    """Return what the file starts for this script: the program that CMake builds where it is that, else the script."""
+    return next((str(node.type) for node in starts_built(package, file, script)), script)
 
 
 def built_fixes(package: PackageFacts, file: LaunchFile, script: str) -> list[str]:

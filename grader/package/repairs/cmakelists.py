@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 
 from cmake_parser.ast import Token
 
-from grader.installable import known_packages, noetic_messages
+from grader.installable import is_no_package, known_packages, noetic_messages
 from grader.model.package import CMAKE, MANIFEST, PackageFacts, meant_command
 from grader.model.repair import RepairKind
 from grader.package.cmake_parse import commands_of, join_half_comment, parse_tree_of
@@ -93,6 +93,7 @@ def repair_cmake(
         add_call(files, "project(…)", f"project({name or wanted.package})", ("cmake_minimum_required",))
     _move_project(files)
     _spell_catkin(files)
+    _leave_out_modules(files)
     if not _calls_catkin(files, package):
         line = f"find_package(catkin REQUIRED COMPONENTS {needs})"
         add_call(files, "find_package(catkin …)", line, ("project",))
@@ -123,6 +124,19 @@ def _calls_catkin(files: Files, package: PackageFacts) -> bool:
     written = [[t.value for t in words_of(c)] for c in calls_of(files, "find_package")]
     known = [list(c.args) for c in told if c.name == "find_package"]
     return any(words[:1] == ["catkin"] for words in (*written, *known))
+
+
+def _leave_out_modules(files: Files) -> None:
+    """Leave modules of Python out of find_package(catkin …): no package of ROS is one."""
+    for command in reversed(calls_of(files, "find_package")):  # places above stay
+        words = words_of(command)
+        of_catkin = words[1:] if words and words[0].value == "catkin" else []
+        lost = [word for word in of_catkin if is_no_package(word.value)]
+        text, names = cmake_text(files), join_words(word.value for word in lost)
+        for word in reversed(lost):
+            text = replace_token(text, word, "")
+        message = f"line {command.line} of {CMAKE}: find_package(…) names {names}, and no package of ROS is called so"
+        files.change("build-line", CMAKE, text, message, f"take {names} out of find_package(…)")
 
 
 def _spell_catkin(files: Files) -> None:

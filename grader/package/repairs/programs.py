@@ -10,7 +10,14 @@ from pathlib import PurePosixPath
 from cmake_parser.ast import Command, Token
 
 from grader.model.package import CMAKE, PackageFacts
-from grader.package.repairs.cmake_calls import calls_of, cmake_text, find_commented, replace_token, words_of
+from grader.package.repairs.cmake_calls import (
+    all_words,
+    calls_of,
+    cmake_text,
+    find_commented,
+    replace_token,
+    words_of,
+)
 from grader.package.repairs.editing import Files
 from grader.package.repairs.files import is_own
 from grader.package.repairs.names import CPP, Wanted, is_near
@@ -82,23 +89,39 @@ def install_scripts(files: Files, package: PackageFacts, wanted: Wanted) -> None
 
 
 def correct_paths(files: Files, package: PackageFacts) -> None:
-    """Of files that a call names and that lie elsewhere in the package, each by its name alone: where they lie."""
+    """Of files that a call names and that lie elsewhere in the package, each by its name alone, or that have nearly
+    this name in the same folder: where they lie."""
     own = [f.path for f in package.files if is_own(f.path)]
+    written = {_plain(token.value) for token in all_words(files)}
     for call in reversed(calls_of(files, INSTALL, "add_executable", "add_library")):  # places above stay
-        moved: list[tuple[Token, str]] = []
-        for token in words_of(call):
-            path = PurePosixPath(_plain(token.value))
-            copies = [one for one in own if PurePosixPath(one).name == path.name]
-            is_file = path.suffix in (".py", *CPP) and "$" not in str(path)
-            if is_file and len(copies) == 1 and not (files.folder / path).exists():
-                moved.append((token, copies[0]))
+        words = words_of(call)
+        named = words if call.identifier.lower() == INSTALL else words[1:]  # a target may be called mean.cpp
+        moved = [(one, there) for one in named if (there := _meant_file(files, one.value, own, written))]
         text = cmake_text(files)
         for token, right in reversed(moved):
             text = replace_token(text, token, right)
-        named, there = join_words(t.value for t, _ in moved), join_words(right for _, right in moved)
-        message = f"line {call.line} of {CMAKE}: {call.identifier}(…) names {named}, which the package has as {there}"
+        names, there = join_words(t.value for t, _ in moved), join_words(right for _, right in moved)
+        message = f"line {call.line} of {CMAKE}: {call.identifier}(…) names {names}, which the package has as {there}"
         fix = " and ".join(f"write {right} instead of {token.value}" for token, right in moved)
         files.change("build-line", CMAKE, text, message, fix)
+
+
+def _meant_file(files: Files, word: str, own: Sequence[str], written: Collection[str]) -> str:
+    """Return where the only file lies that a word means which names none; "" where it is not plain. What `written`
+    names is meant there."""
+    path = PurePosixPath(_plain(word))
+    if path.suffix not in (".py", *CPP) or not _is_missing(files, word, ()):
+        return ""
+    same = [one for one in own if PurePosixPath(one).name == path.name]
+    near = [one for one in own if one not in written and _is_slip_of(path, PurePosixPath(one))]
+    found = same or near
+    return found[0] if len(found) == 1 else ""
+
+
+def _is_slip_of(written: PurePosixPath, path: PurePosixPath) -> bool:
+    """Return whether a letter is wrong in a file's name. Where only a digit differs, they are two files."""
+    letters = {re.sub(r"\d", "", one.name) for one in (written, path)}
+    return written.parent == path.parent and len(letters) > 1 and is_near(written.name, path.name)
 
 
 OF_TARGETS = ("add_executable", "target_link_libraries", "add_dependencies", "set_target_properties")

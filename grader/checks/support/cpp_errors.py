@@ -1,0 +1,115 @@
+"""What the compiler and the linker say of a C++ source, in a student's words, and what to do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+from grader.checks.support.build_output import FIRST_ERROR_HINT, Explained
+from grader.checks.support.scripts import cmake_calls
+from grader.checks.support.text import near_names
+from grader.installable import ON_THE_MACHINE
+from grader.model.package import PackageFacts
+
+STANDARD = {
+    **dict.fromkeys(("cout", "cin", "cerr", "endl"), "iostream"),
+    **dict.fromkeys(("string", "to_string", "stoi"), "string"),
+    **{name: name for name in ("vector", "map")},
+}
+"""Names of C++'s standard library that are written without `std::`, with their headers."""
+
+
+def _no_semicolon(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    where = f"of the statement before `{found[2]}`" if found[1] else "of that line"
+    return Explained(f"{found.string}: a `;` is missing", f"write a `;` at the end {where}")
+
+
+def _no_semicolon_above(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+    """Where what the compiler did not expect begins its line, the statement above has no end."""
+    place = re.search(r":(\d+):", found.string)
+    source = re.compile(rf"\s*{place[1]} \|\s*{re.escape(found[1])}") if place else None
+    if source is None or not any(source.match(line) for line in lines):
+        return Explained(found.string, FIRST_ERROR_HINT)
+    hint = f"write a `;` at the end of the last line of code above line {place[1] if place else ''}"
+    return Explained(f"{found.string}: a `;` is missing above it", hint)
+
+
+def _no_brace(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    return Explained(
+        f"{found.string}: a `}}` is missing",
+        "write a `}` for each `{`; the indentation shows where one is missing",
+    )
+
+
+def _explain_undeclared(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+    name, near = found[1], found[2]
+    if re.fullmatch(r"_\d", name) and any("boost::bind" in line for line in lines):
+        return _no_placeholder(name)
+    if name in STANDARD:
+        return Explained(found.string, f"write std::{name}, and #include <{STANDARD[name]}> at the top")
+    declare = f"declare {name} above that line, or include the header that does"
+    return Explained(
+        found.string,
+        f"write {near} there, if that is what you mean; otherwise {declare}" if near else declare,
+    )
+
+
+def _no_placeholder(name: str) -> Explained:
+    """The Boost of ROS Noetic knows `_1` by itself, and later ones do not."""
+    why = f"{name} in boost::bind(…) is unknown to this grading machine's Boost, which is newer than ROS Noetic's"
+    hint = (
+        f"{ON_THE_MACHINE}build it with ROS Noetic's own Boost; boost::placeholders::{name} works with both"
+    )
+    return Explained(why, hint, of_machine=True)
+
+
+def _no_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    """A service's type has two parts, and nothing else."""
+    near = near_names(found[2], ("Request", "Response"))
+    hint = f"write {found[1]}::{near[0]}" if near else f"look up the name of that part of {found[1]}"
+    return Explained(f"there is no {found[2]} in {found[1]}", hint)
+
+
+def _no_member(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    return Explained(found.string, f"write {found[2]} in place of {found[1]}")
+
+
+def _explain_unlinked(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    if found[1] == "main":
+        why = "a program has no `main` function"
+        return Explained(why, "write `int main(int argc, char **argv)` in one of its sources")
+    name = found[1].partition("(")[0]
+    alone = programs_without(package, "target_link_libraries") if name.startswith("ros::") else []
+    program = alone[0] if alone else "<program>"
+    own = "" if alone else "; a function of your own needs its .cpp file in add_executable(…)"
+    why = f"{name} is used, but nothing that is linked defines it"
+    return Explained(why, f"write {call_below(program, 'target_link_libraries', '${catkin_LIBRARIES}')}{own}")
+
+
+def programs_without(package: PackageFacts, command: str) -> list[str]:
+    """Return the programs that no such command is called for."""
+    named = {call.args[0] for call in cmake_calls(package, command) if call.args}
+    made = [call.args[0] for call in cmake_calls(package, "add_executable") if call.args]
+    return [program for program in made if program not in named]
+
+
+def call_below(program: str, command: str, words: str) -> str:
+    return f"{command}({program} {words}) below its add_executable(…)"
+
+
+def _main_twice(_found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    why = "two sources of one program have a `main` function"
+    return Explained(why, "write a separate add_executable(…) for each program")
+
+
+CPP_ERRORS: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]], ...] = (
+    (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
+    (r"expected initializer before '([^']+)'", _no_semicolon_above),
+    (r"expected '}' at end of input", _no_brace),
+    (r"'([^']+)' was not declared in this scope(?:; did you mean '([^']+)')?", _explain_undeclared),
+    (r"'([^']+)::(\w+)' has not been declared", _no_type),
+    (r"'([^']+)' is not a member of .*; did you mean '([^']+)'", _no_member),
+    (r"has no member named '([^']+)'; did you mean '([^']+)'", _no_member),
+    (r"undefined reference to '([^']+)", _explain_unlinked),
+    (r"multiple definition of 'main", _main_twice),
+)
