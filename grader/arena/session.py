@@ -21,7 +21,15 @@ from grader.arena.process_environment import LOOPBACK, ProcessEnvironment, searc
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.run_state import ROSOUT, RunState, all_compute
 from grader.errors import ArenaError
-from grader.evidence.events import OTHER_TYPE, STOPPED, TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
+from grader.evidence.events import (
+    NO_ANSWER,
+    OTHER_TYPE,
+    STOPPED,
+    TOPICS,
+    ActorEvent,
+    ProcessEvent,
+    ScenarioEvent,
+)
 from grader.evidence.run import is_grader_node
 from grader.evidence.writer import EvidenceChannel, EvidenceWriter
 from grader.ros_env import RosInstallation
@@ -170,7 +178,7 @@ class ArenaSession:
 
         if not await self.wait(is_over, timeout_s + END_S) or number not in self._answers:
             after_s = min(timeout_s, time.monotonic() - begun_s)
-            return {"error": f"no answer within {after_s:.3g} s"}
+            return {"error": f"{NO_ANSWER} {after_s:.3g} s"}
         return self._answers.pop(number)
 
     async def wait(self, condition: Callable[[], bool], timeout_s: float) -> bool:

@@ -113,9 +113,9 @@ def _cite_start(
     if len(wrong) != 1 or slips_of(package, run, first.callerid, "added-first"):
         return verdict
     slip = wrong[0]
-    message = f"{verdict.message}; line {slip.line} of {slip.file} sets `{slip.name}` to {slip.message}"
-    hint = f"on line {slip.line} of {slip.file}, set `{slip.name}` to {params.start}"
-    return verdict.model_copy(update={"message": message, "hint": hint, "citations": (slip.place,)})
+    where = f"line {slip.line} of {slip.file}"
+    why = f"{where} sets `{slip.name}` to {slip.message}"
+    return verdict.explained(why, f"on {where}, set `{slip.name}` to {params.start}", (slip.place,))
 
 
 def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:

@@ -107,7 +107,7 @@ def _with_next(verdict: Verdict, package: PackageFacts, params: LaunchXmlParams)
         return verdict
     message = f"{verdict.message}; with that repaired, {'; '.join(f'line {s.line}: {s.why}' for s in slips)}"
     hint = "; then ".join((verdict.hint, *dict.fromkeys(f"on line {s.line} {s.fix}" for s in slips)))
-    cited = tuple(FileCitation(file=s.file, line=s.line) for s in slips)
+    cited = tuple(s.place for s in slips)
     return verdict.model_copy(
         update={"message": message, "hint": hint, "citations": (*verdict.citations, *cited)}
     )
@@ -139,7 +139,7 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
         message = (
             f"{file.path} has no <node> for {name}: line {built[0].line} starts {built[0].type}, which is C++"
         )
-        cited = (FileCitation(file=built[0].file, line=built[0].line),)
+        cited = (built[0].place,)
         return failed(message, hint="; ".join(built_fixes(package, file, name)), citations=cited)
     return slip.verdict() if slip else _no_node(file, package.name, name)
 
@@ -184,7 +184,7 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     """No node is even meant for it."""
     message = f"{file.path} has no <node> for {name}"
     if test := next((t for t in file.tests if t.type == name), None):
-        cited = (FileCitation(file=test.file, line=test.line),)
+        cited = (test.place,)
         message = f"{message}: only rostest starts a <test>"
         return failed(message, hint=f"write {_node_tag(pkg, name)} in place of the <test>", citations=cited)
     commented = (line for kind, line in file.commented if kind in {name, PurePosixPath(name).stem})

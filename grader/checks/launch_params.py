@@ -325,12 +325,12 @@ def _wrong_value(
         if len(again) > 1:
             lines = join_words(str(p.line) for p in again)
             hint = f"lines {lines} give the same name: write {join_words(missing)} for the others"
-        cited = tuple(FileCitation(file=p.file, line=p.line) for p in again)
+        cited = tuple(p.place for p in again)
         return failed(message, hint=hint, citations=cited)
     others = [name for name, value in wanted.items() if not _fits(before[place + name], value)]
     name = others[0]
     read = {p.name.removeprefix(place): p for p in file.params if p.name in {place + one for one in others}}
-    cited = tuple(FileCitation(file=p.file, line=p.line) for p in read.values())
+    cited = tuple(p.place for p in read.values())
     found, value = before[place + name], wanted[name]
     if isinstance(found, str) and found.strip() == str(value):
         message = f'{place}{name} is the text "{found}", which the node does not read as a number'
@@ -378,4 +378,4 @@ def _value_text(value: object) -> str:
 
 def _lines(file: LaunchFile, wanted: Wanted) -> tuple[FileCitation, ...]:
     found = [p for p in file.params if p.name.rpartition("/")[2] in wanted]
-    return tuple(FileCitation(file=p.file, line=p.line) for p in found[:3])
+    return tuple(p.place for p in found[:3])

@@ -177,7 +177,7 @@ def _absent(package: PackageFacts, run: Run, nodes: Sequence[str], absent: Seque
         why = why_not_up(package, run, absent[0])
     said = "" if why.citations or why.unbuilt or quoted(run) in why.why else quoted(run)
     if not why.citations:
-        why = why._replace(citations=(FileCitation(file=absent[0].file, line=absent[0].line),))
+        why = why._replace(citations=(absent[0].place,))
     name = "" if several else f"{absent[0].full_name}: "
     return why.verdict(f"{_comes_up(nodes)}; {name}{why.why}{said}")
 

@@ -500,7 +500,7 @@ def _other_value(
         topics = join_words(sorted(filter(None, sent)))
         message, hint = f"{message}; none came after {topics}", f"publish again in the callback of {topics}"
     verdict = failed(message, hint=hint)
-    return verdict.once() if params.when == "last" else verdict
+    return verdict.once() if params.when == "last" else verdict.model_copy(update={"callbacks": "before"})
 
 
 def _values(asked: Sequence[Reading]) -> str:

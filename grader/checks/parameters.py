@@ -416,7 +416,7 @@ def _given_at(package: PackageFacts, build: Run, name: str) -> tuple[FileCitatio
     launched = [
         one for file in package.launch_files for one in file.params if absolute_name(one.name) == name
     ]
-    found = [FileCitation(file=one.file, line=one.line) for one in launched]
+    found = [one.place for one in launched]
     for file in (f.path for f in package.files if f.path.endswith((".yaml", ".yml"))):
         keys = [key for key in keys_of(build, file) if key.path and name.endswith(key.path)]
         found += [FileCitation(file=file, line=key.line) for key in keys]

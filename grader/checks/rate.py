@@ -28,9 +28,9 @@ from grader.checks.support.topics import (
 )
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
-from grader.model.package import LaunchParam, PackageFacts, PythonSlip
+from grader.model.package import PackageFacts, PythonSlip, SlipKind
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import hertz, plural, seconds, significant
 
 FLOOD_FACTOR = 5
@@ -205,7 +205,7 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
 
 def _asked_flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
     """Return where the node's script asks for so many messages, or for more than it can send."""
-    asked = _asked_rates(run, package, params)
+    asked = _slips(run, package, params, "rate-number")
     least_hz = max((1 - NUMBER_SHARE) * found.mean_hz, FLOOD_FACTOR * params.rate_hz)
     return next((slip for slip in asked if float(slip.message) >= least_hz), None)
 
@@ -241,22 +241,16 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
     in_bounds = params.low_hz * (1 - ROUNDING) <= mean_hz <= params.high_hz * (1 + ROUNDING)
     if in_bounds and even:
         return None
-    other = (
+    wrong = _wrong_mean(found, params)
+    return (
         _fell_silent(found, run, package, params)
         or _published_twice(found, run, package, params)
-        or _twice_in_turn(found, run, package, params)
+        or (_by_slip(wrong, "publish-twice", run, package, params) if mean_hz > params.high_hz else None)
         or _bursts(found, outside, even, params)
+        or (_by_slip(wrong, "sleep-twice", run, package, params) if mean_hz < params.rate_hz else None)
+        or _by_number(wrong, mean_hz, run, package, params)
+        or _by_parameter(wrong, run, package, params, mean_hz)
     )
-    if other is not None:
-        return other
-    wrong = _wrong_mean(found, params)
-    callers = (c.callerid for c in run.student_channels(params.topic))
-    twice = next((s for one in callers for s in slips_of(package, run, one, "sleep-twice")), None)
-    if twice is not None and mean_hz < params.rate_hz:
-        message = f"{wrong.message}; {twice.file}: {twice.message}"
-        return _explained(wrong, twice, message, f"in {twice.file}, {twice.fix}")
-    by_number = _by_number(wrong, found.mean_hz, run, package, params)
-    return by_number or _by_parameter(wrong, run, package, params, mean_hz)
 
 
 def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
@@ -266,13 +260,9 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
         return None
     lasted = seconds(found.times_ns[-1] - found.times_ns[0])
     message = f"{params.topic} falls silent {lasted} after its first message, although its node keeps running"
-    callers = (c.callerid for c in run.student_channels(params.topic))
     if slow := _asked_slow(found, run, package, params):
         return slow
-    slip = next(
-        (s for one in callers for s in slips_of(package, run, one, "spin-in-loop", "unregistered")), None
-    )
-    if slip is not None:
+    if slip := next(iter(_slips(run, package, params, "spin-in-loop", "unregistered")), None):
         return failed(f"{message}: {slip.message}", hint=slip.fix, citations=(slip.place,))
     hint = f"publish in a loop `{LOOP}`, not a fixed number of times"
     return failed(message, hint=hint).once()
@@ -280,7 +270,7 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
 
 def _asked_slow(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
     """The silence is no longer than the pause for which the node's script asks."""
-    asked = _asked_rates(run, package, params)
+    asked = _slips(run, package, params, "rate-number")
     slow = next((s for s in asked if found.tail_ns * float(s.message) < PAUSES_WAITED * 1e9), None)
     if slow is None or float(slow.message) >= params.low_hz:
         return None
@@ -299,16 +289,14 @@ def _published_twice(found: Rhythm, run: Run, package: PackageFacts, params: Rat
     return failed(message, hint=f"give the one of {copied} that is for another topic that topic's name")
 
 
-def _twice_in_turn(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
-    """The loop publishes the same on two lines that follow each other."""
-    callers = (c.callerid for c in run.student_channels(params.topic))
-    twice = next((s for one in callers for s in slips_of(package, run, one, "publish-twice")), None)
-    if twice is None or found.mean_hz <= params.high_hz:
+def _by_slip(
+    verdict: Verdict, kind: SlipKind, run: Run, package: PackageFacts, params: RateParams
+) -> Verdict | None:
+    """Name the line on which a publisher's loop does twice in a turn what it should do once."""
+    slip = next(iter(_slips(run, package, params, kind)), None)
+    if slip is None:
         return None
-    wrong = _wrong_mean(found, params)
-    return _explained(
-        wrong, twice, f"{wrong.message}; {twice.file}: {twice.message}", f"in {twice.file}, {twice.fix}"
-    )
+    return verdict.explained(f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
 
 
 def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -> Verdict | None:
@@ -335,33 +323,31 @@ def _by_number(
 ) -> Verdict | None:
     """Name the line where the node's script asks for the rate that was measured."""
     slip = _asked_number(mean_hz, run, package, params)
-    if slip is None:
-        return None
-    return _with_line(verdict, slip, params)
+    return None if slip is None else _with_line(verdict, slip, params)
 
 
 def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdict:
     """Return the verdict with the line that asks for another rate."""
     where = f"{slip.file}, line {slip.line}"
-    said = f"{slip.name}(…) is given two numbers: {slip.fix}" if slip.fix else f"asks for {slip.message} Hz"
-    message = f"{verdict.message}; {where} {said}" if not slip.fix else f"{verdict.message}; {where}: {said}"
-    right = f"{slip.name}({significant(1 / params.rate_hz)})" if slip.name else ""
-    right = right or loop_rate(significant(params.rate_hz))
-    hint = f"make it {significant(params.rate_hz)} Hz in {where}: use {right}"
-    return _explained(verdict, slip, message, hint)
+    said = (
+        f": {slip.name}(…) is given two numbers: {slip.fix}" if slip.fix else f" asks for {slip.message} Hz"
+    )
+    hz, period_s = significant(params.rate_hz), significant(1 / params.rate_hz)
+    right = f"{slip.name}({period_s})" if slip.name else loop_rate(hz)
+    return verdict.explained(f"{where}{said}", f"make it {hz} Hz in {where}: use {right}", (slip.place,))
 
 
-def _asked_rates(run: Run, package: PackageFacts, params: RateParams) -> list[PythonSlip]:
-    """Return the lines in which the scripts of the topic's publishers ask for a rate."""
+def _slips(run: Run, package: PackageFacts, params: RateParams, *kinds: SlipKind) -> list[PythonSlip]:
+    """Return what is remarkable, of these kinds, in the scripts of the topic's publishers."""
     channels = run.student_channels(params.topic)
-    return [s for c in channels for s in slips_of(package, run, c.callerid, "rate-number")]
+    return [s for c in channels for s in slips_of(package, run, c.callerid, *kinds)]
 
 
 def _asked_number(mean_hz: float, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
     """Return where a script asks for the rate that was measured, which is not the right one."""
     wrong = (
         s
-        for s in _asked_rates(run, package, params)
+        for s in _slips(run, package, params, "rate-number")
         if not params.low_hz <= float(s.message) <= params.high_hz
     )
     return next((s for s in wrong if abs(float(s.message) - mean_hz) < NUMBER_SHARE * mean_hz), None)
@@ -396,8 +382,8 @@ def _by_parameter(
         if value is None:
             told = f"which nothing sets in this run: the default in {where} counts"
             hint = f"make {significant(params.rate_hz)} the default in {where}, or {hint}"
-        message = f"{verdict.message}; the node takes its rate from {slip.message}, {told}"
-        return _explained(verdict, place, message, hint)
+        why = f"the node takes its rate from {slip.message}, {told}"
+        return verdict.explained(why, hint, (place.place,))
     return verdict
 
 
@@ -411,9 +397,9 @@ def _by_read_parameter(
             continue
         if value != params.rate_hz and abs(value - mean_hz) < NUMBER_SHARE * mean_hz:
             where = f"{given.file}, line {given.line}"
-            message = f"{verdict.message}; the node reads {name}, which is {value_text(value)} in {where}"
+            why = f"the node reads {name}, which is {value_text(value)} in {where}"
             hint = f"set {name} to {significant(params.rate_hz)} in {where}"
-            return _explained(verdict, given, message, hint)
+            return verdict.explained(why, hint, (given.place,))
     return verdict
 
 
@@ -424,19 +410,9 @@ def _by_default(
     unset = [name for name in read if name not in there and RATE_NAME.search(name.rpartition("/")[2])]
     if len(unset) != 1 or not verdict.status.is_lost:
         return verdict
-    message = (
-        f"{verdict.message}; the node asks for {unset[0]}, which nothing sets in this run: its default counts"
-    )
-    hint = (
-        f"make {significant(params.rate_hz)} the default of {unset[0]} in your program, if that is its rate"
-    )
-    return verdict.model_copy(update={"message": message, "hint": hint})
-
-
-def _explained(verdict: Verdict, place: PythonSlip | LaunchParam, message: str, hint: str) -> Verdict:
-    """Return the verdict with what the line at that place explains."""
-    cited = (FileCitation(file=place.file, line=place.line),)
-    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+    why = f"the node asks for {unset[0]}, which nothing sets in this run: its default counts"
+    hz = significant(params.rate_hz)
+    return verdict.explained(why, f"make {hz} the default of {unset[0]} in your program, if that is its rate")
 
 
 def _rate_hint(ratio: float, nominal: str, *, even: bool) -> str:

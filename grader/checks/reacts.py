@@ -294,8 +294,8 @@ def _judge_unanswered(
     late = max((one.after_s for one in slow if one.after_s is not None), default=None)
     if late is None and len(slow) == len(answers):
         seen, hint = (f"; {instead[0]}", instead[1]) if instead else ("", hint)
-        verdict = failed(f"{reaction.format('never follows')}, which came {times}{seen}", hint=hint)
+        verdict = failed(f"{reaction.format('never follows')}, which came {times}{seen}", hint=hint).late()
         return verdict.once() if len(answers) == 1 else verdict
     how = "does not follow" if late is None else f"comes up to {late:.2f} s after"
-    verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).once()
+    verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).late().once()
     return excused(verdict, run, slow[0].at_ns, run.end_ns, why_late)

@@ -14,7 +14,7 @@ from grader.checks.support.fields import differences, fields_text, value_text
 from grader.checks.support.processes import GlobalName, TypeName, life_of, plain_type
 from grader.checks.support.text import SERVICE, SPIN, imports, near_names, service_call, shown
 from grader.checks.support.topics import cite, no_node, why_unreached
-from grader.evidence.events import MISFIT
+from grader.evidence.events import MISFIT, NO_ANSWER
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -324,7 +324,8 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         end = explain_end(owner, run, package)
         return failed(f"{asked} gives no answer: {owner.name} ended ({end.cause})", hint=end.hint)
     why = shown(one.detail) or "the call was not answered"
-    return failed(f"{asked} gives no answer: {why}", hint=f"try it by hand: {_by_hand(service, one)}")
+    verdict = failed(f"{asked} gives no answer: {why}", hint=f"try it by hand: {_by_hand(service, one)}")
+    return verdict.late() if one.detail.startswith(NO_ANSWER) else verdict
 
 
 def _undivided(package: PackageFacts, kind: str, one: Exchange) -> Verdict | None:

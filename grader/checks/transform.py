@@ -362,7 +362,7 @@ def _wrong_pose(
     if not old:
         hint = _axes(value, pose, params)[1] or hint
         return failed(f"{what}{_why(value, pose, params)}; {says}", hint=hint)
-    verdict = failed(f"{what}: it is that of an older pose; {says}", hint=hint)
+    verdict = failed(f"{what}: it is that of an older pose; {says}", hint=hint).late()
     if len(judged) > FEW and len({_text(one.value) for one in judged if one.value}) == 1:
         return verdict
     verdict = verdict.once()

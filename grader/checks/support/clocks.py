@@ -240,7 +240,8 @@ def excused(verdict: Verdict, run: Run, from_ns: int, to_ns: int, why: Callable[
     if what := why(late):
         message = f"{verdict.message}; but the grading machine was {what}"
         hint = "grade again when the machine is less busy"
-        return inconclusive(message, hint=hint, measured=verdict.measured)
+        still_open = inconclusive(message, hint=hint, measured=verdict.measured)
+        return still_open.model_copy(update={"excused": verdict.message})
     if why(whole):
         return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})
     return verdict

@@ -258,14 +258,9 @@ def cite_slip(verdict: Verdict, count: Count, run: Run, package: PackageFacts, *
     slip = next(iter(slips_of(package, run, count.callerid, *kinds)), None)
     if slip is None or not verdict.status.is_lost:
         return verdict
-    message = f"{verdict.message}; {slip.file}, line {slip.line}: {slip.message}"
-    hint = (
-        f"in {slip.file}, {slip.fix}"
-        if "line" in slip.fix
-        else f"{slip.fix} on line {slip.line} of {slip.file}"
-    )
-    cited = (slip.place, *verdict.citations)
-    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+    named = "line" in slip.fix
+    hint = f"in {slip.file}, {slip.fix}" if named else f"{slip.fix} on line {slip.line} of {slip.file}"
+    return verdict.explained(f"{slip.file}, line {slip.line}: {slip.message}", hint, (slip.place,))
 
 
 def added_early(first: Count, run: Run, package: PackageFacts, start: int) -> PythonSlip | None:
@@ -279,12 +274,8 @@ def added_early(first: Count, run: Run, package: PackageFacts, start: int) -> Py
 
 def cite_early(verdict: Verdict, slip: PythonSlip) -> Verdict:
     """Return the verdict of a counter that begins, or goes on after its wrap, one too high, with the line."""
-    message = (
-        f"{verdict.message}; line {slip.line} of {slip.file} adds one to `{slip.name}` before it is published"
-    )
-    return verdict.model_copy(
-        update={"message": message, "hint": f"in {slip.file}, {slip.fix}", "citations": (slip.place,)}
-    )
+    why = f"line {slip.line} of {slip.file} adds one to `{slip.name}` before it is published"
+    return verdict.explained(why, f"in {slip.file}, {slip.fix}", (slip.place,))
 
 
 class Turns(NamedTuple):

@@ -182,7 +182,7 @@ def refusal(run: Run, package: PackageFacts | None = None) -> Absence | None:
 def _declared(name: str, package: PackageFacts) -> tuple[FileCitation, ...]:
     """Return where an argument without a default is declared."""
     args = (arg for file in package.launch_files for arg in file.unset_args if arg.declared)
-    return tuple(FileCitation(file=arg.file, line=arg.line) for arg in args if arg.name == name)[:1]
+    return tuple(arg.place for arg in args if arg.name == name)[:1]
 
 
 def explain_by_refused_launch(
@@ -228,7 +228,7 @@ def _unset_args(text: str, package: PackageFacts | None) -> Absence | None:
     verb = "uses" if len(lines) == 1 else "use"
     why = f"roslaunch starts nothing: {where} {verb} {names}, which no <arg> declares"
     hint = f"below <launch>, add {declares}, with {'its value' if len(args) == 1 else 'their values'} in place of …"
-    cited = tuple(FileCitation(file=arg.file, line=arg.line) for arg in args)
+    cited = tuple(arg.place for arg in args)
     return Absence(why, hint, citations=tuple(dict.fromkeys(cited)))
 
 

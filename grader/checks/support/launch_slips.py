@@ -50,11 +50,15 @@ class Slip(NamedTuple):
     refused: bool = False
     lacks: str = ""
 
+    @property
+    def place(self) -> FileCitation:
+        """The line."""
+        return FileCitation(file=self.file, line=self.line)
+
     def verdict(self, said: str = "") -> Verdict:
         """Return the verdict with what roslaunch said (`said`) at the end."""
-        cited = (FileCitation(file=self.file, line=self.line),)
         message = f"{self.file}, line {self.line}: {self.why}{said}"
-        return (unjudged if self.of_manifest else failed)(message, hint=self.fix, citations=cited)
+        return (unjudged if self.of_manifest else failed)(message, hint=self.fix, citations=(self.place,))
 
 
 PROGRAMS_OF = {

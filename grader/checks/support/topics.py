@@ -30,7 +30,6 @@ from grader.model.package import LaunchNode, PackageFacts, PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.model.verdict import (
     EvidenceCitation,
-    FileCitation,
     Status,
     Verdict,
     failed,
@@ -145,7 +144,7 @@ def _judge_misnamed(
         here = [name for name in published if name.startswith(node.namespace)] or near or published
         hint = "look at its <remap>: `from` is the name in the script, `to` the new one"
         verdict = of_node(f"{what}; the node publishes on {join_words(here)}", measured=measured, hint=hint)
-        return verdict.about(citations=(FileCitation(file=node.file, line=node.line),))
+        return verdict.about(citations=(node.place,))
     if not near:
         return None
     hint = f"name the topic {topic} in {PUBLISHER}"
@@ -313,12 +312,12 @@ def explain_by_unheard_topic(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the topic on which the run publishes and that no node heard, whatever it did instead."""
-    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
-    if not unexplained or not isinstance(run, Run) or early_end(run) or not (found := unheard(run, package)):
+    if not is_unexplained(check, verdict) or not isinstance(run, Run) or early_end(run):
         return verdict
-    cited = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
-    update = {"message": f"{verdict.message}; {found.message}", "hint": found.hint, "cause": found.message}
-    return verdict.model_copy(update={**update, "citations": (*verdict.citations, cited)})
+    if (found := unheard(run, package)) is None:
+        return verdict
+    explained = verdict.explained(found.message, found.hint, cause=found.message)
+    return explained.about(citations=(cite(run, "/grader/graph"),))
 
 
 def why_unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
@@ -332,6 +331,11 @@ def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | 
     return next((s for s in package.slips if s.file in scripts and s.kind in kinds), None)
 
 
+def is_unexplained(check: Check, verdict: Verdict) -> bool:
+    """Return whether it is a loss of what comes of callbacks, and nothing says yet why it came to it."""
+    return check.of_callbacks and verdict.status.is_lost and not verdict.cause
+
+
 SEEN_AS = {"nan": r"\bnan\b", "degrees": r" is wrong in | answers ", "return": r"returns nothing"}
 """How a value that is none shows in a verdict, by the name of its slip."""
 
@@ -340,26 +344,17 @@ def explain_by_wrong_value(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the line of a script that runs on which the value goes wrong."""
-    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
-    if not unexplained or package is None or not isinstance(run, Run):
+    if not is_unexplained(check, verdict) or package is None or not isinstance(run, Run):
         return verdict
     files = _files_that_run(package, run)
     found = (s for s in package.slips if s.kind == "wrong-value" and s.file in files)
     slip = next((s for s in found if re.search(SEEN_AS[s.name], verdict.message)), None)
     if slip is None:
         return verdict
-    message = f"{verdict.message}; line {slip.line} of {slip.file}: {slip.message}"
-    update = {"message": message, "hint": slip.fix, "citations": (slip.place, *verdict.citations)}
-    return verdict.model_copy(update={**update, "cause": slip.message})
+    why = f"line {slip.line} of {slip.file}: {slip.message}"
+    return verdict.explained(why, slip.fix, (slip.place,), cause=slip.message)
 
 
-LATE = re.compile(
-    r"comes up to [\d.]+ s after|does not follow|never follows|of an older pose|gives no answer: no answer within"
-)
-"""How it shows that a node comes to a message, or a request, too late."""
-AT_ONCE = "in the first message"
-ENDLESS, FLOODED = "never ends", "; the recorder kept "
-"""What a slip says of such a loop, and a verdict of a topic on which more came than is recorded."""
 OF_RESULTS = ("prints", "rostest")
 """Checks of what comes of callbacks in the end."""
 
@@ -383,18 +378,17 @@ def explain_by_waiting_callback(
         return verdict
     files = _files_that_run(package, run)
     slip = next((s for s in package.slips if s.kind == "callback-waits" and s.file in files), None)
-    if slip is None or AT_ONCE in verdict.message:
+    if slip is None or verdict.callbacks == "before":
         return verdict
-    if ENDLESS in slip.message and FLOODED in verdict.message and verdict.status is Status.INCONCLUSIVE:
-        lost = verdict.message.partition("; but the grading machine")[0]
+    if slip.is_endless and verdict.dropped and verdict.status is Status.INCONCLUSIVE:
+        # the flood is the loop's own, and keeps the machine busy: neither excuses it
+        lost = verdict.excused or verdict.message
         verdict = verdict.model_copy(update={"status": Status.FAIL, "message": lost})
-    if not verdict.status.is_lost or not (ENDLESS in slip.message or LATE.search(verdict.message)):
+    if not verdict.status.is_lost or not (slip.is_endless or verdict.callbacks == "late"):
         return verdict
-    message = f"{verdict.message}; in {slip.file}, {slip.message}"
-    ends = "the caller waits" if "answer" in verdict.message else "nothing else is heard"
+    ends = "the caller waits" if check.name == "service-answers" else "nothing else is heard"
     hint = f"in {slip.file}, {slip.fix}: {ends} until the callback ends"
-    update = {"message": message, "hint": hint, "citations": (slip.place, *verdict.citations)}
-    return verdict.model_copy(update={**update, "cause": slip.message})
+    return verdict.explained(f"in {slip.file}, {slip.message}", hint, (slip.place,), cause=slip.message)
 
 
 def call_in_comment(package: PackageFacts, run: Run, call: str) -> PythonSlip | None:
@@ -522,6 +516,7 @@ def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdi
     if not found:
         return verdict
     taken = verdict.status in TAKEN and not check.heeds_losses
+    verdict = verdict.model_copy(update={"dropped": any(one.dropped for one in found)})
     if not taken and verdict.status is not Status.INCONCLUSIVE:
         measured = "; ".join(filter(None, (verdict.measured, *(one.words for one in found))))
         return verdict.model_copy(update={"measured": measured})
