@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Annotated
 
 from pydantic import AfterValidator
@@ -21,6 +20,7 @@ from grader.checks.support.text import INIT, imports, near_names, publisher, sub
 from grader.checks.support.topics import (
     End,
     cite,
+    connected_nodes,
     no_message,
     no_node,
     nodes_on,
@@ -277,7 +277,9 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
         Both ends need the same topic name, with the namespace and after every `<remap>`, and the same
         message type. `rosnode info <node>` and `rqt_graph` show the connections.
     """
-    found = next(_pairs(run, params), None)
+    found = next(
+        connected_nodes(run, params.topic, lambda node, end: _fits(run, node, params.name(end))), None
+    )
     ends = [_wanted_text(params.name(end), end) for end in ENDS]
     if found:
         verdict = passed(f"{found[0]} and {found[1]} are connected over {params.topic}")
@@ -289,15 +291,6 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
         measured=verdict.measured or (f"connections over {join_words(over)}" if over else "no connection"),
         citations=(*verdict.citations, cite(run, "/grader/graph")),
     )
-
-
-def _pairs(run: Run, params: ConnectedParams) -> Iterator[tuple[str, str]]:
-    for _, event in run.graph:
-        for one in event.connections:
-            pair = (one.publisher, one.subscriber)
-            fits = _fits(run, pair[0], params.publisher) and _fits(run, pair[1], params.subscriber)
-            if one.topic == params.topic and pair[0] != pair[1] and fits:
-                yield pair
 
 
 def _fits(run: Run, node: str, wanted: str) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import PurePosixPath
 from typing import Literal
 
@@ -64,6 +64,18 @@ def topics_with(run: Run, end: End, fits: Callable[[str], bool] | None = None) -
     """Return the topics with such a node at this end; `/rosout` is left out."""
     topics = dict.fromkeys(topic for _, event in run.graph for topic in getattr(event, end))
     return tuple(topic for topic in topics if topic != "/rosout" and nodes_on(run, topic, end, fits))
+
+
+def connected_nodes(
+    run: Run, topic: str, fits: Callable[[str, End], bool] | None = None
+) -> Iterator[tuple[str, str]]:
+    """Yield publisher and subscriber of each connection of two nodes over the topic: of the student's, or of those that
+    `fits` accepts at their end."""
+    wanted = fits or (lambda node, _: run.is_student_node(node))
+    for one in (one for _, event in run.graph for one in event.connections if one.topic == topic):
+        first, second = one.publisher, one.subscriber
+        if first != second and wanted(first, "publishers") and wanted(second, "subscribers"):
+            yield first, second
 
 
 def published_topics(run: Run) -> dict[str, str]:
