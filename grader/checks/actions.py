@@ -120,7 +120,7 @@ def action_result(package: PackageFacts, run: Run, params: ActionResultParams) -
         expected=params.words,
         measured=verdict.measured
         or (_measured_text(run, goal, params) if goal else "no such goal could be sent"),
-        citations=(*verdict.citations, cite(run, "/grader/actor", *span)),
+        citations=(cite(run, "/grader/actor", *span),),
     )
 
 

@@ -122,7 +122,7 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
     return verdict.about(
         expected=expected,
         measured=verdict.measured or plural(len(lines), "line"),
-        citations=(*verdict.citations, cite(run, "/grader/console", *span)),
+        citations=(cite(run, "/grader/console", *span),),
     )
 
 
@@ -236,7 +236,7 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
         verdict = passed("no callback failed")
     measured = plural(len(found), "traceback")
     place = cite(run, "/grader/console", asked[0].start_ns, asked[-1].end_ns)
-    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, place))
+    return verdict.about(expected=expected, measured=measured, citations=(place,))
 
 
 ALIKE = 0.7

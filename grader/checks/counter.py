@@ -19,18 +19,18 @@ from grader.checks.support.counters import (
     cite_slip,
     counts,
     first_values,
+    judge_flood,
     judge_wraps,
     longest,
     steps_to_judge,
     wrong_steps,
 )
 from grader.checks.support.exit_causes import explain_early_end
-from grader.checks.support.processes import PublishedTopic, slips_of
+from grader.checks.support.processes import OnTopic, slips_of
 from grader.checks.support.text import LOOP
 from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
-from grader.model.record import Record
 from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
 
@@ -40,22 +40,18 @@ LARGEST = 2.0**64
 FIRST_STEPS = 50
 
 
-class StartParams(Record):
+class StartParams(OnTopic):
     """Where the counting begins."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     start: int = 0
     """The first value that the counter has to publish."""
     rate_hz: Annotated[float, Field(gt=0)] = 10.0
     """The nominal rate, to tell a flood of messages from a counter."""
 
 
-class StepParams(Record):
+class StepParams(OnTopic):
     """How the counter goes on."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     maximum: int = 127
     """The last value before the wrap."""
     rate_hz: Annotated[float, Field(gt=0)] = 10.0
@@ -94,7 +90,7 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
     return verdict.about(
         expected=expected,
         measured=first_values(first.values),
-        citations=(*verdict.citations, cite(run, params.topic, first.times_ns[0], first.times_ns[0])),
+        citations=(cite(run, params.topic, first.times_ns[0], first.times_ns[0]),),
     )
 
 
@@ -187,7 +183,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     return verdict.about(
         expected=expected,
         measured=f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}",
-        citations=(*verdict.citations, cite(run, params.topic, at.from_ns, at.to_ns)),
+        citations=(cite(run, params.topic, at.from_ns, at.to_ns),),
     )
 
 
@@ -267,7 +263,8 @@ def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict 
     if not found.steps or found.excused:
         return None
     if found.flood:
-        return _flood_verdict(len(found.steps), params)
+        drops = f"drops most values: {plural(len(found.steps), 'skip')}"
+        return judge_flood(params.topic, drops, params.rate_hz)
     if not found.own:
         missing = sum(int(min(s.change, LARGEST)) - 1 for s in found.lost)
         message = f"{plural(missing, 'value')} of {params.topic} were lost on the way, with a gap in time"
@@ -301,13 +298,6 @@ def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, p
     seen = "" if verdict.status is Status.PASS else f"; {verdict.message}"
     hint = "set a counter before the loop, publish it, and add one to it each time around the loop"
     return failed(message + seen, hint=hint, citations=(slip.place,))
-
-
-def _flood_verdict(skips: int, params: StepParams) -> Verdict:
-    message = f"{params.topic} is flooded, so its publisher drops most values: {plural(skips, 'skip')}"
-    return unjudged(
-        message, hint=f"first publish at {significant(params.rate_hz)} Hz, then look at the counter again"
-    )
 
 
 def _usual_fault(usual: float) -> str:

@@ -110,7 +110,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     return verdict.about(
         expected=expected,
         measured=verdict.measured or count,
-        citations=(*verdict.citations, sent),
+        citations=(sent,),
     )
 
 

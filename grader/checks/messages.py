@@ -22,9 +22,10 @@ from grader.checks.support.fields import (
     is_within,
     no_field,
     readings,
+    refuse_disorder,
     value_text,
 )
-from grader.checks.support.processes import PublishedTopic, early_end, is_flood, observed_until_ns, slips_of
+from grader.checks.support.processes import OnTopic, early_end, is_flood, observed_until_ns, slips_of
 from grader.checks.support.text import (
     NUMBER,
     OTHER_WORDS_SHARE,
@@ -40,8 +41,7 @@ from grader.checks.support.topics import Sender, cite, losses, no_message, nothi
 from grader.evidence.run import Channel, Run
 from grader.model.message_definitions import NOT_FINITE
 from grader.model.package import PackageFacts
-from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 ENOUGH = 3
@@ -53,11 +53,9 @@ TIMED = both(" % rospy.get_time()", " with ros::Time::now().toSec() for %s")
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
 
 
-class MessageParams(Record):
+class MessageParams(OnTopic):
     """The text of each message."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     template: Annotated[str, Field(min_length=1), refuse_others(SECONDS)]
     """The whole text, in which `{seconds}` stands for a time that grows: `hello world {seconds}`."""
 
@@ -234,13 +232,16 @@ def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: 
 VALUES_SHOWN = 4
 
 
-class FieldBoundsParams(Record):
-    """A field and its bounds: `min`, `max` or both."""
+class FieldParams(OnTopic):
+    """A field of the messages."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     field: FieldPath
     """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item."""
+
+
+class FieldBoundsParams(FieldParams):
+    """A field and its bounds: `min`, `max` or both."""
+
     min: float | None = None
     """The least value, in the field's own unit; null: no bound."""
     max: float | None = None
@@ -255,8 +256,7 @@ class FieldBoundsParams(Record):
     def _some_bound(self) -> FieldBoundsParams:
         if self.min is None and self.max is None:
             raise ValueError("give min, max or both")
-        if self.min is not None and self.max is not None and self.min > self.max:
-            raise ValueError(f"min, {self.min:g}, is more than max, {self.max:g}")
+        refuse_disorder(self.min, self.max)
         return self
 
     @property
@@ -302,14 +302,18 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
             verdict = inconclusive(verdict.message, hint="grade again")
     else:
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {_share(found, outside)}")
-    spans = [r.time_ns for r in outside or found]
-    cited = cite(run, params.topic, spans[0], spans[-1]) if spans else cite(run, params.topic)
     share = f" in {params.share:.0%} of the messages" if params.share < 1 else ""
     return verdict.about(
         expected=f"{params.field} of {params.topic} {params.words}{share}",
         measured=verdict.measured or _range(usable),
-        citations=(*verdict.citations, cited),
+        citations=(_span(run, outside or found, params),),
     )
+
+
+def _span(run: Run, readings: Sequence[Reading], params: FieldParams) -> EvidenceCitation:
+    """Return the stretch of the topic from the first to the last of these messages; of none, the whole topic."""
+    times = [readings[0].time_ns, readings[-1].time_ns] if readings else []
+    return cite(run, params.topic, *times)
 
 
 def _outside(
@@ -342,13 +346,9 @@ def _range(readings: Sequence[Reading]) -> str:
     return f"{span}, and {plural(nan, 'NaN')}" if nan else span
 
 
-class FieldEqualsParams(Record):
+class FieldEqualsParams(FieldParams):
     """A field and its value."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
-    field: FieldPath
-    """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item."""
     value: Any = None
     """The right value, as in YAML: a number (also `.inf` or `.nan`), text, true or false, a list or a map."""
     values: tuple[Any, ...] = ()
@@ -428,12 +428,10 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     else:
         count = f"all of {plural(len(found), 'message')}" if params.when == "every" else which
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {count}")
-    spans = [r.time_ns for r in wrong or asked]
-    cited = cite(run, params.topic, spans[0], spans[-1]) if spans else cite(run, params.topic)
     return verdict.about(
         expected=f"{params.field} of {params.topic} {params.words} in {which}",
         measured=verdict.measured or _values(asked),
-        citations=(*verdict.citations, cited),
+        citations=(_span(run, wrong or asked, params),),
     )
 
 
@@ -462,10 +460,8 @@ def _in_order(found: Sequence[Reading], run: Run, params: FieldEqualsParams) -> 
                 verdict = verdict.once()
             break
         at = here + 1
-    cited = cite(run, params.topic, found[0].time_ns, found[-1].time_ns)
-    return verdict.about(
-        expected=f"{what} {params.words}", measured=_values(found), citations=(*verdict.citations, cited)
-    )
+    cited = (_span(run, found, params),)
+    return verdict.about(expected=f"{what} {params.words}", measured=_values(found), citations=cited)
 
 
 def _in_another_order(found: Sequence[Reading], params: FieldEqualsParams) -> Verdict:

@@ -85,7 +85,7 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
     measured = f"on the server: {join_words(found)}" if found else "nothing on the server"
     cited: tuple[Citation, ...] = (cite(run, "/grader/param"),)
     place = (FileCitation(file=source.path),) if source and not verdict.citations else ()
-    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, *place, *cited))
+    return verdict.about(expected=expected, measured=measured, citations=(*place, *cited))
 
 
 def _names_missing(

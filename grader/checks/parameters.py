@@ -98,7 +98,7 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
     )
     cited = cite(run, "/grader/console")
     measured = f"{len(params.names) - len(missing)} of {plural(len(params.names), 'value')} printed"
-    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cited))
+    return verdict.about(expected=expected, measured=measured, citations=(cited,))
 
 
 def _exchanged(
@@ -221,7 +221,7 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
     )
     cited = cite(run, "/grader/param")
     measured = f"{params.name}: {'not there' if got is None else shown(str(got))}"
-    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cited))
+    return verdict.about(expected=expected, measured=measured, citations=(cited,))
 
 
 def _set_in_part(
@@ -351,7 +351,7 @@ def param_value(package: PackageFacts, build: Run, run: Run, params: ParamValueP
     return verdict.about(
         expected=f"{params.name}: {shown(value_text(params.value))}",
         measured=verdict.measured or ("not set" if got is MISSING else shown(value_text(got))),
-        citations=(*verdict.citations, cited),
+        citations=(cited,),
     )
 
 

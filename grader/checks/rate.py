@@ -15,7 +15,7 @@ from grader.checks.support.clocks import NO_EXCUSE, Lateness, excused, lateness
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
-from grader.checks.support.processes import PublishedTopic, life_of, lives, observed_until_ns, slips_of
+from grader.checks.support.processes import OnTopic, life_of, lives, observed_until_ns, slips_of
 from grader.checks.support.text import LOOP, both, loop_rate
 from grader.checks.support.topics import (
     Sender,
@@ -29,7 +29,6 @@ from grader.checks.support.topics import (
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts, PythonSlip, SlipKind
-from grader.model.record import Record
 from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import hertz, plural, seconds, significant
 
@@ -55,11 +54,9 @@ Share = Annotated[float, Field(ge=0, le=1)]
 Positive = Annotated[float, Field(gt=0)]
 
 
-class RateParams(Record):
+class RateParams(OnTopic):
     """The nominal rate, and how far from it messages may come."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     rate_hz: Positive
     """The nominal rate."""
     tolerance: Share = 0.05

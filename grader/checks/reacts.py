@@ -9,7 +9,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.clocks import excused, run_seconds, why_late
+from grader.checks.support.clocks import excused, no_clock, run_seconds, why_late
 from grader.checks.support.fields import (
     FieldPath,
     Reading,
@@ -18,6 +18,7 @@ from grader.checks.support.fields import (
     is_within,
     no_field,
     readings,
+    refuse_disorder,
     value_text,
 )
 from grader.checks.support.processes import GlobalName, observed_until_ns
@@ -56,8 +57,7 @@ class Condition(Record):
         asks = (self.min is not None or self.max is not None, self.value is not None)
         if (self.field is None and any(asks)) or (self.field is not None and sum(asks) != 1):
             raise ValueError("give field with min, max or both, or field with value, or none of them")
-        if self.min is not None and self.max is not None and self.min > self.max:
-            raise ValueError(f"min, {self.min:g}, is more than max, {self.max:g}")
+        refuse_disorder(self.min, self.max)
         if self.tolerance and isinstance(self.value, bool):
             raise ValueError("tolerance is for numbers, and true and false are none")
         if self.tolerance and isinstance(self.value, str):
@@ -157,7 +157,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         measured=verdict.measured
         or f"{len(times)} of {plural(len(answers), 'answer')}"
         + (f", up to {max(times):.2f} s after" if times else ""),
-        citations=(*verdict.citations, cite(run, params.cause.topic, *span), cite(run, params.effect.topic)),
+        citations=(cite(run, params.cause.topic, *span), cite(run, params.effect.topic)),
     )
 
 
@@ -193,8 +193,8 @@ def _answers(
 def _nothing_to_judge(
     package: PackageFacts, run: Run, effects: Sequence[Reading], own: Sequence[Channel], params: ReactsParams
 ) -> Verdict | None:
-    if run_seconds(run) is None:
-        return inconclusive("the run's fast clock was not recorded", hint="grade again")
+    if unknown := no_clock(run):
+        return unknown
     if not effects:
         return no_message(package, run, params.effect.topic)
     if params.effect.field is not None and not any(one.values for one in effects):

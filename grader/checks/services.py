@@ -82,7 +82,7 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
     return verdict.about(
         expected=f"{params.service} of type {params.type}",
         measured=verdict.measured or described(found),
-        citations=(*verdict.citations, cited),
+        citations=(cited,),
     )
 
 
@@ -126,7 +126,7 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
     return verdict.about(
         expected=join_words(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1)),
         measured=verdict.measured or _measured_text(call),
-        citations=(*verdict.citations, _citation(call, run)),
+        citations=(_citation(call, run),),
     )
 
 

@@ -10,7 +10,7 @@ from grader.checks.registry import Refers, check
 from grader.checks.support.processes import (
     GlobalName,
     GlobalPattern,
-    PublishedTopic,
+    OnTopic,
     TypeName,
     is_called,
     named_at,
@@ -41,11 +41,9 @@ def _message_text(text: str | None) -> str | None:
     return text
 
 
-class TopicTypeParams(Record):
+class TopicTypeParams(OnTopic):
     """The topic and its type."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     type: Annotated[TypeName, Refers("message")]
     """As `rostopic info` gives it: `std_msgs/Int8`."""
     definition: Annotated[str | None, AfterValidator(_message_text)] = None
@@ -170,7 +168,7 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
     return verdict.about(
         expected=f"no topic besides {join_words(params.topics)}" if params.topics else "no topic at all",
         measured=verdict.measured or join_words(published) or "no topic",
-        citations=(*verdict.citations, cite(run, "/grader/graph")),
+        citations=(cite(run, "/grader/graph"),),
     )
 
 
@@ -190,11 +188,8 @@ def _publisher(run: Run, topic: str) -> str:
     return next(iter(nodes_on(run, topic, "publishers")), "") or run.student_channels(topic)[0].callerid
 
 
-class LatchedParams(Record):
+class LatchedParams(OnTopic):
     """The topic."""
-
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
 
 
 @check("latched", params=LatchedParams, messages_only=True, heeds_losses=True)
@@ -236,7 +231,7 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
     return verdict.about(
         expected=f"a latched publisher on {params.topic}",
         measured=verdict.measured or kinds,
-        citations=(*verdict.citations, cite(run, topic)),
+        citations=(cite(run, topic),),
     )
 
 
@@ -289,7 +284,7 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
     return verdict.about(
         expected=f"{ends[0]} connected to {ends[1]} over {params.topic}",
         measured=verdict.measured or (f"connections over {join_words(over)}" if over else "no connection"),
-        citations=(*verdict.citations, cite(run, "/grader/graph")),
+        citations=(cite(run, "/grader/graph"),),
     )
 
 

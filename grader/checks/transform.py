@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.clocks import excused, run_seconds, why_late
+from grader.checks.support.clocks import clock_slack_s, excused, no_clock, run_seconds, why_late
 from grader.checks.support.frames import (
     TOPICS,
     Frame,
@@ -32,9 +32,6 @@ from grader.wording import join_words, plural, significant
 
 ORDER_S = 0.1
 """Two topics come over two connections: so much earlier a transform may be recorded than the pose that it follows."""
-TICK_S = 0.05
-TRANSPORT_S = 0.02
-"""With a fast clock, a step of it, and what the wall takes from node to recorder."""
 FEW = 3
 """So many transforms may be the same for the machine's sake; more were never changed."""
 
@@ -128,7 +125,7 @@ def transform(package: PackageFacts, run: Run, params: TransformParams) -> Verdi
     return verdict.about(
         expected=_expected_text(params),
         measured=verdict.measured or _measured_text(seen, own),
-        citations=(*verdict.citations, *(cite(run, topic) for topic in topics)),
+        citations=tuple(cite(run, topic) for topic in topics),
     )
 
 
@@ -312,9 +309,8 @@ def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict 
     """Return what is wrong with a transform that has to follow poses."""
     poses, to_s = _poses(run, params.pose_of or ""), run_seconds(run)
     if not poses or to_s is None:
-        what = f"no pose came on {params.pose_of}" if to_s else "the run's fast clock was not recorded"
-        return inconclusive(what, hint="grade again")
-    slack_s = params.within_s + (TICK_S + TRANSPORT_S * run.warp if run.clock == "warped" else 0.0)
+        return no_clock(run) or inconclusive(f"no pose came on {params.pose_of}", hint="grade again")
+    slack_s = params.within_s + clock_slack_s(run)
     order_s, timed = ORDER_S * run.warp, [(to_s(t), pose) for t, pose in poses]
     judged = [one for one in seen if to_s(one.time_ns) >= timed[0][0] + slack_s]
     wrong = [

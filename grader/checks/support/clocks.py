@@ -7,6 +7,7 @@ the machine was in a stretch of time, and `excused` opens a verdict that this ca
 
 from __future__ import annotations
 
+import math
 import statistics
 import struct
 from bisect import bisect_right
@@ -23,6 +24,10 @@ from grader.wording import plural, seconds
 Seconds = tuple[float, ...]
 ToSeconds = Callable[[int], float]
 """From a `log_time` (ns) to a second of the time that the node lives in."""
+TICK_S = 0.05
+"""A step of the fast clock."""
+TRANSPORT_S = 0.02
+"""What the wall takes from a node to the recorder."""
 SLACK_S = 1.5
 SLACK_SHARE = 0.05
 WATCHED_S = 3.0
@@ -53,6 +58,19 @@ def run_seconds(run: Run) -> ToSeconds | None:
         return lambda time_ns: (time_ns - run.start_ns) / 1e9
     ticks = _ticks(run)
     return _interpolate(ticks, ticks[0][1]) if ticks else None
+
+
+def no_clock(run: Run) -> Verdict | None:
+    """Return the verdict where no one can tell the time in a run with a fast clock; None where there is a clock."""
+    if run_seconds(run) is not None:
+        return None
+    return inconclusive("the run's fast clock was not recorded", hint="grade again")
+
+
+def clock_slack_s(run: Run) -> float:
+    """Return by how much a time that a node reads may be off, by no fault of its own. With a fast clock it gets the
+    time of the last tick, and what the wall takes from node to recorder lasts that many times longer."""
+    return TICK_S + TRANSPORT_S * run.warp if run.clock == "warped" else 0.0
 
 
 def time_between(run: Run, from_ns: int, to_ns: int) -> str:
@@ -191,10 +209,13 @@ class Lateness(NamedTuple):
         """Whether the machine had next to no time to spare."""
         return (self.busy or 0.0) >= FULL
 
-    @property
-    def reason(self) -> str:
-        """What was the matter with the machine: `busy`, or `late itself, by up to 80 ms`."""
-        return "busy" if self.full else f"late itself, by up to {self.max_ms:.0f} ms"
+    def reason(self, max_ms: float, p95_ms: float = math.inf) -> str:
+        """Return what was the matter with the machine, `busy` or `late itself, by up to 80 ms`; "" where it was late by
+        less than this."""
+        if self.full:
+            return "busy"
+        late = self.max_ms >= max_ms or self.p95_ms >= p95_ms
+        return f"late itself, by up to {self.max_ms:.0f} ms" if late else ""
 
     @property
     def described(self) -> str:
@@ -249,9 +270,7 @@ def excused(verdict: Verdict, run: Run, from_ns: int, to_ns: int, why: Callable[
 
 def why_late(late: Lateness) -> str:
     """Return what the machine was where it was late enough to delay an answer; "" where it was not."""
-    if not (late.full or late.max_ms >= LATE_MS):
-        return ""
-    return late.reason
+    return late.reason(LATE_MS)
 
 
 class _Window(NamedTuple):

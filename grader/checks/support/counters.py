@@ -12,7 +12,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.support.exit_causes import explain_early_end, explain_traceback, process_tracebacks
-from grader.checks.support.processes import PublishedTopic, lives, observed_until_ns, slips_of
+from grader.checks.support.processes import OnTopic, lives, observed_until_ns, slips_of
 from grader.checks.support.text import loop_rate
 from grader.checks.support.topics import losses, whole_until_ns
 from grader.evidence.run import Channel, Run, once_for_each_run
@@ -205,11 +205,9 @@ def first_values(values: Sequence[float]) -> str:
     return f"{from_start}, …" if len(values) > 4 else from_start
 
 
-class WrapParams(Record):
+class WrapParams(OnTopic):
     """Where the counter wraps."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     minimum: int = 0
     """The first value after the wrap."""
     maximum: int = 127
@@ -310,13 +308,16 @@ def _is_bad(step: Step, params: WrapParams) -> bool:
     )
 
 
+def judge_flood(topic: str, drops: str, rate_hz: float) -> Verdict:
+    """Return that there is nothing to judge where the publisher itself drops values."""
+    hint = f"first publish at {significant(rate_hz)} Hz, then look at the counter again"
+    return unjudged(f"{topic} is flooded, so its publisher {drops}", hint=hint)
+
+
 def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: WrapParams) -> Verdict:
     whose = whose_turn(step, count, run, params)
     if whose == "flood":
-        message = f"{params.topic} is flooded, so its publisher drops values, around the wrap too"
-        return unjudged(
-            message, hint=f"first publish at {significant(params.rate_hz)} Hz, then look at the counter again"
-        )
+        return judge_flood(params.topic, "drops values, around the wrap too", params.rate_hz)
     if whose == "lost":
         message = f"values of {params.topic} were lost around the wrap, with a gap in time"
         return inconclusive(message, hint="grade again when the machine is less busy")

@@ -115,6 +115,12 @@ def bounds_text(low: float | None, high: float | None) -> str:
     )
 
 
+def refuse_disorder(low: float | None, high: float | None) -> None:
+    """Raise ValueError for bounds between which no value lies."""
+    if low is not None and high is not None and low > high:
+        raise ValueError(f"min, {low:g}, is more than max, {high:g}")
+
+
 def is_within(value: float, low: float | None, high: float | None) -> bool:
     """Return whether the value is within. A bound counts, also where a 32-bit field cannot hold it exactly; NaN does
     not."""

@@ -18,6 +18,7 @@ from grader.checks.support.text import ANONYMOUS, init
 from grader.evidence.events import ProcessEvent
 from grader.evidence.run import Run, once_for_each_run
 from grader.model.package import PackageFacts, PythonSlip, SlipKind
+from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, unjudged
 from grader.wording import join_words, seconds, shorten
 
@@ -300,3 +301,10 @@ GlobalPattern = Annotated[str, AfterValidator(_global_pattern)]
 """Such a name, or a pattern for several: `/square/*`."""
 PublishedTopic = Annotated[GlobalName, Refers("published")]
 """A topic on which the student publishes."""
+
+
+class OnTopic(Record):
+    """What is judged on a topic of the student's."""
+
+    topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
