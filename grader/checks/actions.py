@@ -18,7 +18,7 @@ from grader.evidence.events import ActorEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, significant, there_is
 
 GOES_ON_NS = 1_000_000_000
@@ -138,7 +138,7 @@ def _goals(run: Run, action: str) -> list[Goal]:
 
 def _fault(package: PackageFacts, run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:
     if goal.end is None:
-        return inconclusive(f"the run ended before {goal.name} of {params.action} did", hint="grade again")
+        return grade_again(f"the run ended before {goal.name} of {params.action} did")
     if goal.end.value is None:
         return _no_result(package, run, goal, params)
     status, hint = goal.end.detail, HINTS[params.status]
@@ -263,14 +263,13 @@ def _not_sent(package: PackageFacts, run: Run, goals: Sequence[Goal], params: Ac
         hint = "use the handout's names and types in the .action file, and build again"
         return unjudged(f"{params.action} cannot be used as the handout asks: {why}", hint=hint)
     if notes:
-        return inconclusive(shown(notes[0]), hint="grade again")
+        return grade_again(shown(notes[0]))
     if not nodes_on(run, f"{params.action}/goal", "subscribers"):
         return _no_server(package, run, params)
     if goals and (end := explain_early_end(package, run)):
         message = f"the node ended before goal {params.goal} of {params.action} was sent: {end.cause}"
         return end.verdict(unjudged, message)
-    message = f"only {plural(len(goals), 'goal')} could be sent to {params.action}"
-    return inconclusive(message, hint="grade again")
+    return grade_again(f"only {plural(len(goals), 'goal')} could be sent to {params.action}")
 
 
 def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> Verdict:

@@ -30,6 +30,7 @@ from grader.model.verdict import (
     Status,
     Verdict,
     failed,
+    grade_again,
     inconclusive,
     machine_lacks,
     passed,
@@ -301,7 +302,7 @@ def _not_started(package: PackageFacts, made: dict[str, Executable]) -> Verdict:
     }
     if not early:
         message = f"catkin_make succeeded, but no program was started ({join_words(made)})"
-        return inconclusive(message, measured="built, not started", hint="grade again")
+        return grade_again(message, measured="built, not started")
     message = (
         f"catkin_make succeeded, but rosrun finds no {join_words(early, 'or')}: "
         "add_executable(…) comes before catkin_package(…)"

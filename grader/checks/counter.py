@@ -31,7 +31,7 @@ from grader.checks.support.text import LOOP
 from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
-from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 CONNECT_NS = 1_000_000_000
@@ -122,15 +122,14 @@ def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:
         message = f"{run.evidence} may have begun after the first message on {params.topic}"
         return inconclusive(message, hint="start the recording before the node")
     if may_have_missed_first(run, params.topic, first):
-        message = f"the recorder missed the first messages on {params.topic}"
-        return inconclusive(message, hint="grade again")
+        return grade_again(f"the recorder missed the first messages on {params.topic}")
     hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
     message = f"the first value on {params.topic} is {significant(first.values[0])}, not {params.start}"
     # a full queue drops values again and again: where the next ones came whole, it was not full
     drops = first.is_flood(run, params.rate_hz) and any(s.change > 1 for s in first.steps[:FIRST_STEPS])
     if first.values[0] > params.start and drops:
         why = f"{message}; but the node floods its topics, and in a flood the publisher's queue drops values"
-        return inconclusive(why, hint="grade again")
+        return grade_again(why)
     verdict = failed(message, hint=hint)
     return verdict.once() if _may_follow_others(run, first, params) else verdict
 
@@ -230,7 +229,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
 def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     """There is no counter on the topic."""
     if losses(run, topic):
-        return inconclusive(f"too little was recorded on {topic}", measured="no number", hint="grade again")
+        return grade_again(f"too little was recorded on {topic}", measured="no number")
     if any(c.messages for c in run.student_channels(topic)):
         hint = "publish the counter itself, as an Int8"
         return unjudged(f"{topic} carries no numbers", measured="no number", hint=hint)
@@ -313,5 +312,5 @@ def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) ->
     cause = f": the node ended ({end.cause})" if end else ""
     message = f"only {plural(steps + 1, 'value')} came on {params.topic}{cause}"
     if losses(run, params.topic):
-        return inconclusive(message, hint="grade again")
+        return grade_again(message)
     return unjudged(message, hint=f"publish in a loop `{LOOP}`")

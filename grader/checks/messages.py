@@ -41,7 +41,7 @@ from grader.checks.support.topics import Sender, cite, losses, no_message, nothi
 from grader.evidence.run import Channel, Run
 from grader.model.message_definitions import NOT_FINITE
 from grader.model.package import PackageFacts
-from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import EvidenceCitation, Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 ENOUGH = 3
@@ -183,8 +183,7 @@ def _wrong_time(
         told = [float(found[1]) for text in channel.data if (found := pattern.fullmatch(text))]
         clocks = clocks_at(run, channel.times_ns)
         if not clocks:
-            message = "the time in the messages cannot be judged: the run's /clock was not recorded"
-            return inconclusive(message, hint="grade again")
+            return grade_again("the time in the messages cannot be judged: the run's /clock was not recorded")
         own_doing = early_end(run) is not None or _watched_ns(run, heard) >= WATCHED_S * 1e9
         short = is_flood(run) or (own_doing and clocks[0][-1] < WATCHED_S)
         wrong = wrong_growth(told, clocks, short=short)
@@ -220,13 +219,13 @@ def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: 
     """Too little came: the node's own fault where it died, or was watched long enough."""
     few = f"only {plural(sum(len(c.messages) for c in heard), 'message')} came on {params.topic}"
     if losses(run, params.topic):
-        return inconclusive(f"{few}: too few to see the time grow", hint="grade again")
+        return grade_again(f"{few}: too few to see the time grow")
     if end := explain_early_end(package, run):
         message = f"{few} before the node ended ({end.cause}): too few to see the time grow"
         return end.verdict(unjudged, message)
     if _watched_ns(run, heard) >= WATCHED_S * 1e9:
         return unjudged(f"{few}: too few to see the time grow", hint=f"publish in the loop; {ASK_AGAIN}")
-    return inconclusive(f"{few} while it was watched: too few to see the time grow", hint="grade again")
+    return grade_again(f"{few} while it was watched: too few to see the time grow")
 
 
 VALUES_SHOWN = 4
@@ -299,7 +298,7 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
     elif len(found) - len(outside) < params.share * len(found) - ROUNDING:
         verdict = _outside(outside, found, run, params)
         if params.share < 1 and losses(run, params.topic):
-            verdict = inconclusive(verdict.message, hint="grade again")
+            verdict = grade_again(verdict.message)
     else:
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {_share(found, outside)}")
     share = f" in {params.share:.0%} of the messages" if params.share < 1 else ""

@@ -38,7 +38,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts, PythonSlip
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, seconds
 
 IN_A_LOOP = f"loop with `{LOOP}`" + both(" and catch rospy.ROSInterruptException around it", "")
@@ -214,8 +214,7 @@ def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None
 def _short_watch(one: Life, up_ns: int, params: NodeLivesParams) -> Verdict | None:
     if one.end is not None and up_ns >= params.min_s * 1e9:
         return None
-    message = f"{_script(one)} was watched for {seconds(up_ns)} only, or its end was not recorded"
-    return inconclusive(message, hint="grade again")
+    return grade_again(f"{_script(one)} was watched for {seconds(up_ns)} only, or its end was not recorded")
 
 
 def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
@@ -247,7 +246,7 @@ def _locked_up(one: Life, run: Run) -> Verdict | None:
         return passed(f"{_script(one)} is one node and stayed alive; {flood}, so its end is not counted")
     if was_talking(one, run):
         message = f"{_script(one)} stopped on Ctrl-C but did not end: rospy may have locked up by itself"
-        return inconclusive(message, hint="grade again")
+        return grade_again(message)
     return None
 
 

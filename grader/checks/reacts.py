@@ -26,7 +26,7 @@ from grader.checks.support.topics import cite, misfit, no_message, refused_type,
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import plural, significant
 
 ORDER_S = 0.1
@@ -286,7 +286,7 @@ def _judge_unanswered(
         return verdict.model_copy(update={"cause": deaf.message})
     if not answers:
         message = f"{params.cause.words} did not come, or so late that no answer could be waited for"
-        return inconclusive(message, hint="grade again")
+        return grade_again(message)
     slow = [one for one in answers if one.after_s is None or one.after_s > params.within_s]
     if not slow:
         return None

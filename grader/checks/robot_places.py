@@ -36,7 +36,7 @@ from grader.checks.support.topics import SYSTEM_TOPICS, cite, no_message, nodes_
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
 from grader.wording import join_words, significant
 
 STALLED_MS = 1000.0
@@ -186,14 +186,14 @@ def _not_asked(asked: Stretch | None, run: Run, params: EndsAtParams) -> Verdict
     if asked is not None or params.asked_on is None:
         return None
     if nodes_on(run, params.asked_on, "subscribers"):
-        return inconclusive(f"message {params.number} on {params.asked_on} was not sent", hint="grade again")
+        return grade_again(f"message {params.number} on {params.asked_on} was not sent")
     hint = f"subscribe to it: {subscriber(params.asked_on)}"
     return unjudged(f"no node listens to {params.asked_on}, so no goal could be sent", hint=hint)
 
 
 def _too_late(asked: Stretch, params: EndsAtParams) -> Verdict:
     message = f"no position came on {params.topic} in the {asked.to_s - asked.from_s:.1f} s of this goal"
-    return inconclusive(message, hint="grade again")
+    return grade_again(message)
 
 
 def _judge_arrival(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> Verdict:
@@ -397,8 +397,7 @@ def _no_walls(region: Region) -> Verdict | None:
 
 
 def _too_short(params: StaysWithinParams) -> Verdict:
-    message = f"no position came on {params.topic} after the first {significant(params.from_s)} s"
-    return inconclusive(message, hint="grade again")
+    return grade_again(f"no position came on {params.topic} after the first {significant(params.from_s)} s")
 
 
 def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinParams) -> Verdict:

@@ -23,6 +23,7 @@ from grader.model.verdict import (
     FileCitation,
     Verdict,
     failed,
+    grade_again,
     inconclusive,
     passed,
     unjudged,
@@ -183,8 +184,7 @@ def _judge_uncalled(
         end = explain_end(one, run, package)
         message = f"{one.name} ended before {params.service} could be called: {end.cause}"
         return end.verdict(unjudged, message)
-    message = f"{params.service} was called {plural(len(made), 'time')} of {len(params.expect)}"
-    return inconclusive(message, hint="grade again")
+    return grade_again(f"{params.service} was called {plural(len(made), 'time')} of {len(params.expect)}")
 
 
 def _not_there(package: PackageFacts, run: Run, params: ServiceAnswersParams) -> Verdict:

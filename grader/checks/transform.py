@@ -27,7 +27,7 @@ from grader.checks.support.topics import cite, no_message, run_slip
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed
+from grader.model.verdict import Verdict, failed, grade_again, passed
 from grader.wording import join_words, plural, significant
 
 ORDER_S = 0.1
@@ -309,7 +309,7 @@ def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict 
     """Return what is wrong with a transform that has to follow poses."""
     poses, to_s = _poses(run, params.pose_of or ""), run_seconds(run)
     if not poses or to_s is None:
-        return no_clock(run) or inconclusive(f"no pose came on {params.pose_of}", hint="grade again")
+        return no_clock(run) or grade_again(f"no pose came on {params.pose_of}")
     slack_s = params.within_s + clock_slack_s(run)
     order_s, timed = ORDER_S * run.warp, [(to_s(t), pose) for t, pose in poses]
     judged = [one for one in seen if to_s(one.time_ns) >= timed[0][0] + slack_s]

@@ -287,6 +287,11 @@ def inconclusive(message: str, **details: Unpack[Details]) -> Verdict:
     return Verdict(status=Status.INCONCLUSIVE, score=0.0, message=message, **details)
 
 
+def grade_again(message: str, *, measured: str = "") -> Verdict:
+    """Return a verdict that is open because this run shows too little; another one may show more."""
+    return inconclusive(message, hint="grade again", measured=measured)
+
+
 def machine_lacks(message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that is open until the grading machine has what it lacks."""
     return Verdict(status=Status.INCONCLUSIVE, score=0.0, message=message, of_machine=True, **details)

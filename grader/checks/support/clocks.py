@@ -18,7 +18,7 @@ from typing import NamedTuple
 from grader.checks.support.text import GET_TIME
 from grader.evidence.events import HostEvent
 from grader.evidence.run import Channel, Run, once_for_each_run
-from grader.model.verdict import Verdict, failed, inconclusive
+from grader.model.verdict import Verdict, failed, grade_again, inconclusive
 from grader.wording import plural, seconds
 
 Seconds = tuple[float, ...]
@@ -64,7 +64,7 @@ def no_clock(run: Run) -> Verdict | None:
     """Return the verdict where no one can tell the time in a run with a fast clock; None where there is a clock."""
     if run_seconds(run) is not None:
         return None
-    return inconclusive("the run's fast clock was not recorded", hint="grade again")
+    return grade_again("the run's fast clock was not recorded")
 
 
 def clock_slack_s(run: Run) -> float:
@@ -139,10 +139,9 @@ def _go_along(told: Sequence[float], clock: Seconds, slack_s: float) -> bool:
 
 
 def _too_short(span_s: float) -> Verdict:
-    message = (
+    return grade_again(
         f"the messages were watched for {span_s:.1f} s only: too short to tell how the time in them grows"
     )
-    return inconclusive(message, hint="grade again")
 
 
 def _falls_back(before: float, after: float) -> Verdict:

@@ -18,7 +18,7 @@ from grader.checks.support.topics import losses, whole_until_ns
 from grader.evidence.run import Channel, Run, once_for_each_run
 from grader.model.package import PackageFacts, PythonSlip, SlipKind
 from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
 from grader.wording import plural, significant
 
 FLOOD_FACTOR, FLOOD_HZ = 3, 500
@@ -245,8 +245,7 @@ def judge_wraps(
         message = f"after {significant(good[0].before)} comes {params.minimum}, {plural(len(good), 'time')}"
         return passed(message), last
     if losses(run, params.topic) and not count.is_flood(run, params.rate_hz):
-        message = f"only {plural(len(good), 'reset')} of {params.wraps} is recorded"
-        return inconclusive(message, hint="grade again"), last
+        return grade_again(f"only {plural(len(good), 'reset')} of {params.wraps} is recorded"), last
     verdict = _judge_death(count, run, package, params) or _stuck(count, params)
     return verdict or _silent(count, run, package, params) or _too_few(count, good, run, params), last
 

@@ -20,15 +20,7 @@ from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.submission import chmod_hint
-from grader.model.verdict import (
-    FileCitation,
-    Verdict,
-    failed,
-    inconclusive,
-    joined,
-    machine_lacks,
-    unjudged,
-)
+from grader.model.verdict import FileCitation, Verdict, failed, grade_again, joined, machine_lacks, unjudged
 from grader.untrusted_text import without_colours
 from grader.wording import join_words
 
@@ -84,7 +76,7 @@ def not_run(run: Run) -> Verdict | None:
     """Nothing was started at all."""
     if lives(run) or run.graph:
         return None
-    return inconclusive("roslaunch was not run", hint="grade again")
+    return grade_again("roslaunch was not run")
 
 
 def node_slips(package: PackageFacts, file: LaunchFile, run: Run) -> Verdict | None:
@@ -158,23 +150,22 @@ def nodes_up(run: Run, node: LaunchNode) -> tuple[str, ...]:
     return tuple(name for name in run.student_nodes() if pattern.fullmatch(name))
 
 
-def refusal(run: Run, package: PackageFacts | None = None) -> Absence | None:
+def refusal(run: Run, package: PackageFacts) -> Absence | None:
     """Return why roslaunch started nothing, or broke off. `package` has the file's own lines."""
-    text = "\n".join(line for line in _lines(run))
+    text = "\n".join(_lines(run))
     if unset := _unset_args(text, package):
         return unset
-    if package is not None and package.file(IGNORE) is not None and _NO_LAUNCH_FILE in text:
+    if package.file(IGNORE) is not None and _NO_LAUNCH_FILE in text:
         why = f"{IGNORE} hides the package from catkin and roslaunch"
         return Absence(why, f"git rm {IGNORE}", citations=(FileCitation(file=IGNORE),))
     for pattern, why, hint in _REFUSALS:
         if match := re.search(pattern, text):
             words = [shown(PurePosixPath(g).name if "/" in g.strip("/") else g) for g in match.groups()]
-            fix = hint.format(*words)
-            fix = fix.replace("<package>", package.name) if package is not None else fix
-            if package is not None and pattern == NO_FILE and (meant := _file_meant(package, words[0])):
+            fix = hint.format(*words).replace("<package>", package.name)
+            if pattern == NO_FILE and (meant := _file_meant(package, words[0])):
                 fix = f"write $(find {package.name})/{meant}"
             said = f"roslaunch starts nothing: {why.format(*words)}"
-            cited = _declared(words[0], package) if pattern == _UNSET.pattern and package is not None else ()
+            cited = _declared(words[0], package) if pattern == _UNSET.pattern else ()
             return Absence(said, fix, citations=cited, refused=pattern, about="".join(words[:1]))
     return None
 
@@ -209,16 +200,17 @@ def _file_meant(package: PackageFacts, name: str) -> str:
     return names[near[0]] if near else ""
 
 
-def _unset_args(text: str, package: PackageFacts | None) -> Absence | None:
+def _unset_args(text: str, package: PackageFacts) -> Absence | None:
     """Return all the arguments that the launch file asks for and that no `<arg>` declares: roslaunch names only one."""
     asked = _UNSET.search(text)
-    files = package.launch_files if package is not None and asked else ()
+    if asked is None:
+        return None
     lacking = [
         [arg for arg in file.unset_args if not arg.declared]
-        for file in files
-        if asked and any(arg.name == asked[1] for arg in file.unset_args)
+        for file in package.launch_files
+        if any(arg.name == asked[1] for arg in file.unset_args)
     ]
-    if len(lacking) != 1 or asked is None or asked[1] not in {arg.name for arg in lacking[0]}:
+    if len(lacking) != 1 or asked[1] not in {arg.name for arg in lacking[0]}:
         return None
     args = lacking[0]
     lines = sorted({arg.line for arg in args})

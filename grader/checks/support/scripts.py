@@ -9,6 +9,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.model.package import CMakeCall, Executable, Fault, PackageFacts, SourceFile
+from grader.wording import has_role_of
 
 PYTHON = "catkin_install_python"
 RIGHT_SHEBANG = "#!/usr/bin/env python3"
@@ -86,29 +87,10 @@ def paths_by_name(package: PackageFacts) -> dict[str, str]:
     return {PurePosixPath(path).name: path for path in paths}
 
 
-ROLES = (
-    ("talker", "publisher", "pub", "sender", "emitter", "speaker"),
-    ("listener", "subscriber", "sub", "receiver"),
-    ("server", "service"),
-)
-"""Words for the same kind of node in the names of scripts."""
-
-
-def _has_role_of(one: str, other: str) -> bool:
-    """Return whether two scripts are called by different words for the same kind of node, "talker" and
-    "publisher". By the same word they are two that a lab asks for."""
-    given, wanted = (PurePosixPath(path).stem.casefold().split("_") for path in (one, other))
-    return any(
-        word in wanted and set(words).intersection(given) - {word} and word not in given
-        for words in ROLES
-        for word in words
-    )
-
-
 def script_of_role(package: PackageFacts, path: str) -> str:
     """Return the only script whose name has another word for what the name of `path` says that it is; "" if there is
     none, or several."""
-    alike = [p for n, p in paths_by_name(package).items() if n.endswith(".py") and _has_role_of(p, path)]
+    alike = [p for n, p in paths_by_name(package).items() if n.endswith(".py") and has_role_of(p, path)]
     return alike[0] if len(alike) == 1 else ""
 
 

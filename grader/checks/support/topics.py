@@ -33,6 +33,7 @@ from grader.model.verdict import (
     Status,
     Verdict,
     failed,
+    grade_again,
     inconclusive,
     unjudged,
 )
@@ -469,7 +470,7 @@ def _judge_refused(run: Run, topic: str) -> Verdict | None:
     if not refused or run.student_channels(topic):
         return None
     message = f"the recorder could not listen to {topic}: {refused[0].detail or refused[0].event}"
-    return inconclusive(message, measured="no message", hint="grade again")
+    return grade_again(message, measured="no message")
 
 
 class Losses(Record):
@@ -512,7 +513,7 @@ def all_lost(run: Run, topic: str) -> Verdict | None:
     lost = losses(run, topic)
     if lost is None or lost.kept:
         return None
-    return inconclusive(f"nothing was recorded on {topic}", measured="no message", hint="grade again")
+    return grade_again(f"nothing was recorded on {topic}", measured="no message")
 
 
 def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> Verdict:
