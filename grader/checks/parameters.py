@@ -30,14 +30,7 @@ from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import (
-    FileCitation,
-    Verdict,
-    failed,
-    joined,
-    passed,
-    unjudged,
-)
+from grader.model.verdict import FileCitation, Verdict, failed, joined, passed, unjudged
 from grader.wording import join_words, plural, there_is
 
 EXACT = 1e-9

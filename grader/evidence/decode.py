@@ -13,15 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias
 
-from grader.evidence.definitions import (
-    PRIMITIVES,
-    Bound,
-    DefinitionError,
-    Field,
-    Types,
-    bound,
-    parse,
-)
+from grader.evidence.definitions import PRIMITIVES, Bound, DefinitionError, Field, Types, bound, parse
 from grader.evidence.run import DECODED_BYTES_MAX
 from grader.installable import noetic_definitions
 from grader.model.message_definitions import RULE

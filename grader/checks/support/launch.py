@@ -11,11 +11,7 @@ from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_traceback, process_tracebacks, syntax_hint
 from grader.checks.support.launch_slips import PROGRAMS_OF, at_its_lines, node_slip, own_script, owner_of
 from grader.checks.support.processes import early_end, lives, observed_until_ns
-from grader.checks.support.scripts import (
-    paths_by_name,
-    programs,
-    shebang_obstacles,
-)
+from grader.checks.support.scripts import paths_by_name, programs, shebang_obstacles
 from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile

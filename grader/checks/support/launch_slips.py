@@ -21,13 +21,7 @@ from grader.checks.support.scripts import (
 )
 from grader.checks.support.text import near_names, shown
 from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFacts, SourceFile
-from grader.model.verdict import (
-    FileCitation,
-    MistakeKind,
-    Verdict,
-    failed,
-    unjudged,
-)
+from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, unjudged
 from grader.wording import join_words, there_is
 
 OTHER_ATTRIBUTES = {"package": "pkg", "exec": "type", "executable": "type", "script": "type"}
