@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import base64
 import secrets
 import struct
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
 from typing_extensions import Self
@@ -16,10 +17,10 @@ from typing_extensions import Self
 from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
 from grader.arena.killed_processes import Killed
-from grader.arena.left_files import LeftFiles
 from grader.arena.process_environment import LOOPBACK, ProcessEnvironment, search_path
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.run_state import ROSOUT, RunState, all_compute
+from grader.arena.sandbox_files import HOME
 from grader.errors import ArenaError
 from grader.evidence.events import (
     NO_ANSWER,
@@ -30,8 +31,9 @@ from grader.evidence.events import (
     ProcessEvent,
     ScenarioEvent,
 )
-from grader.evidence.run import is_grader_node
+from grader.evidence.run import is_grader_node, left_name
 from grader.evidence.writer import EvidenceChannel, EvidenceWriter
+from grader.files import open_untrusted
 from grader.ros_env import RosInstallation
 
 ARENA = Path(__file__).parent / "ros"
@@ -45,6 +47,8 @@ GROUPS_S, LOOK_S = 2.0, 0.02
 STUCK_S = 0.5
 """So long a call is waited for at least, though the programs only compute."""
 PORT = 11311
+LEFT_FILES_MAX = 200
+"""So many of the files that a run leaves are events."""
 
 
 def arena_command(ros: RosInstallation) -> tuple[list[str], dict[str, str]]:
@@ -388,3 +392,42 @@ def _of(nodes: list[str], topics: Mapping[str, list[str]]) -> dict[str, set[str]
     """Return which of these nodes each topic has; topics that have none of them are left out."""
     found = {topic: {*callers} & {*nodes} for topic, callers in topics.items()}
     return {topic: own for topic, own in found.items() if own}
+
+
+class LeftFiles:
+    """The files that a run's processes left, as `ros/processes.py` reads them.
+
+    Each is an event, and what is kept of it an attachment, within the run's limits. A file of the package that is as it
+    was handed in is not left by the run.
+    """
+
+    def __init__(self, place: ProcessEnvironment, writer: EvidenceWriter) -> None:
+        self._place, self._writer = place, writer
+        self._left_bytes, self._left_files = place.limits.kept_bytes, place.limits.kept_files
+        self._listed = 0
+
+    def add(self, process: str, path: str, size_bytes: int, data: str | None, time_ns: int) -> None:
+        """Add a file by its path in the sandbox; `data` is base64, or None where the arena does not keep it."""
+        content = None if data is None else base64.b64decode(data)
+        if self._listed >= LEFT_FILES_MAX or self._is_handed_in(path, size_bytes, content):
+            return
+        self._listed += 1
+        shown = path.replace(HOME, "~", 1)
+        event = ActorEvent(action="left", actor=process, value=size_bytes, detail=shown)
+        self._writer.event("/grader/actor", time_ns, event)
+        if content is not None and self._left_files and len(content) <= self._left_bytes:
+            self._left_bytes -= len(content)
+            self._left_files -= 1
+            self._writer.attach(left_name(process, shown), content, time_ns, "application/octet-stream")
+
+    def _is_handed_in(self, path: str, size_bytes: int, content: bytes | None) -> bool:
+        sources = PurePosixPath(self._place.inside_workspace, "src")
+        if not PurePosixPath(path).is_relative_to(sources):
+            return False
+        inside = PurePosixPath(path).relative_to(sources).parts
+        try:
+            with open_untrusted(self._place.workspace.repaired, *inside) as file:
+                before = file.read(size_bytes + 1)
+        except OSError:
+            return False
+        return len(before) == size_bytes and content in {None, before}
