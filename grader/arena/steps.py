@@ -31,7 +31,7 @@ from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
 from grader.evidence.decode import FindText
 from grader.evidence.events import GOAL_STATUS, MISFIT, UNHEARD, ActorEvent
-from grader.evidence.message_values import MessageType, Moment, ServiceTypes, action_texts, md5_of
+from grader.evidence.message_values import MessageType, Moment, ServiceTypes, md5_of
 from grader.model.message_definitions import other_fields
 from grader.rubric.scenario import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
@@ -494,12 +494,7 @@ class StepRunner:
 
     def _advertise_action(self, action: Action) -> None:
         try:
-            text = self._arena.place.type_text(action.type, "action")
-            texts = action_texts(action.type, text) if text is not None else {}
-
-            def find_text(type_: str) -> str | None:
-                return texts.get(type_) or self._message_text(type_)
-
+            find_text = self._arena.place.action_texts(action.type)
             self._results[action.type] = MessageType(f"{action.type}ActionResult", find_text)
         except ValueError as error:
             self._note("note", action.name, f"the grader cannot use {action.type}: {error}")

@@ -9,7 +9,16 @@ from typing import NamedTuple
 
 from grader.checks.executable import ExecutableParams, executable
 from grader.checks.registry import LaunchName, ProgramName, check
-from grader.checks.support.launch import died, nodes_up, not_run, quoted, refusal, why_died, why_not_up
+from grader.checks.support.launch import (
+    console_lines,
+    died,
+    nodes_up,
+    not_run,
+    quoted,
+    refusal,
+    why_died,
+    why_not_up,
+)
 from grader.checks.support.launch_slips import (
     Slip,
     built_fixes,
@@ -31,7 +40,6 @@ from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, joined, passed, unjudged
-from grader.untrusted_text import without_colours
 from grader.wording import join_words, plural, there_is
 
 
@@ -455,16 +463,15 @@ def _blanks(run: Run, pages: list[Page]) -> re.Match[str] | None:
     """Return what the shell said of `URL = …`, where no address came to the program because of that."""
     if any(re.search(r"[./]", argument) for page in pages for argument in page.arguments):
         return None
-    return next(filter(None, (ASSIGNED.search(without_colours(c.line)) for _, c in run.console)), None)
+    return next(filter(None, (ASSIGNED.search(line) for line in console_lines(run))), None)
 
 
 def _words(package: PackageFacts, file: LaunchFile, run: Run) -> str:
     """Return what the script or roslaunch said instead."""
-    lines = [without_colours(c.line) for _, c in run.console]
     shell = re.compile(
         r"command not found|No such file|[Ss]yntax error|not found$|bad interpreter|cannot launch node"
     )
-    if found := next((line for line in lines if shell.search(line)), ""):
+    if found := next((line for line in console_lines(run) if shell.search(line)), ""):
         return f": {shown(found)}"
     code = next((code for node in _shells(package, file) if (code := died(run, node)) is not None), None)
     return f": it died with exit code {code}" if code is not None else quoted(run)

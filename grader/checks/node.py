@@ -222,8 +222,7 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     stopped_by = one.end.stopped_by if one.end else None
     if stopped_by in {"TERM", "KILL"}:
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
-        deaf = next((s for s in package.slips if s.kind == "deaf" and s.file == one.start.script), None)
-        if deaf is not None:
+        if deaf := next((s for s in package.slips if s.kind == "deaf" and s.file == one.start.script), None):
             return failed(f"{message}: {deaf.message}", hint=deaf.fix, citations=(deaf.place,))
         if excuse := _locked_up(one, run):
             return excuse

@@ -15,7 +15,7 @@ from grader.checks.support.clocks import NO_EXCUSE, Lateness, excused, lateness
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
-from grader.checks.support.processes import OnTopic, life_of, lives, observed_until_ns, slips_of
+from grader.checks.support.processes import OnTopic, life_of, observed_until_ns, run_scripts, slips_of
 from grader.checks.support.text import LOOP, both, loop_rate
 from grader.checks.support.topics import (
     Sender,
@@ -224,7 +224,7 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
 
 def _has_rate(package: PackageFacts, run: Run) -> bool:
     """Return whether a script that runs asks for a rate somewhere, or is none of Python."""
-    scripts = {one.start.script for one in lives(run)}
+    scripts = run_scripts(run)
     python = any(file.python for file in package.files if file.path in scripts)
     return not python or any(s.kind.startswith("rate-") for s in package.slips if s.file in scripts)
 

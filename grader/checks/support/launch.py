@@ -78,7 +78,7 @@ def not_run(run: Run) -> Verdict | None:
 def node_slips(package: PackageFacts, file: LaunchFile, run: Run) -> Verdict | None:
     """Return what is wrong with the file's own nodes, with what roslaunch said in the run; of one fix for several
     nodes, with all their lines. None where nothing is."""
-    said = "\n".join(_lines(run))
+    said = "\n".join(console_lines(run))
     found = [
         slip
         for node in file.nodes
@@ -148,7 +148,7 @@ def nodes_up(run: Run, node: LaunchNode) -> tuple[str, ...]:
 
 def refusal(run: Run, package: PackageFacts) -> Absence | None:
     """Return why roslaunch started nothing, or broke off. `package` has the file's own lines."""
-    text = "\n".join(_lines(run))
+    text = "\n".join(console_lines(run))
     if unset := _unset_args(text, package):
         return unset
     if package.file(IGNORE) is not None and _NO_LAUNCH_FILE in text:
@@ -242,7 +242,9 @@ def died(run: Run, node: LaunchNode) -> int | None:
 
 def finished(run: Run, node: LaunchNode) -> bool:
     """Return whether it ran to its own end without an error."""
-    return any((m := _FINISHED.search(line)) and _is(node, m[1]) for line in _join_required(_lines(run)))
+    return any(
+        (m := _FINISHED.search(line)) and _is(node, m[1]) for line in _join_required(console_lines(run))
+    )
 
 
 def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
@@ -311,7 +313,7 @@ def quoted(run: Run) -> str:
 
 def roslaunch_error(run: Run) -> str:
     """Return the first line in which roslaunch, or a node that it started, says what is wrong."""
-    lines = _lines(run)
+    lines = console_lines(run)
     found = (line for mark in _ERRORS for line in lines if mark in line)
     return shown(next(found, ""))
 
@@ -319,7 +321,7 @@ def roslaunch_error(run: Run) -> str:
 def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | None:
     """roslaunch did not find the program, or none that may be executed."""
     mark = f"cannot launch node of type [{node.pkg}/{node.type}]"
-    line = next((text for text in _lines(run) if mark in text), None)
+    line = next((text for text in console_lines(run) if mark in text), None)
     if line is None:
         return None
     if (script := own_script(package, node)) and script.executable is False:
@@ -344,7 +346,7 @@ def _silent(run: Run, node: LaunchNode) -> Absence | None:
     others = [n for n in run.student_nodes() if re.fullmatch(r"/.+_\d+_\d{9,}", n)]
     if finished(run, node):
         return Absence("its script ended without ever becoming a node", hint, of_script=True)
-    started = any((m := _STARTED.search(line)) and _is(node, m[1]) for line in _lines(run))
+    started = any((m := _STARTED.search(line)) and _is(node, m[1]) for line in console_lines(run))
     if not started:
         return None
     if others:
@@ -378,5 +380,6 @@ def _join_required(lines: Iterable[str]) -> Iterator[str]:
             yield line
 
 
-def _lines(run: Run) -> list[str]:
+def console_lines(run: Run) -> list[str]:
+    """Return what the run printed, as plain text."""
     return [without_colours(c.line) for _, c in run.console]

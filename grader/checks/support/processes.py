@@ -143,10 +143,20 @@ def named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tupl
 
 def slips_that_name(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> list[PythonSlip]:
     """Return where the run's scripts name this node, topic or parameter; those of a node may be in a variable."""
-    scripts = {one.start.script for one in lives(run)}
-    said = [s for s in package.slips if s.kind == kind and s.file in scripts]
     last = name.rpartition("/")[2]
+    said = run_slips(package, run, kind)
     return [s for s in said if s.message.rpartition("/")[2].lstrip("~") == last]
+
+
+def run_slips(package: PackageFacts, run: Run, *kinds: SlipKind) -> list[PythonSlip]:
+    """Return what is remarkable, of these kinds, in the scripts that run."""
+    scripts = run_scripts(run)
+    return [s for s in package.slips if s.kind in kinds and s.file in scripts]
+
+
+def run_scripts(run: Run) -> set[str | None]:
+    """Return the package's scripts that run; None among them is a program of another kind."""
+    return {one.start.script for one in lives(run)}
 
 
 def early_end(run: Run) -> Life | None:

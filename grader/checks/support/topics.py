@@ -9,7 +9,15 @@ from typing import Literal
 
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end, explain_error
-from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives, named_at, plain_type
+from grader.checks.support.processes import (
+    NO_SCRIPT_HINT,
+    early_end,
+    lives,
+    named_at,
+    plain_type,
+    run_scripts,
+    run_slips,
+)
 from grader.checks.support.scripts import programs
 from grader.checks.support.text import (
     INIT,
@@ -168,7 +176,7 @@ def _judge_misnamed(
 def _namespaced_node(package: PackageFacts, run: Run, topic: str) -> LaunchNode | None:
     """Return the launch file's node in whose namespace the topic is, where the run is a launch file's and the node's
     names are remapped."""
-    if not lives(run) or any(one.start.script for one in lives(run)):
+    if not lives(run) or any(run_scripts(run)):
         return None
     nodes = [n for f in package.launch_files for n in f.brings if n.remaps and topic.startswith(n.namespace)]
     return max(nodes, key=lambda n: len(n.namespace), default=None)
@@ -340,8 +348,7 @@ def why_unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
 
 def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | None:
     """Return the first slip of one of these kinds in a script that runs."""
-    scripts = {one.start.script for one in lives(run)}
-    return next((s for s in package.slips if s.file in scripts and s.kind in kinds), None)
+    return next(iter(run_slips(package, run, *kinds)), None)
 
 
 def is_unexplained(check: Check, verdict: Verdict) -> bool:
@@ -374,7 +381,7 @@ OF_RESULTS = ("prints", "rostest")
 
 def _files_that_run(package: PackageFacts, run: Run) -> set[str | None]:
     """Return the scripts that run, those that a launch file started, and the sources of programs of C++."""
-    scripts = {one.start.script for one in lives(run)}
+    scripts = run_scripts(run)
     nodes = [node for file in package.launch_files for node in file.brings]
     types = {node.type for node in nodes if node.full_name in run.student_nodes()}
     launched = {file.path for file in package.files if PurePosixPath(file.path).name in types}
@@ -406,8 +413,7 @@ def explain_by_waiting_callback(
 
 def call_in_comment(package: PackageFacts, run: Run, call: str) -> PythonSlip | None:
     """Return where a script that runs has such a call in a comment: `Subscriber`."""
-    scripts = {one.start.script for one in lives(run)}
-    found = (s for s in package.slips if s.kind == "commented-out" and s.file in scripts)
+    found = run_slips(package, run, "commented-out")
     return next((s for s in found if s.name.rpartition(" ")[2] == call), None)
 
 
@@ -416,11 +422,10 @@ def copied_topic(
 ) -> str:
     """Return the lines of one running script that name the same topic, this one if any is given: one is copied and not
     changed; "" for none."""
-    scripts = {one.start.script for one in lives(run)}
     places: dict[tuple[str, str], list[int]] = {}
-    for slip in package.slips:
+    for slip in run_slips(package, run, kind):
         name = slip.message.strip("/")
-        if slip.kind == kind and slip.file in scripts and name == (topic.strip("/") or name):
+        if name == (topic.strip("/") or name):
             places.setdefault((slip.file, name), []).append(slip.line)
     found = ((file, sorted(set(lines))) for (file, _), lines in places.items())
     return next((f"lines {join_words(map(str, n))} of {file}" for file, n in found if len(n) > 1), "")
