@@ -177,7 +177,7 @@ def _no_result(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
     verdict = failed(message, hint=hint).once()
     if _goes_on(run, goal, params):
         verdict = failed(f"{said}: it goes on, though it was cancelled", hint=HINTS["PREEMPTED"])
-    return excused(verdict, run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
+    return _excused(verdict, run, goal)
 
 
 def _goes_on(run: Run, goal: Goal, params: ActionResultParams) -> bool:
@@ -200,7 +200,7 @@ def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
             f"{message}: it was over before it could be cancelled",
             hint="let it take as long as the handout says",
         )
-        return excused(verdict.once(), run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
+        return _excused(verdict.once(), run, goal)
     unset = any("did not set the goal to a terminal status" in line.line for _, line in run.console)
     if status == "ABORTED" and unset:
         message += ": the callback returns without saying how the goal ends"
@@ -234,11 +234,12 @@ def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | 
     count = plural(came, "feedback message")
     message = f"{count} came on {goal.name} of {params.action}, but {params.feedback} are expected"
     verdict = failed(message, hint="call server.publish_feedback(feedback) each time around the loop")
-    return (
-        verdict
-        if came == 0
-        else excused(verdict.once(), run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
-    )
+    return verdict if came == 0 else _excused(verdict.once(), run, goal)
+
+
+def _excused(verdict: Verdict, run: Run, goal: Goal) -> Verdict:
+    """Return the verdict, open where the machine was late itself while the goal was pursued."""
+    return excused(verdict, run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
 
 
 def _feedback(run: Run, goal: Goal, params: ActionResultParams) -> int:

@@ -41,7 +41,7 @@ from grader.checks.support.topics import Sender, cite, losses, no_message, nothi
 from grader.evidence.run import Channel, Run
 from grader.model.message_definitions import NOT_FINITE
 from grader.model.package import PackageFacts
-from grader.model.verdict import EvidenceCitation, Verdict, failed, grade_again, passed, unjudged
+from grader.model.verdict import EvidenceCitation, Status, Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 ENOUGH = 3
@@ -185,10 +185,11 @@ def _wrong_time(
         if not clocks:
             return grade_again("the time in the messages cannot be judged: the run's /clock was not recorded")
         own_doing = early_end(run) is not None or _watched_ns(run, heard) >= WATCHED_S * 1e9
+        # What the node itself cut short is judged by as much as there is: grading again would show no more.
         short = is_flood(run) or (own_doing and clocks[0][-1] < WATCHED_S)
         wrong = wrong_growth(told, clocks, short=short)
         if wrong is not None:
-            too_few = own_doing and wrong.status.value == "inconclusive"
+            too_few = own_doing and wrong.status is Status.INCONCLUSIVE
             return _too_few(package, run, heard, params) if too_few else wrong
         counted = _judge_counting(package, run, channel, told)
         if counted is not None:
@@ -297,6 +298,7 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
         verdict = no_field(missing, channels)
     elif len(found) - len(outside) < params.share * len(found) - ROUNDING:
         verdict = _outside(outside, found, run, params)
+        # Of a share, the messages that the recorder lost may be the ones that were right.
         if params.share < 1 and losses(run, params.topic):
             verdict = grade_again(verdict.message)
     else:

@@ -12,7 +12,6 @@ from pydantic import Field, model_validator
 from grader.checks.registry import check
 from grader.checks.support.clocks import excused, lateness, no_clock
 from grader.checks.support.geometry import (
-    MOVED_M,
     Course,
     Point,
     Pose,
@@ -160,6 +159,7 @@ def _strays_late(course: Course, way: Way) -> bool:
 
 def _in_degrees(run: Run) -> Words | None:
     """A turn so fast that degrees are meant where radians are asked for."""
+    # All topics: poses may be judged, and the velocities that led to them are on another one.
     turns = ((c, turn) for c in run.student_channels() for turn in turns_of(c))
     channel, fastest = max(turns, key=lambda one: abs(one[1]), default=(None, 0.0))
     if channel is None or abs(fastest) < DEGREES_FROM:
@@ -199,11 +199,6 @@ def metres(distance_m: float) -> str:
 
 def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: bool) -> Words:
     """The likeliest cause; `mirror` where the way is seen from the path's own start."""
-    if max(math.dist(p.point, path[0].point) for p in path) <= MOVED_M:
-        return Words(
-            "it never moves",
-            "publish a linear.x that is not 0, again and again for as long as it should drive",
-        )
     return (
         (_explain_mirrored(path, way) if mirror else None)
         or _wrong_start(path, way, course)

@@ -312,12 +312,12 @@ def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict 
         return no_clock(run) or grade_again(f"no pose came on {params.pose_of}")
     slack_s = params.within_s + clock_slack_s(run)
     order_s, timed = ORDER_S * run.warp, [(to_s(t), pose) for t, pose in poses]
-    judged = [one for one in seen if to_s(one.time_ns) >= timed[0][0] + slack_s]
+    from_s = timed[0][0] + slack_s
+    judged = [(t, value) for t, value in seen if value is not None and to_s(t) >= from_s]
     wrong = [
-        one
-        for one in judged
-        for may in [_candidates(to_s(one.time_ns), timed, slack_s, order_s)]
-        if one.value is None or not any(_fits(one.value, pose, params) for pose in may)
+        (t, value)
+        for t, value in judged
+        if not any(_fits(value, pose, params) for pose in _candidates(to_s(t), timed, slack_s, order_s))
     ]
     if wrong:
         return _wrong_pose(run, wrong, judged, poses, params)
@@ -333,24 +333,22 @@ def _candidates(
     at_s: float, poses: Sequence[tuple[float, Transform]], slack_s: float, order_s: float
 ) -> list[Transform]:
     """Return the poses that a transform of that time may have."""
+    # The last pose stays right for as long as no other comes, however long that is.
     last_s = max((t for t, _ in poses if t <= at_s), default=at_s)
     return [pose for t, pose in poses if min(at_s - slack_s, last_s) <= t <= at_s + order_s]
 
 
 def _wrong_pose(
     run: Run,
-    wrong: Sequence[Seen],
-    judged: Sequence[Seen],
+    wrong: Sequence[tuple[int, Transform]],
+    judged: Sequence[tuple[int, Transform]],
     poses: Sequence[tuple[int, Transform]],
     params: TransformParams,
 ) -> Verdict:
-    first, count = wrong[0], f"in {len(wrong)} of {plural(len(judged), 'message')}"
-    value = first.value
-    pose = next((p for t, p in reversed(poses) if t <= first.time_ns), poses[0][1])
+    (first_ns, value), count = wrong[0], f"in {len(wrong)} of {plural(len(judged), 'message')}"
+    pose = next((p for t, p in reversed(poses) if t <= first_ns), poses[0][1])
     hint = f"send the pose of each message on {params.pose_of} at once, in its callback"
-    if value is None:
-        return failed(f"{params.name} is not a transform {count}", hint=hint)
-    old = [t for t, p in poses if _fits(value, p, params) and t <= first.time_ns]
+    old = [t for t, p in poses if _fits(value, p, params) and t <= first_ns]
     what, says = (
         f"{params.name} is wrong {count}",
         f"it is {_text(value)} while {params.pose_of} says {_text(pose)}",
@@ -359,10 +357,11 @@ def _wrong_pose(
         hint = _axes(value, pose, params)[1] or hint
         return failed(f"{what}{_why(value, pose, params)}; {says}", hint=hint)
     verdict = failed(f"{what}: it is that of an older pose; {says}", hint=hint).late()
-    if len(judged) > FEW and len({_text(one.value) for one in judged if one.value}) == 1:
+    # One and the same pose all the time is no lag of the machine's.
+    if len(judged) > FEW and len({_text(one) for _, one in judged}) == 1:
         return verdict
     verdict = verdict.once()
-    return excused(verdict, run, old[-1], wrong[-1].time_ns, why_late)
+    return excused(verdict, run, old[-1], wrong[-1][0], why_late)
 
 
 def _too_seldom(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict | None:
