@@ -228,6 +228,7 @@ class ArenaSession:
             "master": self._master,
             "stage": self.place.stage(),
             "cgroups": self.place.sandbox.cgroups.model_dump(),
+            # In a sandbox the network is the run's own, so the usual port is free: outside, the system chooses one.
             "port": PORT if self.place.sandbox.bubblewrap else 0,
             "limits": self.place.limits.model_dump(),
             "suffix": "_" + secrets.token_hex(4),
@@ -241,6 +242,7 @@ class ArenaSession:
             self._failure = f"it sent something that is not a frame: {type(error).__name__}"
         except Exception as error:  # noqa: BLE001 - the disk, the memory: `wait` raises it where it is heeded
             self._error = error
+        # After `done` the output ends as it should.
         if not chunk and not self._done:
             self._failure = self._failure or "its output ended"
         self._changed.set()
@@ -265,6 +267,7 @@ class ArenaSession:
             secs, nsecs = TIME.unpack(frame.datas[-1])
             self._clock_ns = secs * NS + nsecs
         if frame.datas and not is_grader_node(channel.callerid):
+            # A helper's messages may be waited for as well, and are no sign that the student's nodes do anything.
             own = channel.callerid not in self.live.helper_nodes
             if channel.topic != ROSOUT:
                 self.live.talking.setdefault(channel.callerid, time.monotonic())

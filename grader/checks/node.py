@@ -205,6 +205,7 @@ def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None
     if not nodes:
         hint = f"call {INIT} before anything that waits"
         return unjudged(f"{_script(one)} runs, but never registers as a node", hint=hint).once()
+    # Another tool's recording does not say whose a node is: there, as many nodes as processes are right.
     if len(nodes) > (1 if are_noted(run) else max(1, len(lives(run)))):
         hint = f"one script is one node: call {INIT} once, and start no other process"
         return failed(f"{_script(one)} registers as {len(nodes)} nodes: {join_words(nodes)}", hint=hint)

@@ -182,6 +182,7 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     if not slips and (found.mean_hz >= FLOOD_HZ or not found.is_even):
         slip = call_in_comment(package, run, "sleep")
         slips = [slip] if slip is not None else []
+    # An even stream sleeps, if too briefly: it has a wrong rate, not a loop without a sleep.
     if not slips and found.mean_hz < FLOOD_HZ and found.is_even:
         return None
     if not slips and (slip := _asked_flood(found, run, package, params)):
@@ -191,6 +192,7 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     about = f"{float(f'{found.mean_hz:.2g}'):,.0f}"
     made = both(f"rate = rospy.Rate({hz})", f"ros::Rate rate({hz})")
     hint = f"call rate.sleep(), with parentheses, in every iteration; {made}"
+    # There is a `sleep()` already, behind the loop or in a comment: the slip says what to do with it.
     if slips and slips[0].kind in {"sleep-outside", "commented-out"}:
         hint = slips[0].fix
     return failed(
@@ -214,6 +216,7 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     seen = f"{plural(len(found.times_ns), 'message')} in {seconds(found.span_ns)}"
     if end := explain_early_end(package, run):
         verdict = end.verdict(unjudged, f"only {seen} on {params.topic}: the node ended ({end.cause})")
+        # A loop that never waits can be over before a rate shows: then the pause is the second thing to write.
         if not end.by_itself or run.foreign or _has_rate(package, run):
             return verdict
         paced = f"rate = rospy.Rate({significant(params.rate_hz)}) above the loop, rate.sleep() in it"
@@ -239,6 +242,7 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
     if in_bounds and even:
         return None
     wrong = _wrong_mean(found, params)
+    # What a line of the script, or the shape of the stream, explains goes before the bare numbers.
     return (
         _fell_silent(found, run, package, params)
         or _published_twice(found, run, package, params)
@@ -252,6 +256,7 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
 
 def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
     """The silence at the end is longer than anything that came before it."""
+    # The last gap is the silence itself, up to when the node was watched.
     before_ns = max(found.gaps_ns[:-1], default=0)
     if found.tail_ns <= max(5 * params.period_ns, 2 * before_ns, 0.5e9):
         return None

@@ -169,6 +169,7 @@ def _answers(
     if to_s is None:
         return []
     each = params.cause.field is None
+    # A condition on a field holds for many messages on end: only where it begins to hold is an answer due.
     before = (False, *(params.cause.holds(one) for one in causes))
     starts = [
         one.time_ns
@@ -184,6 +185,7 @@ def _answers(
         after_s = to_s(came[first]) - to_s(at_ns) if first < len(came) else math.inf
         if after_s <= params.within_s or (after_s < math.inf and came[first] < next_ns):
             answers.append(Answer(at_ns, max(0.0, after_s)))
+            # Where each message is a cause, an effect answers one of them alone.
             first += each
         elif to_s(until_ns) - to_s(at_ns) >= params.within_s:
             answers.append(Answer(at_ns, None))

@@ -249,6 +249,7 @@ def _fell_silent(
     then, no one knows."""
     sent = [c for c in run.channels if c.topic == params.topic and c.messages]
     own = run.student_channels(params.topic)
+    # A simulator goes on telling where the robot is, and velocities say nothing of where it was.
     if not judged or len(sent) > len(own) or any("Twist" in channel.type for channel in sent):
         return None
     silent_s, gap_s = asked.to_s - judged[-1].time_s, (judged[-1].time_s - judged[0].time_s) / len(judged)

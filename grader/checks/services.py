@@ -247,6 +247,7 @@ def exchanges(run: Run, service: str) -> tuple[Exchange, ...]:
     answers = [(t, e) for t, e in run.actors if e.action == "answer" and e.topic == service]
     found = []
     for number, (at_ns, call) in enumerate(calls):
+        # One call is made after the other, so that the answers are in their order.
         time_ns, answer = answers[number] if number < len(answers) else (None, None)
         response, detail = (answer.value, answer.detail) if answer else (None, "")
         kind = plain_type(call.type or "")

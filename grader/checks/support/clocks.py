@@ -46,6 +46,7 @@ def clocks_at(run: Run, times_ns: Sequence[int]) -> tuple[Seconds, ...]:
     if run.clock != "warped":
         return (wall,)
     ticks = sorted(_ticks(run))
+    # What a node reads is the last tick before it sends.
     at = [bisect_right(ticks, (t, float("inf"))) - 1 for t in times_ns]
     if min(at, default=-1) < 0:
         return ()
@@ -146,6 +147,7 @@ def _too_short(span_s: float) -> Verdict:
 
 def _falls_back(before: float, after: float) -> Verdict:
     message = f"the time in the messages goes back from {_plain(before)} to {_plain(after)}"
+    # Large and whole, and less than a second of nanoseconds.
     within = before < 1e9 and before == int(before) and before > 1e6
     why = "`.nsecs` is only the part after the whole second; " if within else ""
     return failed(message, hint=why + ASK_AGAIN)
@@ -291,6 +293,7 @@ class _Window(NamedTuple):
 def _windows(run: Run, from_ns: int, to_ns: int) -> list[_Window]:
     """Return all that touch this stretch of time."""
     starts = [run.start_ns, *(t for t, _ in run.host)]
+    # There is one start more than events: what came after the last one was not measured.
     found = [_Window(start, t, event) for start, (t, event) in zip(starts, run.host, strict=False)]
     return [w for w in found if w.to_ns > from_ns and w.from_ns < to_ns]
 

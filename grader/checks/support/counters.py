@@ -154,6 +154,7 @@ def wrong_steps(count: Count, run: Run, *, maximum: int, rate_hz: float) -> Wron
     wrong = tuple(s for s in steps_to_judge(count, maximum) if s.change in {0, -1} or s.change > 1)
     skips = tuple(s for s in wrong if s.change > 1)
     usual = count.usual_step()
+    # A counter that stands still, goes back or goes by two is wrong at any rate: no queue makes it so.
     if wrong and skips == wrong and usual in {None, 1} and count.is_flood(run, rate_hz):
         return Wrong(wrong, flood=True, excused=usual == 1)
     lost = tuple(s for s in skips if count.was_lost_in_transit(s, s.change))
@@ -237,6 +238,7 @@ def judge_wraps(
     turns, good, wrong = turns_of(count, run, params)
     bad = wrong[0] if wrong else None
     if bad is not None:
+        # Past the maximum, the first bad step is no turn yet: the line is told by where the counter turns in the end.
         turn = next((s for s in turns if s.before > params.maximum), bad) if bad.change > 0 else bad
         written = slips_of(package, run, count.callerid, "reset-value", "reset-limit")
         return _where_reset(_bad_turn(bad, turns, count, run, params), turn, written, params), bad
@@ -244,6 +246,7 @@ def judge_wraps(
     if len(good) >= params.wraps:
         message = f"after {significant(good[0].before)} comes {params.minimum}, {plural(len(good), 'time')}"
         return passed(message), last
+    # A flood is the publisher's own doing, also where the recorder could not keep up with it.
     if losses(run, params.topic) and not count.is_flood(run, params.rate_hz):
         return grade_again(f"only {plural(len(good), 'reset')} of {params.wraps} is recorded"), last
     verdict = _judge_death(count, run, package, params) or _stuck(count, params)
@@ -370,6 +373,7 @@ def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
         if late is None:
             return f"the counter never resets: {comes}, and it keeps counting"
         return f"the counter resets too late, from {significant(late.before)} to {significant(late.after)}: {comes}"
+    # With a maximum of 127, int8 goes on at -128: the type's range made it turn, and no line of the script.
     if step.after == -(high + 1):
         return f"the counter overflows to {after}, as a signed integer of this size does: {comes}"
     if step.before >= high - 1:
@@ -384,6 +388,7 @@ def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapPara
     if end is None:
         return None
     last = count.values[-1]
+    # A publisher that packs one number too many (int8: 128) dies where it should have reset.
     if last >= params.maximum - 1:
         message = f"the node dies at {significant(last + 1)}, where the counter should reset: {end.cause}"
         limits = slips_of(package, run, count.callerid, "reset-limit")
@@ -441,6 +446,7 @@ def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Ve
     if count.is_flood(run, params.rate_hz) or wrong:
         message = f"{params.wraps} resets were not seen: {seen}, which do not count up one by one"
         return unjudged(message, hint="first make the counter go up by one at its rate")
+    # Half the rate is another criterion's matter, which says more about it.
     if len(count.steps) < params.rate_hz * span_s / 2:
         message = f"{params.topic} is too slow to see {params.wraps} resets: {seen}"
         return unjudged(message, hint=f"use {loop_rate(significant(params.rate_hz))}")

@@ -100,6 +100,7 @@ def _life(run: Run, start_ns: int, start: ProcessEvent) -> Life:
     ends = ((t, e) for t, e in run.processes if e.event == "exit" and e.name == start.name and t >= start_ns)
     end_ns, end = next(ends, (None, None))
     interrupt_ns, action = min(_interrupts(run, start.name, start_ns), default=(None, ""))
+    # Ctrl-C for the whole run came when this one had ended by itself.
     if interrupt_ns is not None and end_ns is not None and end_ns < interrupt_ns:
         interrupt_ns, action = None, ""
     return Life(start.name, start_ns, start, end_ns, end, interrupt_ns, action in STEPS)

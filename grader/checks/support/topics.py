@@ -124,6 +124,7 @@ def no_message(
 ) -> Verdict:
     """Return why no message came on a topic. `of_node` makes the verdict where the node itself is the reason; `kind` is
     the type that the topic should have."""
+    # What the recorder lost, the topic's name, the node, its script: the first that holds says most.
     if lost := all_lost(run, topic):
         return lost
     published = published_topics(run)
