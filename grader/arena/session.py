@@ -144,6 +144,15 @@ class ArenaSession:
         self._killed.starting(spec["name"])
         self.send(do="start", spec=spec)
 
+    async def run_to_end(self, spec: dict[str, Any], limit_s: float, *, int_s: float = 1.0) -> bool:
+        """Start a process and return whether it came to its end in time; else it is interrupted."""
+        name = spec["name"]
+        self.start(spec)
+        ended = await self.wait(lambda: name in self.exit_codes, limit_s)
+        if not ended:
+            await self.interrupt(name, int_s=int_s, term_s=1.0)
+        return ended
+
     async def interrupt(self, name: str, *, int_s: float, term_s: float, action: str = "interrupt") -> None:
         """Send Ctrl-C, TERM after `int_s`, and KILL after another `term_s`. Return when the process has ended.
 

@@ -265,6 +265,7 @@ class StepRunner:
                 publish, values[index % len(values)], index, total
             ):
                 return
+            # What came late is not caught up with: a burst would be another rate than the rubric's.
             due_ns = max(due_ns + round(NS / publish.rate_hz), self._arena.ros_now_ns())
             await self._until(due_ns)
 
@@ -273,6 +274,7 @@ class StepRunner:
         live = self._live
         if topic not in live.subscribed and topic not in self._deaf:
             self._tell(f"waiting for a subscriber on {topic}")
+            # Where all processes are up and hear another topic of these, this one's subscriber would be there as well.
             settled = live.subscribed & self._types.keys() and live.running <= live.registered
             patience_s = SUBSCRIBE_S if settled else self._scenario.until.first_message_s
             await self._come(lambda: topic in live.subscribed, patience_s, topics={topic})
@@ -338,6 +340,7 @@ class StepRunner:
 
     async def _play(self, play: Play) -> None:
         channels = [c for c in self._channels_to_play(play) if self._md5sums[c.topic] == c.md5sum]
+        # All channels by time, as they were recorded: topics may depend on each other.
         messages = sorted((m.log_time_ns, c.topic, m.data) for c in channels for m in c.messages)
         topics = {channel.topic for channel in channels}
         self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
@@ -387,6 +390,7 @@ class StepRunner:
             return
         name = wait.topic or wait.node or ""
         self._tell(f"waiting for {name}")
+        # What did not come the last time is given little time again, until something is started anew.
         limit_s = wait.limit_s or (min(SUBSCRIBE_S, patience_s) if name in self._in_vain else patience_s)
         if self._deaf and self._deaf <= live.refused and not live.topics[name].count:
             limit_s = min(limit_s, UNANSWERED_S)  # the node's type is another: it hears nothing to answer

@@ -279,6 +279,7 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
 def _not_installed(facts: CMakeFacts, lacks: dict[str, Lack]) -> Verdict:
     verdict = inconclusive if any(lack.unsure for lack in lacks.values()) else failed
     follows = all(lack.follows for lack in lacks.values())
+    # Where CMake itself fails, or catkin_package() is missing, this follows from another criterion's loss.
     found = (unjudged if facts.fault or follows else verdict)(
         f"{facts.file}: {'; '.join(_reasons(lacks))}", hint="; ".join(_fixes(lacks))
     )
