@@ -143,7 +143,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         or _excuse_lateness(_uneven(found, run, package, params), found, run, package, params)
         or passed(f"{params.topic} runs at {hertz(found.mean_hz)}, evenly")
     )
-    citations = (*verdict.citations, cite(run, params.topic, found.times_ns[0], found.times_ns[-1]))
+    citations = (cite(run, params.topic, found.times_ns[0], found.times_ns[-1]),)
     measured = described(found, *params.bounds_ns)
     if verdict.status is Status.INCONCLUSIVE or NO_EXCUSE in verdict.message:
         measured += _lateness(found, run)
