@@ -11,14 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from grader.api import grade, judge, load_result, load_rubric
-    from grader.errors import (
-        EvidenceError,
-        GraderError,
-        HostError,
-        RubricError,
-        SubmissionError,
-        UsageError,
-    )
+    from grader.errors import EvidenceError, GraderError, HostError, RubricError, SubmissionError, UsageError
     from grader.model.result import CriterionResult, GradingResult
     from grader.model.verdict import EvidenceCitation, FileCitation, Status
     from grader.rubric.load import LoadedRubric

@@ -76,10 +76,7 @@ def make_recorder(
 ) -> Recorder | StaticRecorder:
     """Return what records the rubric's scenarios (`only` these), to be used as a context: the arena, or a recorder of
     files alone where nothing is to be run, or can be. `about` goes into the metadata."""
-    from grader.arena.static_recorder import (  # noqa: PLC0415 - see LATER
-        STATIC_ONLY,
-        StaticRecorder,
-    )
+    from grader.arena.static_recorder import STATIC_ONLY, StaticRecorder  # noqa: PLC0415 - see LATER
 
     make_folder(job.evidence)
     rubric, options = job.rubric.rubric, job.options

@@ -91,6 +91,7 @@ def note(path: Path, late_ms: float) -> None:
     """Write down what was just measured. Raises OSError."""
     descriptor = open_lock(path)
     try:
+        # Each grader has a place of its own, as far as there are enough: nobody waits for a lock to write one number.
         place = os.getpid() % ENTRIES * ENTRY.size
         os.pwrite(descriptor, ENTRY.pack(time.monotonic_ns(), late_ms), place)
     finally:
@@ -156,6 +157,7 @@ class Admission:
             yield
             return
         with FileLock(self._folder / "runs") as runs:
+            # Whoever holds the turn alone keeps all later ones out while the runs that have begun come to their end.
             with FileLock(self._folder / "turn") as turn:
                 await _until(lambda: turn.take(shared=not alone), ALONE_PATIENCE_S)
                 await _until(lambda: runs.take(shared=not alone), ALONE_PATIENCE_S)

@@ -317,10 +317,7 @@ async def _build(place: ProcessEnvironment) -> bytes:
         give_to(place.course, place.sandbox.uid)
     with EvidenceWriter(path, scenario="course", clock="real", warp=1.0, metadata={}) as writer:
         async with ArenaSession(place, writer, master=False) as arena:
-            arena.start(_spec(place))
-            ended = await arena.wait(lambda: COURSE_NAME in arena.exit_codes, BUILD_S)
-            if not ended:
-                await arena.interrupt(COURSE_NAME, int_s=2.0, term_s=1.0)
+            ended = await arena.run_to_end(_spec(place), BUILD_S, int_s=2.0)
             await arena.finish()
     if not ended or arena.exit_codes.get(COURSE_NAME) != 0:
         raise ArenaError(

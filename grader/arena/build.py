@@ -75,6 +75,7 @@ async def build(
 
     Returns the place with the built workspace's environment. Raises ArenaError where the arena fails.
     """
+    # On one core, a base beside the build would only make this build later.
     wants_base = place.sandbox.bubblewrap and not has_base(place) and len(os.sched_getaffinity(0)) > 1
     to_compile = list(python_files)
     (place.folder / "bin" / "python-files.json").write_text(json.dumps(to_compile))
@@ -169,9 +170,7 @@ async def _with_setup(place: ProcessEnvironment, arena: ArenaSession) -> Process
     argv = ["/bin/bash", "-c", script, "bash", place.inside_workspace]
     room = DUMP_BYTES + 1
     spec = place.spec(SETUP, argv, role="build", as_handed_in=True, collect=ENVIRONMENT, collect_bytes=room)
-    arena.start(spec)
-    if not await arena.wait(lambda: SETUP in arena.exit_codes, STEP_S):
-        await arena.interrupt(SETUP, int_s=1.0, term_s=1.0)
+    await arena.run_to_end(spec, STEP_S)
     path = _kept_file(place, ENVIRONMENT)
     dump = path.read_bytes() if path and arena.exit_codes.get(SETUP) == 0 else None
     excess = excess_of(dump) if dump else ""
@@ -179,6 +178,7 @@ async def _with_setup(place: ProcessEnvironment, arena: ArenaSession) -> Process
         arena.note(
             ActorEvent(action="limit", actor=SETUP, detail=f"it sets {excess}: nodes run without them")
         )
+    # Nodes run all the same, by the sources: what the build lacks is its own criterion's.
     if not dump or excess:
         return place.from_source()
     return replace(place, env=keep_ros_variables(parse_env(dump)))
@@ -187,10 +187,8 @@ async def _with_setup(place: ProcessEnvironment, arena: ArenaSession) -> Process
 async def _answer(place: ProcessEnvironment, arena: ArenaSession, script: str) -> None:
     """Record what `rosrun` says to a script that is not as it should be, in the package as handed in."""
     file = Path(script).name
-    name = f"rosrun {file}"
-    arena.start(place.spec(name, ["rosrun", place.package, file], as_handed_in=True))
-    if not await arena.wait(lambda: name in arena.exit_codes, ROSRUN_S):
-        await arena.interrupt(name, int_s=1.0, term_s=1.0)
+    spec = place.spec(f"rosrun {file}", ["rosrun", place.package, file], as_handed_in=True)
+    await arena.run_to_end(spec, ROSRUN_S)
 
 
 def _trace(place: ProcessEnvironment) -> tuple[Path | None, str]:

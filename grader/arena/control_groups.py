@@ -176,6 +176,7 @@ def _usable(folder: Path, key: str) -> bool:
     except OSError:
         return False
     try:
+        # It is only read: there is nothing to limit.
         if key.partition(".")[0].startswith("cpu"):
             return (trial / key).is_file()
         (trial / key).write_text("1073741824" if key.startswith("memory") else "512")
@@ -212,6 +213,7 @@ ROUNDS = 5
 def place_for_runs(own: Path) -> Path:
     """Return where groups of runs are to be made, given this process's group, and make it ready where that is
     allowed."""
+    # This process has moved already, or comes of one that has.
     if own.name == LEAF:
         return own.parent
     with suppress(OSError):  # it stays as it was: `cgroups._usable` finds out what it can do

@@ -36,6 +36,7 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     enough = (not still_starting, *_enough(live, until, now_s))
     if live.ended and not live.running:
         return "complete" if until.ended and all(enough) else "ended", ""
+    # Where nothing ends the run before its limit, the limit is its end and no failure.
     if waits(until):
         if all(enough):
             return "complete", ""
@@ -108,6 +109,8 @@ def next_look_s(live: RunState, until: Until, now_s: float) -> float:
     looks += [max(live.last_sent_s, live.last_heard_s) + HEARD_AT_MOST_S]
     looks += [live.activity_s + (until.quiet_s or 0), live.news_s + until.silent_s]
     looks += [_lived_s(live, until.alive_s or 0)]
+    # What no time above tells, as whether a process has come to rest, is looked at once a second. The last part makes
+    # `>` true at the next look.
     ahead = [look - now_s for look in looks if look > now_s]
     return min([*ahead, 1.0]) + 0.001
 

@@ -30,6 +30,8 @@ from grader.arena.sandbox_files import (
     with_standins,
 )
 from grader.arena.workspace import Built, Workspace, read_archive, read_folder
+from grader.evidence.decode import FindText
+from grader.evidence.message_values import action_texts
 from grader.files import read_untrusted
 from grader.host_programs import find_host_program
 from grader.ros_env import SYSTEM_PATH, RosInstallation
@@ -202,6 +204,15 @@ class ProcessEnvironment:
             if data is not None:
                 return data.decode(errors="replace")
         return None
+
+    def action_texts(self, type_: str) -> FindText:
+        """Return what finds the texts of the messages that an action consists of, and of all others.
+
+        Raises ValueError where the text of the action is none.
+        """
+        text = self.type_text(type_, "action")
+        own = {} if text is None else action_texts(type_, text)
+        return lambda name: own.get(name) or self.type_text(name, "msg")
 
     def is_own(self, type_: str) -> bool:
         """Return whether a type belongs to a package of the submission."""

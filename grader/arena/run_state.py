@@ -140,6 +140,7 @@ class RunState:
         if times_ns is not None:
             room = ARRIVALS_MAX - len(times_ns)
             times_ns += [time_ns] * min(count, room)
+            # Where there is no room the last one moves on, so that the span of a flood stays right.
             times_ns[-1] = time_ns
 
     def note_messages(self, topic: str, count: int, now_s: float, *, active: bool = True) -> None:
@@ -284,6 +285,7 @@ def is_silent(live: RunState, topics: tuple[str, ...], until: Until, now_s: floa
         return False
     seen = [live.topics[topic] for topic in topics if topic in live.topics]
     count = sum(one.count for one in seen)
+    # No node has a publisher of it, and none is to register one any more.
     if not count and live.published.keys().isdisjoint(topics):
         return True
     line_s = 0.0 if live.running <= _unused(live) else live.last_line_s

@@ -239,6 +239,7 @@ async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple
         now_s = time.monotonic()
         done = find_outcome(live, until, now_s)
         if done is not None:
+            # What was printed last may not be in yet, and the verdict rests on it.
             if until.heard and live.running:
                 await arena.wait(lambda: not live.running, HEARD_SETTLE_S)
             return done
@@ -260,6 +261,7 @@ def _does_not_follow(scenario: Scenario, arena: ArenaSession, now_s: float) -> b
     """Return whether a node keeps its own rate, however fast `/clock` runs: it sleeps by the wall's clock."""
     for topic in scenario.until.messages:
         seen = arena.live.topics[topic]
+        # A machine that others fill also makes a node slow, by no clock of its own.
         seen_s = now_s - seen.first_s
         lost_s = arena.live.lost_s - seen.lost_before_s
         if seen.count and seen_s - lost_s > UNFOLLOWED_S:
@@ -295,6 +297,7 @@ def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int
         if start.is_rostest:
             how = ["python3", f"{place.shims}/{ROSTESTS}"]
         argv = [*how, package, program, *start.args]
+        # Without what the built workspace's `setup.bash` adds: it is no program of the student's.
         yield replace(place, env={}).spec(start.name, argv, role="grader", copy=False)
     elif start.tests is not None:
         argv = ["python3", f"{place.shims}/{FUNCTIONS}", place.package_folder]

@@ -17,7 +17,7 @@ from typing import Any
 from grader.arena.session import ArenaSession
 from grader.errors import ArenaError
 from grader.evidence.events import GOAL_STATUS, MISFIT, OTHER_TYPE, ActorEvent
-from grader.evidence.message_values import MessageType, Moment, ServiceTypes, action_texts
+from grader.evidence.message_values import MessageType, Moment, ServiceTypes
 from grader.model.message_definitions import other_fields
 from grader.rubric.scenario import Served
 
@@ -135,13 +135,8 @@ class ServedAction:
         self._send("status", {"status_list": []})
 
     def _find(self) -> dict[str, MessageType]:
-        type_, place = self._served.type, self._arena.place
-        text = place.type_text(type_, "action")
-        texts = {} if text is None else action_texts(type_, text)
-
-        def find_text(name: str) -> str | None:
-            return texts.get(name) or place.type_text(name, "msg")
-
+        type_ = self._served.type
+        find_text = self._arena.place.action_texts(type_)
         own = {part: f"{type_}Action{part.title()}" for part in ("goal", "feedback", "result")}
         return {n: MessageType(t, find_text) for n, t in {**own, "status": STATUS, "cancel": CANCEL}.items()}
 

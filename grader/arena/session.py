@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import base64
 import secrets
 import struct
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
 from typing_extensions import Self
@@ -16,14 +17,23 @@ from typing_extensions import Self
 from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
 from grader.arena.killed_processes import Killed
-from grader.arena.left_files import LeftFiles
 from grader.arena.process_environment import LOOPBACK, ProcessEnvironment, search_path
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.run_state import ROSOUT, RunState, all_compute
+from grader.arena.sandbox_files import HOME
 from grader.errors import ArenaError
-from grader.evidence.events import OTHER_TYPE, STOPPED, TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
-from grader.evidence.run import is_grader_node
+from grader.evidence.events import (
+    NO_ANSWER,
+    OTHER_TYPE,
+    STOPPED,
+    TOPICS,
+    ActorEvent,
+    ProcessEvent,
+    ScenarioEvent,
+)
+from grader.evidence.run import is_grader_node, left_name
 from grader.evidence.writer import EvidenceChannel, EvidenceWriter
+from grader.files import open_untrusted
 from grader.ros_env import RosInstallation
 
 ARENA = Path(__file__).parent / "ros"
@@ -37,6 +47,8 @@ GROUPS_S, LOOK_S = 2.0, 0.02
 STUCK_S = 0.5
 """So long a call is waited for at least, though the programs only compute."""
 PORT = 11311
+LEFT_FILES_MAX = 200
+"""So many of the files that a run leaves are events."""
 
 
 def arena_command(ros: RosInstallation) -> tuple[list[str], dict[str, str]]:
@@ -132,6 +144,15 @@ class ArenaSession:
         self._killed.starting(spec["name"])
         self.send(do="start", spec=spec)
 
+    async def run_to_end(self, spec: dict[str, Any], limit_s: float, *, int_s: float = 1.0) -> bool:
+        """Start a process and return whether it came to its end in time; else it is interrupted."""
+        name = spec["name"]
+        self.start(spec)
+        ended = await self.wait(lambda: name in self.exit_codes, limit_s)
+        if not ended:
+            await self.interrupt(name, int_s=int_s, term_s=1.0)
+        return ended
+
     async def interrupt(self, name: str, *, int_s: float, term_s: float, action: str = "interrupt") -> None:
         """Send Ctrl-C, TERM after `int_s`, and KILL after another `term_s`. Return when the process has ended.
 
@@ -170,7 +191,7 @@ class ArenaSession:
 
         if not await self.wait(is_over, timeout_s + END_S) or number not in self._answers:
             after_s = min(timeout_s, time.monotonic() - begun_s)
-            return {"error": f"no answer within {after_s:.3g} s"}
+            return {"error": f"{NO_ANSWER} {after_s:.3g} s"}
         return self._answers.pop(number)
 
     async def wait(self, condition: Callable[[], bool], timeout_s: float) -> bool:
@@ -216,6 +237,7 @@ class ArenaSession:
             "master": self._master,
             "stage": self.place.stage(),
             "cgroups": self.place.sandbox.cgroups.model_dump(),
+            # In a sandbox the network is the run's own, so the usual port is free: outside, the system chooses one.
             "port": PORT if self.place.sandbox.bubblewrap else 0,
             "limits": self.place.limits.model_dump(),
             "suffix": "_" + secrets.token_hex(4),
@@ -229,6 +251,7 @@ class ArenaSession:
             self._failure = f"it sent something that is not a frame: {type(error).__name__}"
         except Exception as error:  # noqa: BLE001 - the disk, the memory: `wait` raises it where it is heeded
             self._error = error
+        # After `done` the output ends as it should.
         if not chunk and not self._done:
             self._failure = self._failure or "its output ended"
         self._changed.set()
@@ -253,6 +276,7 @@ class ArenaSession:
             secs, nsecs = TIME.unpack(frame.datas[-1])
             self._clock_ns = secs * NS + nsecs
         if frame.datas and not is_grader_node(channel.callerid):
+            # A helper's messages may be waited for as well, and are no sign that the student's nodes do anything.
             own = channel.callerid not in self.live.helper_nodes
             if channel.topic != ROSOUT:
                 self.live.talking.setdefault(channel.callerid, time.monotonic())
@@ -380,3 +404,42 @@ def _of(nodes: list[str], topics: Mapping[str, list[str]]) -> dict[str, set[str]
     """Return which of these nodes each topic has; topics that have none of them are left out."""
     found = {topic: {*callers} & {*nodes} for topic, callers in topics.items()}
     return {topic: own for topic, own in found.items() if own}
+
+
+class LeftFiles:
+    """The files that a run's processes left, as `ros/processes.py` reads them.
+
+    Each is an event, and what is kept of it an attachment, within the run's limits. A file of the package that is as it
+    was handed in is not left by the run.
+    """
+
+    def __init__(self, place: ProcessEnvironment, writer: EvidenceWriter) -> None:
+        self._place, self._writer = place, writer
+        self._left_bytes, self._left_files = place.limits.kept_bytes, place.limits.kept_files
+        self._listed = 0
+
+    def add(self, process: str, path: str, size_bytes: int, data: str | None, time_ns: int) -> None:
+        """Add a file by its path in the sandbox; `data` is base64, or None where the arena does not keep it."""
+        content = None if data is None else base64.b64decode(data)
+        if self._listed >= LEFT_FILES_MAX or self._is_handed_in(path, size_bytes, content):
+            return
+        self._listed += 1
+        shown = path.replace(HOME, "~", 1)
+        event = ActorEvent(action="left", actor=process, value=size_bytes, detail=shown)
+        self._writer.event("/grader/actor", time_ns, event)
+        if content is not None and self._left_files and len(content) <= self._left_bytes:
+            self._left_bytes -= len(content)
+            self._left_files -= 1
+            self._writer.attach(left_name(process, shown), content, time_ns, "application/octet-stream")
+
+    def _is_handed_in(self, path: str, size_bytes: int, content: bytes | None) -> bool:
+        sources = PurePosixPath(self._place.inside_workspace, "src")
+        if not PurePosixPath(path).is_relative_to(sources):
+            return False
+        inside = PurePosixPath(path).relative_to(sources).parts
+        try:
+            with open_untrusted(self._place.workspace.repaired, *inside) as file:
+                before = file.read(size_bytes + 1)
+        except OSError:
+            return False
+        return len(before) == size_bytes and content in {None, before}

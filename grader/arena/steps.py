@@ -31,7 +31,7 @@ from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
 from grader.evidence.decode import FindText
 from grader.evidence.events import GOAL_STATUS, MISFIT, UNHEARD, ActorEvent
-from grader.evidence.message_values import MessageType, Moment, ServiceTypes, action_texts, md5_of
+from grader.evidence.message_values import MessageType, Moment, ServiceTypes, md5_of
 from grader.model.message_definitions import other_fields
 from grader.rubric.scenario import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
@@ -265,6 +265,7 @@ class StepRunner:
                 publish, values[index % len(values)], index, total
             ):
                 return
+            # What came late is not caught up with: a burst would be another rate than the rubric's.
             due_ns = max(due_ns + round(NS / publish.rate_hz), self._arena.ros_now_ns())
             await self._until(due_ns)
 
@@ -273,6 +274,7 @@ class StepRunner:
         live = self._live
         if topic not in live.subscribed and topic not in self._deaf:
             self._tell(f"waiting for a subscriber on {topic}")
+            # Where all processes are up and hear another topic of these, this one's subscriber would be there as well.
             settled = live.subscribed & self._types.keys() and live.running <= live.registered
             patience_s = SUBSCRIBE_S if settled else self._scenario.until.first_message_s
             await self._come(lambda: topic in live.subscribed, patience_s, topics={topic})
@@ -338,6 +340,7 @@ class StepRunner:
 
     async def _play(self, play: Play) -> None:
         channels = [c for c in self._channels_to_play(play) if self._md5sums[c.topic] == c.md5sum]
+        # All channels by time, as they were recorded: topics may depend on each other.
         messages = sorted((m.log_time_ns, c.topic, m.data) for c in channels for m in c.messages)
         topics = {channel.topic for channel in channels}
         self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
@@ -387,6 +390,7 @@ class StepRunner:
             return
         name = wait.topic or wait.node or ""
         self._tell(f"waiting for {name}")
+        # What did not come the last time is given little time again, until something is started anew.
         limit_s = wait.limit_s or (min(SUBSCRIBE_S, patience_s) if name in self._in_vain else patience_s)
         if self._deaf and self._deaf <= live.refused and not live.topics[name].count:
             limit_s = min(limit_s, UNANSWERED_S)  # the node's type is another: it hears nothing to answer
@@ -494,12 +498,7 @@ class StepRunner:
 
     def _advertise_action(self, action: Action) -> None:
         try:
-            text = self._arena.place.type_text(action.type, "action")
-            texts = action_texts(action.type, text) if text is not None else {}
-
-            def find_text(type_: str) -> str | None:
-                return texts.get(type_) or self._message_text(type_)
-
+            find_text = self._arena.place.action_texts(action.type)
             self._results[action.type] = MessageType(f"{action.type}ActionResult", find_text)
         except ValueError as error:
             self._note("note", action.name, f"the grader cannot use {action.type}: {error}")

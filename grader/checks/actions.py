@@ -18,7 +18,7 @@ from grader.evidence.events import ActorEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, significant, there_is
 
 GOES_ON_NS = 1_000_000_000
@@ -120,7 +120,7 @@ def action_result(package: PackageFacts, run: Run, params: ActionResultParams) -
         expected=params.words,
         measured=verdict.measured
         or (_measured_text(run, goal, params) if goal else "no such goal could be sent"),
-        citations=(*verdict.citations, cite(run, "/grader/actor", *span)),
+        citations=(cite(run, "/grader/actor", *span),),
     )
 
 
@@ -138,7 +138,7 @@ def _goals(run: Run, action: str) -> list[Goal]:
 
 def _fault(package: PackageFacts, run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:
     if goal.end is None:
-        return inconclusive(f"the run ended before {goal.name} of {params.action} did", hint="grade again")
+        return grade_again(f"the run ended before {goal.name} of {params.action} did")
     if goal.end.value is None:
         return _no_result(package, run, goal, params)
     status, hint = goal.end.detail, HINTS[params.status]
@@ -177,7 +177,7 @@ def _no_result(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
     verdict = failed(message, hint=hint).once()
     if _goes_on(run, goal, params):
         verdict = failed(f"{said}: it goes on, though it was cancelled", hint=HINTS["PREEMPTED"])
-    return excused(verdict, run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
+    return _excused(verdict, run, goal)
 
 
 def _goes_on(run: Run, goal: Goal, params: ActionResultParams) -> bool:
@@ -200,7 +200,7 @@ def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
             f"{message}: it was over before it could be cancelled",
             hint="let it take as long as the handout says",
         )
-        return excused(verdict.once(), run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
+        return _excused(verdict.once(), run, goal)
     unset = any("did not set the goal to a terminal status" in line.line for _, line in run.console)
     if status == "ABORTED" and unset:
         message += ": the callback returns without saying how the goal ends"
@@ -234,11 +234,12 @@ def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | 
     count = plural(came, "feedback message")
     message = f"{count} came on {goal.name} of {params.action}, but {params.feedback} are expected"
     verdict = failed(message, hint="call server.publish_feedback(feedback) each time around the loop")
-    return (
-        verdict
-        if came == 0
-        else excused(verdict.once(), run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
-    )
+    return verdict if came == 0 else _excused(verdict.once(), run, goal)
+
+
+def _excused(verdict: Verdict, run: Run, goal: Goal) -> Verdict:
+    """Return the verdict, open where the machine was late itself while the goal was pursued."""
+    return excused(verdict, run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
 
 
 def _feedback(run: Run, goal: Goal, params: ActionResultParams) -> int:
@@ -263,14 +264,13 @@ def _not_sent(package: PackageFacts, run: Run, goals: Sequence[Goal], params: Ac
         hint = "use the handout's names and types in the .action file, and build again"
         return unjudged(f"{params.action} cannot be used as the handout asks: {why}", hint=hint)
     if notes:
-        return inconclusive(shown(notes[0]), hint="grade again")
+        return grade_again(shown(notes[0]))
     if not nodes_on(run, f"{params.action}/goal", "subscribers"):
         return _no_server(package, run, params)
     if goals and (end := explain_early_end(package, run)):
         message = f"the node ended before goal {params.goal} of {params.action} was sent: {end.cause}"
         return end.verdict(unjudged, message)
-    message = f"only {plural(len(goals), 'goal')} could be sent to {params.action}"
-    return inconclusive(message, hint="grade again")
+    return grade_again(f"only {plural(len(goals), 'goal')} could be sent to {params.action}")
 
 
 def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> Verdict:

@@ -30,6 +30,7 @@ from grader.model.verdict import (
     Status,
     Verdict,
     failed,
+    grade_again,
     inconclusive,
     machine_lacks,
     passed,
@@ -263,7 +264,7 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
         return passed(message, expected=expected, measured=measured)
     first = broken[0]
     calls = (made[b.program].call for b in broken if b.program in made)
-    cited = tuple(FileCitation(file=call.file, line=call.line) for call in calls)
+    cited = tuple(call.place for call in calls)
     start = cite(run, "/grader/process", first.life.start_ns, first.life.end_ns)
     return failed(
         f"{verdict.message}, but {'; '.join(f'{b.program} does not run: {b.why}' for b in broken)}",
@@ -292,7 +293,7 @@ def _not_started(package: PackageFacts, made: dict[str, Executable]) -> Verdict:
             f"{shown(away.folder)}",
             measured="built, not where rosrun looks",
             hint="remove RUNTIME_OUTPUT_DIRECTORY: catkin puts programs into lib/<package>",
-            citations=(FileCitation(file=call.file, line=call.line),),
+            citations=(call.place,),
         )
     set_at = next(iter(cmake_calls(package, "catkin_package")), None)
     calls = {name: one.call for name, one in made.items()}
@@ -301,12 +302,12 @@ def _not_started(package: PackageFacts, made: dict[str, Executable]) -> Verdict:
     }
     if not early:
         message = f"catkin_make succeeded, but no program was started ({join_words(made)})"
-        return inconclusive(message, measured="built, not started", hint="grade again")
+        return grade_again(message, measured="built, not started")
     message = (
         f"catkin_make succeeded, but rosrun finds no {join_words(early, 'or')}: "
         "add_executable(…) comes before catkin_package(…)"
     )
-    cited = tuple(FileCitation(file=c.file, line=c.line) for c in early.values())
+    cited = tuple(c.place for c in early.values())
     hint = "move add_executable(…) below catkin_package(…), which says where programs go"
     return failed(message, measured="built, not where rosrun looks", hint=hint, citations=cited)
 

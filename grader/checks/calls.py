@@ -106,7 +106,7 @@ def calls(package: PackageFacts, run: Run, params: CallsParams) -> Verdict:
     return verdict.about(
         expected=params.words,
         measured=join_words(_text(r) for r in made) or verdict.measured or "no call",
-        citations=(*verdict.citations, cite(run, "/grader/actor", *_span(made))),
+        citations=(cite(run, "/grader/actor", *_span(made)),),
     )
 
 

@@ -71,7 +71,7 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
     measured = ", ".join(map(_call_text, named[:CALLS_SHOWN])) or "none of the three calls"
     fault = facts.fault
     if not wrong and fault is None:
-        places = tuple(FileCitation(file=c.file, line=c.line) for c in named[:3])
+        places = tuple(c.place for c in named[:3])
         all_there = passed(f"{facts.file} has all three calls")
         return all_there.about(expected=expected, measured=measured, citations=places)
     lines = tuple(FileCitation(file=facts.file, line=one.place) for one in wrong)
@@ -262,7 +262,7 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
     of_python = [one for one in all_named if one.call.name == PYTHON]
     named = join_words(dict.fromkeys(shown(one.path) for one in of_python))
     measured = f"catkin_install_python installs {named or 'no script'}"
-    calls = tuple(FileCitation(file=o.call.file, line=o.call.line) for o in of_python)
+    calls = tuple(o.call.place for o in of_python)
     lacks = {s: lack for s in params.scripts if (lack := _lack(package, all_named, s, params.scripts))}
     if not lacks:
         message = f"{facts.file} installs {names}"
@@ -279,6 +279,7 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
 def _not_installed(facts: CMakeFacts, lacks: dict[str, Lack]) -> Verdict:
     verdict = inconclusive if any(lack.unsure for lack in lacks.values()) else failed
     follows = all(lack.follows for lack in lacks.values())
+    # Where CMake itself fails, or catkin_package() is missing, this follows from another criterion's loss.
     found = (unjudged if facts.fault or follows else verdict)(
         f"{facts.file}: {'; '.join(_reasons(lacks))}", hint="; ".join(_fixes(lacks))
     )
@@ -394,7 +395,7 @@ def _without_call(
 ) -> Lack:
     if package.cmake and (slip := _misspelt(package.cmake, PYTHON)):
         why, respelt = _respell(slip, PYTHON)[:2]
-        return Lack(f"{why}, so nothing installs {{}}", respelt, FileCitation(file=slip.file, line=slip.line))
+        return Lack(f"{why}, so nothing installs {{}}", respelt, slip.place)
     fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN})"
     if beside := package.folder_beside:
         path = path.removeprefix(f"{beside}/")
@@ -413,7 +414,7 @@ def _without_call(
         return Lack(f"{why}, and is not {PYTHON}(…)", f"{fix} below it", _line(of_programs), path)
     why = f"{NOT_CALLED}, so nothing installs {{}}"
     above = next(iter(cmake_calls(package, "catkin_package")), None)
-    line = FileCitation(file=above.file, line=above.line) if above else None
+    line = above.place if above else None
     return Lack(why, f"{fix}{below_catkin_package(package)}", line, path, uncalled=True)
 
 
@@ -431,4 +432,4 @@ def _folder_above(all_named: Sequence[Installed], path: str) -> Installed | None
 
 
 def _line(one: Installed) -> FileCitation:
-    return FileCitation(file=one.call.file, line=one.call.line)
+    return one.call.place

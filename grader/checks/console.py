@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from difflib import SequenceMatcher
 from itertools import islice
 from typing import Annotated
@@ -38,7 +38,7 @@ from grader.evidence.events import ConsoleLine
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 LINES_MAX, LINE_CHARS_MAX = 20_000, 1_000
@@ -77,9 +77,10 @@ class PrintsParams(Record):
             text = text.replace(PLACE, significant(number), 1)
         return repr(text.replace(PLACE, "<number>"))
 
-    def pattern(self, number: str = NUMBER) -> re.Pattern[str]:
-        """Return the words, without regard to capitals and blanks, and a group for each number."""
-        return re.compile(f"({number})".join(words_pattern(words) for words in self.text.split(PLACE)))
+    def found_in(self, line: Line) -> Iterator[re.Match[str]]:
+        """Yield where the line has the words, without regard to capitals and blanks, with a group for each number."""
+        pattern = f"({NUMBER})".join(words_pattern(words) for words in self.text.split(PLACE))
+        return re.finditer(pattern, line.text[:LINE_CHARS_MAX])
 
 
 @check("prints", params=PrintsParams)
@@ -122,26 +123,23 @@ def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
     return verdict.about(
         expected=expected,
         measured=verdict.measured or plural(len(lines), "line"),
-        citations=(*verdict.citations, cite(run, "/grader/console", *span)),
+        citations=(cite(run, "/grader/console", *span),),
     )
 
 
 def _fits(line: Line, params: PrintsParams) -> bool:
     """Return whether the text stands anywhere on the line with the right numbers in it."""
-    each = (found.groups() for found in params.pattern().finditer(line.text[:LINE_CHARS_MAX]))
+    most = params.tolerance + ROUNDING
     return any(
-        all(
-            abs(float(text) - n) <= params.tolerance + ROUNDING
-            for text, n in zip(texts, params.numbers, strict=False)
-        )
-        for texts in each
+        all(abs(float(text) - n) <= most for text, n in zip(found.groups(), params.numbers, strict=False))
+        for found in params.found_in(line)
     )
 
 
 def _not_printed(
     one: Life, lines: Sequence[Line], package: PackageFacts, run: Run, params: PrintsParams
 ) -> Verdict:
-    other = [line for line in lines if params.pattern().search(line.text[:LINE_CHARS_MAX])]
+    other = [line for line in lines if any(params.found_in(line))]
     hint = f"print {params.words} where it happens"
     if other:
         near = f", within {significant(params.tolerance)}" if params.tolerance else ""
@@ -168,7 +166,7 @@ def _not_printed(
 
 def _slip(line: Line, params: PrintsParams) -> str:
     """Return in brackets what is odd about a line's numbers if one is in another unit."""
-    found = params.pattern().search(line.text[:LINE_CHARS_MAX])
+    found = next(params.found_in(line), None)
     each = zip(found.groups() if found else (), params.numbers, strict=False)
     return next(filter(None, (unit_slip(float(text), number) for text, number in each)), "")
 
@@ -236,7 +234,7 @@ def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParam
         verdict = passed("no callback failed")
     measured = plural(len(found), "traceback")
     place = cite(run, "/grader/console", asked[0].start_ns, asked[-1].end_ns)
-    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, place))
+    return verdict.about(expected=expected, measured=measured, citations=(place,))
 
 
 ALIKE = 0.7
@@ -328,8 +326,7 @@ def _only_printed(run: Run, params: LogsParams) -> Verdict | None:
         return failed(message, hint=_call(params))
     if _is_late(run, params):
         return passed(f"{shown(said[0].line)!r} is logged too late: the node was already being stopped")
-    message = f"{shown(said[0].line)!r} was logged on the console, and did not arrive on /rosout"
-    return inconclusive(message, hint="grade again")
+    return grade_again(f"{shown(said[0].line)!r} was logged on the console, and did not arrive on /rosout")
 
 
 def _is_late(run: Run, params: LogsParams) -> bool:

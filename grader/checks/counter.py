@@ -19,19 +19,19 @@ from grader.checks.support.counters import (
     cite_slip,
     counts,
     first_values,
+    judge_flood,
     judge_wraps,
     longest,
     steps_to_judge,
     wrong_steps,
 )
 from grader.checks.support.exit_causes import explain_early_end
-from grader.checks.support.processes import PublishedTopic, slips_of
+from grader.checks.support.processes import OnTopic, slips_of
 from grader.checks.support.text import LOOP
 from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
-from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 CONNECT_NS = 1_000_000_000
@@ -40,22 +40,18 @@ LARGEST = 2.0**64
 FIRST_STEPS = 50
 
 
-class StartParams(Record):
+class StartParams(OnTopic):
     """Where the counting begins."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     start: int = 0
     """The first value that the counter has to publish."""
     rate_hz: Annotated[float, Field(gt=0)] = 10.0
     """The nominal rate, to tell a flood of messages from a counter."""
 
 
-class StepParams(Record):
+class StepParams(OnTopic):
     """How the counter goes on."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     maximum: int = 127
     """The last value before the wrap."""
     rate_hz: Annotated[float, Field(gt=0)] = 10.0
@@ -94,7 +90,7 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
     return verdict.about(
         expected=expected,
         measured=first_values(first.values),
-        citations=(*verdict.citations, cite(run, params.topic, first.times_ns[0], first.times_ns[0])),
+        citations=(cite(run, params.topic, first.times_ns[0], first.times_ns[0]),),
     )
 
 
@@ -113,9 +109,9 @@ def _cite_start(
     if len(wrong) != 1 or slips_of(package, run, first.callerid, "added-first"):
         return verdict
     slip = wrong[0]
-    message = f"{verdict.message}; line {slip.line} of {slip.file} sets `{slip.name}` to {slip.message}"
-    hint = f"on line {slip.line} of {slip.file}, set `{slip.name}` to {params.start}"
-    return verdict.model_copy(update={"message": message, "hint": hint, "citations": (slip.place,)})
+    where = f"line {slip.line} of {slip.file}"
+    why = f"{where} sets `{slip.name}` to {slip.message}"
+    return verdict.explained(why, f"on {where}, set `{slip.name}` to {params.start}", (slip.place,))
 
 
 def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:
@@ -126,15 +122,14 @@ def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:
         message = f"{run.evidence} may have begun after the first message on {params.topic}"
         return inconclusive(message, hint="start the recording before the node")
     if may_have_missed_first(run, params.topic, first):
-        message = f"the recorder missed the first messages on {params.topic}"
-        return inconclusive(message, hint="grade again")
+        return grade_again(f"the recorder missed the first messages on {params.topic}")
     hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
     message = f"the first value on {params.topic} is {significant(first.values[0])}, not {params.start}"
     # a full queue drops values again and again: where the next ones came whole, it was not full
     drops = first.is_flood(run, params.rate_hz) and any(s.change > 1 for s in first.steps[:FIRST_STEPS])
     if first.values[0] > params.start and drops:
         why = f"{message}; but the node floods its topics, and in a flood the publisher's queue drops values"
-        return inconclusive(why, hint="grade again")
+        return grade_again(why)
     verdict = failed(message, hint=hint)
     return verdict.once() if _may_follow_others(run, first, params) else verdict
 
@@ -187,7 +182,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     return verdict.about(
         expected=expected,
         measured=f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}",
-        citations=(*verdict.citations, cite(run, params.topic, at.from_ns, at.to_ns)),
+        citations=(cite(run, params.topic, at.from_ns, at.to_ns),),
     )
 
 
@@ -227,14 +222,14 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     lowest, highest = significant(min(count.values)), significant(max(count.values))
     measured = f"{plural(len(count.values), 'value')}, {lowest} to {highest}, {turn}"
     at = (seen.from_ns, seen.to_ns) if seen else (count.times_ns[0], count.times_ns[-1])
-    cited = (*verdict.citations, cite(run, params.topic, *at))
+    cited = (cite(run, params.topic, *at),)
     return verdict.about(expected=expected, measured=measured, citations=cited)
 
 
 def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     """There is no counter on the topic."""
     if losses(run, topic):
-        return inconclusive(f"too little was recorded on {topic}", measured="no number", hint="grade again")
+        return grade_again(f"too little was recorded on {topic}", measured="no number")
     if any(c.messages for c in run.student_channels(topic)):
         hint = "publish the counter itself, as an Int8"
         return unjudged(f"{topic} carries no numbers", measured="no number", hint=hint)
@@ -267,7 +262,8 @@ def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict 
     if not found.steps or found.excused:
         return None
     if found.flood:
-        return _flood_verdict(len(found.steps), params)
+        drops = f"drops most values: {plural(len(found.steps), 'skip')}"
+        return judge_flood(params.topic, drops, params.rate_hz)
     if not found.own:
         missing = sum(int(min(s.change, LARGEST)) - 1 for s in found.lost)
         message = f"{plural(missing, 'value')} of {params.topic} were lost on the way, with a gap in time"
@@ -303,13 +299,6 @@ def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, p
     return failed(message + seen, hint=hint, citations=(slip.place,))
 
 
-def _flood_verdict(skips: int, params: StepParams) -> Verdict:
-    message = f"{params.topic} is flooded, so its publisher drops most values: {plural(skips, 'skip')}"
-    return unjudged(
-        message, hint=f"first publish at {significant(params.rate_hz)} Hz, then look at the counter again"
-    )
-
-
 def _usual_fault(usual: float) -> str:
     if usual == 0:
         return "stays at one value"
@@ -323,5 +312,5 @@ def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) ->
     cause = f": the node ended ({end.cause})" if end else ""
     message = f"only {plural(steps + 1, 'value')} came on {params.topic}{cause}"
     if losses(run, params.topic):
-        return inconclusive(message, hint="grade again")
+        return grade_again(message)
     return unjudged(message, hint=f"publish in a loop `{LOOP}`")

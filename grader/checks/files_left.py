@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from grader.checks.registry import ProcessName, Refers, check
 from grader.checks.support.clocks import excused, why_late
 from grader.checks.support.exit_causes import explain_early_end
-from grader.checks.support.fields import bounds_text, is_within
+from grader.checks.support.fields import bounds_text, is_within, refuse_disorder
 from grader.checks.support.processes import GlobalName, TypeName, lives, not_started, plain_type
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
@@ -56,8 +56,7 @@ class ColumnBounds(Record):
 
     @model_validator(mode="after")
     def _in_order(self) -> ColumnBounds:
-        if self.min is not None and self.max is not None and self.min > self.max:
-            raise ValueError(f"min, {self.min:g}, is more than max, {self.max:g}")
+        refuse_disorder(self.min, self.max)
         return self
 
 
@@ -173,7 +172,7 @@ def file_left(package: PackageFacts, run: Run, params: FileLeftParams) -> Verdic
         expected=params.words,
         measured=verdict.measured
         or (f"{found[0].size_bytes} bytes" if found else plural(len(files), "file")),
-        citations=(*verdict.citations, cite(run, "/grader/actor")),
+        citations=(cite(run, "/grader/actor"),),
     )
 
 

@@ -9,7 +9,16 @@ from typing import NamedTuple
 
 from grader.checks.executable import ExecutableParams, executable
 from grader.checks.registry import LaunchName, ProgramName, check
-from grader.checks.support.launch import died, nodes_up, not_run, quoted, refusal, why_died, why_not_up
+from grader.checks.support.launch import (
+    console_lines,
+    died,
+    nodes_up,
+    not_run,
+    quoted,
+    refusal,
+    why_died,
+    why_not_up,
+)
 from grader.checks.support.launch_slips import (
     Slip,
     built_fixes,
@@ -31,7 +40,6 @@ from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, joined, passed, unjudged
-from grader.untrusted_text import without_colours
 from grader.wording import join_words, plural, there_is
 
 
@@ -107,7 +115,7 @@ def _with_next(verdict: Verdict, package: PackageFacts, params: LaunchXmlParams)
         return verdict
     message = f"{verdict.message}; with that repaired, {'; '.join(f'line {s.line}: {s.why}' for s in slips)}"
     hint = "; then ".join((verdict.hint, *dict.fromkeys(f"on line {s.line} {s.fix}" for s in slips)))
-    cited = tuple(FileCitation(file=s.file, line=s.line) for s in slips)
+    cited = tuple(s.place for s in slips)
     return verdict.model_copy(
         update={"message": message, "hint": hint, "citations": (*verdict.citations, *cited)}
     )
@@ -140,7 +148,7 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
         message = (
             f"{file.path} has no <node> for {name}: line {built[0].line} starts {built[0].type}, which is C++"
         )
-        cited = (FileCitation(file=built[0].file, line=built[0].line),)
+        cited = (built[0].place,)
         return failed(message, hint="; ".join(built_fixes(package, file, name)), citations=cited)
     if slip and any(
         node.line == slip.line for node in built
@@ -189,7 +197,7 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     """No node is even meant for it."""
     message = f"{file.path} has no <node> for {name}"
     if test := next((t for t in file.tests if t.type == name), None):
-        cited = (FileCitation(file=test.file, line=test.line),)
+        cited = (test.place,)
         message = f"{message}: only rostest starts a <test>"
         return failed(message, hint=f"write {_node_tag(pkg, name)} in place of the <test>", citations=cited)
     commented = (line for kind, line in file.commented if kind in {name, PurePosixPath(name).stem})
@@ -406,7 +414,7 @@ NOT_FOUND = re.compile(r"/(?P<file>[^/\s]+): line (?P<line>\d+): (?P<name>\S+): 
 def _misspelt_program(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams) -> Slip | None:
     """Return the line of a shell script that calls the program by a slip of its name."""
     paths = {PurePosixPath(path).name: path for path in _shell_scripts(package, file)}
-    for found in filter(None, (NOT_FOUND.search(without_colours(c.line)) for _, c in run.console)):
+    for found in filter(None, map(NOT_FOUND.search, console_lines(run))):
         if found["file"] in paths and near_names(params.program, [found["name"]]):
             fix = f"on line {found['line']}, write {params.program} instead of {found['name']}"
             return Slip(paths[found["file"]], int(found["line"]), "", fix)
@@ -473,16 +481,15 @@ def _blanks(run: Run, pages: list[Page]) -> re.Match[str] | None:
     """Return what the shell said of `URL = …`, where no address came to the program because of that."""
     if any(re.search(r"[./]", argument) for page in pages for argument in page.arguments):
         return None
-    return next(filter(None, (ASSIGNED.search(without_colours(c.line)) for _, c in run.console)), None)
+    return next(filter(None, (ASSIGNED.search(line) for line in console_lines(run))), None)
 
 
 def _words(package: PackageFacts, file: LaunchFile, run: Run) -> str:
     """Return what the script or roslaunch said instead."""
-    lines = [without_colours(c.line) for _, c in run.console]
     shell = re.compile(
         r"command not found|No such file|[Ss]yntax error|not found$|bad interpreter|cannot launch node"
     )
-    if found := next((line for line in lines if shell.search(line)), ""):
+    if found := next((line for line in console_lines(run) if shell.search(line)), ""):
         return f": {shown(found)}"
     code = next((code for node in _shells(package, file) if (code := died(run, node)) is not None), None)
     return f": it died with exit code {code}" if code is not None else quoted(run)

@@ -9,7 +9,7 @@ from typing import Any
 
 from grader.checks.launch_files import missing_node
 from grader.checks.registry import LaunchName, check
-from grader.checks.support.console_output import printed_lines
+from grader.checks.support.console_output import Line, printed_lines
 from grader.checks.support.launch import (
     BAD_FILE,
     NO_FILE,
@@ -129,7 +129,7 @@ def _read_where_loaded(
     file: LaunchFile, run: Run, params: LaunchLoadsParams, before: Mapping[str, Any]
 ) -> bool:
     """The file is loaded into a namespace, and the node reads it there: it prints all that is in it."""
-    lines = [line for line in printed_lines(run) if not SUMMARY.match(line.text)]
+    lines = _lines_of_nodes(run)
     return any(
         all(name in before and is_printed(before[name], lines) for name in _names_in_namespace(load, params))
         for load in file.loads
@@ -139,10 +139,15 @@ def _read_where_loaded(
 
 def _read_by_other_names(run: Run, params: LaunchLoadsParams, before: Mapping[str, Any]) -> bool:
     """The file has other names, and the node reads these: it prints all of their values."""
-    lines = [line for line in printed_lines(run) if not SUMMARY.match(line.text)]
+    lines = _lines_of_nodes(run)
     names = [absolute_name(name) for name in params.names]
     there = [name if name in before else name_in_its_place(name, before, names) for name in names]
     return all(name is not None and is_printed(before[name], lines) for name in there)
+
+
+def _lines_of_nodes(run: Run) -> list[Line]:
+    """Return what was printed, without roslaunch's own summary: that shows the values of all parameters."""
+    return [line for line in printed_lines(run) if not SUMMARY.match(line.text)]
 
 
 def _other_tag(
@@ -325,12 +330,12 @@ def _wrong_value(
         if len(again) > 1:
             lines = join_words(str(p.line) for p in again)
             hint = f"lines {lines} give the same name: write {join_words(missing)} for the others"
-        cited = tuple(FileCitation(file=p.file, line=p.line) for p in again)
+        cited = tuple(p.place for p in again)
         return failed(message, hint=hint, citations=cited)
     others = [name for name, value in wanted.items() if not _fits(before[place + name], value)]
     name = others[0]
     read = {p.name.removeprefix(place): p for p in file.params if p.name in {place + one for one in others}}
-    cited = tuple(FileCitation(file=p.file, line=p.line) for p in read.values())
+    cited = tuple(p.place for p in read.values())
     found, value = before[place + name], wanted[name]
     if isinstance(found, str) and found.strip() == str(value):
         message = f'{place}{name} is the text "{found}", which the node does not read as a number'
@@ -378,4 +383,4 @@ def _value_text(value: object) -> str:
 
 def _lines(file: LaunchFile, wanted: Wanted) -> tuple[FileCitation, ...]:
     found = [p for p in file.params if p.name.rpartition("/")[2] in wanted]
-    return tuple(FileCitation(file=p.file, line=p.line) for p in found[:3])
+    return tuple(p.place for p in found[:3])

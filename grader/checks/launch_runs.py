@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import Annotated, NamedTuple
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from grader.checks.launch_files import missing_node
 from grader.checks.launch_params import params_in_place, params_misplaced
@@ -25,7 +24,14 @@ from grader.checks.support.launch import (
     why_died,
     why_not_up,
 )
-from grader.checks.support.launch_names import RENAMES, find_renaming, names_in_scripts
+from grader.checks.support.launch_connections import (
+    CONNECTED_WITHIN_S,
+    RENAMES,
+    blame_place,
+    blame_renaming,
+    over_another_topic,
+    together_s,
+)
 from grader.checks.support.launch_slips import (
     Slip,
     nodes_of_program,
@@ -34,16 +40,19 @@ from grader.checks.support.launch_slips import (
     read_launch,
     refusals,
 )
+from grader.checks.support.parameters import absolute_name
 from grader.checks.support.processes import GlobalName, early_end
 from grader.checks.support.scripts import shebang_obstacles
 from grader.checks.support.text import SPIN, near_names
-from grader.checks.support.topics import cite, nodes_on, topics_with
-from grader.evidence.events import GraphEvent
+from grader.checks.support.topics import cite, connected_nodes, nodes_on
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, joined, passed, unjudged
 from grader.wording import is_one_edit, join_words, plural, there_is
+
+NodeName = Annotated[str, AfterValidator(absolute_name)]
+"""With its slash, also where a rubric leaves it out."""
 
 
 class LaunchConnectsParams(Record):
@@ -83,7 +92,7 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
     file = read_launch(package, params.launch)
     if isinstance(file, Verdict):
         return file.about(expected=expected)
-    found = list(connections(run, params.topic))
+    found = list(connected_nodes(run, params.topic))
     nodes = run.student_nodes()
     verdict = (
         not_run(run)
@@ -111,15 +120,6 @@ def _listed_nodes(run: Run) -> str:
     return f"{plural(len(nodes), 'node')}: {join_words(nodes)}" if nodes else "no node came up"
 
 
-def connections(run: Run, topic: str) -> Iterator[tuple[str, str]]:
-    """Publisher and subscriber, two nodes of the student's that were connected over the topic."""
-    for _, event in run.graph:
-        for one in event.connections:
-            pair = (one.publisher, one.subscriber)
-            if one.topic == topic and pair[0] != pair[1] and all(map(run.is_student_node, pair)):
-                yield pair
-
-
 def _names_missing(nodes: tuple[str, ...], file: LaunchFile, params: LaunchConnectsParams) -> Verdict | None:
     missing = [n for n in params.nodes if f"/{n.lstrip('/')}" not in nodes]
     if not missing or not nodes:
@@ -144,19 +144,7 @@ def _why_unconnected(
         message = f"{_comes_up(nodes)}; the file declares {plural(len(file.nodes), 'node')}{quoted(run)}"
         return failed(message, hint="give the talker and the listener a <node> each")
     other = over_another_topic(run, params.topic, quoted(run))
-    return _by_renaming(package, run, file.brings, params.topic, other) or other
-
-
-def _by_renaming(
-    package: PackageFacts, run: Run, nodes: Sequence[LaunchNode], topic: str, verdict: Verdict
-) -> Verdict | None:
-    """Return the verdict with the lines of the launch file that give the topic another name, if it has some."""
-    renaming = find_renaming(package, nodes, topic, run)
-    if renaming is None:
-        return None
-    message = f"{verdict.message}: it {renaming.why}"
-    update = {"message": message, "hint": renaming.fix, "citations": renaming.citations}
-    return verdict.model_copy(update=update)
+    return blame_renaming(package, run, file.brings, params.topic, other) or other
 
 
 def _comes_up(nodes: Sequence[str]) -> str:
@@ -177,34 +165,9 @@ def _absent(package: PackageFacts, run: Run, nodes: Sequence[str], absent: Seque
         why = why_not_up(package, run, absent[0])
     said = "" if why.citations or why.unbuilt or quoted(run) in why.why else quoted(run)
     if not why.citations:
-        why = why._replace(citations=(FileCitation(file=absent[0].file, line=absent[0].line),))
+        why = why._replace(citations=(absent[0].place,))
     name = "" if several else f"{absent[0].full_name}: "
     return why.verdict(f"{_comes_up(nodes)}; {name}{why.why}{said}")
-
-
-def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
-    """Return why nodes that are there are not connected: other topics, other types, or an end that is missing."""
-    others = {
-        c.topic
-        for _, event in run.graph
-        for c in event.connections
-        if c.topic not in {topic, "/rosout"} and run.is_student_node(c.subscriber)
-    }
-    if others:
-        message = f"the nodes are connected over {join_words(sorted(others))}, not over {topic}"
-        return failed(message + said, hint=f"both have to use {topic}; look for a <remap> or a namespace")
-    publishers, subscribers = nodes_on(run, topic, "publishers"), nodes_on(run, topic, "subscribers")
-    if publishers and subscribers:
-        message = (
-            f"{join_words(publishers)} and {join_words(subscribers)} are both on {topic}, but not connected"
-        )
-        return failed(message + said, hint="do both use the same message type?").once()
-    lacking = "publishes on" if not publishers else "subscribes to"
-    seen = topics_with(run, "subscribers" if publishers else "publishers")
-    there = f"; one {lacking} {join_words(seen)}" if seen else ""
-    message = f"{join_words(run.student_nodes())} are not connected: none {lacking} {topic}{there}{said}"
-    hint = f"launch a talker and a listener that use {topic}; look for a <remap> or a namespace"
-    return failed(message, hint=hint)
 
 
 class LaunchRunsParams(Record):
@@ -216,7 +179,7 @@ class LaunchRunsParams(Record):
     """A topic over which the nodes are connected, with its slash; null: none is asked for."""
     scripts: tuple[str, ...] = ()
     """The student's scripts that have to run, or C++ programs by their names."""
-    nodes: Annotated[dict[str, DependencyName], Field(default_factory=dict)]
+    nodes: Annotated[dict[NodeName, DependencyName], Field(default_factory=dict)]
     """Names of nodes that have to come up, each with the package that it comes from."""
     programs: tuple[ProgramName, ...] = ()
     """Programs of other packages that have to run, under any name: `turtlesim/turtlesim_node`."""
@@ -257,7 +220,7 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     """
     what = [
         *(PurePosixPath(s).name for s in params.scripts),
-        *(f"/{n.lstrip('/')}" for n in params.nodes),
+        *params.nodes,
         *params.programs,
     ]
     over = f", connected over {params.topic}" if params.topic else ""
@@ -308,14 +271,14 @@ def _right_parts(
     nodes = {PurePosixPath(script).name: _of_script(package, file, run, script) for script in params.scripts}
     for name, pkg in params.nodes.items():
         wrong = _wrong_name(file, name, pkg) or _find_swap(file, name, params)
-        nodes[f"/{name.lstrip('/')}"] = [] if wrong else _nodes_named(file, name)[:1]
+        nodes[name] = [] if wrong else _nodes_named(file, name)[:1]
     nodes |= {program: list(nodes_of_program(file, program)[:1]) for program in params.programs}
     up = [
         name
         for name, found in nodes.items()
         if found and all(nodes_up(run, one) and why_died(package, run, one) is None for one in found)
     ]
-    connected = params.topic is not None and any(connections(run, params.topic))
+    connected = params.topic is not None and any(connected_nodes(run, params.topic))
     if not up:
         misnamed = [one for name, pkg in params.nodes.items() for one in _misnamed(file, name, pkg)]
         if not (connected and len(misnamed) == len(params.nodes) > 0):
@@ -396,7 +359,7 @@ def _twins(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
     seen: dict[str, LaunchNode] = {}
     for node in file.brings:
         first = seen.setdefault(node.full_name, node)
-        wanted = [f"/{name.lstrip('/')}" for name in params.nodes if name.endswith(f"/{node.name}")]
+        wanted = [name for name in params.nodes if name.endswith(f"/{node.name}")]
         lacking = [name for name in wanted if name not in {one.full_name for one in file.brings}]
         spaces = [line for line in node.renaming if line.tag not in RENAMES]
         if first is node or not is_exact(node) or len(lacking) != 1 or len(spaces) != 1:
@@ -423,7 +386,7 @@ def _wrong_names(file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
     slips = []
     misnamed = ((name, node) for name, pkg in params.nodes.items() for node in _misnamed(file, name, pkg))
     for wanted, node in misnamed:
-        why = f"the node of {node.type} is called {node.full_name}, not /{wanted.lstrip('/')}"
+        why = f"the node of {node.type} is called {node.full_name}, not {wanted}"
         if node.namespace == "/":
             fix = f'on line {node.line}, write name="{wanted.lstrip("/")}"'
             slips.append(Slip(node.file, node.line, why, fix).verdict())
@@ -438,28 +401,28 @@ def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
     if any(n.pkg == pkg or "$(" in (n.pkg or "") for n in found):
         return None
     if found:
-        why = f'/{name.lstrip("/")} is a node of the package "{found[0].pkg}", not of {pkg}'
+        why = f'{name} is a node of the package "{found[0].pkg}", not of {pkg}'
         return Slip(found[0].file, found[0].line, why, f'write pkg="{pkg}"').verdict()
     others = [n.full_name for n in file.brings]
-    near = near_names(f"/{name.lstrip('/')}", others) or tuple(others)
+    near = near_names(name, others) or tuple(others)
     seen = f"; it has {join_words(near)}" if near else ""
     hint = f'write <node pkg="{pkg}" name="{name.lstrip("/")}" …/>'
-    return failed(f"{file.path} has no node /{name.lstrip('/')}{seen}", hint=hint)
+    return failed(f"{file.path} has no node {name}{seen}", hint=hint)
 
 
 def _find_swap(file: LaunchFile, name: str, params: LaunchRunsParams) -> Verdict | None:
     """The name of one node is on the program of another: `/talker` runs listener.py."""
     for node in _nodes_named(file, name):
         program = PurePosixPath(node.type or "").stem
-        if program != name.lstrip("/") and program in {n.lstrip("/") for n in params.nodes}:
-            why = f"/{name.lstrip('/')} runs {node.type}, whose name is /{program}: the names are swapped"
+        if f"/{program}" != name and f"/{program}" in params.nodes:
+            why = f"{name} runs {node.type}, whose name is /{program}: the names are swapped"
             fix = f'write name="{program}" beside type="{node.type}"'
             return Slip(node.file, node.line, why, fix).verdict()
     return None
 
 
 def _nodes_named(file: LaunchFile, name: str) -> list[LaunchNode]:
-    exact = [n for n in file.brings if n.full_name == f"/{name.lstrip('/')}"]
+    exact = [n for n in file.brings if n.full_name == name]
     return exact or [n for n in file.brings if not is_exact(n) and "$(anon" not in n.full_name]
 
 
@@ -476,7 +439,7 @@ def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) 
 
 def _are_connected(run: Run, topic: str, names: list[str], *, alone: bool) -> bool:
     """Return whether two of the nodes are connected; where the lab names one `alone`, or none, it with any other."""
-    pairs = list(connections(run, topic))
+    pairs = list(connected_nodes(run, topic))
     if alone:
         return any(not names or {*pair} & {*names} for pair in pairs)
     return any({*pair} <= {*names} for pair in pairs)
@@ -489,34 +452,6 @@ def _judge_deaths(package: PackageFacts, run: Run, wanted: list[Wanted], when: s
             message = f"{one.node.full_name} {when} {absence.why}"
             return verdict(message, hint=absence.hint, citations=absence.citations)
     return None
-
-
-def _in_namespaces(file: LaunchFile, verdict: Verdict, nodes: list[LaunchNode], topic: str) -> Verdict:
-    """Name the namespaces of a launch file that starts the same nodes in several, and the lines that make them."""
-    spaces = list(dict.fromkeys(node.namespace.strip("/") for node in nodes if node.namespace != "/"))
-    found = [line for n in nodes for line in n.renaming if line.tag not in RENAMES]
-    places = {(line.file, line.line) for line in found} or {(n.file or file.path, n.line) for n in nodes}
-    update = {
-        "message": f"{verdict.message}: it puts its nodes in the namespaces {join_words(spaces)}",
-        "hint": f'write one <node> of each outside of <group ns="{spaces[0]}">: in it, {topic.lstrip("/")} '
-        f"becomes /{spaces[0]}{topic}",
-        "citations": tuple(FileCitation(file=path, line=line) for path, line in sorted(places))[:4],
-    }
-    return verdict.model_copy(update=update)
-
-
-CONNECTED_WITHIN_S = 3.0
-"""Nodes that were on a topic together for longer, and not connected, differ in its type."""
-
-
-def _together_s(run: Run, topic: str) -> float:
-    """Return how long the topic had a publisher and a subscriber of the student's at the same time."""
-
-    def has_both(event: GraphEvent) -> bool:
-        ends = (event.publishers.get(topic, ()), event.subscribers.get(topic, ()))
-        return all(any(map(run.is_student_node, nodes)) for nodes in ends)
-
-    return sum(after - at for (at, event), (after, _) in pairwise(run.graph) if has_both(event)) / 1e9
 
 
 def _ended_before(package: PackageFacts, file: LaunchFile, ended: Sequence[LaunchNode]) -> Verdict:
@@ -538,34 +473,12 @@ def _not_connected(
     if dead := _judge_deaths(package, run, wanted, "came up, but before it was connected"):
         return dead
     ended = [w.node for w in wanted if finished(run, w.node)]
-    if ended and _together_s(run, topic) < CONNECTED_WITHIN_S:
+    if ended and together_s(run, topic) < CONNECTED_WITHIN_S:
         return _ended_before(package, file, ended)
-    other = over_another_topic(run, topic)
-    moved = [w.node for w in wanted if w.node.remaps or w.node.namespace != "/"]
-    nodes = [w.node for w in wanted] if len(wanted) > 1 else file.brings
-    if renamed := _by_renaming(package, run, nodes, topic, other):
-        return renamed
-    if len({node.namespace for node in moved} - {"/"}) > 1:
-        return _in_namespaces(file, other, moved, topic)
-    if moved:
-        return _named_in_scripts(package, file, other, wanted, topic)
+    other, nodes = over_another_topic(run, topic), [w.node for w in wanted]
+    of_launch_file = blame_renaming(
+        package, run, nodes if len(nodes) > 1 else file.brings, topic, other
+    ) or blame_place(package, file, nodes, topic, other)
+    if of_launch_file is not None:
+        return of_launch_file
     return other.model_copy(update={"unjudged": True}) if all(w.own for w in wanted) else other
-
-
-def _named_in_scripts(
-    package: PackageFacts, file: LaunchFile, verdict: Verdict, wanted: list[Wanted], topic: str
-) -> Verdict:
-    """Name the lines of the scripts that have another topic, and what gives the right one another name then."""
-    nodes = [w.node for w in wanted]
-    named = names_in_scripts(package, nodes, topic)
-    if not named:
-        return verdict
-    renaming = find_renaming(package, nodes, topic, in_scripts=False)
-    lines = join_words(f"line {one.line} of {one.file}" for one in named)
-    hint = (
-        f"write {topic.lstrip('/')} on {lines}, not {join_words(dict.fromkeys(one.message for one in named))}"
-    )
-    if renaming is not None:
-        hint = f"{hint}; then in {file.path} {renaming.fix}"
-    cited = (*(one.place for one in named), *(renaming.citations if renaming is not None else ()))
-    return verdict.model_copy(update={"hint": hint, "citations": cited})

@@ -43,7 +43,7 @@ from grader.checks.support.topics import (
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts, PythonSlip
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 CALLBACK_HINT = (
@@ -110,7 +110,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     return verdict.about(
         expected=expected,
         measured=verdict.measured or count,
-        citations=(*verdict.citations, sent),
+        citations=(sent,),
     )
 
 
@@ -191,7 +191,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         verdict = _taken_off(f"the node stops listening to {topic} before anything is sent", slip)
     elif verdict is None and topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
-        verdict = inconclusive(message, hint="grade again")
+        verdict = grade_again(message)
     elif verdict is None and (slip := run_slip(package, run, "never-reached")):
         message = f"the node never subscribes to {topic}: {slip.message}"
         verdict = failed(message, hint=f"in {slip.file}, {slip.fix}", citations=(slip.place,))

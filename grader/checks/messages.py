@@ -22,9 +22,10 @@ from grader.checks.support.fields import (
     is_within,
     no_field,
     readings,
+    refuse_disorder,
     value_text,
 )
-from grader.checks.support.processes import PublishedTopic, early_end, is_flood, observed_until_ns, slips_of
+from grader.checks.support.processes import OnTopic, early_end, is_flood, observed_until_ns, slips_of
 from grader.checks.support.text import (
     NUMBER,
     OTHER_WORDS_SHARE,
@@ -40,8 +41,7 @@ from grader.checks.support.topics import Sender, cite, losses, no_message, nothi
 from grader.evidence.run import Channel, Run
 from grader.model.message_definitions import NOT_FINITE
 from grader.model.package import PackageFacts
-from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import EvidenceCitation, Status, Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 ENOUGH = 3
@@ -53,11 +53,9 @@ TIMED = both(" % rospy.get_time()", " with ros::Time::now().toSec() for %s")
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
 
 
-class MessageParams(Record):
+class MessageParams(OnTopic):
     """The text of each message."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     template: Annotated[str, Field(min_length=1), refuse_others(SECONDS)]
     """The whole text, in which `{seconds}` stands for a time that grows: `hello world {seconds}`."""
 
@@ -185,13 +183,13 @@ def _wrong_time(
         told = [float(found[1]) for text in channel.data if (found := pattern.fullmatch(text))]
         clocks = clocks_at(run, channel.times_ns)
         if not clocks:
-            message = "the time in the messages cannot be judged: the run's /clock was not recorded"
-            return inconclusive(message, hint="grade again")
+            return grade_again("the time in the messages cannot be judged: the run's /clock was not recorded")
         own_doing = early_end(run) is not None or _watched_ns(run, heard) >= WATCHED_S * 1e9
+        # What the node itself cut short is judged by as much as there is: grading again would show no more.
         short = is_flood(run) or (own_doing and clocks[0][-1] < WATCHED_S)
         wrong = wrong_growth(told, clocks, short=short)
         if wrong is not None:
-            too_few = own_doing and wrong.status.value == "inconclusive"
+            too_few = own_doing and wrong.status is Status.INCONCLUSIVE
             return _too_few(package, run, heard, params) if too_few else wrong
         counted = _judge_counting(package, run, channel, told)
         if counted is not None:
@@ -222,25 +220,28 @@ def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: 
     """Too little came: the node's own fault where it died, or was watched long enough."""
     few = f"only {plural(sum(len(c.messages) for c in heard), 'message')} came on {params.topic}"
     if losses(run, params.topic):
-        return inconclusive(f"{few}: too few to see the time grow", hint="grade again")
+        return grade_again(f"{few}: too few to see the time grow")
     if end := explain_early_end(package, run):
         message = f"{few} before the node ended ({end.cause}): too few to see the time grow"
         return end.verdict(unjudged, message)
     if _watched_ns(run, heard) >= WATCHED_S * 1e9:
         return unjudged(f"{few}: too few to see the time grow", hint=f"publish in the loop; {ASK_AGAIN}")
-    return inconclusive(f"{few} while it was watched: too few to see the time grow", hint="grade again")
+    return grade_again(f"{few} while it was watched: too few to see the time grow")
 
 
 VALUES_SHOWN = 4
 
 
-class FieldBoundsParams(Record):
-    """A field and its bounds: `min`, `max` or both."""
+class FieldParams(OnTopic):
+    """A field of the messages."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     field: FieldPath
     """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item."""
+
+
+class FieldBoundsParams(FieldParams):
+    """A field and its bounds: `min`, `max` or both."""
+
     min: float | None = None
     """The least value, in the field's own unit; null: no bound."""
     max: float | None = None
@@ -255,8 +256,7 @@ class FieldBoundsParams(Record):
     def _some_bound(self) -> FieldBoundsParams:
         if self.min is None and self.max is None:
             raise ValueError("give min, max or both")
-        if self.min is not None and self.max is not None and self.min > self.max:
-            raise ValueError(f"min, {self.min:g}, is more than max, {self.max:g}")
+        refuse_disorder(self.min, self.max)
         return self
 
     @property
@@ -298,18 +298,23 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
         verdict = no_field(missing, channels)
     elif len(found) - len(outside) < params.share * len(found) - ROUNDING:
         verdict = _outside(outside, found, run, params)
+        # Of a share, the messages that the recorder lost may be the ones that were right.
         if params.share < 1 and losses(run, params.topic):
-            verdict = inconclusive(verdict.message, hint="grade again")
+            verdict = grade_again(verdict.message)
     else:
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {_share(found, outside)}")
-    spans = [r.time_ns for r in outside or found]
-    cited = cite(run, params.topic, spans[0], spans[-1]) if spans else cite(run, params.topic)
     share = f" in {params.share:.0%} of the messages" if params.share < 1 else ""
     return verdict.about(
         expected=f"{params.field} of {params.topic} {params.words}{share}",
         measured=verdict.measured or _range(usable),
-        citations=(*verdict.citations, cited),
+        citations=(_span(run, outside or found, params),),
     )
+
+
+def _span(run: Run, readings: Sequence[Reading], params: FieldParams) -> EvidenceCitation:
+    """Return the stretch of the topic from the first to the last of these messages; of none, the whole topic."""
+    times = [readings[0].time_ns, readings[-1].time_ns] if readings else []
+    return cite(run, params.topic, *times)
 
 
 def _outside(
@@ -342,13 +347,9 @@ def _range(readings: Sequence[Reading]) -> str:
     return f"{span}, and {plural(nan, 'NaN')}" if nan else span
 
 
-class FieldEqualsParams(Record):
+class FieldEqualsParams(FieldParams):
     """A field and its value."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
-    field: FieldPath
-    """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item."""
     value: Any = None
     """The right value, as in YAML: a number (also `.inf` or `.nan`), text, true or false, a list or a map."""
     values: tuple[Any, ...] = ()
@@ -428,12 +429,10 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     else:
         count = f"all of {plural(len(found), 'message')}" if params.when == "every" else which
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {count}")
-    spans = [r.time_ns for r in wrong or asked]
-    cited = cite(run, params.topic, spans[0], spans[-1]) if spans else cite(run, params.topic)
     return verdict.about(
         expected=f"{params.field} of {params.topic} {params.words} in {which}",
         measured=verdict.measured or _values(asked),
-        citations=(*verdict.citations, cited),
+        citations=(_span(run, wrong or asked, params),),
     )
 
 
@@ -468,10 +467,8 @@ def _in_order(
                 verdict = verdict.once()
             break
         at = here + 1
-    cited = cite(run, params.topic, found[0].time_ns, found[-1].time_ns)
-    return verdict.about(
-        expected=f"{what} {params.words}", measured=_values(found), citations=(*verdict.citations, cited)
-    )
+    cited = (_span(run, found, params),)
+    return verdict.about(expected=f"{what} {params.words}", measured=_values(found), citations=cited)
 
 
 def _in_another_order(found: Sequence[Reading], params: FieldEqualsParams) -> Verdict:
@@ -506,7 +503,7 @@ def _other_value(
         topics = join_words(sorted(filter(None, sent)))
         message, hint = f"{message}; none came after {topics}", f"publish again in the callback of {topics}"
     verdict = failed(message, hint=hint)
-    return verdict.once() if params.when == "last" else verdict
+    return verdict.once() if params.when == "last" else verdict.model_copy(update={"callbacks": "before"})
 
 
 def _values(asked: Sequence[Reading]) -> str:

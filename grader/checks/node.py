@@ -38,7 +38,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts, PythonSlip
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import join_words, plural, seconds
 
 IN_A_LOOP = f"loop with `{LOOP}`" + both(" and catch rospy.ROSInterruptException around it", "")
@@ -205,6 +205,7 @@ def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None
     if not nodes:
         hint = f"call {INIT} before anything that waits"
         return unjudged(f"{_script(one)} runs, but never registers as a node", hint=hint).once()
+    # Another tool's recording does not say whose a node is: there, as many nodes as processes are right.
     if len(nodes) > (1 if are_noted(run) else max(1, len(lives(run)))):
         hint = f"one script is one node: call {INIT} once, and start no other process"
         return failed(f"{_script(one)} registers as {len(nodes)} nodes: {join_words(nodes)}", hint=hint)
@@ -214,8 +215,7 @@ def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None
 def _short_watch(one: Life, up_ns: int, params: NodeLivesParams) -> Verdict | None:
     if one.end is not None and up_ns >= params.min_s * 1e9:
         return None
-    message = f"{_script(one)} was watched for {seconds(up_ns)} only, or its end was not recorded"
-    return inconclusive(message, hint="grade again")
+    return grade_again(f"{_script(one)} was watched for {seconds(up_ns)} only, or its end was not recorded")
 
 
 def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
@@ -223,8 +223,7 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     stopped_by = one.end.stopped_by if one.end else None
     if stopped_by in {"TERM", "KILL"}:
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
-        deaf = next((s for s in package.slips if s.kind == "deaf" and s.file == one.start.script), None)
-        if deaf is not None:
+        if deaf := next((s for s in package.slips if s.kind == "deaf" and s.file == one.start.script), None):
             return failed(f"{message}: {deaf.message}", hint=deaf.fix, citations=(deaf.place,))
         if excuse := _locked_up(one, run) or _asleep(one, package):
             return excuse
@@ -264,7 +263,7 @@ def _locked_up(one: Life, run: Run) -> Verdict | None:
         return passed(f"{_script(one)} is one node and stayed alive; {flood}, so its end is not counted")
     if was_talking(one, run):
         message = f"{_script(one)} stopped on Ctrl-C but did not end: rospy may have locked up by itself"
-        return inconclusive(message, hint="grade again")
+        return grade_again(message)
     return None
 
 

@@ -29,14 +29,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import (
-    Citation,
-    FileCitation,
-    Verdict,
-    failed,
-    inconclusive,
-    passed,
-)
+from grader.model.verdict import Citation, FileCitation, Verdict, failed, grade_again, passed
 from grader.wording import join_words, plural, there_is
 
 
@@ -79,7 +72,7 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
     if source is None:
         verdict = _no_file(package, build, params.file, wanted)
     elif one is None or one.end is None:
-        verdict = inconclusive(f"rosparam load {source.path} was not run to its end", hint="grade again")
+        verdict = grade_again(f"rosparam load {source.path} was not run to its end")
     else:
         lost = _error(run, one, source.path, build)
         lost = lost or _names_missing(found, wanted, source.path, package, build)
@@ -87,7 +80,7 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
     measured = f"on the server: {join_words(found)}" if found else "nothing on the server"
     cited: tuple[Citation, ...] = (cite(run, "/grader/param"),)
     place = (FileCitation(file=source.path),) if source and not verdict.citations else ()
-    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, *place, *cited))
+    return verdict.about(expected=expected, measured=measured, citations=(*place, *cited))
 
 
 def _names_missing(

@@ -30,14 +30,7 @@ from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import (
-    FileCitation,
-    Verdict,
-    failed,
-    joined,
-    passed,
-    unjudged,
-)
+from grader.model.verdict import FileCitation, Verdict, failed, joined, passed, unjudged
 from grader.wording import join_words, plural, there_is
 
 EXACT = 1e-9
@@ -98,7 +91,7 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
     )
     cited = cite(run, "/grader/console")
     measured = f"{len(params.names) - len(missing)} of {plural(len(params.names), 'value')} printed"
-    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cited))
+    return verdict.about(expected=expected, measured=measured, citations=(cited,))
 
 
 def _exchanged(
@@ -221,7 +214,7 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
     )
     cited = cite(run, "/grader/param")
     measured = f"{params.name}: {'not there' if got is None else shown(str(got))}"
-    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cited))
+    return verdict.about(expected=expected, measured=measured, citations=(cited,))
 
 
 def _set_in_part(
@@ -351,7 +344,7 @@ def param_value(package: PackageFacts, build: Run, run: Run, params: ParamValueP
     return verdict.about(
         expected=f"{params.name}: {shown(value_text(params.value))}",
         measured=verdict.measured or ("not set" if got is MISSING else shown(value_text(got))),
-        citations=(*verdict.citations, cited),
+        citations=(cited,),
     )
 
 
@@ -416,7 +409,7 @@ def _given_at(package: PackageFacts, build: Run, name: str) -> tuple[FileCitatio
     launched = [
         one for file in package.launch_files for one in file.params if absolute_name(one.name) == name
     ]
-    found = [FileCitation(file=one.file, line=one.line) for one in launched]
+    found = [one.place for one in launched]
     for file in (f.path for f in package.files if f.path.endswith((".yaml", ".yml"))):
         keys = [key for key in keys_of(build, file) if key.path and name.endswith(key.path)]
         found += [FileCitation(file=file, line=key.line) for key in keys]

@@ -15,7 +15,7 @@ from grader.checks.support.clocks import NO_EXCUSE, Lateness, excused, lateness
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
-from grader.checks.support.processes import PublishedTopic, life_of, lives, observed_until_ns, slips_of
+from grader.checks.support.processes import OnTopic, life_of, observed_until_ns, run_scripts, slips_of
 from grader.checks.support.text import LOOP, both, loop_rate
 from grader.checks.support.topics import (
     SYSTEM_TOPICS,
@@ -29,9 +29,8 @@ from grader.checks.support.topics import (
 )
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
-from grader.model.package import LaunchParam, PackageFacts, PythonSlip
-from grader.model.record import Record
-from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.package import PackageFacts, PythonSlip, SlipKind
+from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import hertz, join_words, plural, seconds, significant
 
 FLOOD_FACTOR = 5
@@ -56,11 +55,9 @@ Share = Annotated[float, Field(ge=0, le=1)]
 Positive = Annotated[float, Field(gt=0)]
 
 
-class RateParams(Record):
+class RateParams(OnTopic):
     """The nominal rate, and how far from it messages may come."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     rate_hz: Positive
     """The nominal rate."""
     tolerance: Share = 0.05
@@ -147,7 +144,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         or _excuse_lateness(_uneven(found, run, package, params), found, run, package, params)
         or passed(f"{params.topic} runs at {hertz(found.mean_hz)}, evenly")
     )
-    citations = (*verdict.citations, cite(run, params.topic, found.times_ns[0], found.times_ns[-1]))
+    citations = (cite(run, params.topic, found.times_ns[0], found.times_ns[-1]),)
     measured = described(found, *params.bounds_ns)
     if verdict.status is Status.INCONCLUSIVE or NO_EXCUSE in verdict.message:
         measured += _lateness(found, run)
@@ -186,6 +183,7 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     if not slips and (found.mean_hz >= FLOOD_HZ or not found.is_even):
         slip = call_in_comment(package, run, "sleep")
         slips = [slip] if slip is not None else []
+    # An even stream sleeps, if too briefly: it has a wrong rate, not a loop without a sleep.
     if not slips and found.mean_hz < FLOOD_HZ and found.is_even:
         return None
     if not slips and (slip := _asked_flood(found, run, package, params)):
@@ -195,6 +193,7 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     about = f"{float(f'{found.mean_hz:.2g}'):,.0f}"
     made = both(f"rate = rospy.Rate({hz})", f"ros::Rate rate({hz})")
     hint = f"call rate.sleep(), with parentheses, in every iteration; {made}"
+    # There is a `sleep()` already, behind the loop or in a comment: the slip says what to do with it.
     if slips and slips[0].kind in {"sleep-outside", "commented-out"}:
         hint = slips[0].fix
     return failed(
@@ -206,7 +205,7 @@ def _flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
 
 def _asked_flood(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
     """Return where the node's script asks for so many messages, or for more than it can send."""
-    asked = _asked_rates(run, package, params)
+    asked = _slips(run, package, params, "rate-number")
     least_hz = max((1 - NUMBER_SHARE) * found.mean_hz, FLOOD_FACTOR * params.rate_hz)
     return next((slip for slip in asked if float(slip.message) >= least_hz), None)
 
@@ -218,6 +217,7 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     seen = f"{plural(len(found.times_ns), 'message')} in {seconds(found.span_ns)}"
     if end := explain_early_end(package, run):
         verdict = end.verdict(unjudged, f"only {seen} on {params.topic}: the node ended ({end.cause})")
+        # A loop that never waits can be over before a rate shows: then the pause is the second thing to write.
         if not end.by_itself or run.foreign or _has_rate(package, run):
             return verdict
         paced = f"rate = rospy.Rate({significant(params.rate_hz)}) above the loop, rate.sleep() in it"
@@ -228,7 +228,7 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
 
 def _has_rate(package: PackageFacts, run: Run) -> bool:
     """Return whether a script that runs asks for a rate somewhere, or is none of Python."""
-    scripts = {one.start.script for one in lives(run)}
+    scripts = run_scripts(run)
     python = any(file.python for file in package.files if file.path in scripts)
     return not python or any(s.kind.startswith("rate-") for s in package.slips if s.file in scripts)
 
@@ -242,38 +242,30 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
     in_bounds = params.low_hz * (1 - ROUNDING) <= mean_hz <= params.high_hz * (1 + ROUNDING)
     if in_bounds and even:
         return None
-    other = (
+    wrong = _wrong_mean(found, params)
+    # What a line of the script, or the shape of the stream, explains goes before the bare numbers.
+    return (
         _fell_silent(found, run, package, params)
         or _published_twice(found, run, package, params)
-        or _twice_in_turn(found, run, package, params)
+        or (_by_slip(wrong, "publish-twice", run, package, params) if mean_hz > params.high_hz else None)
         or _bursts(found, outside, even, params)
+        or (_by_slip(wrong, "sleep-twice", run, package, params) if mean_hz < params.rate_hz else None)
+        or _by_number(wrong, mean_hz, run, package, params)
+        or _by_parameter(wrong, run, package, params, mean_hz)
     )
-    if other is not None:
-        return other
-    wrong = _wrong_mean(found, params)
-    callers = (c.callerid for c in run.student_channels(params.topic))
-    twice = next((s for one in callers for s in slips_of(package, run, one, "sleep-twice")), None)
-    if twice is not None and mean_hz < params.rate_hz:
-        message = f"{wrong.message}; {twice.file}: {twice.message}"
-        return _explained(wrong, twice, message, f"in {twice.file}, {twice.fix}")
-    by_number = _by_number(wrong, found.mean_hz, run, package, params)
-    return by_number or _by_parameter(wrong, run, package, params, mean_hz)
 
 
 def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
     """The silence at the end is longer than anything that came before it."""
+    # The last gap is the silence itself, up to when the node was watched.
     before_ns = max(found.gaps_ns[:-1], default=0)
     if found.tail_ns <= max(5 * params.period_ns, 2 * before_ns, 0.5e9):
         return None
     lasted = seconds(found.times_ns[-1] - found.times_ns[0])
     message = f"{params.topic} falls silent {lasted} after its first message, although its node keeps running"
-    callers = (c.callerid for c in run.student_channels(params.topic))
     if slow := _asked_slow(found, run, package, params):
         return slow
-    slip = next(
-        (s for one in callers for s in slips_of(package, run, one, "spin-in-loop", "unregistered")), None
-    )
-    if slip is not None:
+    if slip := next(iter(_slips(run, package, params, "spin-in-loop", "unregistered")), None):
         return failed(f"{message}: {slip.message}", hint=slip.fix, citations=(slip.place,))
     hint = f"publish in a loop `{LOOP}`, not a fixed number of times"
     if others := _goes_on(found, run, params):
@@ -293,7 +285,7 @@ def _goes_on(found: Rhythm, run: Run, params: RateParams) -> str:
 
 def _asked_slow(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
     """The silence is no longer than the pause for which the node's script asks."""
-    asked = _asked_rates(run, package, params)
+    asked = _slips(run, package, params, "rate-number")
     slow = next((s for s in asked if found.tail_ns * float(s.message) < PAUSES_WAITED * 1e9), None)
     if slow is None or float(slow.message) >= params.low_hz:
         return None
@@ -312,16 +304,14 @@ def _published_twice(found: Rhythm, run: Run, package: PackageFacts, params: Rat
     return failed(message, hint=f"give the one of {copied} that is for another topic that topic's name")
 
 
-def _twice_in_turn(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
-    """The loop publishes the same on two lines that follow each other."""
-    callers = (c.callerid for c in run.student_channels(params.topic))
-    twice = next((s for one in callers for s in slips_of(package, run, one, "publish-twice")), None)
-    if twice is None or found.mean_hz <= params.high_hz:
+def _by_slip(
+    verdict: Verdict, kind: SlipKind, run: Run, package: PackageFacts, params: RateParams
+) -> Verdict | None:
+    """Name the line on which a publisher's loop does twice in a turn what it should do once."""
+    slip = next(iter(_slips(run, package, params, kind)), None)
+    if slip is None:
         return None
-    wrong = _wrong_mean(found, params)
-    return _explained(
-        wrong, twice, f"{wrong.message}; {twice.file}: {twice.message}", f"in {twice.file}, {twice.fix}"
-    )
+    return verdict.explained(f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
 
 
 def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -> Verdict | None:
@@ -348,33 +338,31 @@ def _by_number(
 ) -> Verdict | None:
     """Name the line where the node's script asks for the rate that was measured."""
     slip = _asked_number(mean_hz, run, package, params)
-    if slip is None:
-        return None
-    return _with_line(verdict, slip, params)
+    return None if slip is None else _with_line(verdict, slip, params)
 
 
 def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdict:
     """Return the verdict with the line that asks for another rate."""
     where = f"{slip.file}, line {slip.line}"
-    said = f"{slip.name}(…) is given two numbers: {slip.fix}" if slip.fix else f"asks for {slip.message} Hz"
-    message = f"{verdict.message}; {where} {said}" if not slip.fix else f"{verdict.message}; {where}: {said}"
-    right = f"{slip.name}({significant(1 / params.rate_hz)})" if slip.name else ""
-    right = right or loop_rate(significant(params.rate_hz))
-    hint = f"make it {significant(params.rate_hz)} Hz in {where}: use {right}"
-    return _explained(verdict, slip, message, hint)
+    said = (
+        f": {slip.name}(…) is given two numbers: {slip.fix}" if slip.fix else f" asks for {slip.message} Hz"
+    )
+    hz, period_s = significant(params.rate_hz), significant(1 / params.rate_hz)
+    right = f"{slip.name}({period_s})" if slip.name else loop_rate(hz)
+    return verdict.explained(f"{where}{said}", f"make it {hz} Hz in {where}: use {right}", (slip.place,))
 
 
-def _asked_rates(run: Run, package: PackageFacts, params: RateParams) -> list[PythonSlip]:
-    """Return the lines in which the scripts of the topic's publishers ask for a rate."""
+def _slips(run: Run, package: PackageFacts, params: RateParams, *kinds: SlipKind) -> list[PythonSlip]:
+    """Return what is remarkable, of these kinds, in the scripts of the topic's publishers."""
     channels = run.student_channels(params.topic)
-    return [s for c in channels for s in slips_of(package, run, c.callerid, "rate-number")]
+    return [s for c in channels for s in slips_of(package, run, c.callerid, *kinds)]
 
 
 def _asked_number(mean_hz: float, run: Run, package: PackageFacts, params: RateParams) -> PythonSlip | None:
     """Return where a script asks for the rate that was measured, which is not the right one."""
     wrong = (
         s
-        for s in _asked_rates(run, package, params)
+        for s in _slips(run, package, params, "rate-number")
         if not params.low_hz <= float(s.message) <= params.high_hz
     )
     return next((s for s in wrong if abs(float(s.message) - mean_hz) < NUMBER_SHARE * mean_hz), None)
@@ -409,8 +397,8 @@ def _by_parameter(
         if value is None:
             told = f"which nothing sets in this run: the default in {where} counts"
             hint = f"make {significant(params.rate_hz)} the default in {where}, or {hint}"
-        message = f"{verdict.message}; the node takes its rate from {slip.message}, {told}"
-        return _explained(verdict, place, message, hint)
+        why = f"the node takes its rate from {slip.message}, {told}"
+        return verdict.explained(why, hint, (place.place,))
     return verdict
 
 
@@ -424,9 +412,9 @@ def _by_read_parameter(
             continue
         if value != params.rate_hz and abs(value - mean_hz) < NUMBER_SHARE * mean_hz:
             where = f"{given.file}, line {given.line}"
-            message = f"{verdict.message}; the node reads {name}, which is {value_text(value)} in {where}"
+            why = f"the node reads {name}, which is {value_text(value)} in {where}"
             hint = f"set {name} to {significant(params.rate_hz)} in {where}"
-            return _explained(verdict, given, message, hint)
+            return verdict.explained(why, hint, (given.place,))
     return verdict
 
 
@@ -437,19 +425,9 @@ def _by_default(
     unset = [name for name in read if name not in there and RATE_NAME.search(name.rpartition("/")[2])]
     if len(unset) != 1 or not verdict.status.is_lost:
         return verdict
-    message = (
-        f"{verdict.message}; the node asks for {unset[0]}, which nothing sets in this run: its default counts"
-    )
-    hint = (
-        f"make {significant(params.rate_hz)} the default of {unset[0]} in your program, if that is its rate"
-    )
-    return verdict.model_copy(update={"message": message, "hint": hint})
-
-
-def _explained(verdict: Verdict, place: PythonSlip | LaunchParam, message: str, hint: str) -> Verdict:
-    """Return the verdict with what the line at that place explains."""
-    cited = (FileCitation(file=place.file, line=place.line),)
-    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+    why = f"the node asks for {unset[0]}, which nothing sets in this run: its default counts"
+    hz = significant(params.rate_hz)
+    return verdict.explained(why, f"make {hz} the default of {unset[0]} in your program, if that is its rate")
 
 
 def _rate_hint(ratio: float, nominal: str, *, even: bool) -> str:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.clocks import excused, run_seconds, why_late
+from grader.checks.support.clocks import excused, no_clock, run_seconds, why_late
 from grader.checks.support.fields import (
     FieldPath,
     Reading,
@@ -18,6 +18,7 @@ from grader.checks.support.fields import (
     is_within,
     no_field,
     readings,
+    refuse_disorder,
     value_text,
 )
 from grader.checks.support.processes import GlobalName, observed_until_ns
@@ -25,7 +26,7 @@ from grader.checks.support.topics import cite, misfit, no_message, refused_type,
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, grade_again, passed, unjudged
 from grader.wording import plural, significant
 
 ORDER_S = 0.1
@@ -56,8 +57,7 @@ class Condition(Record):
         asks = (self.min is not None or self.max is not None, self.value is not None)
         if (self.field is None and any(asks)) or (self.field is not None and sum(asks) != 1):
             raise ValueError("give field with min, max or both, or field with value, or none of them")
-        if self.min is not None and self.max is not None and self.min > self.max:
-            raise ValueError(f"min, {self.min:g}, is more than max, {self.max:g}")
+        refuse_disorder(self.min, self.max)
         if self.tolerance and isinstance(self.value, bool):
             raise ValueError("tolerance is for numbers, and true and false are none")
         if self.tolerance and isinstance(self.value, str):
@@ -157,7 +157,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         measured=verdict.measured
         or f"{len(times)} of {plural(len(answers), 'answer')}"
         + (f", up to {max(times):.2f} s after" if times else ""),
-        citations=(*verdict.citations, cite(run, params.cause.topic, *span), cite(run, params.effect.topic)),
+        citations=(cite(run, params.cause.topic, *span), cite(run, params.effect.topic)),
     )
 
 
@@ -169,6 +169,7 @@ def _answers(
     if to_s is None:
         return []
     each = params.cause.field is None
+    # A condition on a field holds for many messages on end: only where it begins to hold is an answer due.
     before = (False, *(params.cause.holds(one) for one in causes))
     starts = [
         one.time_ns
@@ -184,6 +185,7 @@ def _answers(
         after_s = to_s(came[first]) - to_s(at_ns) if first < len(came) else math.inf
         if after_s <= params.within_s or (after_s < math.inf and came[first] < next_ns):
             answers.append(Answer(at_ns, max(0.0, after_s)))
+            # Where each message is a cause, an effect answers one of them alone.
             first += each
         elif to_s(until_ns) - to_s(at_ns) >= params.within_s:
             answers.append(Answer(at_ns, None))
@@ -193,8 +195,8 @@ def _answers(
 def _nothing_to_judge(
     package: PackageFacts, run: Run, effects: Sequence[Reading], own: Sequence[Channel], params: ReactsParams
 ) -> Verdict | None:
-    if run_seconds(run) is None:
-        return inconclusive("the run's fast clock was not recorded", hint="grade again")
+    if unknown := no_clock(run):
+        return unknown
     if not effects:
         return no_message(package, run, params.effect.topic)
     if params.effect.field is not None and not any(one.values for one in effects):
@@ -286,7 +288,7 @@ def _judge_unanswered(
         return verdict.model_copy(update={"cause": deaf.message})
     if not answers:
         message = f"{params.cause.words} did not come, or so late that no answer could be waited for"
-        return inconclusive(message, hint="grade again")
+        return grade_again(message)
     slow = [one for one in answers if one.after_s is None or one.after_s > params.within_s]
     if not slow:
         return None
@@ -294,8 +296,8 @@ def _judge_unanswered(
     late = max((one.after_s for one in slow if one.after_s is not None), default=None)
     if late is None and len(slow) == len(answers):
         seen, hint = (f"; {instead[0]}", instead[1]) if instead else ("", hint)
-        verdict = failed(f"{reaction.format('never follows')}, which came {times}{seen}", hint=hint)
+        verdict = failed(f"{reaction.format('never follows')}, which came {times}{seen}", hint=hint).late()
         return verdict.once() if len(answers) == 1 else verdict
     how = "does not follow" if late is None else f"comes up to {late:.2f} s after"
-    verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).once()
+    verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).late().once()
     return excused(verdict, run, slow[0].at_ns, run.end_ns, why_late)

@@ -10,9 +10,8 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import check
-from grader.checks.support.clocks import Lateness, excused, lateness, run_seconds
+from grader.checks.support.clocks import excused, lateness, no_clock
 from grader.checks.support.geometry import (
-    MOVED_M,
     Course,
     Point,
     Pose,
@@ -33,7 +32,7 @@ from grader.checks.support.topics import Sender, cite, nothing_sent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, passed, unjudged
 from grader.wording import join_words, significant
 
 LATE_MS = 25.0
@@ -103,27 +102,25 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     """
     found = track(run, params.topic, params.hold_s, of=params.of)
     if found is None:
-        verdict = _nothing(package, run, params)
-    elif found.misfit:
-        hint = f"rostopic info {params.topic} shows their type"
-        verdict = unjudged(f"the messages on {params.topic} {found.misfit}", measured=found.misfit, hint=hint)
-    elif found.fault:
-        hint = "print what you publish: a division by zero, or a square root of a negative number?"
-        verdict = failed(f"the messages on {params.topic} {found.fault}", measured=found.fault, hint=hint)
+        verdict = no_clock(run) or nothing_sent(package, run, params.topic, params.of or "student")
     else:
-        verdict = _judge_track(found, run, params)
-    span = cite(run, params.topic)
+        verdict = unreadable(found, params.topic) or _judge_track(found, run, params)
     return verdict.about(
         expected=f"a way through {join_words(map(spot, params.points))}, within {metres(params.tolerance_m)}",
         measured=verdict.measured or "no path",
-        citations=(*verdict.citations, span),
+        citations=(cite(run, params.topic),),
     )
 
 
-def _nothing(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
-    if run_seconds(run) is None:
-        return inconclusive("the run's fast clock was not recorded", hint="grade again")
-    return nothing_sent(package, run, params.topic, params.of or "student")
+def unreadable(found: Track, topic: str) -> Verdict | None:
+    """Return the verdict where the messages tell of no path."""
+    if found.misfit:
+        hint = f"rostopic info {topic} shows their type"
+        return unjudged(f"the messages on {topic} {found.misfit}", measured=found.misfit, hint=hint)
+    if found.fault:
+        hint = "print what you publish: a division by zero, or a square root of a negative number?"
+        return failed(f"the messages on {topic} {found.fault}", measured=found.fault, hint=hint)
+    return None
 
 
 def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
@@ -142,7 +139,7 @@ def _judge_track(found: Track, run: Run, params: PathParams) -> Verdict:
     if not nearly.done and not _strays_late(nearly, params.way):
         return verdict
     # a robot that only just strays may have strayed with a machine that was late itself
-    return excused(verdict, run, run.start_ns, run.end_ns, _why_late)
+    return excused(verdict, run, run.start_ns, run.end_ns, lambda late: late.reason(LATE_MS, LATE_P95_MS))
 
 
 def _drift_m(run: Run, path: Sequence[Pose], way: Way) -> float:
@@ -160,14 +157,9 @@ def _strays_late(course: Course, way: Way) -> bool:
     return course.strayed is not None and LATE_TURNS < course.reached < len(way.points)
 
 
-def _why_late(late: Lateness) -> str:
-    if not (late.full or late.max_ms >= LATE_MS or late.p95_ms >= LATE_P95_MS):
-        return ""
-    return late.reason
-
-
 def _in_degrees(run: Run) -> Words | None:
     """A turn so fast that degrees are meant where radians are asked for."""
+    # All topics: poses may be judged, and the velocities that led to them are on another one.
     turns = ((c, turn) for c in run.student_channels() for turn in turns_of(c))
     channel, fastest = max(turns, key=lambda one: abs(one[1]), default=(None, 0.0))
     if channel is None or abs(fastest) < DEGREES_FROM:
@@ -207,11 +199,6 @@ def metres(distance_m: float) -> str:
 
 def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: bool) -> Words:
     """The likeliest cause; `mirror` where the way is seen from the path's own start."""
-    if max(math.dist(p.point, path[0].point) for p in path) <= MOVED_M:
-        return Words(
-            "it never moves",
-            "publish a linear.x that is not 0, again and again for as long as it should drive",
-        )
     return (
         (_explain_mirrored(path, way) if mirror else None)
         or _wrong_start(path, way, course)

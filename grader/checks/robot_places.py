@@ -10,8 +10,8 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.robot_path import metres, spot
-from grader.checks.support.clocks import Lateness, excused, run_seconds
+from grader.checks.robot_path import metres, spot, unreadable
+from grader.checks.support.clocks import LATE_MS, Lateness, excused, no_clock, run_seconds
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.geometry import (
     MOVED_M,
@@ -36,10 +36,9 @@ from grader.checks.support.topics import SYSTEM_TOPICS, cite, no_message, nodes_
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
 from grader.wording import join_words, significant
 
-LATE_MS = 100.0
 STALLED_MS = 1000.0
 """In the time of the run, which may be faster than the wall's."""
 STILL_S = 0.5
@@ -151,7 +150,7 @@ def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
     return verdict.about(
         expected=params.words,
         measured=verdict.measured or "no position",
-        citations=(*verdict.citations, cite(run, params.topic)),
+        citations=(cite(run, params.topic),),
     )
 
 
@@ -178,31 +177,23 @@ def stretch_to_judge(run: Run, params: EndsAtParams) -> Stretch | None:
 
 def _unreadable(found: Track | None, package: PackageFacts, run: Run, params: Place) -> Verdict | None:
     """Return why there is no path to be judged; None where there is one."""
-    if run_seconds(run) is None:
-        return inconclusive("the run's fast clock was not recorded", hint="grade again")
     if found is None:
-        return no_message(package, run, params.topic)
-    if found.misfit:
-        hint = f"rostopic info {params.topic} shows their type"
-        return unjudged(f"the messages on {params.topic} {found.misfit}", measured=found.misfit, hint=hint)
-    if found.fault:
-        hint = "print what you publish: a division by zero, or a square root of a negative number?"
-        return failed(f"the messages on {params.topic} {found.fault}", measured=found.fault, hint=hint)
-    return None
+        return no_clock(run) or no_message(package, run, params.topic)
+    return unreadable(found, params.topic)
 
 
 def _not_asked(asked: Stretch | None, run: Run, params: EndsAtParams) -> Verdict | None:
     if asked is not None or params.asked_on is None:
         return None
     if nodes_on(run, params.asked_on, "subscribers"):
-        return inconclusive(f"message {params.number} on {params.asked_on} was not sent", hint="grade again")
+        return grade_again(f"message {params.number} on {params.asked_on} was not sent")
     hint = f"subscribe to it: {subscriber(params.asked_on)}"
     return unjudged(f"no node listens to {params.asked_on}, so no goal could be sent", hint=hint)
 
 
 def _too_late(asked: Stretch, params: EndsAtParams) -> Verdict:
     message = f"no position came on {params.topic} in the {asked.to_s - asked.from_s:.1f} s of this goal"
-    return inconclusive(message, hint="grade again")
+    return grade_again(message)
 
 
 def _judge_arrival(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> Verdict:
@@ -258,6 +249,7 @@ def _fell_silent(
     then, no one knows."""
     sent = [c for c in run.channels if c.topic == params.topic and c.messages]
     own = run.student_channels(params.topic)
+    # A simulator goes on telling where the robot is, and velocities say nothing of where it was.
     if not judged or len(sent) > len(own) or any("Twist" in channel.type for channel in sent):
         return None
     silent_s, gap_s = asked.to_s - judged[-1].time_s, (judged[-1].time_s - judged[0].time_s) / len(judged)
@@ -294,13 +286,9 @@ def _excuse_nearly(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
 
     def why_late(late: Lateness) -> str:
         stalled = late.max_ms * run.warp >= STALLED_MS
-        if nearly and late.full and not stalled:
-            return "busy"
-        return (
-            f"late itself, by up to {late.max_ms:.0f} ms"
-            if stalled or (nearly and late.max_ms >= LATE_MS)
-            else ""
-        )
+        if stalled:
+            return f"late itself, by up to {late.max_ms:.0f} ms"
+        return late.reason(LATE_MS) if nearly else ""
 
     began = (c.times_ns[0] for c in run.student_channels() if c.messages and c.topic not in SYSTEM_TOPICS)
     from_ns, to_ns = min(began, default=run.start_ns), observed_until_ns(run) or run.end_ns
@@ -379,7 +367,7 @@ def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> 
     return verdict.about(
         expected=f"{region.words}{share}",
         measured=verdict.measured or "no position",
-        citations=(*verdict.citations, cite(run, params.topic)),
+        citations=(cite(run, params.topic),),
     )
 
 
@@ -410,8 +398,7 @@ def _no_walls(region: Region) -> Verdict | None:
 
 
 def _too_short(params: StaysWithinParams) -> Verdict:
-    message = f"no position came on {params.topic} after the first {significant(params.from_s)} s"
-    return inconclusive(message, hint="grade again")
+    return grade_again(f"no position came on {params.topic} after the first {significant(params.from_s)} s")
 
 
 def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinParams) -> Verdict:

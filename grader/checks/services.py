@@ -14,7 +14,7 @@ from grader.checks.support.fields import differences, fields_text, value_text
 from grader.checks.support.processes import GlobalName, TypeName, life_of, plain_type
 from grader.checks.support.text import SERVICE, SPIN, imports, near_names, service_call, shown
 from grader.checks.support.topics import cite, no_node, why_unreached
-from grader.evidence.events import MISFIT
+from grader.evidence.events import MISFIT, NO_ANSWER
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -23,6 +23,7 @@ from grader.model.verdict import (
     FileCitation,
     Verdict,
     failed,
+    grade_again,
     inconclusive,
     passed,
     unjudged,
@@ -82,7 +83,7 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
     return verdict.about(
         expected=f"{params.service} of type {params.type}",
         measured=verdict.measured or described(found),
-        citations=(*verdict.citations, cited),
+        citations=(cited,),
     )
 
 
@@ -126,7 +127,7 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
     return verdict.about(
         expected=join_words(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1)),
         measured=verdict.measured or _measured_text(call),
-        citations=(*verdict.citations, _citation(call, run)),
+        citations=(_citation(call, run),),
     )
 
 
@@ -183,8 +184,7 @@ def _judge_uncalled(
         end = explain_end(one, run, package)
         message = f"{one.name} ended before {params.service} could be called: {end.cause}"
         return end.verdict(unjudged, message)
-    message = f"{params.service} was called {plural(len(made), 'time')} of {len(params.expect)}"
-    return inconclusive(message, hint="grade again")
+    return grade_again(f"{params.service} was called {plural(len(made), 'time')} of {len(params.expect)}")
 
 
 def _not_there(package: PackageFacts, run: Run, params: ServiceAnswersParams) -> Verdict:
@@ -247,6 +247,7 @@ def exchanges(run: Run, service: str) -> tuple[Exchange, ...]:
     answers = [(t, e) for t, e in run.actors if e.action == "answer" and e.topic == service]
     found = []
     for number, (at_ns, call) in enumerate(calls):
+        # One call is made after the other, so that the answers are in their order.
         time_ns, answer = answers[number] if number < len(answers) else (None, None)
         response, detail = (answer.value, answer.detail) if answer else (None, "")
         kind = plain_type(call.type or "")
@@ -324,7 +325,8 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         end = explain_end(owner, run, package)
         return failed(f"{asked} gives no answer: {owner.name} ended ({end.cause})", hint=end.hint)
     why = shown(one.detail) or "the call was not answered"
-    return failed(f"{asked} gives no answer: {why}", hint=f"try it by hand: {_by_hand(service, one)}")
+    verdict = failed(f"{asked} gives no answer: {why}", hint=f"try it by hand: {_by_hand(service, one)}")
+    return verdict.late() if one.detail.startswith(NO_ANSWER) else verdict
 
 
 def _undivided(package: PackageFacts, kind: str, one: Exchange) -> Verdict | None:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.clocks import NEVER_LATE_S, Lateness, excused, ros_seconds
+from grader.checks.support.clocks import NEVER_LATE_S, clock_slack_s, excused, no_clock, ros_seconds
 from grader.checks.support.fields import FieldPath, no_field, readings
 from grader.checks.support.processes import PublishedTopic
 from grader.checks.support.text import NOW, both, shown
@@ -17,13 +17,8 @@ from grader.checks.support.topics import cite, no_message
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, passed, unjudged
 from grader.wording import join_words, plural, significant
-
-TICK_S = 0.05
-"""A step of the fast clock: a node that asks for the time gets the last one."""
-TRANSPORT_S = 0.02
-"""From the stamp to the recorder, on the wall: with a fast clock, that many times longer."""
 
 THREADS_S = 0.005
 """Two threads may send in another order than they asked for the time."""
@@ -100,7 +95,7 @@ def stamps(package: PackageFacts, run: Run, params: StampsParams) -> Verdict:
     return verdict.about(
         expected=f"{_name(params)} of {params.topic} within {significant(params.within_s)} s of the message{frame}",
         measured=verdict.measured or _ages(found),
-        citations=(*verdict.citations, cite(run, params.topic, *span)),
+        citations=(cite(run, params.topic, *span),),
     )
 
 
@@ -152,8 +147,8 @@ def _nothing_to_judge(
         return None
     if not any(channel.messages for channel in channels):
         return no_message(package, run, params.topic)
-    if ros_seconds(run) is None:
-        return inconclusive("the run's fast clock was not recorded", hint="grade again")
+    if unknown := no_clock(run):
+        return unknown
     read = readings(channels, params.field, numbers=False)
     if not any(one.values for one in read):
         return no_field(read[0], channels)
@@ -214,7 +209,7 @@ def _backwards(found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
 
 
 def _limit_s(run: Run, params: StampsParams) -> float:
-    return params.within_s + (TICK_S + TRANSPORT_S * run.warp if run.clock == "warped" else 0.0)
+    return params.within_s + clock_slack_s(run)
 
 
 def _far(run: Run, found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
@@ -234,12 +229,10 @@ def _far(run: Run, found: Sequence[Stamp], params: StampsParams) -> Verdict | No
     if whole or (len(off) == len(found) and min(abs(one.age_s) for one in off) > gross_s):
         return verdict
 
-    def why(late: Lateness) -> str:
-        if not (late.full or late.max_ms / 1e3 * run.warp >= params.within_s / 2):
-            return ""
-        return late.reason
-
-    return excused(verdict.once(), run, found[0].time_ns, found[-1].time_ns, why)
+    half_ms = params.within_s / 2 * 1e3 / run.warp
+    return excused(
+        verdict.once(), run, found[0].time_ns, found[-1].time_ns, lambda late: late.reason(half_ms)
+    )
 
 
 def _other_frame(found: Sequence[Stamp], params: StampsParams) -> Verdict | None:

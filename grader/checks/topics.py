@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Annotated
 
 from pydantic import AfterValidator
@@ -11,7 +10,7 @@ from grader.checks.registry import Refers, check
 from grader.checks.support.processes import (
     GlobalName,
     GlobalPattern,
-    PublishedTopic,
+    OnTopic,
     TypeName,
     is_called,
     named_at,
@@ -21,6 +20,7 @@ from grader.checks.support.text import INIT, imports, near_names, publisher, sub
 from grader.checks.support.topics import (
     End,
     cite,
+    connected_nodes,
     no_message,
     no_node,
     nodes_on,
@@ -41,11 +41,9 @@ def _message_text(text: str | None) -> str | None:
     return text
 
 
-class TopicTypeParams(Record):
+class TopicTypeParams(OnTopic):
     """The topic and its type."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     type: Annotated[TypeName, Refers("message")]
     """As `rostopic info` gives it: `std_msgs/Int8`."""
     definition: Annotated[str | None, AfterValidator(_message_text)] = None
@@ -170,7 +168,7 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
     return verdict.about(
         expected=f"no topic besides {join_words(params.topics)}" if params.topics else "no topic at all",
         measured=verdict.measured or join_words(published) or "no topic",
-        citations=(*verdict.citations, cite(run, "/grader/graph")),
+        citations=(cite(run, "/grader/graph"),),
     )
 
 
@@ -190,11 +188,8 @@ def _publisher(run: Run, topic: str) -> str:
     return next(iter(nodes_on(run, topic, "publishers")), "") or run.student_channels(topic)[0].callerid
 
 
-class LatchedParams(Record):
+class LatchedParams(OnTopic):
     """The topic."""
-
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
 
 
 @check("latched", params=LatchedParams, messages_only=True, heeds_losses=True)
@@ -236,7 +231,7 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
     return verdict.about(
         expected=f"a latched publisher on {params.topic}",
         measured=verdict.measured or kinds,
-        citations=(*verdict.citations, cite(run, topic)),
+        citations=(cite(run, topic),),
     )
 
 
@@ -277,7 +272,9 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
         Both ends need the same topic name, with the namespace and after every `<remap>`, and the same
         message type. `rosnode info <node>` and `rqt_graph` show the connections.
     """
-    found = next(_pairs(run, params), None)
+    found = next(
+        connected_nodes(run, params.topic, lambda node, end: _fits(run, node, params.name(end))), None
+    )
     ends = [_wanted_text(params.name(end), end) for end in ENDS]
     if found:
         verdict = passed(f"{found[0]} and {found[1]} are connected over {params.topic}")
@@ -287,17 +284,8 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
     return verdict.about(
         expected=f"{ends[0]} connected to {ends[1]} over {params.topic}",
         measured=verdict.measured or (f"connections over {join_words(over)}" if over else "no connection"),
-        citations=(*verdict.citations, cite(run, "/grader/graph")),
+        citations=(cite(run, "/grader/graph"),),
     )
-
-
-def _pairs(run: Run, params: ConnectedParams) -> Iterator[tuple[str, str]]:
-    for _, event in run.graph:
-        for one in event.connections:
-            pair = (one.publisher, one.subscriber)
-            fits = _fits(run, pair[0], params.publisher) and _fits(run, pair[1], params.subscriber)
-            if one.topic == params.topic and pair[0] != pair[1] and fits:
-                yield pair
 
 
 def _fits(run: Run, node: str, wanted: str) -> bool:

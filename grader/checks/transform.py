@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.clocks import excused, run_seconds, why_late
+from grader.checks.support.clocks import clock_slack_s, excused, no_clock, run_seconds, why_late
 from grader.checks.support.frames import (
     TOPICS,
     Frame,
@@ -27,14 +27,11 @@ from grader.checks.support.topics import cite, no_message, run_slip
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed
+from grader.model.verdict import Verdict, failed, grade_again, passed
 from grader.wording import join_words, plural, significant
 
 ORDER_S = 0.1
 """Two topics come over two connections: so much earlier a transform may be recorded than the pose that it follows."""
-TICK_S = 0.05
-TRANSPORT_S = 0.02
-"""With a fast clock, a step of it, and what the wall takes from node to recorder."""
 FEW = 3
 """So many transforms may be the same for the machine's sake; more were never changed."""
 
@@ -128,7 +125,7 @@ def transform(package: PackageFacts, run: Run, params: TransformParams) -> Verdi
     return verdict.about(
         expected=_expected_text(params),
         measured=verdict.measured or _measured_text(seen, own),
-        citations=(*verdict.citations, *(cite(run, topic) for topic in topics)),
+        citations=tuple(cite(run, topic) for topic in topics),
     )
 
 
@@ -312,16 +309,15 @@ def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict 
     """Return what is wrong with a transform that has to follow poses."""
     poses, to_s = _poses(run, params.pose_of or ""), run_seconds(run)
     if not poses or to_s is None:
-        what = f"no pose came on {params.pose_of}" if to_s else "the run's fast clock was not recorded"
-        return inconclusive(what, hint="grade again")
-    slack_s = params.within_s + (TICK_S + TRANSPORT_S * run.warp if run.clock == "warped" else 0.0)
+        return no_clock(run) or grade_again(f"no pose came on {params.pose_of}")
+    slack_s = params.within_s + clock_slack_s(run)
     order_s, timed = ORDER_S * run.warp, [(to_s(t), pose) for t, pose in poses]
-    judged = [one for one in seen if to_s(one.time_ns) >= timed[0][0] + slack_s]
+    from_s = timed[0][0] + slack_s
+    judged = [(t, value) for t, value in seen if value is not None and to_s(t) >= from_s]
     wrong = [
-        one
-        for one in judged
-        for may in [_candidates(to_s(one.time_ns), timed, slack_s, order_s)]
-        if one.value is None or not any(_fits(one.value, pose, params) for pose in may)
+        (t, value)
+        for t, value in judged
+        if not any(_fits(value, pose, params) for pose in _candidates(to_s(t), timed, slack_s, order_s))
     ]
     if wrong:
         return _wrong_pose(run, wrong, judged, poses, params)
@@ -337,24 +333,22 @@ def _candidates(
     at_s: float, poses: Sequence[tuple[float, Transform]], slack_s: float, order_s: float
 ) -> list[Transform]:
     """Return the poses that a transform of that time may have."""
+    # The last pose stays right for as long as no other comes, however long that is.
     last_s = max((t for t, _ in poses if t <= at_s), default=at_s)
     return [pose for t, pose in poses if min(at_s - slack_s, last_s) <= t <= at_s + order_s]
 
 
 def _wrong_pose(
     run: Run,
-    wrong: Sequence[Seen],
-    judged: Sequence[Seen],
+    wrong: Sequence[tuple[int, Transform]],
+    judged: Sequence[tuple[int, Transform]],
     poses: Sequence[tuple[int, Transform]],
     params: TransformParams,
 ) -> Verdict:
-    first, count = wrong[0], f"in {len(wrong)} of {plural(len(judged), 'message')}"
-    value = first.value
-    pose = next((p for t, p in reversed(poses) if t <= first.time_ns), poses[0][1])
+    (first_ns, value), count = wrong[0], f"in {len(wrong)} of {plural(len(judged), 'message')}"
+    pose = next((p for t, p in reversed(poses) if t <= first_ns), poses[0][1])
     hint = f"send the pose of each message on {params.pose_of} at once, in its callback"
-    if value is None:
-        return failed(f"{params.name} is not a transform {count}", hint=hint)
-    old = [t for t, p in poses if _fits(value, p, params) and t <= first.time_ns]
+    old = [t for t, p in poses if _fits(value, p, params) and t <= first_ns]
     what, says = (
         f"{params.name} is wrong {count}",
         f"it is {_text(value)} while {params.pose_of} says {_text(pose)}",
@@ -362,11 +356,12 @@ def _wrong_pose(
     if not old:
         hint = _axes(value, pose, params)[1] or hint
         return failed(f"{what}{_why(value, pose, params)}; {says}", hint=hint)
-    verdict = failed(f"{what}: it is that of an older pose; {says}", hint=hint)
-    if len(judged) > FEW and len({_text(one.value) for one in judged if one.value}) == 1:
+    verdict = failed(f"{what}: it is that of an older pose; {says}", hint=hint).late()
+    # One and the same pose all the time is no lag of the machine's.
+    if len(judged) > FEW and len({_text(one) for _, one in judged}) == 1:
         return verdict
     verdict = verdict.once()
-    return excused(verdict, run, old[-1], wrong[-1].time_ns, why_late)
+    return excused(verdict, run, old[-1], wrong[-1][0], why_late)
 
 
 def _too_seldom(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict | None:

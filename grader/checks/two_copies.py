@@ -35,15 +35,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import (
-    Verdict,
-    failed,
-    inconclusive,
-    machine_lacks,
-    partial,
-    passed,
-    unjudged,
-)
+from grader.model.verdict import Verdict, failed, grade_again, machine_lacks, partial, passed, unjudged
 from grader.wording import join_words, plural, seconds
 
 SAME_NAME = "new node registered with same name"
@@ -142,7 +134,7 @@ def _not_started(package: PackageFacts, run: Run, params: CopiesParams) -> Verdi
             message = f"{one.name} never registers as a node, so what waits for it was not started"
             return unjudged(message, hint=f"call {INIT} before anything that waits").once()
     if any(one.name in {params.first, params.second} for one in waited_for):
-        return inconclusive("only one copy was started", hint="grade again")
+        return grade_again("only one copy was started")
     return unjudged("no copy was started: there is no script to run", hint=NO_SCRIPT_HINT)
 
 
@@ -193,8 +185,7 @@ def _judge_unknown_nodes(run: Run, trio: Trio) -> Verdict | None:
     if trio.first_nodes and trio.second_nodes:
         return None
     if run.student_nodes() and not are_noted(run):
-        message = "the recording does not say which node belongs to which copy"
-        return inconclusive(message, hint="grade again")
+        return grade_again("the recording does not say which node belongs to which copy")
     which = "second" if trio.first_nodes else "first" if trio.second_nodes else ""
     if not which:
         message = "neither copy registers as a node"
@@ -271,8 +262,7 @@ def _unheard(
         )
         return unjudged(message, hint=f"publish on {params.topic} in the loop `{LOOP}`, again and again")
     if fewest < FEW:
-        message = "the two copies were watched too briefly to see their messages printed"
-        return inconclusive(message, hint="grade again")
+        return grade_again("the two copies were watched too briefly to see their messages printed")
     if not printed:
         message = f"both copies run, but {params.listener} prints nothing of what they send"
         return unjudged(message, hint="first make the listener print what it hears")

@@ -13,15 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias
 
-from grader.evidence.definitions import (
-    PRIMITIVES,
-    Bound,
-    DefinitionError,
-    Field,
-    Types,
-    bound,
-    parse,
-)
+from grader.evidence.definitions import PRIMITIVES, Bound, DefinitionError, Field, Types, bound, parse
 from grader.evidence.run import DECODED_BYTES_MAX
 from grader.installable import noetic_definitions
 from grader.model.message_definitions import RULE
@@ -72,6 +64,7 @@ class Decoder:
             value, end = self._plan.read(data, 0)
         except (struct.error, ValueError):
             return None
+        # Bytes that are left over show that the definition is not this message's.
         return value if end == len(data) else None
 
 
@@ -195,6 +188,7 @@ class _Readers:
 
 def _as_struct(fields: Sequence[Field]) -> struct.Struct | None:
     """Return how numbers lie in a message that has nothing else; None for any other."""
+    # One call of `struct` for all of a message of numbers alone: of these a run has most.
     letters = [_LETTERS.get(field.type, "") for field in fields if not field.array]
     return (
         struct.Struct("<" + "".join(letters))

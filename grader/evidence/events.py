@@ -31,6 +31,8 @@ OTHER_TYPE = "asks for another type"
 """Begins the detail of the note on a node that the grader's own node refused for its type."""
 UNHEARD = "nothing was published: no node has subscribed"
 """The detail of the note on a topic to which a step would have sent messages."""
+NO_ANSWER = "no answer within"
+"""Begins the detail of the answer to a call that a service did not answer in time."""
 
 
 class ProcessEvent(Record):

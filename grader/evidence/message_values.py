@@ -12,13 +12,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, TypeGuard
 
 from grader.evidence.decode import Decoder, Encoder, FindText, definition, full_definition, full_name
-from grader.evidence.definitions import (
-    MAX_DEFINITION_BYTES,
-    PRIMITIVES,
-    Field,
-    parse,
-    sections_of,
-)
+from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, parse, sections_of
 from grader.installable import noetic_messages
 from grader.model.message_definitions import DIVIDER, NOT_FINITE
 from grader.wording import did_you_mean, join_words

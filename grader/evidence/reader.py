@@ -275,6 +275,7 @@ class _RunBuilder:
 
     def _describe(self, record: mcap.McapRecord) -> None:
         if isinstance(record, mcap.Schema):
+            # A file may repeat its schemas, in its chunks and in its summary: they are held once.
             if record.id not in self._schemas:
                 self._budget.hold(len(record.data), foreign=self._metadata is None)
                 self._schemas[record.id] = record

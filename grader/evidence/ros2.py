@@ -16,15 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from grader.errors import EvidenceError
-from grader.evidence.definitions import (
-    PACKAGE,
-    DefinitionError,
-    alias,
-    bound,
-    canonical,
-    parse,
-    sections_of,
-)
+from grader.evidence.definitions import PACKAGE, DefinitionError, alias, bound, canonical, parse, sections_of
 from grader.evidence.run import (
     DECODED_BYTES_MAX,
     BudgetExceeded,

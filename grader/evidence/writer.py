@@ -59,7 +59,7 @@ class EvidenceStream:
         self._mcap.add_metadata(METADATA_NAME, {_text(k): _text(v) for k, v in entries.items()})
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[str, str, str, str], EvidenceChannel] = {}
-        self._events: dict[str, list[int]] = {}
+        self._events: dict[str, EvidenceChannel] = {}
 
     def register_channel(
         self,
@@ -106,9 +106,9 @@ class EvidenceStream:
         channel = self._events.get(topic)
         if channel is None:
             schema = self._schema(f"grader.{type(record).__name__}", "jsonschema", _json_schema(type(record)))
-            channel = self._events[topic] = [self._mcap.register_channel(topic, "json", schema), 0]
-        self._mcap.add_message(channel[0], log_time_ns, data, log_time_ns, channel[1])
-        channel[1] += 1
+            number = self._mcap.register_channel(topic, "json", schema)
+            channel = self._events[topic] = EvidenceChannel(self._mcap, number)
+        channel.message(log_time_ns, data)
 
     def _schema(self, name: str, encoding: str, data: bytes) -> int:
         key = (name, encoding, data)  # a student's node may send a text of ours as its definition
@@ -167,6 +167,7 @@ class EvidenceWriter(EvidenceStream):
         try:
             self.finish()
             self._file.flush()
+            # On the disk before it has its name: a power cut leaves no half file under it.
             os.fsync(self._file.fileno())
             self._file.close()
             self._part.replace(self._path)

@@ -157,6 +157,7 @@ def _opener(head: bytes) -> Callable[[Any], Any] | None:
 def _looks_like_zip(path: Path, head: bytes) -> bool:
     if head.startswith((b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")):
         return True
+    # A zip may stand behind something else (a program that unpacks itself), and a tar may hold one at its end.
     return _opener(head) is None and not _looks_like_tar(head) and zipfile.is_zipfile(path)
 
 

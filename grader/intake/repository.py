@@ -122,6 +122,7 @@ def _remote_refs(source: Source, git: Git, into: Path) -> dict[str, str]:
     git.run("init", "--quiet", "--template=", ".", cwd=into)
     listed = _ask(source, git, into, ("ls-remote", "--quiet"))
     refs = parse_refs(os.fsdecode(listed))
+    # A repository has one kind of hash, and it is chosen when it is made.
     if any(len(commit) == _FULL_HASHES[1] for commit in refs.values()):
         shutil.rmtree(into / ".git")
         git.run("init", "--quiet", "--template=", "--object-format=sha256", ".", cwd=into)
@@ -140,6 +141,7 @@ def _fetch(source: Source, git: Git, into: Path, refs: dict[str, str], wanted: W
             raise
         except GitFailed:
             pass
+    # A server that gives no single commit by its hash gives its branches, and the commit is looked for there.
     _fetch_refs(source, git, into, ("--update-shallow",), *_everything(refs, wanted))
     try:
         return _commit_of(git, into, wanted.commit or "FETCH_HEAD")
@@ -210,6 +212,7 @@ def _checkout(source: Source, git: Git, into: Path, commit: str, files: _Files) 
     (info / "attributes").write_text(_ATTRIBUTES, encoding="utf-8")
     sparse: tuple[str, ...] = ()
     if files.left_out:
+        # The list of what to leave out has a path on each line.
         if any("\n" in path for path in files.left_out):
             raise SubmissionError(
                 f"{source.given}: {brief(files.left_out[0])} is too large",

@@ -185,6 +185,7 @@ def tree_digest(
         path = os.fsencode(entry.path)
         content = b"%d" % entry.size_bytes if entry.path in left_out else _content(root / entry.path, entry)
         bit = b"x" if executable.get(entry.path) else b"-"
+        # With the lengths in front, no two different trees give the same bytes.
         digest.update(b"%s %s %d %d\n%s" % (entry.kind.encode(), bit, len(path), len(content), path))
         digest.update(content)
     return digest.hexdigest()

@@ -103,6 +103,7 @@ class Unpacker:
 
         A workspace holds links that point outside (`src/CMakeLists.txt` leads to `/opt/ros`): they are no offence.
         """
+        # A relative target is followed to see where it leads; an absolute one leads outside as it stands.
         if sum(not target.startswith("/") for target in self._links.values()) > self._limits.links:
             self.refuse(f"it holds more than {self._limits.links} links")
         for path, target in self._links.items():
@@ -119,6 +120,7 @@ class Unpacker:
 
     def _remove_strays(self) -> set[str]:
         outside: set[str] = set()
+        # A link to a link that is removed leads nowhere from then on, or out by another way: look again.
         while stray := [path for path in self._links if path not in outside and self._leads_out(path)]:
             for path in stray:
                 (self._root / path).unlink()
@@ -130,6 +132,7 @@ class Unpacker:
         if place.is_dir() and not place.is_symlink():
             self.refuse(f"the entry '{brief(path)}' is a link and a folder at once")
         place = self._free(path)
+        # A link that was made before stands on the way: what is written behind it would be somewhere else.
         if place.parent.resolve() != self._root.resolve().joinpath(*path.split("/")[:-1]):
             self.refuse(f"the entry '{brief(path)}' is behind a link")
         place.symlink_to(target)

@@ -18,7 +18,7 @@ from pydantic import Field
 
 from grader.model.record import Record
 from grader.model.submission import ModeSource
-from grader.model.verdict import FileCitation
+from grader.model.verdict import FileCitation, Placed
 from grader.wording import is_one_edit
 
 MANIFEST, CMAKE = "package.xml", "CMakeLists.txt"
@@ -129,7 +129,7 @@ def meant_manifest(name: str) -> str:
     return f"{name} has to be called package.xml: git mv {shlex.quote(name)} package.xml"
 
 
-class CMakeCall(Record):
+class CMakeCall(Placed, Record):
     """One command of the package's CMake files with its arguments after expansion; `name` in lower case."""
 
     name: str
@@ -271,7 +271,7 @@ SlipKind = Literal[
 ]  # fmt: skip
 
 
-class PythonSlip(Record):
+class PythonSlip(Placed, Record):
     """What is remarkable in a Python file, most of it slips that show only when the node runs. For a file that does
     not compile, only names, types and rates are known; for one of C++, only `callback-waits` and `degrees`.
 
@@ -326,12 +326,12 @@ class PythonSlip(Record):
     name: str = ""
 
     @property
-    def place(self) -> FileCitation:
-        """The line."""
-        return FileCitation(file=self.file, line=self.line)
+    def is_endless(self) -> bool:
+        """Whether it is a callback that never ends, and not one that only sleeps."""
+        return self.kind == "callback-waits" and "never ends" in self.message
 
 
-class LaunchLine(Record):
+class LaunchLine(Placed, Record):
     """A tag that gives the topics of nodes other names: a `<remap>`, `value` its `from`; `args`, the `args` of a
     `<node>` with `old:=new` in them, `value` the old name; any other by its `ns`."""
 
@@ -341,7 +341,7 @@ class LaunchLine(Record):
     line: int
 
 
-class LaunchArg(Record):
+class LaunchArg(Placed, Record):
     """An `<arg>` that has no value where `$(arg …)` asks for it. `declared`: there is an `<arg>`, without a default,
     and `line` is its own; else the line that asks."""
 
@@ -351,7 +351,7 @@ class LaunchArg(Record):
     line: int
 
 
-class LaunchNode(Record):
+class LaunchNode(Placed, Record):
     """One `<node>`, with its attributes as written; a missing attribute is None.
 
     `remaps` are those in force: those that come before it in `<launch>` and its `<group>`s, then its own.
@@ -385,7 +385,7 @@ class LaunchNode(Record):
         return f"{self.namespace}{self.name or ''}"
 
 
-class LaunchParam(Record):
+class LaunchParam(Placed, Record):
     """One `<param>`; `name` is the full name on the server; `value` is None if a file or command gives it."""
 
     name: str
@@ -395,7 +395,7 @@ class LaunchParam(Record):
     line: int
 
 
-class LaunchLoad(Record):
+class LaunchLoad(Placed, Record):
     """One `<rosparam>`; `source` is its `file` (None for text in the tag), `namespace` where its names go."""
 
     source: str | None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import posixpath
 from collections.abc import Sequence
 from enum import Enum
-from typing import Literal
+from typing import Literal, Protocol
 
 from pydantic import Field
 from typing_extensions import TypedDict, Unpack
@@ -58,6 +58,22 @@ class FileCitation(Record):
     def below(self, folder: str) -> FileCitation:
         """Return the line of the file that has this path in `folder`, another package's: `../lab_msgs`."""
         return self.model_copy(update={"file": posixpath.normpath(f"{folder}/{self.file}")})
+
+
+class _OnLine(Protocol):
+    @property
+    def file(self) -> str: ...
+    @property
+    def line(self) -> int | None: ...
+
+
+class Placed:
+    """Mixin for what stands on a line of a file."""
+
+    @property
+    def place(self: _OnLine) -> FileCitation:
+        """The line."""
+        return FileCitation(file=self.file, line=self.line)
 
 
 def cited_lines(citations: Sequence[Citation]) -> set[tuple[str, int]]:
@@ -126,6 +142,9 @@ class Verdict(Record):
     process ended of, in words that are the same in every verdict that rests on it. `blocked_by` is the criterion that
     explains the absence, `right` what earned a part of the points, `mistake` the kind of what was done wrong. `said` is
     what a node printed, logged or published in place of what was asked, `sought` names: the lines of both are cited.
+    `callbacks`: a callback came too `late` to what was sent, or never; or it is about what came `before` any callback
+    could keep the node waiting. `excused`: what would be lost if the machine had not been late. `dropped`: so much came
+    on its topics that the recorder dropped some.
     """
 
     status: Status
@@ -146,6 +165,9 @@ class Verdict(Record):
     mistake: Mistake | None = None
     said: str = ""
     sought: tuple[Sought, ...] = ()
+    callbacks: Literal["", "late", "before"] = ""
+    excused: str = ""
+    dropped: bool = False
 
     def about(
         self,
@@ -160,6 +182,17 @@ class Verdict(Record):
         places = None if citations is None else tuple(dict.fromkeys((*self.citations, *citations)))
         fields = {"expected": expected, "measured": measured, "said": said, "citations": places}
         return self.model_copy(update={name: value for name, value in fields.items() if value is not None})
+
+    def explained(self, why: str, hint: str, citations: Citations = (), *, cause: str = "") -> Verdict:
+        """Return a loss with why it came to it behind its message, what to do about that, and its lines before its own.
+        `cause` is what else rests on it."""
+        update = {
+            "message": f"{self.message}; {why}",
+            "hint": hint,
+            "citations": tuple(dict.fromkeys((*citations, *self.citations))),
+            "cause": cause or self.cause,
+        }
+        return self.model_copy(update=update)
 
     def moved(self, folder: str) -> Verdict:
         """Return the verdict with the files that it cites below `folder`: `../lab_msgs`."""
@@ -189,6 +222,10 @@ class Verdict(Record):
     def sought_name(self, kind: SoughtKind) -> str:
         """Return the first name of this kind to cite the lines of; "" where none is sought."""
         return next(iter(self.sought_names(kind)), "")
+
+    def late(self) -> Verdict:
+        """Return the verdict marked as one that shows a callback which came too late, or never."""
+        return self.model_copy(update={"callbacks": "late"})
 
     def once(self) -> Verdict:
         """Return the verdict marked as a loss that one run's timing could have made."""
@@ -248,6 +285,11 @@ def unjudged(message: str, **details: Unpack[Details]) -> Verdict:
 def inconclusive(message: str, **details: Unpack[Details]) -> Verdict:
     """Return a verdict that is still open, for no fault of the student's."""
     return Verdict(status=Status.INCONCLUSIVE, score=0.0, message=message, **details)
+
+
+def grade_again(message: str, *, measured: str = "") -> Verdict:
+    """Return a verdict that is open because this run shows too little; another one may show more."""
+    return inconclusive(message, hint="grade again", measured=measured)
 
 
 def machine_lacks(message: str, **details: Unpack[Details]) -> Verdict:

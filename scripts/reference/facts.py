@@ -12,6 +12,7 @@ from grader.evidence import events
 from grader.evidence.run import Channel, Message, Run
 from grader.model import package
 from grader.model.record import field_docstrings
+from grader.model.verdict import Placed
 from scripts.reference.table import MADE, cell, table
 
 INTRODUCTION = f"""# What a check is given
@@ -70,8 +71,9 @@ def _alternatives(found: re.Match[str]) -> str:
 
 
 def _members(kind: type) -> Iterator[tuple[str, str]]:
-    """Yield properties and methods with the docstrings that they have."""
-    for name, member in vars(kind).items():
+    """Yield properties and methods with the docstrings that they have, those of the mixin `Placed` among them."""
+    mixed_in = vars(Placed) if issubclass(kind, Placed) else {}
+    for name, member in {**mixed_in, **vars(kind)}.items():
         if name.startswith("_") or name in INNER:
             continue
         function = member.func if isinstance(member, cached_property) else getattr(member, "fget", member)

@@ -64,7 +64,7 @@ def node(name: str) -> LaunchNode:
 )  # fmt: skip
 def test_words_of_roslaunch(part: str) -> None:
     run = run_of(lines_of(part))
-    calls = (lambda: refusal(run), lambda: died(run, node("a")), lambda: finished(run, node("a")))
+    calls = (lambda: refusal(run, NO_PACKAGE), lambda: died(run, node("a")), lambda: finished(run, node("a")))
     assert cpu_s_of(*calls) < CPU_S
 
 

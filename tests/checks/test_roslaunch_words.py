@@ -8,6 +8,7 @@ from grader.checks.launch_files import value_given
 from grader.checks.support.launch import died, finished, is_exact, name_pattern, refusal
 from grader.checks.support.parameters import explain_yaml, explain_yaml_line
 from grader.evidence.run import Run
+from grader.judging.facts import NO_PACKAGE
 from grader.model.package import LaunchNode
 from tests.support.timeline import build_runs
 
@@ -47,7 +48,7 @@ def node(name: str, namespace: str = "/") -> LaunchNode:
     ],
 )
 def test_refusals(said: list[str], why: str) -> None:
-    found = refusal(printed(*(RED.format(line) for line in said)))
+    found = refusal(printed(*(RED.format(line) for line in said)), NO_PACKAGE)
     assert found is not None
     assert why in found.why
     assert found.hint
@@ -55,14 +56,8 @@ def test_refusals(said: list[str], why: str) -> None:
 
 
 def test_no_refusal() -> None:
-    assert (
-        refusal(
-            printed(
-                "started roslaunch server http://127.0.0.1:43899/", "[fin-8] process has finished cleanly"
-            )
-        )
-        is None
-    )
+    run = printed("started roslaunch server http://127.0.0.1:43899/", "[fin-8] process has finished cleanly")
+    assert refusal(run, NO_PACKAGE) is None
 
 
 def test_ends_of_nodes() -> None:

@@ -166,7 +166,9 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
 def _of_no_ros(name: str, package: PackageFacts) -> Explained | None:
     """Explain a name of ROS 2's or of a Python module's, or one with a sign behind it; None for any other."""
     if name[-1:] in {",", ";", ".", ":"}:
-        why = f"find_package(…) names {name[:-1]} with a `{name[-1]}` behind it, and only blanks part its names"
+        why = (
+            f"find_package(…) names {name[:-1]} with a `{name[-1]}` behind it, and only blanks part its names"
+        )
         return Explained(why, f"write {name[:-1]} instead of {name}")
     if name in ROS_2:
         return Explained(f"it needs {name}, which is from ROS 2", f"take {name} out: this lab is for ROS 1")

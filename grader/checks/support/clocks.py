@@ -7,6 +7,7 @@ the machine was in a stretch of time, and `excused` opens a verdict that this ca
 
 from __future__ import annotations
 
+import math
 import statistics
 import struct
 from bisect import bisect_right
@@ -17,12 +18,16 @@ from typing import NamedTuple
 from grader.checks.support.text import GET_TIME
 from grader.evidence.events import HostEvent
 from grader.evidence.run import Channel, Run, once_for_each_run
-from grader.model.verdict import Verdict, failed, inconclusive
+from grader.model.verdict import Verdict, failed, grade_again, inconclusive
 from grader.wording import plural, seconds
 
 Seconds = tuple[float, ...]
 ToSeconds = Callable[[int], float]
 """From a `log_time` (ns) to a second of the time that the node lives in."""
+TICK_S = 0.05
+"""A step of the fast clock."""
+TRANSPORT_S = 0.02
+"""What the wall takes from a node to the recorder."""
 SLACK_S = 1.5
 SLACK_SHARE = 0.05
 WATCHED_S = 3.0
@@ -41,6 +46,7 @@ def clocks_at(run: Run, times_ns: Sequence[int]) -> tuple[Seconds, ...]:
     if run.clock != "warped":
         return (wall,)
     ticks = sorted(_ticks(run))
+    # What a node reads is the last tick before it sends.
     at = [bisect_right(ticks, (t, float("inf"))) - 1 for t in times_ns]
     if min(at, default=-1) < 0:
         return ()
@@ -53,6 +59,19 @@ def run_seconds(run: Run) -> ToSeconds | None:
         return lambda time_ns: (time_ns - run.start_ns) / 1e9
     ticks = _ticks(run)
     return _interpolate(ticks, ticks[0][1]) if ticks else None
+
+
+def no_clock(run: Run) -> Verdict | None:
+    """Return the verdict where no one can tell the time in a run with a fast clock; None where there is a clock."""
+    if run_seconds(run) is not None:
+        return None
+    return grade_again("the run's fast clock was not recorded")
+
+
+def clock_slack_s(run: Run) -> float:
+    """Return by how much a time that a node reads may be off, by no fault of its own. With a fast clock it gets the
+    time of the last tick, and what the wall takes from node to recorder lasts that many times longer."""
+    return TICK_S + TRANSPORT_S * run.warp if run.clock == "warped" else 0.0
 
 
 def time_between(run: Run, from_ns: int, to_ns: int) -> str:
@@ -121,14 +140,14 @@ def _go_along(told: Sequence[float], clock: Seconds, slack_s: float) -> bool:
 
 
 def _too_short(span_s: float) -> Verdict:
-    message = (
+    return grade_again(
         f"the messages were watched for {span_s:.1f} s only: too short to tell how the time in them grows"
     )
-    return inconclusive(message, hint="grade again")
 
 
 def _falls_back(before: float, after: float) -> Verdict:
     message = f"the time in the messages goes back from {_plain(before)} to {_plain(after)}"
+    # Large and whole, and less than a second of nanoseconds.
     within = before < 1e9 and before == int(before) and before > 1e6
     why = "`.nsecs` is only the part after the whole second; " if within else ""
     return failed(message, hint=why + ASK_AGAIN)
@@ -191,10 +210,13 @@ class Lateness(NamedTuple):
         """Whether the machine had next to no time to spare."""
         return (self.busy or 0.0) >= FULL
 
-    @property
-    def reason(self) -> str:
-        """What was the matter with the machine: `busy`, or `late itself, by up to 80 ms`."""
-        return "busy" if self.full else f"late itself, by up to {self.max_ms:.0f} ms"
+    def reason(self, max_ms: float, p95_ms: float = math.inf) -> str:
+        """Return what was the matter with the machine, `busy` or `late itself, by up to 80 ms`; "" where it was late by
+        less than this."""
+        if self.full:
+            return "busy"
+        late = self.max_ms >= max_ms or self.p95_ms >= p95_ms
+        return f"late itself, by up to {self.max_ms:.0f} ms" if late else ""
 
     @property
     def described(self) -> str:
@@ -240,7 +262,8 @@ def excused(verdict: Verdict, run: Run, from_ns: int, to_ns: int, why: Callable[
     if what := why(late):
         message = f"{verdict.message}; but the grading machine was {what}"
         hint = "grade again when the machine is less busy"
-        return inconclusive(message, hint=hint, measured=verdict.measured)
+        still_open = inconclusive(message, hint=hint, measured=verdict.measured)
+        return still_open.model_copy(update={"excused": verdict.message})
     if why(whole):
         return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})
     return verdict
@@ -248,9 +271,7 @@ def excused(verdict: Verdict, run: Run, from_ns: int, to_ns: int, why: Callable[
 
 def why_late(late: Lateness) -> str:
     """Return what the machine was where it was late enough to delay an answer; "" where it was not."""
-    if not (late.full or late.max_ms >= LATE_MS):
-        return ""
-    return late.reason
+    return late.reason(LATE_MS)
 
 
 class _Window(NamedTuple):
@@ -272,6 +293,7 @@ class _Window(NamedTuple):
 def _windows(run: Run, from_ns: int, to_ns: int) -> list[_Window]:
     """Return all that touch this stretch of time."""
     starts = [run.start_ns, *(t for t, _ in run.host)]
+    # There is one start more than events: what came after the last one was not measured.
     found = [_Window(start, t, event) for start, (t, event) in zip(starts, run.host, strict=False)]
     return [w for w in found if w.to_ns > from_ns and w.from_ns < to_ns]
 

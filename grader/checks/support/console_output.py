@@ -137,6 +137,7 @@ def numbers_in(text: str) -> frozenset[int]:
 
 def _numbers(text: str, *, dashes: bool) -> Iterator[tuple[int, int]]:
     """Yield each whole number with its offset. With `dashes`, a `-` after a letter or a dot is not a sign."""
+    # Digits of an address or a time of day are no value that was sent.
     if "x" in text or "X" in text:
         text = _HEX.sub(_blanks_for, text)
     if ":" in text or "-" in text:

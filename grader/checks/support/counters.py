@@ -12,13 +12,13 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.support.exit_causes import explain_early_end, explain_traceback, process_tracebacks
-from grader.checks.support.processes import PublishedTopic, lives, observed_until_ns, slips_of
+from grader.checks.support.processes import OnTopic, lives, observed_until_ns, slips_of
 from grader.checks.support.text import loop_rate
 from grader.checks.support.topics import losses, whole_until_ns
 from grader.evidence.run import Channel, Run, once_for_each_run
 from grader.model.package import PackageFacts, PythonSlip, SlipKind
 from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Status, Verdict, failed, grade_again, inconclusive, passed, unjudged
 from grader.wording import plural, significant
 
 FLOOD_FACTOR, FLOOD_HZ = 3, 500
@@ -154,6 +154,7 @@ def wrong_steps(count: Count, run: Run, *, maximum: int, rate_hz: float) -> Wron
     wrong = tuple(s for s in steps_to_judge(count, maximum) if s.change in {0, -1} or s.change > 1)
     skips = tuple(s for s in wrong if s.change > 1)
     usual = count.usual_step()
+    # A counter that stands still, goes back or goes by two is wrong at any rate: no queue makes it so.
     if wrong and skips == wrong and usual in {None, 1} and count.is_flood(run, rate_hz):
         return Wrong(wrong, flood=True, excused=usual == 1)
     lost = tuple(s for s in skips if count.was_lost_in_transit(s, s.change))
@@ -205,11 +206,9 @@ def first_values(values: Sequence[float]) -> str:
     return f"{from_start}, …" if len(values) > 4 else from_start
 
 
-class WrapParams(Record):
+class WrapParams(OnTopic):
     """Where the counter wraps."""
 
-    topic: PublishedTopic
-    """The topic, with its slash: `/chatter`."""
     minimum: int = 0
     """The first value after the wrap."""
     maximum: int = 127
@@ -239,6 +238,7 @@ def judge_wraps(
     turns, good, wrong = turns_of(count, run, params)
     bad = wrong[0] if wrong else None
     if bad is not None:
+        # Past the maximum, the first bad step is no turn yet: the line is told by where the counter turns in the end.
         turn = next((s for s in turns if s.before > params.maximum), bad) if bad.change > 0 else bad
         written = slips_of(package, run, count.callerid, "reset-value", "reset-limit")
         return _where_reset(_bad_turn(bad, turns, count, run, params), turn, written, params), bad
@@ -246,9 +246,9 @@ def judge_wraps(
     if len(good) >= params.wraps:
         message = f"after {significant(good[0].before)} comes {params.minimum}, {plural(len(good), 'time')}"
         return passed(message), last
+    # A flood is the publisher's own doing, also where the recorder could not keep up with it.
     if losses(run, params.topic) and not count.is_flood(run, params.rate_hz):
-        message = f"only {plural(len(good), 'reset')} of {params.wraps} is recorded"
-        return inconclusive(message, hint="grade again"), last
+        return grade_again(f"only {plural(len(good), 'reset')} of {params.wraps} is recorded"), last
     verdict = _judge_death(count, run, package, params) or _stuck(count, params)
     return verdict or _silent(count, run, package, params) or _too_few(count, good, run, params), last
 
@@ -258,14 +258,9 @@ def cite_slip(verdict: Verdict, count: Count, run: Run, package: PackageFacts, *
     slip = next(iter(slips_of(package, run, count.callerid, *kinds)), None)
     if slip is None or not verdict.status.is_lost:
         return verdict
-    message = f"{verdict.message}; {slip.file}, line {slip.line}: {slip.message}"
-    hint = (
-        f"in {slip.file}, {slip.fix}"
-        if "line" in slip.fix
-        else f"{slip.fix} on line {slip.line} of {slip.file}"
-    )
-    cited = (slip.place, *verdict.citations)
-    return verdict.model_copy(update={"message": message, "hint": hint, "citations": cited})
+    named = "line" in slip.fix
+    hint = f"in {slip.file}, {slip.fix}" if named else f"{slip.fix} on line {slip.line} of {slip.file}"
+    return verdict.explained(f"{slip.file}, line {slip.line}: {slip.message}", hint, (slip.place,))
 
 
 def added_early(first: Count, run: Run, package: PackageFacts, start: int) -> PythonSlip | None:
@@ -279,12 +274,8 @@ def added_early(first: Count, run: Run, package: PackageFacts, start: int) -> Py
 
 def cite_early(verdict: Verdict, slip: PythonSlip) -> Verdict:
     """Return the verdict of a counter that begins, or goes on after its wrap, one too high, with the line."""
-    message = (
-        f"{verdict.message}; line {slip.line} of {slip.file} adds one to `{slip.name}` before it is published"
-    )
-    return verdict.model_copy(
-        update={"message": message, "hint": f"in {slip.file}, {slip.fix}", "citations": (slip.place,)}
-    )
+    why = f"line {slip.line} of {slip.file} adds one to `{slip.name}` before it is published"
+    return verdict.explained(why, f"in {slip.file}, {slip.fix}", (slip.place,))
 
 
 class Turns(NamedTuple):
@@ -319,13 +310,16 @@ def _is_bad(step: Step, params: WrapParams) -> bool:
     )
 
 
+def judge_flood(topic: str, drops: str, rate_hz: float) -> Verdict:
+    """Return that there is nothing to judge where the publisher itself drops values."""
+    hint = f"first publish at {significant(rate_hz)} Hz, then look at the counter again"
+    return unjudged(f"{topic} is flooded, so its publisher {drops}", hint=hint)
+
+
 def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: WrapParams) -> Verdict:
     whose = whose_turn(step, count, run, params)
     if whose == "flood":
-        message = f"{params.topic} is flooded, so its publisher drops values, around the wrap too"
-        return unjudged(
-            message, hint=f"first publish at {significant(params.rate_hz)} Hz, then look at the counter again"
-        )
+        return judge_flood(params.topic, "drops values, around the wrap too", params.rate_hz)
     if whose == "lost":
         message = f"values of {params.topic} were lost around the wrap, with a gap in time"
         return inconclusive(message, hint="grade again when the machine is less busy")
@@ -379,6 +373,7 @@ def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
         if late is None:
             return f"the counter never resets: {comes}, and it keeps counting"
         return f"the counter resets too late, from {significant(late.before)} to {significant(late.after)}: {comes}"
+    # With a maximum of 127, int8 goes on at -128: the type's range made it turn, and no line of the script.
     if step.after == -(high + 1):
         return f"the counter overflows to {after}, as a signed integer of this size does: {comes}"
     if step.before >= high - 1:
@@ -393,6 +388,7 @@ def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapPara
     if end is None:
         return None
     last = count.values[-1]
+    # A publisher that packs one number too many (int8: 128) dies where it should have reset.
     if last >= params.maximum - 1:
         message = f"the node dies at {significant(last + 1)}, where the counter should reset: {end.cause}"
         limits = slips_of(package, run, count.callerid, "reset-limit")
@@ -450,6 +446,7 @@ def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Ve
     if count.is_flood(run, params.rate_hz) or wrong:
         message = f"{params.wraps} resets were not seen: {seen}, which do not count up one by one"
         return unjudged(message, hint="first make the counter go up by one at its rate")
+    # Half the rate is another criterion's matter, which says more about it.
     if len(count.steps) < params.rate_hz * span_s / 2:
         message = f"{params.topic} is too slow to see {params.wraps} resets: {seen}"
         return unjudged(message, hint=f"use {loop_rate(significant(params.rate_hz))}")

@@ -18,7 +18,7 @@ from grader.checks.support.processes import plain_type
 from grader.checks.support.text import shown
 from grader.evidence.run import Channel
 from grader.model.message_definitions import NOT_FINITE
-from grader.model.verdict import Verdict, inconclusive, unjudged
+from grader.model.verdict import Verdict, grade_again, unjudged
 from grader.wording import plural, significant
 
 ROUNDING = 1e-6
@@ -101,7 +101,7 @@ def no_field(missing: Reading, channels: Iterable[Channel]) -> Verdict:
     channel = next(c for c in channels if c.messages)
     what = f"the messages on {channel.topic} ({plain_type(channel.type)})"
     if all(value is None for value in channel.values):
-        return inconclusive(f"{what} cannot be read", hint="grade again")
+        return grade_again(f"{what} cannot be read")
     hint = f"rostopic echo {channel.topic} shows the fields"
     return unjudged(f"{what} do not fit: {missing.fault}", measured=missing.fault, hint=hint)
 
@@ -113,6 +113,12 @@ def bounds_text(low: float | None, high: float | None) -> str:
     return (
         f"at least {significant(low)}" if high is None else f"from {significant(low)} to {significant(high)}"
     )
+
+
+def refuse_disorder(low: float | None, high: float | None) -> None:
+    """Raise ValueError for bounds between which no value lies."""
+    if low is not None and high is not None and low > high:
+        raise ValueError(f"min, {low:g}, is more than max, {high:g}")
 
 
 def is_within(value: float, low: float | None, high: float | None) -> bool:

@@ -49,6 +49,7 @@ class Transform(NamedTuple):
 
     def apart(self, other: Transform) -> tuple[float, float]:
         """Return how far two transforms are from each other, in metres and degrees."""
+        # A quaternion and its negative are the same rotation.
         cos = abs(sum(a * b for a, b in zip(self.turn, other.turn, strict=True)))
         return math.dist(self.at, other.at), math.degrees(2 * math.acos(min(1.0, cos)))
 

@@ -11,24 +11,12 @@ from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_traceback, process_tracebacks, syntax_hint
 from grader.checks.support.launch_slips import PROGRAMS_OF, at_its_lines, node_slip, own_script, owner_of
 from grader.checks.support.processes import early_end, lives, observed_until_ns
-from grader.checks.support.scripts import (
-    paths_by_name,
-    programs,
-    shebang_obstacles,
-)
+from grader.checks.support.scripts import paths_by_name, programs, shebang_obstacles
 from grader.checks.support.text import INIT, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.submission import chmod_hint
-from grader.model.verdict import (
-    FileCitation,
-    Verdict,
-    failed,
-    inconclusive,
-    joined,
-    machine_lacks,
-    unjudged,
-)
+from grader.model.verdict import FileCitation, Verdict, failed, grade_again, joined, machine_lacks, unjudged
 from grader.untrusted_text import without_colours
 from grader.wording import join_words
 
@@ -85,13 +73,13 @@ def not_run(run: Run) -> Verdict | None:
     """Nothing was started at all."""
     if lives(run) or run.graph:
         return None
-    return inconclusive("roslaunch was not run", hint="grade again")
+    return grade_again("roslaunch was not run")
 
 
 def node_slips(package: PackageFacts, file: LaunchFile, run: Run) -> Verdict | None:
     """Return what is wrong with the file's own nodes, with what roslaunch said in the run; of one fix for several
     nodes, with all their lines. None where nothing is."""
-    said = "\n".join(_lines(run))
+    said = "\n".join(console_lines(run))
     found = [
         slip
         for node in file.nodes
@@ -159,25 +147,24 @@ def nodes_up(run: Run, node: LaunchNode) -> tuple[str, ...]:
     return tuple(name for name in run.student_nodes() if pattern.fullmatch(name))
 
 
-def refusal(run: Run, package: PackageFacts | None = None) -> Absence | None:
+def refusal(run: Run, package: PackageFacts) -> Absence | None:
     """Return why roslaunch started nothing, or broke off. `package` has the file's own lines."""
-    text = "\n".join(line for line in _lines(run))
+    text = "\n".join(console_lines(run))
     if unset := _unset_args(text, package):
         return unset
-    if package is not None and package.file(IGNORE) is not None and _NO_LAUNCH_FILE in text:
+    if package.file(IGNORE) is not None and _NO_LAUNCH_FILE in text:
         why = f"{IGNORE} hides the package from catkin and roslaunch"
         return Absence(why, f"git rm {IGNORE}", citations=(FileCitation(file=IGNORE),))
     for pattern, why, hint in _REFUSALS:
         if match := re.search(pattern, text):
             words = [shown(PurePosixPath(g).name if "/" in g.strip("/") else g) for g in match.groups()]
-            fix = hint.format(*words)
-            fix = fix.replace("<package>", package.name) if package is not None else fix
-            if package is not None and pattern == NO_FILE and (meant := _file_meant(package, words[0])):
+            fix = hint.format(*words).replace("<package>", package.name)
+            if pattern == NO_FILE and (meant := _file_meant(package, words[0])):
                 fix = f"write $(find {package.name})/{meant}"
             said = f"roslaunch starts nothing: {why.format(*words)}"
-            if package is not None and pattern == NO_PACKAGE and near_names(words[0], [package.name]):
+            if pattern == NO_PACKAGE and near_names(words[0], [package.name]):
                 return Absence(f"{said}: this one is called {package.name}", f"write $(find {package.name})")
-            cited = _declared(words[0], package) if pattern == _UNSET.pattern and package is not None else ()
+            cited = _declared(words[0], package) if pattern == _UNSET.pattern else ()
             return Absence(said, fix, citations=cited, refused=pattern, about="".join(words[:1]))
     return None
 
@@ -185,7 +172,7 @@ def refusal(run: Run, package: PackageFacts | None = None) -> Absence | None:
 def _declared(name: str, package: PackageFacts) -> tuple[FileCitation, ...]:
     """Return where an argument without a default is declared."""
     args = (arg for file in package.launch_files for arg in file.unset_args if arg.declared)
-    return tuple(FileCitation(file=arg.file, line=arg.line) for arg in args if arg.name == name)[:1]
+    return tuple(arg.place for arg in args if arg.name == name)[:1]
 
 
 def explain_by_refused_launch(
@@ -213,16 +200,17 @@ def _file_meant(package: PackageFacts, name: str) -> str:
     return names[near[0]] if near else ""
 
 
-def _unset_args(text: str, package: PackageFacts | None) -> Absence | None:
+def _unset_args(text: str, package: PackageFacts) -> Absence | None:
     """Return all the arguments that the launch file asks for and that no `<arg>` declares: roslaunch names only one."""
     asked = _UNSET.search(text)
-    files = package.launch_files if package is not None and asked else ()
+    if asked is None:
+        return None
     lacking = [
         [arg for arg in file.unset_args if not arg.declared]
-        for file in files
-        if asked and any(arg.name == asked[1] for arg in file.unset_args)
+        for file in package.launch_files
+        if any(arg.name == asked[1] for arg in file.unset_args)
     ]
-    if len(lacking) != 1 or asked is None or asked[1] not in {arg.name for arg in lacking[0]}:
+    if len(lacking) != 1 or asked[1] not in {arg.name for arg in lacking[0]}:
         return None
     args = lacking[0]
     lines = sorted({arg.line for arg in args})
@@ -232,7 +220,7 @@ def _unset_args(text: str, package: PackageFacts | None) -> Absence | None:
     verb = "uses" if len(lines) == 1 else "use"
     why = f"roslaunch starts nothing: {where} {verb} {names}, which no <arg> declares"
     hint = f"below <launch>, add {declares}, with {'its value' if len(args) == 1 else 'their values'} in place of …"
-    cited = tuple(FileCitation(file=arg.file, line=arg.line) for arg in args)
+    cited = tuple(arg.place for arg in args)
     return Absence(why, hint, citations=tuple(dict.fromkeys(cited)))
 
 
@@ -258,7 +246,9 @@ def died(run: Run, node: LaunchNode) -> int | None:
 
 def finished(run: Run, node: LaunchNode) -> bool:
     """Return whether it ran to its own end without an error."""
-    return any((m := _FINISHED.search(line)) and _is(node, m[1]) for line in _join_required(_lines(run)))
+    return any(
+        (m := _FINISHED.search(line)) and _is(node, m[1]) for line in _join_required(console_lines(run))
+    )
 
 
 def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
@@ -327,7 +317,7 @@ def quoted(run: Run) -> str:
 
 def roslaunch_error(run: Run) -> str:
     """Return the first line in which roslaunch, or a node that it started, says what is wrong."""
-    lines = _lines(run)
+    lines = console_lines(run)
     found = (line for mark in _ERRORS for line in lines if mark in line)
     return shown(next(found, ""))
 
@@ -335,7 +325,7 @@ def roslaunch_error(run: Run) -> str:
 def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | None:
     """roslaunch did not find the program, or none that may be executed."""
     mark = f"cannot launch node of type [{node.pkg}/{node.type}]"
-    line = next((text for text in _lines(run) if mark in text), None)
+    line = next((text for text in console_lines(run) if mark in text), None)
     if line is None:
         return None
     if (script := own_script(package, node)) and script.executable is False:
@@ -360,7 +350,7 @@ def _silent(run: Run, node: LaunchNode) -> Absence | None:
     others = [n for n in run.student_nodes() if re.fullmatch(r"/.+_\d+_\d{9,}", n)]
     if finished(run, node):
         return Absence("its script ended without ever becoming a node", hint, of_script=True)
-    started = any((m := _STARTED.search(line)) and _is(node, m[1]) for line in _lines(run))
+    started = any((m := _STARTED.search(line)) and _is(node, m[1]) for line in console_lines(run))
     if not started:
         return None
     if others:
@@ -394,5 +384,6 @@ def _join_required(lines: Iterable[str]) -> Iterator[str]:
             yield line
 
 
-def _lines(run: Run) -> list[str]:
+def console_lines(run: Run) -> list[str]:
+    """Return what the run printed, as plain text."""
     return [without_colours(c.line) for _, c in run.console]

@@ -21,13 +21,7 @@ from grader.checks.support.scripts import (
 )
 from grader.checks.support.text import near_names, shown
 from grader.model.package import Executable, LaunchFile, LaunchNode, PackageFacts, SourceFile
-from grader.model.verdict import (
-    FileCitation,
-    MistakeKind,
-    Verdict,
-    failed,
-    unjudged,
-)
+from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, unjudged
 from grader.wording import join_words, there_is
 
 OTHER_ATTRIBUTES = {"package": "pkg", "exec": "type", "executable": "type", "script": "type"}
@@ -50,11 +44,15 @@ class Slip(NamedTuple):
     refused: bool = False
     lacks: str = ""
 
+    @property
+    def place(self) -> FileCitation:
+        """The line."""
+        return FileCitation(file=self.file, line=self.line)
+
     def verdict(self, said: str = "") -> Verdict:
         """Return the verdict with what roslaunch said (`said`) at the end."""
-        cited = (FileCitation(file=self.file, line=self.line),)
         message = f"{self.file}, line {self.line}: {self.why}{said}"
-        return (unjudged if self.of_manifest else failed)(message, hint=self.fix, citations=cited)
+        return (unjudged if self.of_manifest else failed)(message, hint=self.fix, citations=(self.place,))
 
 
 PROGRAMS_OF = {

@@ -17,11 +17,11 @@ from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
 from grader.checks.support.processes import early_end
 from grader.checks.support.text import get_param, init, near_names
-from grader.checks.support.topics import nodes_on, published_topics
+from grader.checks.support.topics import cite, is_unexplained, nodes_on, published_topics
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchNode, LaunchParam, PackageFacts
-from grader.model.verdict import EvidenceCitation, FileCitation, Verdict
+from grader.model.verdict import EvidenceCitation, Verdict
 from grader.wording import plural, there_is
 
 SYSTEM = (
@@ -212,8 +212,7 @@ def explain_by_unread_parameter(
     check: Check, _package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the parameter that the run sets and that no node asked for, whatever it did instead."""
-    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
-    if not unexplained or not isinstance(run, Run) or early_end(run):
+    if not is_unexplained(check, verdict) or not isinstance(run, Run) or early_end(run):
         return verdict
     reads = [(e.actor, absolute_name(e.topic or "")) for _, e in run.actors if e.action == "read"]
     names = {name for _, name in reads}  # a program of the grader's reads some of them itself
@@ -232,25 +231,21 @@ def explain_by_unread_parameter(
     hint = f"read it with {get_param(f'~{last}' if above in run.student_nodes() else name)}"
     if own and own[0][1] == f"{own[0][0]}/{last}" and above not in run.student_nodes():
         hint = f"name the node {above}: {init(above.lstrip('/'))}"
-    message = f"{verdict.message}; the run sets {name} to {value!r}, and no node reads it{seen}"
-    cited = EvidenceCitation(evidence=run.evidence, topic="/grader/actor")
-    update = {"message": message, "hint": hint, "citations": (*verdict.citations, cited), "cause": name}
-    return verdict.model_copy(update=update)
+    why = f"the run sets {name} to {value!r}, and no node reads it{seen}"
+    return verdict.explained(why, hint, cause=name).about(citations=(cite(run, "/grader/actor"),))
 
 
 def explain_by_misplaced_parameter(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the parameter that the node reads and a launch file sets somewhere else."""
-    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
-    if not unexplained or package is None or not isinstance(run, Run) or early_end(run):
+    if not is_unexplained(check, verdict) or package is None or not isinstance(run, Run) or early_end(run):
         return verdict
     found = next(_misplaced(package, run, _publishing(verdict, run)), None)
     if found is None:
         return verdict
     asked, param, node = found
     sets = f"line {param.line} of {param.file} sets {param.name}, and {node.full_name} reads {asked}"
-    message = f"{verdict.message}; {sets}"
     last, within = asked.rpartition("/")[2], f"{node.full_name}/"
     hint = f"on line {param.line} of {param.file}, write "
     if asked.startswith(within) and not param.name.startswith(within):
@@ -258,9 +253,7 @@ def explain_by_misplaced_parameter(
         hint = f'move line {param.line} of {param.file} into {place}, as <param name="{last}" …/>'
     else:
         hint += f'name="{last if asked.startswith(within) else asked}"'
-    cited = (FileCitation(file=param.file, line=param.line), *verdict.citations)
-    update = {"message": message, "hint": hint, "citations": cited, "cause": asked}
-    return verdict.model_copy(update=update)
+    return verdict.explained(sets, hint, (param.place,), cause=asked)
 
 
 def _publishing(verdict: Verdict, run: Run) -> set[str]:

@@ -18,6 +18,7 @@ from grader.checks.support.text import ANONYMOUS, init
 from grader.evidence.events import ProcessEvent
 from grader.evidence.run import Run, once_for_each_run
 from grader.model.package import PackageFacts, PythonSlip, SlipKind
+from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, unjudged
 from grader.wording import join_words, seconds, shorten
 
@@ -99,6 +100,7 @@ def _life(run: Run, start_ns: int, start: ProcessEvent) -> Life:
     ends = ((t, e) for t, e in run.processes if e.event == "exit" and e.name == start.name and t >= start_ns)
     end_ns, end = next(ends, (None, None))
     interrupt_ns, action = min(_interrupts(run, start.name, start_ns), default=(None, ""))
+    # Ctrl-C for the whole run came when this one had ended by itself.
     if interrupt_ns is not None and end_ns is not None and end_ns < interrupt_ns:
         interrupt_ns, action = None, ""
     return Life(start.name, start_ns, start, end_ns, end, interrupt_ns, action in STEPS)
@@ -142,10 +144,20 @@ def named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tupl
 
 def slips_that_name(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> list[PythonSlip]:
     """Return where the run's scripts name this node, topic or parameter; those of a node may be in a variable."""
-    scripts = {one.start.script for one in lives(run)}
-    said = [s for s in package.slips if s.kind == kind and s.file in scripts]
     last = name.rpartition("/")[2]
+    said = run_slips(package, run, kind)
     return [s for s in said if s.message.rpartition("/")[2].lstrip("~") == last]
+
+
+def run_slips(package: PackageFacts, run: Run, *kinds: SlipKind) -> list[PythonSlip]:
+    """Return what is remarkable, of these kinds, in the scripts that run."""
+    scripts = run_scripts(run)
+    return [s for s in package.slips if s.kind in kinds and s.file in scripts]
+
+
+def run_scripts(run: Run) -> set[str | None]:
+    """Return the package's scripts that run; None among them is a program of another kind."""
+    return {one.start.script for one in lives(run)}
 
 
 def early_end(run: Run) -> Life | None:
@@ -300,3 +312,10 @@ GlobalPattern = Annotated[str, AfterValidator(_global_pattern)]
 """Such a name, or a pattern for several: `/square/*`."""
 PublishedTopic = Annotated[GlobalName, Refers("published")]
 """A topic on which the student publishes."""
+
+
+class OnTopic(Record):
+    """What is judged on a topic of the student's."""
+
+    topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""

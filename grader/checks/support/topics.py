@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import PurePosixPath
 from typing import Literal
 
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end, explain_error
-from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives, named_at, plain_type
+from grader.checks.support.processes import (
+    NO_SCRIPT_HINT,
+    early_end,
+    lives,
+    named_at,
+    plain_type,
+    run_scripts,
+    run_slips,
+)
 from grader.checks.support.scripts import programs
 from grader.checks.support.text import (
     INIT,
@@ -30,10 +38,10 @@ from grader.model.package import LaunchNode, PackageFacts, PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.model.verdict import (
     EvidenceCitation,
-    FileCitation,
     Status,
     Verdict,
     failed,
+    grade_again,
     inconclusive,
     unjudged,
 )
@@ -65,6 +73,18 @@ def topics_with(run: Run, end: End, fits: Callable[[str], bool] | None = None) -
     """Return the topics with such a node at this end; `/rosout` is left out."""
     topics = dict.fromkeys(topic for _, event in run.graph for topic in getattr(event, end))
     return tuple(topic for topic in topics if topic != "/rosout" and nodes_on(run, topic, end, fits))
+
+
+def connected_nodes(
+    run: Run, topic: str, fits: Callable[[str, End], bool] | None = None
+) -> Iterator[tuple[str, str]]:
+    """Yield publisher and subscriber of each connection of two nodes over the topic: of the student's, or of those that
+    `fits` accepts at their end."""
+    wanted = fits or (lambda node, _: run.is_student_node(node))
+    for one in (one for _, event in run.graph for one in event.connections if one.topic == topic):
+        first, second = one.publisher, one.subscriber
+        if first != second and wanted(first, "publishers") and wanted(second, "subscribers"):
+            yield first, second
 
 
 def published_topics(run: Run) -> dict[str, str]:
@@ -104,6 +124,7 @@ def no_message(
 ) -> Verdict:
     """Return why no message came on a topic. `of_node` makes the verdict where the node itself is the reason; `kind` is
     the type that the topic should have."""
+    # What the recorder lost, the topic's name, the node, its script: the first that holds says most.
     if lost := all_lost(run, topic):
         return lost
     published = published_topics(run)
@@ -145,7 +166,7 @@ def _judge_misnamed(
         here = [name for name in published if name.startswith(node.namespace)] or near or published
         hint = "look at its <remap>: `from` is the name in the script, `to` the new one"
         verdict = of_node(f"{what}; the node publishes on {join_words(here)}", measured=measured, hint=hint)
-        return verdict.about(citations=(FileCitation(file=node.file, line=node.line),))
+        return verdict.about(citations=(node.place,))
     if not near:
         return None
     hint = f"name the topic {topic} in {PUBLISHER}"
@@ -156,7 +177,7 @@ def _judge_misnamed(
 def _namespaced_node(package: PackageFacts, run: Run, topic: str) -> LaunchNode | None:
     """Return the launch file's node in whose namespace the topic is, where the run is a launch file's and the node's
     names are remapped."""
-    if not lives(run) or any(one.start.script for one in lives(run)):
+    if not lives(run) or any(run_scripts(run)):
         return None
     nodes = [n for f in package.launch_files for n in f.brings if n.remaps and topic.startswith(n.namespace)]
     return max(nodes, key=lambda n: len(n.namespace), default=None)
@@ -313,12 +334,12 @@ def explain_by_unheard_topic(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the topic on which the run publishes and that no node heard, whatever it did instead."""
-    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
-    if not unexplained or not isinstance(run, Run) or early_end(run) or not (found := unheard(run, package)):
+    if not is_unexplained(check, verdict) or not isinstance(run, Run) or early_end(run):
         return verdict
-    cited = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
-    update = {"message": f"{verdict.message}; {found.message}", "hint": found.hint, "cause": found.message}
-    return verdict.model_copy(update={**update, "citations": (*verdict.citations, cited)})
+    if (found := unheard(run, package)) is None:
+        return verdict
+    explained = verdict.explained(found.message, found.hint, cause=found.message)
+    return explained.about(citations=(cite(run, "/grader/graph"),))
 
 
 def why_unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
@@ -328,8 +349,12 @@ def why_unreached(package: PackageFacts, run: Run) -> PythonSlip | None:
 
 def run_slip(package: PackageFacts, run: Run, *kinds: SlipKind) -> PythonSlip | None:
     """Return the first slip of one of these kinds in a script that runs."""
-    scripts = {one.start.script for one in lives(run)}
-    return next((s for s in package.slips if s.file in scripts and s.kind in kinds), None)
+    return next(iter(run_slips(package, run, *kinds)), None)
+
+
+def is_unexplained(check: Check, verdict: Verdict) -> bool:
+    """Return whether it is a loss of what comes of callbacks, and nothing says yet why it came to it."""
+    return check.of_callbacks and verdict.status.is_lost and not verdict.cause
 
 
 SEEN_AS = {"nan": r"\bnan\b", "degrees": r" is wrong in | answers ", "return": r"returns nothing"}
@@ -340,33 +365,24 @@ def explain_by_wrong_value(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
     """Return a lost mark with the line of a script that runs on which the value goes wrong."""
-    unexplained = check.of_callbacks and verdict.status.is_lost and not verdict.cause
-    if not unexplained or package is None or not isinstance(run, Run):
+    if not is_unexplained(check, verdict) or package is None or not isinstance(run, Run):
         return verdict
     files = _files_that_run(package, run)
     found = (s for s in package.slips if s.kind == "wrong-value" and s.file in files)
     slip = next((s for s in found if re.search(SEEN_AS[s.name], verdict.message)), None)
     if slip is None:
         return verdict
-    message = f"{verdict.message}; line {slip.line} of {slip.file}: {slip.message}"
-    update = {"message": message, "hint": slip.fix, "citations": (slip.place, *verdict.citations)}
-    return verdict.model_copy(update={**update, "cause": slip.message})
+    why = f"line {slip.line} of {slip.file}: {slip.message}"
+    return verdict.explained(why, slip.fix, (slip.place,), cause=slip.message)
 
 
-LATE = re.compile(
-    r"comes up to [\d.]+ s after|does not follow|never follows|of an older pose|gives no answer: no answer within"
-)
-"""How it shows that a node comes to a message, or a request, too late."""
-AT_ONCE = "in the first message"
-ENDLESS, FLOODED = "never ends", "; the recorder kept "
-"""What a slip says of such a loop, and a verdict of a topic on which more came than is recorded."""
 OF_RESULTS = ("prints", "rostest")
 """Checks of what comes of callbacks in the end."""
 
 
 def _files_that_run(package: PackageFacts, run: Run) -> set[str | None]:
     """Return the scripts that run, those that a launch file started, and the sources of programs of C++."""
-    scripts = {one.start.script for one in lives(run)}
+    scripts = run_scripts(run)
     nodes = [node for file in package.launch_files for node in file.brings]
     types = {node.type for node in nodes if node.full_name in run.student_nodes()}
     launched = {file.path for file in package.files if PurePosixPath(file.path).name in types}
@@ -383,24 +399,22 @@ def explain_by_waiting_callback(
         return verdict
     files = _files_that_run(package, run)
     slip = next((s for s in package.slips if s.kind == "callback-waits" and s.file in files), None)
-    if slip is None or AT_ONCE in verdict.message:
+    if slip is None or verdict.callbacks == "before":
         return verdict
-    if ENDLESS in slip.message and FLOODED in verdict.message and verdict.status is Status.INCONCLUSIVE:
-        lost = verdict.message.partition("; but the grading machine")[0]
+    if slip.is_endless and verdict.dropped and verdict.status is Status.INCONCLUSIVE:
+        # the flood is the loop's own, and keeps the machine busy: neither excuses it
+        lost = verdict.excused or verdict.message
         verdict = verdict.model_copy(update={"status": Status.FAIL, "message": lost})
-    if not verdict.status.is_lost or not (ENDLESS in slip.message or LATE.search(verdict.message)):
+    if not verdict.status.is_lost or not (slip.is_endless or verdict.callbacks == "late"):
         return verdict
-    message = f"{verdict.message}; in {slip.file}, {slip.message}"
-    ends = "the caller waits" if "answer" in verdict.message else "nothing else is heard"
+    ends = "the caller waits" if check.name == "service-answers" else "nothing else is heard"
     hint = f"in {slip.file}, {slip.fix}: {ends} until the callback ends"
-    update = {"message": message, "hint": hint, "citations": (slip.place, *verdict.citations)}
-    return verdict.model_copy(update={**update, "cause": slip.message})
+    return verdict.explained(f"in {slip.file}, {slip.message}", hint, (slip.place,), cause=slip.message)
 
 
 def call_in_comment(package: PackageFacts, run: Run, call: str) -> PythonSlip | None:
     """Return where a script that runs has such a call in a comment: `Subscriber`."""
-    scripts = {one.start.script for one in lives(run)}
-    found = (s for s in package.slips if s.kind == "commented-out" and s.file in scripts)
+    found = run_slips(package, run, "commented-out")
     return next((s for s in found if s.name.rpartition(" ")[2] == call), None)
 
 
@@ -409,11 +423,10 @@ def copied_topic(
 ) -> str:
     """Return the lines of one running script that name the same topic, this one if any is given: one is copied and not
     changed; "" for none."""
-    scripts = {one.start.script for one in lives(run)}
     places: dict[tuple[str, str], list[int]] = {}
-    for slip in package.slips:
+    for slip in run_slips(package, run, kind):
         name = slip.message.strip("/")
-        if slip.kind == kind and slip.file in scripts and name == (topic.strip("/") or name):
+        if name == (topic.strip("/") or name):
             places.setdefault((slip.file, name), []).append(slip.line)
     found = ((file, sorted(set(lines))) for (file, _), lines in places.items())
     return next((f"lines {join_words(map(str, n))} of {file}" for file, n in found if len(n) > 1), "")
@@ -463,7 +476,7 @@ def _judge_refused(run: Run, topic: str) -> Verdict | None:
     if not refused or run.student_channels(topic):
         return None
     message = f"the recorder could not listen to {topic}: {refused[0].detail or refused[0].event}"
-    return inconclusive(message, measured="no message", hint="grade again")
+    return grade_again(message, measured="no message")
 
 
 class Losses(Record):
@@ -506,7 +519,7 @@ def all_lost(run: Run, topic: str) -> Verdict | None:
     lost = losses(run, topic)
     if lost is None or lost.kept:
         return None
-    return inconclusive(f"nothing was recorded on {topic}", measured="no message", hint="grade again")
+    return grade_again(f"nothing was recorded on {topic}", measured="no message")
 
 
 def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> Verdict:
@@ -522,6 +535,7 @@ def account_for_losses(check: Check, facts: Mapping[str, object], verdict: Verdi
     if not found:
         return verdict
     taken = verdict.status in TAKEN and not check.heeds_losses
+    verdict = verdict.model_copy(update={"dropped": any(one.dropped for one in found)})
     if not taken and verdict.status is not Status.INCONCLUSIVE:
         measured = "; ".join(filter(None, (verdict.measured, *(one.words for one in found))))
         return verdict.model_copy(update={"measured": measured})

@@ -1,18 +1,26 @@
-"""What a launch file makes of a topic's name by `ns` and `<remap>`, and which of them to remove so that it is right."""
+"""Whether nodes of a launch file are connected over a topic, and why not.
+
+What `ns` and `<remap>` make of its name, which of them to remove to have the right one, and which names scripts write.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from grader.checks.support.launch import nodes_up
 from grader.checks.support.launch_slips import own_script
+from grader.checks.support.topics import nodes_on, topics_with
+from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
-from grader.model.package import LaunchLine, LaunchNode, PackageFacts, PythonSlip
-from grader.model.verdict import FileCitation
+from grader.model.package import LaunchFile, LaunchLine, LaunchNode, PackageFacts, PythonSlip
+from grader.model.verdict import FileCitation, Verdict, failed
 from grader.wording import join_words
 
 UNRESOLVED = "$("
+CONNECTED_WITHIN_S = 3.0
+"""Nodes that were on a topic together for longer, and not connected, differ in its type."""
 RENAMES = ("remap", "args")
 """Where a launch file gives a topic another name by itself; any other line does it by a namespace."""
 
@@ -70,7 +78,7 @@ def find_renaming(
     return None
 
 
-def names_in_scripts(
+def _names_in_scripts(
     package: PackageFacts, nodes: Sequence[LaunchNode], topic: str
 ) -> tuple[PythonSlip, ...]:
     """Return where the scripts of the nodes name a topic, and it is another one; nothing where a script names several,
@@ -140,3 +148,92 @@ def _described(uses: Sequence[_Use], topic: str, *, drop_ns: bool, drop_remaps: 
 def _in_lines(found: Sequence[LaunchLine]) -> str:
     numbers = sorted({line.line for line in found})
     return f" on line{'s' * (len(numbers) > 1)} {join_words(map(str, numbers))}" if numbers else ""
+
+
+def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
+    """Return why nodes that are there are not connected: other topics, other types, or an end that is missing."""
+    others = {
+        c.topic
+        for _, event in run.graph
+        for c in event.connections
+        if c.topic not in {topic, "/rosout"} and run.is_student_node(c.subscriber)
+    }
+    if others:
+        message = f"the nodes are connected over {join_words(sorted(others))}, not over {topic}"
+        return failed(message + said, hint=f"both have to use {topic}; look for a <remap> or a namespace")
+    publishers, subscribers = nodes_on(run, topic, "publishers"), nodes_on(run, topic, "subscribers")
+    if publishers and subscribers:
+        message = (
+            f"{join_words(publishers)} and {join_words(subscribers)} are both on {topic}, but not connected"
+        )
+        return failed(message + said, hint="do both use the same message type?").once()
+    lacking = "publishes on" if not publishers else "subscribes to"
+    seen = topics_with(run, "subscribers" if publishers else "publishers")
+    there = f"; one {lacking} {join_words(seen)}" if seen else ""
+    message = f"{join_words(run.student_nodes())} are not connected: none {lacking} {topic}{there}{said}"
+    hint = f"launch a talker and a listener that use {topic}; look for a <remap> or a namespace"
+    return failed(message, hint=hint)
+
+
+def blame_renaming(
+    package: PackageFacts, run: Run, nodes: Sequence[LaunchNode], topic: str, verdict: Verdict
+) -> Verdict | None:
+    """Return the verdict with the lines of the launch file that give the topic another name; None where none do."""
+    renaming = find_renaming(package, nodes, topic, run)
+    if renaming is None:
+        return None
+    message = f"{verdict.message}: it {renaming.why}"
+    update = {"message": message, "hint": renaming.fix, "citations": renaming.citations}
+    return verdict.model_copy(update=update)
+
+
+def blame_place(
+    package: PackageFacts, file: LaunchFile, nodes: Sequence[LaunchNode], topic: str, verdict: Verdict
+) -> Verdict | None:
+    """Return the verdict with the namespaces that keep nodes apart, or with the scripts' own names for the topic; None
+    where the launch file puts none of the nodes into a namespace and remaps nothing."""
+    moved = [node for node in nodes if node.remaps or node.namespace != "/"]
+    if len({node.namespace for node in moved} - {"/"}) > 1:
+        return _in_namespaces(file, verdict, moved, topic)
+    return _named_in_scripts(package, file, verdict, nodes, topic) if moved else None
+
+
+def _in_namespaces(file: LaunchFile, verdict: Verdict, nodes: Sequence[LaunchNode], topic: str) -> Verdict:
+    """Name the namespaces of a launch file that starts the same nodes in several, and the lines that make them."""
+    spaces = list(dict.fromkeys(node.namespace.strip("/") for node in nodes if node.namespace != "/"))
+    found = [line for n in nodes for line in n.renaming if line.tag not in RENAMES]
+    places = {(line.file, line.line) for line in found} or {(n.file or file.path, n.line) for n in nodes}
+    outside = f'write one <node> of each outside of <group ns="{spaces[0]}">'
+    update = {
+        "message": f"{verdict.message}: it puts its nodes in the namespaces {join_words(spaces)}",
+        "hint": f"{outside}: in it, {topic.lstrip('/')} becomes /{spaces[0]}{topic}",
+        "citations": tuple(FileCitation(file=path, line=line) for path, line in sorted(places))[:4],
+    }
+    return verdict.model_copy(update=update)
+
+
+def together_s(run: Run, topic: str) -> float:
+    """Return how long the topic had a publisher and a subscriber of the student's at the same time."""
+
+    def has_both(event: GraphEvent) -> bool:
+        ends = (event.publishers.get(topic, ()), event.subscribers.get(topic, ()))
+        return all(any(map(run.is_student_node, nodes)) for nodes in ends)
+
+    return sum(after - at for (at, event), (after, _) in pairwise(run.graph) if has_both(event)) / 1e9
+
+
+def _named_in_scripts(
+    package: PackageFacts, file: LaunchFile, verdict: Verdict, nodes: Sequence[LaunchNode], topic: str
+) -> Verdict:
+    """Name the lines of the scripts that have another topic, and what gives the right one another name then."""
+    named = _names_in_scripts(package, nodes, topic)
+    if not named:
+        return verdict
+    renaming = find_renaming(package, nodes, topic, in_scripts=False)
+    lines = join_words(f"line {one.line} of {one.file}" for one in named)
+    others = join_words(dict.fromkeys(one.message for one in named))
+    hint = f"write {topic.lstrip('/')} on {lines}, not {others}"
+    if renaming is not None:
+        hint = f"{hint}; then in {file.path} {renaming.fix}"
+    cited = (*(one.place for one in named), *(renaming.citations if renaming is not None else ()))
+    return verdict.model_copy(update={"hint": hint, "citations": cited})
