@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+from grader.checks.support.clocks import CALIBRATION
+from grader.evidence.reader import load_evidence
 from tests.arena.support import SCRIPT
 
 pytestmark = pytest.mark.ros
@@ -131,6 +133,13 @@ def test_judging_again_gives_the_same_bytes(graded: tuple[Path, Grader], tmp_pat
     assert json.dumps(again, **as_text) == json.dumps(result["criteria"], **as_text)
     single = grader.run("judge", *sorted((folder / "evidence").iterdir()), "--rubric", LAB)[1]
     assert single == out
+
+
+def test_the_machine_is_calibrated_where_a_rate_is_judged(graded: tuple[Path, Grader]) -> None:
+    runs = load_evidence([graded[0] / "evidence"])
+    calibrated = {name for name, run in runs.items() if any(c.topic == CALIBRATION for c in run.channels)}
+    assert calibrated == {"talker"}
+    assert all(run.host for name, run in runs.items() if name != "package")
 
 
 def test_all_reports_and_evidence_are_there(graded: tuple[Path, Grader]) -> None:

@@ -103,7 +103,9 @@ async def run_scenario(
     warp = scenario.warp if scenario.clock == "warped" else 1.0
     starts = _starts(scenario, place)
     with EvidenceWriter(path, scenario=name, clock=scenario.clock, warp=warp, metadata=metadata) as writer:
-        session = ArenaSession(place, writer, last_run=last_run, on_lateness=admission.note_lateness)
+        session = ArenaSession(
+            place, writer, calibrated=bool(rates), last_run=last_run, on_lateness=admission.note_lateness
+        )
         if not any(spec["role"] == "student" for _, spec in starts):
             session.course(ScenarioEvent(event="end", outcome="ended", detail="there was nothing to start"))
             return RunCost(cpu_s=0, student_cpu_s=0)

@@ -68,6 +68,7 @@ class ArenaSession:
 
     Raises ArenaError when it does not start or dies. Times are those of its start plus monotonic time, as the arena's
     own are: a clock that is set while it runs moves none of them. `last_run` says that it will not be run again.
+    `calibrated` says that a calibration publisher runs beside it, which tells what a sleep takes here: rates need it.
     `on_lateness` is told how late the machine is (ms, 95th percentile) as the arena measures it.
     """
 
@@ -77,6 +78,7 @@ class ArenaSession:
         writer: EvidenceWriter,
         *,
         master: bool = True,
+        calibrated: bool = True,
         last_run: bool = False,
         on_lateness: Callable[[float], None] = lambda _: None,
     ) -> None:
@@ -87,6 +89,7 @@ class ArenaSession:
         self.place = place
         self._writer = writer
         self._master = master
+        self._calibrated = calibrated
         self._changed = asyncio.Event()
         self._channels: dict[int, _Channel] = {}
         self._ready = False
@@ -235,6 +238,7 @@ class ArenaSession:
     def _config(self) -> dict[str, Any]:
         return {
             "master": self._master,
+            "calibrated": self._calibrated,
             "stage": self.place.stage(),
             "cgroups": self.place.sandbox.cgroups.model_dump(),
             # In a sandbox the network is the run's own, so the usual port is free: outside, the system chooses one.

@@ -50,7 +50,7 @@ holds what the files say and the build, each `<scenario>.mcap` a run. Any MCAP r
 - **What nodes published**: a channel for each topic and publisher, `message_encoding` `ros1`, its schema
   (`ros1msg`) as the publisher sent it, and the channel metadata `topic`, `callerid`, `md5sum`, `latching` (`1` or
   `0`). `log_time` is when the kernel took the message in (ns since 1970), `sequence` counts on the channel from 0.
-  `/grader/calibration` (`std_msgs/Header`) is a publisher of the grader's, whose pace is known.
+  `/grader/calibration` (`std_msgs/Header`) is a publisher of the grader's, whose pace is known, where a rate is judged.
 - **What the grader noted**: the JSON channels below, `message_encoding` `json`, each with its JSON Schema in the
   file. All times are their `log_time`.
 - **Attachments** of `package.mcap`: the files of the package that were judged.

@@ -37,7 +37,7 @@ MISTAKES = [
     ),
     (
         "mcr2-basic-comms/launch-wrong-package",
-        "✗ launch-xml",
+        "◐ launch-xml",
         "launch/activity1.launch:3",
         "there is no talker.py in a package basic_coms",
         '3 | <node name="talker" pkg="basic_coms"',
@@ -52,7 +52,7 @@ MISTAKES = [
     ),
     (
         "mcr2-basic-comms/listener-not-executable",
-        f"✗ cmake-install {MINUS}15 in all CMakeLists.txt:48",
+        f"◐ cmake-install {MINUS}10 in all CMakeLists.txt:48",
         "fix: write scripts/listener.py into it, after PROGRAMS; the build then makes scripts/listener.py executable",
         f"also costs: listener-executable {MINUS}5",
     ),

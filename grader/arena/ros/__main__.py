@@ -4,9 +4,9 @@ Runs under ROS's own interpreter and imports nothing but the standard library an
 process, the template, which has imported all that an arena needs and does nothing else (`stand_by`).
 
 The first line of its stdin configures an arena:
-`master` (false for a build, which needs none), `port`, `limits`, `suffix` (of its nodes' names), `stage` (the folder
-over which what sandboxes see is mounted, and the user who writes there; null without a sandbox). When stdin ends, all
-ends.
+`master` (false for a build, which needs none), `calibrated` (whether the calibration publisher runs), `port`, `limits`,
+`suffix` (of its nodes' names), `stage` (the folder over which what sandboxes see is mounted, and the user who writes
+there; null without a sandbox). When stdin ends, all ends.
 """
 
 import array
@@ -102,7 +102,8 @@ class Arena:
         api = serve(0, SlaveApi(self._actor, guard).answer, guard, owners, title="the grader's node")
         self._actor.uri = api.uri
         own_ports.update((server.port, api.port, self._actor.port))
-        self._calibration.record(self.loop, self._wire, name.format("calibration"))
+        if self._calibration:
+            self._calibration.record(self.loop, self._wire, name.format("calibration"))
         self._actor.stand_in_for_rosout(self._master)
         self._recorder.on_log = self._actor.pass_on_log
 
@@ -321,7 +322,7 @@ def run_arena():
     leave_keys_behind()
     if config["stage"]:
         enter_own_namespaces()
-    calibration = Calibration() if config["master"] else None
+    calibration = Calibration() if config["master"] and config["calibrated"] else None
     arena = Arena(wire, config, calibration)
     arena.loop.run()
     calibration_s = calibration.stop() if calibration else 0.0
