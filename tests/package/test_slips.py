@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
+from grader.model.package import PythonSlip, SlipKind
 from grader.package.python import check_syntax
 
 pytestmark = pytest.mark.usefixtures("without_processes")
@@ -599,3 +603,8 @@ def test_names_that_ros_is_given_without_quotes(tmp_path, code, fixes):
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if "without quotes" in s.message]
     last = text.count("\n")
     assert [s.fix for s in slips] == [f"on line {last}, write `{fix}`" for fix in fixes]
+
+
+def test_every_kind_is_described() -> None:
+    rows = re.findall(r"^- (`.*?`):", inspect.getdoc(PythonSlip) or "", re.MULTILINE)
+    assert sorted(re.findall(r"`([\w-]+)`", " ".join(rows))) == sorted(get_args(SlipKind))

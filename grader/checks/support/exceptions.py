@@ -5,18 +5,24 @@ from __future__ import annotations
 import ast
 import builtins
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from grader.checks.support.console_output import Frame, Traceback
+from grader.checks.support.console_output import Traceback
+from grader.checks.support.rospy_calls import (
+    Meaning,
+    calls_in_line,
+    explain_rate,
+    explain_ros_call,
+    is_text,
+    line_tree,
+    rewritten,
+)
 from grader.checks.support.text import shown
 from grader.installable import noetic_messages
-from grader.model.package import PackageFacts
 from grader.syntax_fixes import parsed
 from grader.wording import join_words, plural
 
-Meaning = tuple[str, str]
-"""The cause, and what to do."""
 HIDDEN = (
     "str", "int", "float", "list", "dict", "len", "max", "min", "sum", "range", "input", "print", "type", "round",
 )  # fmt: skip
@@ -34,10 +40,6 @@ _OPERANDS = re.compile(
 )
 _ONE_TOO_MANY = re.compile(r"(\w+)\(\) takes (\d+) positional arguments? but (\d+) (?:was|were) given")
 _TOO_FEW = re.compile(r"^(?:\w+\.)*(\w+)\(\) missing \d+ required positional arguments?: (.+)$")
-_BAD_TOPIC = re.compile(
-    r"^topic name is not a non-empty string|^(?:topic parameter 'data_class'|data_class \[)"
-    r"|^(?:Publisher|Subscriber)\.__init__\(\) missing"
-)
 _COMMAND = re.compile(r"Command '(?:\[')?(.+?)(?:'\])?' returned non-zero exit status (\d+)")
 _CALLED = re.compile(r"'(\w+)' object is not callable")
 _WHOLE = re.compile(
@@ -113,7 +115,9 @@ def _index(message: str, source: str, marked: tuple[int, int] | None) -> Meaning
 
 def _subscript(source: str, marked: tuple[int, int] | None) -> ast.Subscript | None:
     """Return the only `x[i]` of the line, or the one that is marked."""
-    every = [n for n in ast.walk(_tree(re.sub(r"^el(?=if\b)", "", source))) if isinstance(n, ast.Subscript)]
+    every = [
+        n for n in ast.walk(line_tree(re.sub(r"^el(?=if\b)", "", source))) if isinstance(n, ast.Subscript)
+    ]
     found = [n for n in every if not isinstance(n.slice, ast.Slice)]
     pointed = [n for n in found if marked and (n.col_offset, n.end_col_offset) == marked]
     return (pointed or found)[0] if pointed or len(found) == 1 else None
@@ -129,7 +133,7 @@ def _key(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning:
 
 
 def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
-    if meaning := _ros_call(message, source):
+    if meaning := explain_ros_call(message, source):
         return meaning
     if found := _UNPACKED.search(message):
         came = f"; {found[3]} came" if found[3] else ""
@@ -142,7 +146,11 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
 
 
 def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
-    if meaning := _ros_call(message, source) or _call(message, source) or _nested_index(message, source):
+    if (
+        meaning := explain_ros_call(message, source)
+        or _call(message, source)
+        or _nested_index(message, source)
+    ):
         return meaning
     if "'NoneType' object" in message:
         return _none()
@@ -157,7 +165,7 @@ def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning
 
 def _tuple(source: str) -> Meaning:
     """Of `scan.ranges[i] = 0`: what a message has as a list is a tuple once it is received."""
-    tree = _tree(source)
+    tree = line_tree(source)
     target = next(
         (n.value for n in ast.walk(tree) if isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store)),
         None,
@@ -177,7 +185,7 @@ def _nested_index(message: str, source: str) -> Meaning | None:
         return None
     nested = [
         n
-        for n in ast.walk(_tree(source))
+        for n in ast.walk(line_tree(source))
         if isinstance(n, ast.Subscript) and isinstance(n.value, ast.Subscript)
     ]
     if len(nested) != 1 or not isinstance(inner := nested[0].value, ast.Subscript):
@@ -188,13 +196,6 @@ def _nested_index(message: str, source: str) -> Meaning | None:
         cause,
         f"write `{shown(f'{flat}[{row} * width + {column}]')}`, where `width` is how many there are in a row",
     )
-
-
-def _tree(source: str) -> ast.AST:
-    """Return the syntax tree of a line that may begin a block; an empty one where Python cannot parse it."""
-    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-        return parsed(f"{source} pass" if source.rstrip().endswith(":") else source)
-    return ast.Module(body=[], type_ignores=[])
 
 
 def _no_number(message: str, source: str) -> Meaning | None:
@@ -225,7 +226,7 @@ def _call(message: str, source: str) -> Meaning | None:
             "call what is in the module (`time.time()`), or import it: `from … import …`",
         )
     if called := _CALLED.search(message):
-        hidden = next((name for name in HIDDEN if _calls(source, name)), "")
+        hidden = next((name for name in HIDDEN if calls_in_line(source, name)), "")
         if hidden:
             cause = f"`{hidden}` is a variable here, and hides Python's `{hidden}`"
             return cause, f"give the variable `{hidden}` another name"
@@ -245,44 +246,6 @@ def _call(message: str, source: str) -> Meaning | None:
     return None
 
 
-def _ros_call(message: str, source: str) -> Meaning | None:
-    """Of a call of rospy's: a topic's name, type or order, a rate, a pause, a class in place of a message."""
-    if _BAD_TOPIC.match(message):
-        return _topic(message, source)
-    if re.search(r"between instances of 'Rate' and|^Rate\.sleep\(\) takes 1 positional", message):
-        slept = next(iter(_calls(source, "sleep")), None)
-        rate = "rate"
-        if slept is not None and "instances" in message and slept.args:
-            rate = ast.unparse(slept.args[0])
-        elif slept is not None and isinstance(slept.func, ast.Attribute):
-            rate = ast.unparse(slept.func.value)
-        return "a Rate already knows how long to sleep", f"write `{shown(rate)}.sleep()`"
-    if meaning := _init_node(message, source) or _parameter(message, source) or _sent_class(message, source):
-        return meaning
-    if asks_for_rate := _calls(source, "Rate"):
-        return _rate(asks_for_rate[0])
-    return None
-
-
-def _sent_class(message: str, source: str) -> Meaning | None:
-    """Of `publish(…)` with the class of the messages, or with a name that was given it."""
-    if serialized := re.match(r"(\w+)\.serialize\(\) missing", message):
-        name = serialized[1]
-        sent = [ast.unparse(one) for call in _calls(source, "publish") for one in call.args[:1]]
-        if sent and re.fullmatch(r"\w+", sent[0]) and sent[0] != name:
-            cause = f"`{shown(sent[0])}` is the type `{name}` itself, and not a message"
-            return cause, f"write brackets where it is made: `{shown(sent[0])} = {name}()`"
-        return (
-            f"`{name}` is the type of the messages, not a message",
-            f"publish a value: `{name}(…)`, or the value alone",
-        )
-    return None
-
-
-SERVICES = ("Service", "ServiceProxy")
-ACTIONS = ("SimpleActionServer", "SimpleActionClient", "ActionServer", "ActionClient")
-
-
 def evaluated(found: Traceback) -> Meaning | None:
     """Return that a text is run as Python code, where what was raised comes from inside that text."""
     own = [frame for frame in found.own_frames if not frame.file.startswith("<")]
@@ -296,135 +259,6 @@ def evaluated(found: Traceback) -> Meaning | None:
 _EVALUATES = re.compile(r"(?<![\w.])((?:ast\.literal_)?eval|exec)\(")
 
 
-def wrong_class(source: str) -> Meaning | None:
-    """Return what is wrong with the type that a line gives a service or an action: one half of it, a value, a text, or
-    the place of the name."""
-    call = next(iter(_calls(source, *SERVICES, *ACTIONS)), None)
-    if call is None or len(call.args) < 2:
-        return None
-    name, type_ = call.args[:2]
-    if is_text(type_) and not is_text(name):
-        return "the name comes first, then the type", rewritten(source, (name, type_), (type_, name))
-    plain = type_.func if isinstance(type_, ast.Call) else type_
-    written = str(plain.value) if isinstance(plain, ast.Constant) else ast.unparse(plain)
-    of_action = getattr(call.func, "attr", getattr(call.func, "id", "")) in ACTIONS
-    halves = r"(?:Action)?(?:Goal|Result|Feedback|Action)?$" if of_action else r"(?:Request|Response)$"
-    right = re.sub(halves, "Action" if of_action else "", re.sub(r".*/", "", written), count=1)
-    if ast.unparse(type_) == right:
-        return None
-    kind = "an action" if of_action else "a service"
-    return f"the type of {kind} is the class `{shown(right)}`", rewritten(source, (type_, right))
-
-
-def _init_node(message: str, source: str) -> Meaning | None:
-    """Of `init_node(…)` without a name, or with one that is not text."""
-    if re.search(r"\b(?:Rate\.)?__init__\(\) missing 1 required positional argument: 'hz'$", message):
-        return (
-            "`Rate(…)` is not told how often",
-            "write how many times a second the loop has to run in its brackets",
-        )
-    if message == "init_node() missing 1 required positional argument: 'name'":
-        return "a node needs a name", "write the node's name in the brackets, as a string"
-    called = next(iter(_calls(source, "init_node")), None)
-    if called is not None and len(called.args) > 1 and message == "'bool' object is not iterable":
-        flag = called.args[1]
-        cause = "the second argument of `init_node(…)` is not `anonymous`, unless it says so"
-        return cause, rewritten(source, (flag, f"anonymous={ast.unparse(flag)}"))
-    if called is None or not called.args or not message.startswith("argument of type"):
-        return None
-    given = called.args[0]
-    return "a node's name is a string", rewritten(source, (given, f"'{ast.unparse(given)}'"))
-
-
-def _parameter(message: str, source: str) -> Meaning | None:
-    """Of `set_param(…)` with the value before the name."""
-    call = next(iter(_calls(source, "set_param")), None)
-    if call is None or len(call.args) != 2 or "expected string" not in message:
-        return None
-    value, name = call.args
-    if is_text(name) and not is_text(value):
-        return "the parameter's name comes first, then its value", rewritten(
-            source, (value, name), (name, value)
-        )
-    return None
-
-
-def _calls(source: str, *names: str) -> list[ast.Call]:
-    """Return the calls in a line of source, of functions or methods with one of these names."""
-    found = [n for n in ast.walk(_tree(source)) if isinstance(n, ast.Call)]
-    return [n for n in found if getattr(n.func, "attr", getattr(n.func, "id", "")) in names]
-
-
-def _topic(message: str, source: str) -> Meaning:
-    """Of `Publisher(…)` or `Subscriber(…)`: the topic's name is a text and comes first, its type is a class."""
-    found = _calls(source, "Publisher", "Subscriber")
-    args = found[0].args if found else []
-    if "<module " in message:
-        module = shown(message.partition("<module '")[2].partition("'")[0])
-        return (
-            "the type's name refers to a whole module",
-            f"import the type itself: `from {module} import …`",
-        )
-    if len(args) < 2:
-        hint = "write the type of the messages after the topic's name, without quotes"
-        return (
-            "the type of the messages is missing" if found else "a topic's name comes first, then its type",
-            hint,
-        )
-    topic, type_ = args[0], args[1]
-    callback = next(iter(args[2:]), None)
-    if is_text(type_) and not is_text(topic):
-        return "the topic's name comes first, then its type", rewritten(
-            source, (topic, type_), (type_, topic)
-        )
-    if callback is not None and re.search(r"<(?:function|bound method) ", message):
-        return "the type comes before the callback", rewritten(source, (type_, callback), (callback, type_))
-    return _no_type(message, source, topic, type_)
-
-
-def is_text(node: ast.expr) -> bool:
-    return isinstance(node, ast.Constant) and isinstance(node.value, str)
-
-
-def _no_type(message: str, source: str, topic: ast.expr, type_: ast.expr) -> Meaning:
-    """Of what stands in the place of the messages' type."""
-    if isinstance(type_, ast.Constant) and is_text(type_):
-        return "the type is given as a string", rewritten(
-            source, (type_, re.sub(r".*[./]", "", str(type_.value)))
-        )
-    if isinstance(type_, ast.Call):
-        return f"`{shown(ast.unparse(type_))}` is a message, not a type", rewritten(
-            source, (type_, type_.func)
-        )
-    if "topic name" in message and isinstance(topic, ast.Name) and topic.id[:1].isupper():
-        return "the topic's name is missing", f"write the topic's name, in quotes, before `{shown(topic.id)}`"
-    if "topic name" in message and not is_text(topic):
-        return "the topic's name is not text", "write the topic's name in quotes"
-    hint = "import the type of the messages, as in `from std_msgs.msg import String`"
-    return f"`{shown(ast.unparse(type_))}` is not a message type", hint
-
-
-def rewritten(source: str, *changes: tuple[ast.expr, ast.expr | str], span_to: ast.expr | None = None) -> str:
-    """Return the advice to write the line with other text in these places of it, the first one up to `span_to`."""
-    line = source.encode()
-    for old, new in sorted(changes, key=lambda change: change[0].col_offset, reverse=True):
-        text = new if isinstance(new, str) else ast.get_source_segment(source, new) or ""
-        line = line[: old.col_offset] + text.encode() + line[(span_to or old).end_col_offset :]
-    return f"write `{shown(line.decode())}`"
-
-
-def _rate(call: ast.Call) -> Meaning | None:
-    """Of `rospy.Rate(…)` with a text, or with 0."""
-    value = call.args[0].value if call.args and isinstance(call.args[0], ast.Constant) else None
-    if isinstance(value, str):
-        number = re.match(r"\s*(\d+(?:\.\d+)?)", value)
-        hint = f"write `rospy.Rate({number[1]})`" if number else "write how many times a second the loop runs"
-        return "a rate is a number, and this is text", hint
-    if value == 0:
-        return "0 Hz is not a rate", "write how many times a second the loop runs, as in `rospy.Rate(10)`"
-    return None
-
-
 def _operands(left: str, right: str, source: str) -> Meaning | None:
     """Of a calculation: a whole message, or a text."""
     message = next((kind for kind in (left, right) if kind[:1].isupper() and kind != "NoneType"), "")
@@ -433,7 +267,7 @@ def _operands(left: str, right: str, source: str) -> Meaning | None:
     if message:
         sides = [
             n.left if message == left else n.right if isinstance(n, ast.BinOp) else n.comparators[-1]
-            for n in ast.walk(_tree(source))
+            for n in ast.walk(line_tree(source))
             if isinstance(n, ast.BinOp | ast.Compare)
         ]
         name = ast.unparse(sides[0]) if len(sides) == 1 else ""
@@ -500,7 +334,7 @@ def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Me
 
 
 def _zero(_message: str, source: str, _marked: tuple[int, int] | None) -> Meaning:
-    rate = next((meaning for call in _calls(source, "Rate") if (meaning := _rate(call))), None)
+    rate = next((meaning for call in calls_in_line(source, "Rate") if (meaning := explain_rate(call))), None)
     return rate or ("it divides by zero", "check that the divisor is not 0 before you divide")
 
 
@@ -574,56 +408,49 @@ _EXPLAINED: dict[str, Callable[[str, str, tuple[int, int] | None], Meaning | Non
 }
 
 
-def _decimal(value: ast.expr) -> Meaning | None:
-    """Return why a calculation gives no whole number, and the one that does; None where it need not be so."""
-    if isinstance(value, ast.BinOp) and isinstance(value.op, ast.Div):
-        whole = f"{ast.unparse(value.left)} // {ast.unparse(value.right)}"
-        return "the message takes a whole number, and `/` makes one with a decimal point", whole
-    parts = list(ast.walk(value))
-    if isinstance(value, ast.Call) and getattr(value.func, "id", "") == "float" and len(value.args) == 1:
-        return "the message takes a whole number, and `float(…)` makes one with a decimal point", ast.unparse(
-            value.args[0]
-        )
-    decimal = any(isinstance(one, ast.Constant) and isinstance(one.value, float) for one in parts)
-    clock = any(getattr(one, "attr", "") in {"get_time", "to_sec", "time"} for one in parts)
-    if decimal or clock:
-        return "the message takes a whole number, and this has a decimal point", f"int({ast.unparse(value)})"
-    return None
-
-
-def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
-    """Return why a message does not take the value that is published: a text for a number, a number for a text, or the
-    publisher of another topic."""
-    made = re.match(r"(\w+)\(\) takes no arguments", found.message)
-    if made and any(one.path.endswith(f"/{made[1]}.srv") for one in package.interfaces):
-        fix = f"write `{made[1]}Response(…)`, and import it beside {made[1]}"
-        return f"`{made[1]}` is the service's type, and its response has another type", fix
-    frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
-    wants_text = "must be of type bytes or an ascii string" in found.message
-    if not wants_text and "integer type" not in found.message:
+def explain_formatting(message: str, source: str) -> tuple[str, str] | None:
+    """Of a text with `%`: as many values as it has places, in brackets behind the `%`."""
+    lacks = message == "not enough arguments for format string"
+    if not lacks and message != "not all arguments converted during string formatting":
         return None
-    kind, other = ("string", "numbers") if wants_text else ("whole number", "strings")
-    sent = next(iter(_calls(frame.source, "publish")), None)
-    owner = ast.unparse(sent.func.value) if sent is not None and isinstance(sent.func, ast.Attribute) else ""
-    slips = [s for s in package.slips if frame.file.endswith(f"/{s.file}")]
-    types = {s.line: s.message for s in slips if s.kind == "publisher-type"}
-    owners = {s.name: s for s in slips if s.kind == "publisher" and s.line in types}
-    texts = [n for n in _calls(frame.source, "str") if len(n.args) == 1]
-    if texts and not wants_text:
-        why = f"the message takes a {kind}, and `str(…)` makes a string of it"
-        return why, rewritten(frame.source, (texts[0], texts[0].args[0]))
-    point = _decimal(sent.args[0]) if sent is not None and sent.args and not wants_text else None
-    if point is not None:
-        return point[0], rewritten(frame.source, (sent.args[0], point[1])) if sent is not None else ""
-    here = owners.get(owner)
-    others = [s for s in owners.values() if (types[s.line] == "String") is not wants_text]
-    if here is not None and here not in others and len(others) == 1:
-        why = f"`{owner}` publishes {types[here.line]} on {here.message} (line {here.line})"
-        lines = sorted((here.line, others[0].line))
-        fix = (
-            f"swap `{owner}` and `{others[0].name}` on lines {lines[0]} and {lines[1]}, or where they publish"
-        )
-        return why, fix
-    call = "str(…)" if wants_text else "int(…)"
-    hint = f"publish a {kind} here, `{call}`; {other} go to the publisher of their own topic"
-    return f"the message takes a {kind} but gets something else", hint
+    there = "more" if lacks else "fewer"
+    why = f"the string has {there} `%` than there are values after it"
+    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        for node in ast.walk(parsed(source)):
+            beside = node.args if isinstance(node, ast.Call) else getattr(node, "elts", [])
+            if fix := _values_in_brackets(source, beside) if lacks else _places_added(source, beside):
+                return why, fix
+    fix = "give one value for each `%` in the string, or remove one"
+    return why, fix if lacks else "put one `%s` for each value into the string"
+
+
+def _places_in(node: ast.expr) -> int:
+    """Return how many values a text takes behind its `%`; 0 of all else."""
+    text = node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
+    return len(re.findall(r"%[-+ #0-9.]*[a-zA-Z]", text.replace("%%", "")))
+
+
+def _values_in_brackets(source: str, beside: Sequence[ast.expr]) -> str:
+    """Return the line of `'%s %s' % a, b` with the values in brackets; "" for another line."""
+    for at, one in enumerate(beside):
+        if (
+            isinstance(one, ast.BinOp)
+            and isinstance(one.op, ast.Mod)
+            and not isinstance(one.right, ast.Tuple)
+        ):
+            values = [one.right, *beside[at + 1 :]]
+            if _places_in(one.left) == len(values) > 1:
+                texts = [ast.get_source_segment(source, value) or "" for value in values]
+                return rewritten(source, (values[0], f"({', '.join(texts)})"), span_to=values[-1])
+    return ""
+
+
+def _places_added(source: str, beside: Sequence[ast.expr]) -> str:
+    """Return the line of `loginfo('a', b)` with a place for each value at the end of the text; "" for another line."""
+    first = beside[0] if beside else None
+    text = (ast.get_source_segment(source, first) or "") if first is not None else ""
+    lacking = len(beside) - 1 - (_places_in(first) if first is not None else 0)
+    if first is None or not is_text(first) or lacking < 1 or text[-3:] in ('"""', "'''"):
+        return ""
+    places = " ".join(["%s"] * lacking)
+    return rewritten(source, (first, f"{text[:-1].rstrip()} {places}{text[-1]}"))

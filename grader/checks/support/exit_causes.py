@@ -16,24 +16,25 @@ from grader.checks.support.exceptions import (
     SLIPS,
     evaluated,
     explain_exception,
+    explain_formatting,
     explain_number_of_values,
-    is_text,
-    rewritten,
-    unfit_value,
-    wrong_class,
 )
 from grader.checks.support.missing_names import (
     IMPORT_ERRORS,
-    NO_MODULE,
+    broken_import,
     fields_of,
     hiding_file,
+    imported_line,
+    is_module,
+    lacking_module,
+    lacking_too,
     name_slip,
     other_name,
-    own_message,
-    unimported_module,
     unmade,
+    unused_import,
 )
 from grader.checks.support.processes import Life, early_end, lives
+from grader.checks.support.rospy_calls import unfit_value, wrong_class
 from grader.checks.support.scripts import OF_INTERFACES, SYNTAX, path_in_package
 from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, shown
 from grader.evidence.events import STOPPED
@@ -41,10 +42,7 @@ from grader.evidence.run import Run
 from grader.installable import (
     NOTHING_TO_DO,
     ON_THE_MACHINE,
-    exists_somewhere,
     install_hint,
-    is_python_module,
-    known_packages,
 )
 from grader.model.package import Fault, PackageFacts, PythonSlip
 from grader.model.verdict import Citations, FileCitation, Verdict, machine_lacks
@@ -96,11 +94,11 @@ _NUMBER_WANTED = re.compile(r"must be (?:an integer|unsigned integer|float) type
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
-_NUMBER_ASKED = re.compile(r"\b(?:int|float)\(\s*(?:raw_)?input\(")
-_ARITY = re.compile(r"([\w.]+)\(\) (?:takes|missing) ")
 _ADDED = re.compile(
     r"can only concatenate str \(not \"(\w+)\"\) to str|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'"
 )
+_NUMBER_ASKED = re.compile(r"\b(?:int|float)\(\s*(?:raw_)?input\(")
+_ARITY = re.compile(r"([\w.]+)\(\) (?:takes|missing) ")
 _NAME = re.compile(r"(?:name|local variable) '(\w+)' (?:is not defined|where it is not|referenced before)")
 _BY_PYTHON = re.compile(r"\. Did you mean: '(\w+)'\?$")
 
@@ -299,12 +297,13 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     )
     unbuilt = None if hiding else unmade(found, package)
     cause, hint = unbuilt or (cause, hint)
-    if lacking := _lacking(found, package):
+    if lacking := lacking_module(found, package):
         return _of_machine(found, lacking, place, package)
-    if broken := _broken(found, package):
+    if broken := broken_import(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""
         cause = f"{shown(found.text)}{where}: raised by a file of this grading machine, {broken}"
-        hint = f"{ON_THE_MACHINE}repair {shown(_imported(found)) or 'what is imported'}, which fails there by itself"
+        line = shown(imported_line(found)) or "what is imported"
+        hint = f"{ON_THE_MACHINE}repair {line}, which fails there by itself"
         return Ending(cause, hint, (place,) if place else (), of_machine=True)
     source = package.file(place.file) if place and found.kind in SYNTAX else None
     if place is not None and source is not None and source.python_fault is not None:
@@ -314,7 +313,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     if place is not None and misplaced is None:
         cause, hint = _by_other_lines(found, place, package) or (cause, hint)
     if place is not None and found.kind in IMPORT_ERRORS and unbuilt is None and not hiding:
-        hint = _unused_import(place, package) or hint
+        hint = unused_import(place, package) or hint
     said = re.sub(r" \(/\S+/__init__\.py\)$", "", found.text)
     if (guess := _BY_PYTHON.search(said)) and (hasattr(builtins, guess[1]) or "did you mean" in cause):
         said = said.removesuffix(guess[0])
@@ -326,39 +325,6 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(said.rstrip('.'))}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else (), unbuilt=unbuilt is not None)
-
-
-def _of_machine(found: Traceback, lacking: str, place: FileCitation | None, package: PackageFacts) -> Ending:
-    """Explain an import of what exists and this machine lacks, with what else the script needs of the kind."""
-    where = f" ({place.file}, line {place.line})" if place else ""
-    others = [name for name in _lacking_too(place, package) if name != lacking]
-    cause = f"{shown(found.text)}{where}: this grading machine lacks {join_words([lacking, *others])}"
-    hint = install_hint(lacking, module=_is_module(lacking, package), also=others)
-    if place is not None and (unused := _unused_import(place, package)):
-        needed = hint.replace(NOTHING_TO_DO, "If you need it, ", 1)
-        hint = f"{unused}. {needed}"
-    return Ending(cause, hint, (place,) if place else (), of_machine=True)
-
-
-def _lacking_too(place: FileCitation | None, package: PackageFacts) -> tuple[str, ...]:
-    """Return the modules of Python, none of ROS's, that the script imports and that were not there either."""
-    slips = (
-        s for s in package.slips if place is not None and (s.file, s.kind) == (place.file, "lacking-import")
-    )
-    return tuple(dict.fromkeys(s.message for s in slips if is_python_module(s.message)))
-
-
-def _unused_import(place: FileCitation, package: PackageFacts) -> str:
-    """Return that the import on that line is not needed; "" where it is, or another name of the file is not there."""
-    own = [s for s in package.slips if s.file == place.file]
-    if any(s.kind in {"undefined", "misspelt"} for s in own):
-        return ""
-    unused = {s.line for s in own if s.kind == "unused-import"}
-    lacking = [(s.line, s.message) for s in own if s.kind == "lacking-import"]
-    needed = {module for line, module in lacking if line not in unused}
-    if any(line == place.line and module in needed for line, module in lacking):
-        return ""
-    return next((s.fix for s in own if (s.kind, s.line) == ("unused-import", place.line)), "")
 
 
 def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
@@ -453,7 +419,7 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     known = explain_number_of_values(found.message) or known
     meant = unfit_value(found, package) or known or other_name(found, package)
     frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
-    meant = meant or _values_of_text(found.message, source)
+    meant = meant or explain_formatting(found.message, source)
     return meant or explain_exception(found.kind, found.message, frame.source, frame.marked)
 
 
@@ -481,151 +447,6 @@ def _callback(found: Traceback, place: FileCitation | None, package: PackageFact
     name = match[1].rpartition(".")[2] if match else ""
     taken = (s for s in package.slips if s.kind == "callback-values" and s.name == name)
     return here or (next(taken, None) if name and not found.own_frames else None)
-
-
-def _operand(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
-    """A text or a message and something else are added: which of both does not fit, where Python marks the place."""
-    if not (match := _ADDED.search(found.message)):
-        return None
-    of_text = bool(match[1]) or "str" in match.groups()
-    left = match[3] == "str" or (not of_text and bool(fields_of(package, match[2])))
-    kind, is_right = (match[1], True) if match[1] else (match[2], False) if left else (match[3], True)
-    other = _other_side(found.own_frames[-1], is_right=is_right)
-    if fields := fields_of(package, kind):
-        value = f"{other or 'msg'}.{fields[0]}"
-        value = value if kind == "String" or not of_text else f"str({value})"
-        return (
-            f"{other or 'one side'} is the whole message ({kind})",
-            f"write `{value}` instead of `{other or 'msg'}`",
-        )
-    if not of_text:
-        return None
-    if other:
-        return f"{other} is not a string", f"write `str({other})` instead of `{other}`"
-    return (
-        f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} is not a string",
-        "wrap it in `str(…)` before you add it to a string",
-    )
-
-
-def _other_side(frame: Frame, *, is_right: bool) -> str:
-    """Return the side of a sum that is not text: of the one that Python marks, or of the line's only one."""
-    source = frame.source[slice(*frame.marked)] if frame.marked else frame.source
-    with suppress(SyntaxError, ValueError, RecursionError):
-        nodes = list(ast.walk(parsed(source)))
-        sums = [n for n in nodes if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)]
-        if sums and (frame.marked or len(sums) == 1):
-            return shown(ast.unparse(sums[0].right if is_right else sums[0].left))
-        more = next((n for n in nodes if isinstance(n, ast.AugAssign)), None)
-        if more is not None:
-            return shown(ast.unparse(more.value if is_right else more.target))
-    return ""
-
-
-def _values_of_text(message: str, source: str) -> tuple[str, str] | None:
-    """Of a text with `%`: as many values as it has places, in brackets behind the `%`."""
-    lacks = message == "not enough arguments for format string"
-    if not lacks and message != "not all arguments converted during string formatting":
-        return None
-    there = "more" if lacks else "fewer"
-    why = f"the string has {there} `%` than there are values after it"
-    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-        for node in ast.walk(parsed(source)):
-            beside = node.args if isinstance(node, ast.Call) else getattr(node, "elts", [])
-            if fix := _values_in_brackets(source, beside) if lacks else _places_added(source, beside):
-                return why, fix
-    fix = "give one value for each `%` in the string, or remove one"
-    return why, fix if lacks else "put one `%s` for each value into the string"
-
-
-def _places_in(node: ast.expr) -> int:
-    """Return how many values a text takes behind its `%`; 0 of all else."""
-    text = node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
-    return len(re.findall(r"%[-+ #0-9.]*[a-zA-Z]", text.replace("%%", "")))
-
-
-def _values_in_brackets(source: str, beside: Sequence[ast.expr]) -> str:
-    """Return the line of `'%s %s' % a, b` with the values in brackets; "" for another line."""
-    for at, one in enumerate(beside):
-        if (
-            isinstance(one, ast.BinOp)
-            and isinstance(one.op, ast.Mod)
-            and not isinstance(one.right, ast.Tuple)
-        ):
-            values = [one.right, *beside[at + 1 :]]
-            if _places_in(one.left) == len(values) > 1:
-                texts = [ast.get_source_segment(source, value) or "" for value in values]
-                return rewritten(source, (values[0], f"({', '.join(texts)})"), span_to=values[-1])
-    return ""
-
-
-def _places_added(source: str, beside: Sequence[ast.expr]) -> str:
-    """Return the line of `loginfo('a', b)` with a place for each value at the end of the text; "" for another line."""
-    first = beside[0] if beside else None
-    text = (ast.get_source_segment(source, first) or "") if first is not None else ""
-    lacking = len(beside) - 1 - (_places_in(first) if first is not None else 0)
-    if first is None or not is_text(first) or lacking < 1 or text[-3:] in ('"""', "'''"):
-        return ""
-    places = " ".join(["%s"] * lacking)
-    return rewritten(source, (first, f"{text[:-1].rstrip()} {places}{text[-1]}"))
-
-
-def _lacking(found: Traceback, package: PackageFacts) -> str:
-    """Return the module that exists and that this machine lacks; "" for a name that is the student's own affair."""
-    match = NO_MODULE.search(found.message) if found.kind == "ModuleNotFoundError" else None
-    # roslib.load_manifest, which rosbuild needed, asks for the ROS package itself
-    name = found.message if found.kind == "ResourceNotFound" else match[1] if match else ""
-    own = package.own_modules
-    sure = found.kind == "ResourceNotFound" or (bool(found.frames) and found.frames[-1].in_library)
-    known = name in known_packages() or not _is_module(name, package)
-    lacks = exists_somewhere(name, own) and (known or not sure)
-    otherwise = own_message(found, package) or unimported_module(found, package)
-    return name if name and name not in own and lacks and not otherwise else ""
-
-
-def _is_module(name: str, package: PackageFacts) -> bool:
-    """Return whether it is a module of Python, and no package of ROS that messages come from."""
-    declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
-    whole = [one.fix for one in package.slips if one.kind == "lacking-import" and one.message == name]
-    of_messages = any(one.endswith((".msg", ".srv")) for one in whole)
-    return name not in declared and not name.endswith(("_msgs", "_srvs")) and not of_messages
-
-
-def _broken(found: Traceback, package: PackageFacts) -> str:
-    """Return the file of ROS's or of the machine's that cannot be imported; "" where the student takes part in it.
-
-    Someone else's file raised it while a line of the student's imported it, and nothing of the package has the name of
-    a module that takes part.
-    """
-    last = found.frames[-1] if found.frames else None
-    imports = _imported(found) or not found.own_frames
-    kinds = (*IMPORT_ERRORS, *SYNTAX) if not found.own_frames else ()
-    if last is None or not last.in_library or not imports or (kinds and found.kind not in kinds):
-        return ""
-    words = set(
-        re.findall(r"\w+", " ".join([found.message, *(f"{f.file} {f.source}" for f in found.frames)]))
-    )
-    own = {
-        name.partition(".")[0]
-        for one in (package, *package.also)
-        for file in one.files
-        for name in file.path.split("/")[-2:]
-        if file.python and not name.startswith("__init__")
-    }
-    shadowed = (
-        own
-        - {f.file.rpartition("/")[2].partition(".")[0] for f in found.own_frames}
-        - {"src", "scripts", "nodes", "bin"}
-    )
-    return "" if shadowed & words else f"{last.file}, line {last.line}"
-
-
-def _imported(found: Traceback) -> str:
-    """Return the student's line that imports something, and does nothing else, if it was the last of the student's to
-    be run."""
-    source = found.own_frames[-1].source if found.own_frames else ""
-    only = all(re.match(r"\s*((import|from)\s|$)", part) for part in source.split(";"))
-    return source if only else ""
 
 
 def process_tracebacks(
@@ -686,3 +507,54 @@ def _signal_name(number: int) -> str:
         return f"signal {number} ({signal.Signals(number).name})"
     except ValueError:
         return f"signal {number}"
+
+
+def _operand(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
+    """A text or a message and something else are added: which of both does not fit, where Python marks the place."""
+    if not (match := _ADDED.search(found.message)):
+        return None
+    of_text = bool(match[1]) or "str" in match.groups()
+    left = match[3] == "str" or (not of_text and bool(fields_of(package, match[2])))
+    kind, is_right = (match[1], True) if match[1] else (match[2], False) if left else (match[3], True)
+    other = _other_side(found.own_frames[-1], is_right=is_right)
+    if fields := fields_of(package, kind):
+        value = f"{other or 'msg'}.{fields[0]}"
+        value = value if kind == "String" or not of_text else f"str({value})"
+        return (
+            f"{other or 'one side'} is the whole message ({kind})",
+            f"write `{value}` instead of `{other or 'msg'}`",
+        )
+    if not of_text:
+        return None
+    if other:
+        return f"{other} is not a string", f"write `str({other})` instead of `{other}`"
+    return (
+        f"{'an' if kind[0] in 'aeiou' else 'a'} {kind} is not a string",
+        "wrap it in `str(…)` before you add it to a string",
+    )
+
+
+def _other_side(frame: Frame, *, is_right: bool) -> str:
+    """Return the side of a sum that is not text: of the one that Python marks, or of the line's only one."""
+    source = frame.source[slice(*frame.marked)] if frame.marked else frame.source
+    with suppress(SyntaxError, ValueError, RecursionError):
+        nodes = list(ast.walk(parsed(source)))
+        sums = [n for n in nodes if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)]
+        if sums and (frame.marked or len(sums) == 1):
+            return shown(ast.unparse(sums[0].right if is_right else sums[0].left))
+        more = next((n for n in nodes if isinstance(n, ast.AugAssign)), None)
+        if more is not None:
+            return shown(ast.unparse(more.value if is_right else more.target))
+    return ""
+
+
+def _of_machine(found: Traceback, lacking: str, place: FileCitation | None, package: PackageFacts) -> Ending:
+    """Explain an import of what exists and this machine lacks, with what else the script needs of the kind."""
+    where = f" ({place.file}, line {place.line})" if place else ""
+    others = [name for name in lacking_too(place, package) if name != lacking]
+    cause = f"{shown(found.text)}{where}: this grading machine lacks {join_words([lacking, *others])}"
+    hint = install_hint(lacking, module=is_module(lacking, package), also=others)
+    if place is not None and (unused := unused_import(place, package)):
+        needed = hint.replace(NOTHING_TO_DO, "If you need it, ", 1)
+        hint = f"{unused}. {needed}"
+    return Ending(cause, hint, (place,) if place else (), of_machine=True)

@@ -1,0 +1,389 @@
+"""Finds what is wrong with the loops of a student's Python, for `slips.py`: those that never end, never wait or stop
+too soon, also in callbacks, and those that do not end on Ctrl-C; besides, the rates that a script asks for.
+
+Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+
+from script_names import (
+    argument,
+    called_name,
+    calls_in,
+    dotted,
+    functions_in,
+    is_call,
+    slip,
+    text_of,
+    turns,
+    walk,
+)
+
+CALLED_BACK = {"Subscriber": "callback", "Service": "handler"}
+"""What calls a function of the script's, and the name of that argument."""
+
+
+def loop_rates(tree):
+    """Rates of loops and timers: a parameter that is read there, its name as written; or a number, in Hz as text.
+
+    Either may have been given to a name once.
+    """
+    bound, looped = {}, set()
+    for node in walk(tree):
+        if isinstance(node, ast.Assign) and len(node.targets) == 1:
+            bound.setdefault(ast.dump(node.targets[0]).replace("Store()", "Load()"), []).append(node.value)
+        elif isinstance(node, (ast.While, ast.For)):
+            looped.update(map(id, calls_in(node, "sleep")))
+
+    def given(node):
+        values = bound.get(ast.dump(node), [node])
+        return values[0] if len(values) == 1 else node
+
+    for node in calls_in(tree, "Rate", "sleep", "Timer"):
+        timed = node.func.attr
+        if not node.args or (timed == "sleep" and id(node) not in looped):
+            continue
+        value = given(node.args[0])
+        whole = nanoseconds_apart(value) if is_call(value, "Duration") else None
+        if is_call(value, "Duration") and value.args and not whole:
+            value = given(value.args[0])
+        yield from loop_rate(node, timed, value, whole or constant(value, given))
+
+
+def loop_rate(call, timed, value, number):
+    """Yield the rate that a `Rate(…)`, `sleep(…)` or `Timer(…)` asks for: of the last two, `number` is in seconds."""
+    name = read_parameter(value) if timed == "Rate" else None
+    if name:
+        yield slip(value.lineno, "rate-parameter", name)
+    elif number:
+        hz = "%.12g" % (number if timed == "Rate" else 1.0 / number)
+        pause, fix = dotted(call.func) if timed == "sleep" else "", ""
+        if is_call(value, "Duration"):
+            pause, fix = dotted(value.func), "its second number counts nanoseconds, so it is %.9g s" % number
+        yield slip(value.lineno, "rate-number", hz, fix=fix, name=pause)
+
+
+def nanoseconds_apart(call):
+    """Return how many seconds `Duration(0, 100)` is, of whole seconds and of nanoseconds; None of any other call."""
+    parts = [getattr(one, "value", None) for one in call.args]
+    if len(parts) != 2 or not all(type(one) is int and 0 <= one < 1 << 31 for one in parts) or not parts[1]:
+        return None
+    return parts[0] + parts[1] * 1e-9
+
+
+MAKES = ("Publisher", "Subscriber", "Service")
+
+
+def never_reached(tree):
+    """Loops without an end before the first `publish(…)`, `Publisher(…)` and the like that comes behind them in the
+    same block, in a function or class of this file too.
+    """
+    parts = [n for n in walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))]
+    own = {n.name for n in parts if calls_in(n, *MAKES)}
+
+    def word(node):
+        name = called_name(node)
+        return name if name in own or is_call(node, "publish", *MAKES) else None
+
+    for node in walk(tree):
+        for block in (getattr(node, "body", None), getattr(node, "orelse", None)):
+            for index, loop in enumerate(block if isinstance(block, list) else ()):
+                spins = isinstance(loop, ast.Expr) and is_call(loop.value, "spin")
+                if not spins and not (isinstance(loop, ast.While) and is_endless(loop)):
+                    continue
+                within = {word(n) for n in ast.walk(loop) if isinstance(n, ast.Call)}
+                behind = [
+                    n for later in block[index + 1 :] for n in ast.walk(later) if isinstance(n, ast.Call)
+                ]
+                behind = [n for n in behind if word(n) and word(n) not in within]
+                if behind and "publish" not in within:
+                    what = "spin()" if spins else "loop"
+                    message = "the %s on line %d never ends, so the %s(…) on line %d is never reached"
+                    message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
+                    fix = "move line %d above line %d" % (behind[0].lineno, loop.lineno)
+                    fix = "" if word(behind[0]) == "publish" else fix
+                    yield slip(loop.lineno, "never-reached", message, fix=fix)
+
+
+def stopped_loops(tree):
+    """`spin()` in a loop that publishes: the loop does not come round. `break` or `return` in each of its turns, or so
+    many turns and no more. And `if` in place of `while`.
+    """
+    turned = dict(turns(tree))
+    for loop in walk(tree):
+        once = isinstance(loop, ast.If) and is_call(getattr(loop.test, "operand", None), "is_shutdown")
+        if once and not turned[loop][1] and calls_in(loop, "publish"):
+            message = "the `if` on line %d runs what follows it once" % loop.lineno
+            fix = "write `while` instead of `if` on line %d" % loop.lineno
+            yield slip(loop.lineno, "loop-left", message, fix=fix)
+        if isinstance(loop, ast.While) and is_call(loop.test, "is_shutdown"):
+            message = (
+                "the loop on line %d runs only when the node should end: a `not` is missing" % loop.lineno
+            )
+            fix = "on line %d, write `while not %s():`" % (loop.lineno, dotted(loop.test.func))
+            yield slip(loop.lineno, "loop-left", message, fix=fix)
+        if not isinstance(loop, (ast.While, ast.For)) or not calls_in(loop, "publish"):
+            continue
+        for spin in calls_in(loop, "spin")[:1]:
+            message = "the loop stops at the spin() on line %d, which waits until the node ends" % spin.lineno
+            fix = "remove spin(): the loop keeps the node alive"
+            yield slip(spin.lineno, "spin-in-loop", message, fix=fix)
+        if is_counted(loop) and not turned[loop][1]:
+            message = "the loop on line %d ends after a fixed number of rounds" % loop.lineno
+            used = {n.id for one in loop.body for n in ast.walk(one) if isinstance(n, ast.Name)}
+            fix = "write `while not rospy.is_shutdown():` on line %d" % loop.lineno
+            if isinstance(loop, ast.For) and dotted(loop.target) in used:
+                fix = "put it inside a `while not rospy.is_shutdown():`"
+            yield slip(loop.lineno, "loop-left", message, fix=fix)
+        left = next((n for n in loop.body if isinstance(n, (ast.Break, ast.Return))), None)
+        if left is not None:
+            word = "break" if isinstance(left, ast.Break) else "return"
+            message = "the loop ends the first time around, at the %s on line %d" % (word, left.lineno)
+            fix = "remove it from line %d, or put it inside an `if`" % left.lineno
+            yield slip(left.lineno, "loop-left", message, fix=fix)
+
+
+def is_counted(loop):
+    """Whether it is `for … in range(…)`, or `while … and count < 10:`."""
+    if isinstance(loop, ast.For):
+        return called_name(loop.iter) == "range"
+    asked = loop.test if isinstance(loop, ast.While) else None
+    parts = asked.values if isinstance(asked, ast.BoolOp) and isinstance(asked.op, ast.And) else [asked]
+    orders = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.NotEq)
+    return any(isinstance(one, ast.Compare) and isinstance(one.ops[0], orders) for one in parts)
+
+
+PAUSES = ("rospy.sleep", "time.sleep")
+WAITS = ("sleep", "spin", "spin_once", "wait_for_message", "wait_for_service", "wait", "join", "input")
+
+
+def sleepless_loops(tree):
+    """Loops that publish and wait nowhere, where `rate.sleep()` stands outside of them."""
+    loops = [n for n in walk(tree) if isinstance(n, (ast.While, ast.For))]
+    sleeps = calls_in(tree, "sleep")
+    for loop in loops:
+        inner = [n for n in ast.walk(loop) if n is not loop and n in loops and calls_in(n, "publish")]
+        before = [n for n in sleeps if n.lineno < loop.lineno and dotted(n.func) not in PAUSES]
+        outside = [n for n in sleeps if n.lineno > loop.lineno] or before
+        yield from sleeps_in_if(loop)
+        if calls_in(loop, *WAITS) or inner or not outside or not calls_in(loop, "publish"):
+            continue
+        name = dotted(outside[0].func) or "sleep"
+        message = "`%s()` is outside the loop on line %d" % (name, loop.lineno)
+        last = loop.body[-1]
+        fix = "move it into that loop, below line %d, with the same spaces or tabs before it as line %d has"
+        fix %= (last.end_lineno, last.lineno)
+        yield slip(outside[0].lineno, "sleep-outside", message, fix=fix, name=name)
+
+
+def sleeps_in_if(loop):
+    """Yield the only `sleep()` of a loop that publishes in each of its turns, where it stands in an `if`."""
+    plain = [one for one in loop.body if isinstance(one, ast.Expr) and is_call(one.value, "publish")]
+    sleeps = [n for one in loop.body for n in calls_in(one, *WAITS)]
+    for one in loop.body:
+        within = one.body if isinstance(one, ast.If) and not one.orelse else []
+        own = [n for n in within if isinstance(n, ast.Expr) and is_call(n.value, "sleep")]
+        if plain and len(sleeps) == len(own) == 1 and own[0] is within[-1] and one is loop.body[-1]:
+            name, line = dotted(own[0].value.func), own[0].lineno
+            message = "`%s()` is inside the `if` on line %d" % (name, one.lineno)
+            fix = "write line %d with the same spaces or tabs before it as line %d has" % (line, one.lineno)
+            yield slip(line, "sleep-outside", message, fix=fix, name=name)
+
+
+def sleeps_twice(tree):
+    """Loops that wait twice in each of their turns, and publish once."""
+    for loop in walk(tree):
+        body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
+        at = [i for i, n in enumerate(body) if isinstance(n, ast.Expr) and called_name(n.value) == "sleep"]
+        if len(at) != 2:
+            continue
+        between, around = body[at[0] + 1 : at[1]], body[: at[0]] + body[at[1] + 1 :]
+        publish = [any(calls_in(one, "publish") for one in part) for part in (between, around)]
+        if sorted(publish) == [False, True]:
+            lines = (body[at[0]].lineno, body[at[1]].lineno)
+            message = "the loop sleeps on line %d and again on line %d" % lines
+            yield slip(lines[1], "sleep-twice", message, fix="delete line %d" % lines[1])
+
+
+def publishes_twice(tree):
+    """Loops that publish on one topic more than once in each of their turns, and sleep once at most."""
+    for loop in walk(tree):
+        body = loop.body if isinstance(loop, (ast.While, ast.For)) else []
+        plain = [one for one in body if isinstance(one, ast.Expr) and called_name(one.value) == "publish"]
+        by_publisher = {}
+        for one in plain:
+            by_publisher.setdefault(ast.dump(one.value.func), []).append(one)
+        many = [same for same in by_publisher.values() if len(same) > 1]
+        if not many or any(
+            calls_in(n, *WAITS) for n in body[body.index(many[0][0]) : body.index(many[0][-1])]
+        ):
+            continue
+        first, second = many[0][:2]
+        lines = [one.lineno for one in many[0]]
+        if ast.dump(first) == ast.dump(second) and body.index(second) == body.index(first) + 1:
+            message, fix = "the loop publishes on line %d and the same again on line %d", "delete line %d"
+            message, fix = message % (lines[0], lines[1]), fix % lines[1]
+        else:
+            listed = "lines %s and %d" % (", ".join(map(str, lines[:-1])), lines[-1])
+            message, fix = "each turn of the loop publishes on %s", "delete all but one of %s"
+            message, fix = message % listed, fix % listed
+        yield slip(lines[1], "publish-twice", message, fix=fix)
+
+
+def waiting_callbacks(tree):
+    """Callbacks of topics and services that do not come to their end, or late: nothing further is read before."""
+    functions = functions_in(tree)
+    for node in walk(tree):
+        kind = called_name(node)
+        given = argument(node, 2, CALLED_BACK[kind]) if kind in CALLED_BACK else []
+        own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
+        inside = list(ast.walk(own)) if own is not None else []
+        for inner in inside if node not in inside else ():
+            if isinstance(inner, ast.While) and is_endless(inner, own):
+                message, fix = "the loop in the callback `%s`, line %d, never ends", "take the loop out of it"
+            elif is_call(inner, "spin"):
+                message, fix = "the callback `%s` calls spin() on line %d", "move line %d out of it"
+            elif called_name(inner) == "sleep" and not is_short(inner):
+                message, fix = "the callback `%s` sleeps on line %d", "delete line %d"
+            else:
+                continue
+            fix = fix % inner.lineno if "%" in fix else fix
+            yield slip(
+                inner.lineno, "callback-waits", message % (own.name, inner.lineno), fix=fix, name=own.name
+            )
+            break
+
+
+def is_short(sleep):
+    return bool(sleep.args) and (constant(sleep.args[0], lambda node: node) or 1.0) < 0.1
+
+
+def is_endless(loop, function=None):
+    """Whether it asks for nothing but the node's end, and nothing in it leaves it; in a function, also for variables of
+    the function that nothing in the loop changes."""
+    asks = asks_for_ever(loop.test) or (function is not None and is_unchanging(loop, function))
+    return asks and not any(isinstance(n, (ast.Break, ast.Return, ast.Raise)) for n in ast.walk(loop))
+
+
+def asks_for_ever(test):
+    inverted = isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not)
+    return (isinstance(test, ast.Constant) and bool(test.value)) or (
+        inverted and is_call(test.operand, "is_shutdown")
+    )
+
+
+def is_unchanging(loop, function):
+    """Whether a loop's condition is made of the function's own variables and numbers, and nothing in it sets them."""
+    parts = [loop.test]
+    if isinstance(loop.test, ast.BoolOp) and isinstance(loop.test.op, ast.And):
+        parts = [part for part in loop.test.values if not asks_for_ever(part)]
+    inside = [n for part in parts for n in ast.walk(part)]
+    names = {n.id for n in inside if isinstance(n, ast.Name)}
+    shared = {
+        name for n in ast.walk(function) if isinstance(n, (ast.Global, ast.Nonlocal)) for name in n.names
+    }
+    own, changed = set_in(function) - shared, set_in(loop)
+    is_plain_test = not any(isinstance(n, (ast.Call, ast.Attribute, ast.Subscript)) for n in inside)
+    return bool(names) and is_plain_test and names <= own - changed
+
+
+def set_in(tree):
+    """Return the names that are set somewhere in a tree."""
+    return {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and not isinstance(n.ctx, ast.Load)}
+
+
+def constant(node, given, depth=4):
+    """Return the positive number that an expression of numbers comes to, None where it is something else."""
+    node = given(node)
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float) and 0 < node.value < 1e9:
+        return float(node.value)
+    if depth and isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Div, ast.Mult)):
+        left, right = constant(node.left, given, depth - 1), constant(node.right, given, depth - 1)
+        if left and right:
+            return left / right if isinstance(node.op, ast.Div) else left * right
+    return None
+
+
+def read_parameter(node):
+    """Return the name in `get_param('name')`, also within `float(…)`."""
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
+        node = node.args[0] if node.func.id in ("float", "int") else node
+    return text_of(node.args[0]) if is_call(node, "get_param") and node.args else ""
+
+
+SWALLOWS = {"KeyboardInterrupt", "ROSInterruptException", "ROSException", "Exception", "BaseException"}
+ENDS = (ast.Break, ast.Return, ast.Raise)
+RAISING = ("wait_for_message", "wait_for_service")
+"""Calls that end with an exception on Ctrl-C. `rate.sleep()` is none of them: by the real clock it sleeps on."""
+ASKS = "check `rospy.is_shutdown()` in it: `while not rospy.is_shutdown():`"
+
+
+def deaf_loops(tree):
+    """Why a node goes on after Ctrl-C: loops that do not ask for it, an `except` within them, signals put off."""
+    endless, others, counted = [], [], []
+    for loop in walk(tree):
+        is_while = isinstance(loop, ast.While)
+        inside = list(ast.walk(loop)) if is_while or isinstance(loop, ast.For) else []
+        if (
+            not inside
+            or any(map(is_shutdown, inside))
+            or not (is_while or is_endless_for(loop) or sleeps(loop))
+        ):
+            continue
+        caught = [h for n in inside if isinstance(n, ast.Try) for h in n.handlers if goes_on(h)]
+        if calls_in(loop, *RAISING):
+            for handler in caught[:1]:
+                message = (
+                    "the `except` on line %d catches what Ctrl-C raises, and the loop on line %d goes on"
+                )
+                endless.append(slip(loop.lineno, "deaf", message % (handler.lineno, loop.lineno), fix=ASKS))
+        elif is_while or is_endless_for(loop):
+            known = not is_while or isinstance(loop.test, ast.Constant)
+            (endless if known else others).append(
+                deaf(loop, [n for n in inside if n is not loop and sleeps(n)])
+            )
+        else:
+            counted.append(deaf(loop, []))
+    for node in walk(tree):
+        if is_call(node, "init_node") and any(k.arg == "disable_signals" for k in node.keywords):
+            message = "`disable_signals=True` on line %d keeps Ctrl-C from rospy" % node.lineno
+            yield slip(node.lineno, "deaf", message, fix="leave it out")
+        if is_call(node, "signal") and node.args and dotted(node.args[0]).endswith("SIGINT"):
+            message = "line %d gives Ctrl-C another meaning" % node.lineno
+            yield slip(node.lineno, "deaf", message, fix="delete it")
+    yield from endless or others or counted
+
+
+def deaf(loop, within):
+    """Return the slip of a loop that never asks, with those `within` it that take their time."""
+    lines = [one.lineno for one in (loop, *within)]
+    named = "loops on lines %s and %d never check" % (", ".join(map(str, lines[:-1])), lines[-1])
+    named = named if within else "loop on line %d never checks" % loop.lineno
+    ends = ["write `if rospy.is_shutdown(): break` below the `for` on line %d" % one.lineno for one in within]
+    fixes = (
+        [ASKS, *ends]
+        if isinstance(loop, ast.While) or within
+        else ["write `if rospy.is_shutdown(): break` below the `for` on line %d" % loop.lineno]
+    )
+    return slip(loop.lineno, "deaf", "the %s whether the node should end" % named, fix="; then ".join(fixes))
+
+
+def is_endless_for(loop):
+    return isinstance(loop, ast.For) and called_name(loop.iter) == "count"
+
+
+def sleeps(loop):
+    """Whether it is a `for` that sleeps in each of its turns, so that it can take long."""
+    return isinstance(loop, ast.For) and bool(calls_in(loop, "sleep"))
+
+
+def goes_on(handler):
+    """Whether an `except` catches what Ctrl-C raises, and leaves neither the loop nor the script."""
+    kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
+    catches = any(kind is None or dotted(kind).rpartition(".")[2] in SWALLOWS for kind in kinds)
+    left = (n for n in ast.walk(handler) if isinstance(n, ENDS) or called_name(n) in ("exit", "_exit"))
+    return catches and next(left, None) is None
+
+
+def is_shutdown(node):
+    return getattr(node, "attr", getattr(node, "id", "")) == "is_shutdown"

@@ -1,0 +1,249 @@
+"""What is wrong with a call of rospy's, by what it raised and the line that calls it: a name, a type or a value in the
+wrong place."""
+
+from __future__ import annotations
+
+import ast
+import re
+from contextlib import suppress
+
+from grader.checks.support.console_output import Frame, Traceback
+from grader.checks.support.text import shown
+from grader.model.package import PackageFacts
+from grader.syntax_fixes import parsed
+
+Meaning = tuple[str, str]
+"""The cause, and what to do."""
+_BAD_TOPIC = re.compile(
+    r"^topic name is not a non-empty string|^(?:topic parameter 'data_class'|data_class \[)"
+    r"|^(?:Publisher|Subscriber)\.__init__\(\) missing"
+)
+
+
+def line_tree(source: str) -> ast.AST:
+    """Return the syntax tree of a line that may begin a block; an empty one where Python cannot parse it."""
+    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        return parsed(f"{source} pass" if source.rstrip().endswith(":") else source)
+    return ast.Module(body=[], type_ignores=[])
+
+
+def explain_ros_call(message: str, source: str) -> Meaning | None:
+    """Of a call of rospy's: a topic's name, type or order, a rate, a pause, a class in place of a message."""
+    if _BAD_TOPIC.match(message):
+        return _topic(message, source)
+    if re.search(r"between instances of 'Rate' and|^Rate\.sleep\(\) takes 1 positional", message):
+        slept = next(iter(calls_in_line(source, "sleep")), None)
+        rate = "rate"
+        if slept is not None and "instances" in message and slept.args:
+            rate = ast.unparse(slept.args[0])
+        elif slept is not None and isinstance(slept.func, ast.Attribute):
+            rate = ast.unparse(slept.func.value)
+        return "a Rate already knows how long to sleep", f"write `{shown(rate)}.sleep()`"
+    if meaning := _init_node(message, source) or _parameter(message, source) or _sent_class(message, source):
+        return meaning
+    if asks_for_rate := calls_in_line(source, "Rate"):
+        return explain_rate(asks_for_rate[0])
+    return None
+
+
+def _sent_class(message: str, source: str) -> Meaning | None:
+    """Of `publish(…)` with the class of the messages, or with a name that was given it."""
+    if serialized := re.match(r"(\w+)\.serialize\(\) missing", message):
+        name = serialized[1]
+        sent = [ast.unparse(one) for call in calls_in_line(source, "publish") for one in call.args[:1]]
+        if sent and re.fullmatch(r"\w+", sent[0]) and sent[0] != name:
+            cause = f"`{shown(sent[0])}` is the type `{name}` itself, and not a message"
+            return cause, f"write brackets where it is made: `{shown(sent[0])} = {name}()`"
+        return (
+            f"`{name}` is the type of the messages, not a message",
+            f"publish a value: `{name}(…)`, or the value alone",
+        )
+    return None
+
+
+SERVICES = ("Service", "ServiceProxy")
+ACTIONS = ("SimpleActionServer", "SimpleActionClient", "ActionServer", "ActionClient")
+
+
+def wrong_class(source: str) -> Meaning | None:
+    """Return what is wrong with the type that a line gives a service or an action: one half of it, a value, a text, or
+    the place of the name."""
+    call = next(iter(calls_in_line(source, *SERVICES, *ACTIONS)), None)
+    if call is None or len(call.args) < 2:
+        return None
+    name, type_ = call.args[:2]
+    if is_text(type_) and not is_text(name):
+        return "the name comes first, then the type", rewritten(source, (name, type_), (type_, name))
+    plain = type_.func if isinstance(type_, ast.Call) else type_
+    written = str(plain.value) if isinstance(plain, ast.Constant) else ast.unparse(plain)
+    of_action = getattr(call.func, "attr", getattr(call.func, "id", "")) in ACTIONS
+    halves = r"(?:Action)?(?:Goal|Result|Feedback|Action)?$" if of_action else r"(?:Request|Response)$"
+    right = re.sub(halves, "Action" if of_action else "", re.sub(r".*/", "", written), count=1)
+    if ast.unparse(type_) == right:
+        return None
+    kind = "an action" if of_action else "a service"
+    return f"the type of {kind} is the class `{shown(right)}`", rewritten(source, (type_, right))
+
+
+def _init_node(message: str, source: str) -> Meaning | None:
+    """Of `init_node(…)` without a name, or with one that is not text."""
+    if re.search(r"\b(?:Rate\.)?__init__\(\) missing 1 required positional argument: 'hz'$", message):
+        return (
+            "`Rate(…)` is not told how often",
+            "write how many times a second the loop has to run in its brackets",
+        )
+    if message == "init_node() missing 1 required positional argument: 'name'":
+        return "a node needs a name", "write the node's name in the brackets, as a string"
+    called = next(iter(calls_in_line(source, "init_node")), None)
+    if called is not None and len(called.args) > 1 and message == "'bool' object is not iterable":
+        flag = called.args[1]
+        cause = "the second argument of `init_node(…)` is not `anonymous`, unless it says so"
+        return cause, rewritten(source, (flag, f"anonymous={ast.unparse(flag)}"))
+    if called is None or not called.args or not message.startswith("argument of type"):
+        return None
+    given = called.args[0]
+    return "a node's name is a string", rewritten(source, (given, f"'{ast.unparse(given)}'"))
+
+
+def _parameter(message: str, source: str) -> Meaning | None:
+    """Of `set_param(…)` with the value before the name."""
+    call = next(iter(calls_in_line(source, "set_param")), None)
+    if call is None or len(call.args) != 2 or "expected string" not in message:
+        return None
+    value, name = call.args
+    if is_text(name) and not is_text(value):
+        return "the parameter's name comes first, then its value", rewritten(
+            source, (value, name), (name, value)
+        )
+    return None
+
+
+def calls_in_line(source: str, *names: str) -> list[ast.Call]:
+    """Return the calls in a line of source, of functions or methods with one of these names."""
+    found = [n for n in ast.walk(line_tree(source)) if isinstance(n, ast.Call)]
+    return [n for n in found if getattr(n.func, "attr", getattr(n.func, "id", "")) in names]
+
+
+def _topic(message: str, source: str) -> Meaning:
+    """Of `Publisher(…)` or `Subscriber(…)`: the topic's name is a text and comes first, its type is a class."""
+    found = calls_in_line(source, "Publisher", "Subscriber")
+    args = found[0].args if found else []
+    if "<module " in message:
+        module = shown(message.partition("<module '")[2].partition("'")[0])
+        return (
+            "the type's name refers to a whole module",
+            f"import the type itself: `from {module} import …`",
+        )
+    if len(args) < 2:
+        hint = "write the type of the messages after the topic's name, without quotes"
+        return (
+            "the type of the messages is missing" if found else "a topic's name comes first, then its type",
+            hint,
+        )
+    topic, type_ = args[0], args[1]
+    callback = next(iter(args[2:]), None)
+    if is_text(type_) and not is_text(topic):
+        return "the topic's name comes first, then its type", rewritten(
+            source, (topic, type_), (type_, topic)
+        )
+    if callback is not None and re.search(r"<(?:function|bound method) ", message):
+        return "the type comes before the callback", rewritten(source, (type_, callback), (callback, type_))
+    return _no_type(message, source, topic, type_)
+
+
+def is_text(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, str)
+
+
+def _no_type(message: str, source: str, topic: ast.expr, type_: ast.expr) -> Meaning:
+    """Of what stands in the place of the messages' type."""
+    if isinstance(type_, ast.Constant) and is_text(type_):
+        return "the type is given as a string", rewritten(
+            source, (type_, re.sub(r".*[./]", "", str(type_.value)))
+        )
+    if isinstance(type_, ast.Call):
+        return f"`{shown(ast.unparse(type_))}` is a message, not a type", rewritten(
+            source, (type_, type_.func)
+        )
+    if "topic name" in message and isinstance(topic, ast.Name) and topic.id[:1].isupper():
+        return "the topic's name is missing", f"write the topic's name, in quotes, before `{shown(topic.id)}`"
+    if "topic name" in message and not is_text(topic):
+        return "the topic's name is not text", "write the topic's name in quotes"
+    hint = "import the type of the messages, as in `from std_msgs.msg import String`"
+    return f"`{shown(ast.unparse(type_))}` is not a message type", hint
+
+
+def rewritten(source: str, *changes: tuple[ast.expr, ast.expr | str], span_to: ast.expr | None = None) -> str:
+    """Return the advice to write the line with other text in these places of it, the first one up to `span_to`."""
+    line = source.encode()
+    for old, new in sorted(changes, key=lambda change: change[0].col_offset, reverse=True):
+        text = new if isinstance(new, str) else ast.get_source_segment(source, new) or ""
+        line = line[: old.col_offset] + text.encode() + line[(span_to or old).end_col_offset :]
+    return f"write `{shown(line.decode())}`"
+
+
+def explain_rate(call: ast.Call) -> Meaning | None:
+    """Of `rospy.Rate(…)` with a text, or with 0."""
+    value = call.args[0].value if call.args and isinstance(call.args[0], ast.Constant) else None
+    if isinstance(value, str):
+        number = re.match(r"\s*(\d+(?:\.\d+)?)", value)
+        hint = f"write `rospy.Rate({number[1]})`" if number else "write how many times a second the loop runs"
+        return "a rate is a number, and this is text", hint
+    if value == 0:
+        return "0 Hz is not a rate", "write how many times a second the loop runs, as in `rospy.Rate(10)`"
+    return None
+
+
+def _decimal(value: ast.expr) -> Meaning | None:
+    """Return why a calculation gives no whole number, and the one that does; None where it need not be so."""
+    if isinstance(value, ast.BinOp) and isinstance(value.op, ast.Div):
+        whole = f"{ast.unparse(value.left)} // {ast.unparse(value.right)}"
+        return "the message takes a whole number, and `/` makes one with a decimal point", whole
+    parts = list(ast.walk(value))
+    if isinstance(value, ast.Call) and getattr(value.func, "id", "") == "float" and len(value.args) == 1:
+        return "the message takes a whole number, and `float(…)` makes one with a decimal point", ast.unparse(
+            value.args[0]
+        )
+    decimal = any(isinstance(one, ast.Constant) and isinstance(one.value, float) for one in parts)
+    clock = any(getattr(one, "attr", "") in {"get_time", "to_sec", "time"} for one in parts)
+    if decimal or clock:
+        return "the message takes a whole number, and this has a decimal point", f"int({ast.unparse(value)})"
+    return None
+
+
+def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
+    """Return why a message does not take the value that is published: a text for a number, a number for a text, or the
+    publisher of another topic."""
+    made = re.match(r"(\w+)\(\) takes no arguments", found.message)
+    if made and any(one.path.endswith(f"/{made[1]}.srv") for one in package.interfaces):
+        fix = f"write `{made[1]}Response(…)`, and import it beside {made[1]}"
+        return f"`{made[1]}` is the service's type, and its response has another type", fix
+    frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
+    wants_text = "must be of type bytes or an ascii string" in found.message
+    if not wants_text and "integer type" not in found.message:
+        return None
+    kind, other = ("string", "numbers") if wants_text else ("whole number", "strings")
+    sent = next(iter(calls_in_line(frame.source, "publish")), None)
+    owner = ast.unparse(sent.func.value) if sent is not None and isinstance(sent.func, ast.Attribute) else ""
+    slips = [s for s in package.slips if frame.file.endswith(f"/{s.file}")]
+    types = {s.line: s.message for s in slips if s.kind == "publisher-type"}
+    owners = {s.name: s for s in slips if s.kind == "publisher" and s.line in types}
+    texts = [n for n in calls_in_line(frame.source, "str") if len(n.args) == 1]
+    if texts and not wants_text:
+        why = f"the message takes a {kind}, and `str(…)` makes a string of it"
+        return why, rewritten(frame.source, (texts[0], texts[0].args[0]))
+    point = _decimal(sent.args[0]) if sent is not None and sent.args and not wants_text else None
+    if point is not None:
+        return point[0], rewritten(frame.source, (sent.args[0], point[1])) if sent is not None else ""
+    here = owners.get(owner)
+    others = [s for s in owners.values() if (types[s.line] == "String") is not wants_text]
+    if here is not None and here not in others and len(others) == 1:
+        why = f"`{owner}` publishes {types[here.line]} on {here.message} (line {here.line})"
+        lines = sorted((here.line, others[0].line))
+        fix = (
+            f"swap `{owner}` and `{others[0].name}` on lines {lines[0]} and {lines[1]}, or where they publish"
+        )
+        return why, fix
+    call = "str(…)" if wants_text else "int(…)"
+    hint = f"publish a {kind} here, `{call}`; {other} go to the publisher of their own topic"
+    return f"the message takes a {kind} but gets something else", hint
