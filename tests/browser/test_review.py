@@ -121,6 +121,7 @@ def test_by_keyboard_alone(opened, out) -> None:
     assert overrides_of(out)["dana"]["style"]["comment"] == "jk: too long"
 
 
+@pytest.mark.full
 def test_one_criterion_by_keyboard_alone(opened, out) -> None:
     page = opened("criteria")
     page.keyboard.press("j")

@@ -329,10 +329,10 @@ def test_threads_that_parse_at_the_same_time() -> None:
 
     def parse(_: int) -> int:
         found = 0
-        for _ in range(40):
+        for _ in range(15):
             _Busy()
             found += len(parsed(source).body)
         return found
 
     with ThreadPoolExecutor(4) as pool:
-        assert list(pool.map(parse, range(4))) == [40 * 300] * 4
+        assert list(pool.map(parse, range(4))) == [15 * 300] * 4
