@@ -15,12 +15,10 @@ from functools import partial
 from pathlib import Path
 
 from grader.files import temporary_folder
+from grader.judging.repair_charges import BUILD, DONE_BEFORE_RUNS, is_unmade
 from grader.judging.repeats_and_repairs import (
-    BUILD,
-    DONE_BEFORE_RUNS,
     concerns,
     is_first_line_added,
-    is_unmade,
     is_used_by,
     launched_in,
     needs_build,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import Annotated, NamedTuple
 
@@ -252,6 +252,8 @@ def _judge_nodes(package: PackageFacts, file: LaunchFile, run: Run, params: Laun
     names = [name for w in wanted for name in nodes_up(run, w.node)]
     if params.topic and not _are_connected(run, params.topic, names, alone=len(wanted) < 2):
         return _not_connected(package, file, run, wanted, params.topic)
+    if params.topic and (ended := _ended_soon(run, [w.node for w in wanted], params.topic)):
+        return _ended_by_itself(package, file, ended)
     if dead := _judge_deaths(package, run, wanted, "came up, but then"):
         return dead
     if params.programs and params.params:
@@ -278,7 +280,8 @@ def _right_parts(
         for name, found in nodes.items()
         if found and all(nodes_up(run, one) and why_died(package, run, one) is None for one in found)
     ]
-    connected = params.topic is not None and any(connected_nodes(run, params.topic))
+    topic, every = params.topic, [one for found in nodes.values() for one in found]
+    connected = topic is not None and any(connected_nodes(run, topic)) and not _ended_soon(run, every, topic)
     if not up:
         misnamed = [one for name, pkg in params.nodes.items() for one in _misnamed(file, name, pkg)]
         if not (connected and len(misnamed) == len(params.nodes) > 0):
@@ -454,10 +457,18 @@ def _judge_deaths(package: PackageFacts, run: Run, wanted: list[Wanted], when: s
     return None
 
 
-def _ended_before(package: PackageFacts, file: LaunchFile, ended: Sequence[LaunchNode]) -> Verdict:
-    """Return that nodes ended before they were connected, and the loop that let them, where one is seen."""
-    alone = "itself before it was" if len(ended) == 1 else "themselves before they were"
-    message = f"{join_words(n.full_name for n in ended)} came up, and ended by {alone} connected"
+def _ended_soon(run: Run, nodes: Iterable[LaunchNode], topic: str) -> list[LaunchNode]:
+    """Return the nodes that ran to their own end while others still connect to them; whether one did, is chance."""
+    ended = [node for node in nodes if finished(run, node)]
+    return ended if together_s(run, topic) < CONNECTED_WITHIN_S else []
+
+
+def _ended_by_itself(package: PackageFacts, file: LaunchFile, ended: Sequence[LaunchNode]) -> Verdict:
+    """Return that nodes ended too soon to be connected, and the loop that let them, where one is seen."""
+    alone = "itself" if len(ended) == 1 else "themselves"
+    message = (
+        f"{join_words(n.full_name for n in ended)} came up, and ended by {alone} before others could connect"
+    )
     scripts = {one.path for n in ended if (one := own_script(package, n)) is not None}
     left = next((s for s in package.slips if s.kind == "loop-left" and s.file in scripts), None)
     if left is not None:
@@ -472,9 +483,8 @@ def _not_connected(
     """A node that died, the launch file's remaps and namespaces, or the scripts' own topics."""
     if dead := _judge_deaths(package, run, wanted, "came up, but before it was connected"):
         return dead
-    ended = [w.node for w in wanted if finished(run, w.node)]
-    if ended and together_s(run, topic) < CONNECTED_WITHIN_S:
-        return _ended_before(package, file, ended)
+    if ended := _ended_soon(run, [w.node for w in wanted], topic):
+        return _ended_by_itself(package, file, ended)
     other, nodes = over_another_topic(run, topic), [w.node for w in wanted]
     of_launch_file = blame_renaming(
         package, run, nodes if len(nodes) > 1 else file.brings, topic, other

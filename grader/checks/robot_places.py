@@ -230,7 +230,7 @@ def _elsewhere(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> 
         return unjudged(never, hint=DRIVE)
     there = next((pose for pose in judged if params.is_near(pose)), None)
     if there is not None:
-        message = f"it is there after {there.time_s - asked.began_s(judged):.1f} s, and goes on: {at}"
+        message = f"it is there after {there.time_s - asked.began_s(judged):.1f} s, but keeps moving: {at}"
         return failed(message, hint="publish a zero velocity once you are there")
     speed_m_s = _speed_m_s(judged)
     if speed_m_s > SLOW_M_S:

@@ -255,7 +255,7 @@ AuthorOption = Annotated[
     str | None, Option("--author", "NAME", "who publishes (default: git config user.name)")
 ]
 DraftsFlag = Annotated[
-    bool, Flag("--drafts", "take results as they are now, also where others are published")
+    bool, Flag("--drafts", "take results as they are now, even if earlier ones are published")
 ]
 STDOUT = "-"
 STATIC = Flag("--static", "check the files only and run nothing")

@@ -47,7 +47,7 @@ def fix_packages(chosen: Sequence[Chosen], *, dry_run: bool, yes: bool) -> bool:
     for one in chosen:
         if one.rubric.rubric.fixes == "none":
             raise UsageError(
-                "This lab wants you to find it yourself",
+                "This lab asks you to fix mistakes yourself",
                 hint="leave out --fix; grader explain CRITERION says how each repair is done",
             )
     if not (dry_run or yes or (sys.stdin.isatty() and sys.stdout.isatty())):

@@ -52,10 +52,10 @@ from grader.judging.cited_lines import (
 )
 from grader.judging.facts import NOT_RUN, Facts, try_facts, views_of
 from grader.judging.later_faults import add_later_faults, is_other_rate
+from grader.judging.repair_charges import is_unmade
 from grader.judging.repeats_and_repairs import (
     apply_repaired_copy,
     drop_unrepeated_losses,
-    is_unmade,
     launched_in,
     needs_build,
     repairs_of,
@@ -339,7 +339,7 @@ class Requirements:
             root = self._roots[criterion.id] = self._roots.get(blocking, blocking)
             message = f"blocked by {root}: {self.verdicts[root].message}"
             if verdict.message not in message:
-                message = f"{message}; here: {_without_cause(verdict)}"
+                message = f"{message}; for this criterion: {_without_cause(verdict)}"
             # what is sure and explains it would come again with the run
             sure = self.verdicts[root].unjudged or self._criteria[root].scenario == criterion.scenario
             update = {

@@ -132,7 +132,7 @@ def _degrees(path: str, code: str) -> Iterator[PythonSlip]:
         number = float(given.rstrip("f")) if re.fullmatch(r"\d+(?:\.\d*)?f?", given) else 0.0
         in_degrees = not names.isdisjoint(re.findall(r"[A-Za-z_]\w*", given)) and not _TURNED.search(given)
         if in_degrees or re.search(_DEGREES, given):
-            fix = "leave out `* 180 / M_PI`: the angle is in radians before"
+            fix = "leave out `* 180 / M_PI`: the angle is already in radians"
         elif number >= _WHOLE_TURN or re.fullmatch(r"\w*(?:deg|degrees)\w*", given, re.IGNORECASE):
             fix = f"write `{match['call']}({given} * M_PI / 180)`"
         else:

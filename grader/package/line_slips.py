@@ -33,7 +33,7 @@ def doubled_and_turned(lines: list[str], near: Iterable[int]) -> Iterator[LineSl
     for number, first, second in pairs:
         if first.strip() == second.strip():
             left = "\n".join([*lines[: number - 1], *lines[number:]])
-            yield LineSlip("the line above is there twice", number, f"delete line {number}", left)
+            yield LineSlip("this line repeats the one above", number, f"delete line {number}", left)
     for number, first, second in pairs:
         if first.strip() and second.strip():
             turned = "\n".join([*lines[: number - 2], second, first, *lines[number:]])

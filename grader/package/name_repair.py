@@ -89,7 +89,7 @@ def with_methods(text: str) -> Iterator[Step]:
 
 
 OF_INIT = "Python calls the method `__init__` of a new object, and never `%s`"
-WITHOUT_SELF = "`%s` is called on an object, and takes no `self`"
+WITHOUT_SELF = "`%s` is a method, so its first parameter has to be `self`"
 
 
 def _methods_of_objects(tree: ast.Module) -> Iterator[tuple[ast.FunctionDef, set[str], set[str]]]:

@@ -61,7 +61,7 @@ _EXCEPT = re.compile(r"\s*(except|finally)\b")
 _NEXT_BLOCK = re.compile(r"\s*(?:@|(?:def|async def|class|if __name__)\b)")
 _NEVER_ENDED = re.compile("never closed|EOL while|unterminated (f-)?string")
 _UNCLOSED = re.compile(r"'([(\[{])' was never closed")
-_OUT_OF_BLOCK = "this line is further out than the lines around it, which belong to one block"
+_OUT_OF_BLOCK = "this line is indented less than the lines around it, which belong to one block"
 _COPIED = "copied from a PDF or a web page"
 
 _MESSAGES: tuple[tuple[str, ...], ...] = (

@@ -36,19 +36,17 @@ def score_words(result: GradingResult) -> tuple[str, ...]:
 
 
 def made_up_words(result: GradingResult) -> tuple[str, ...]:
-    """Return `Made up for this submission: rate = 14`, of the criteria that are shown."""
+    """Return `Values chosen at random for this submission: rate = 14`, of the criteria that are shown."""
     values = {name: value for c in result.criteria for name, value in c.made_up.items()}
     said = ", ".join(f"{name} = {as_text(value)}" for name, value in values.items())
-    return (f"Made up for this submission: {said}",) if said else ()
+    return (f"Values chosen at random for this submission: {said}",) if said else ()
 
 
 def gate_words(result: GradingResult) -> tuple[str, ...]:
     """Return a sentence for a gate that keeps the points low, or for penalties that take more than there is."""
     if gate := result.gate:
-        before = f"{number(gate.points_before)} of {number(result.max_points)} points before"
-        return (
-            f"{before}, {number(gate.at_most)} after: without {gate.criterion}, no more than that counts",
-        )
+        earned = f"{number(gate.points_before)} of {number(result.max_points)} points were earned"
+        return (f"{earned}, but without {gate.criterion} at most {number(gate.at_most)} count",)
     below = sum(c.points for c in result.criteria)
     return ("Penalties never take the total below zero.",) if below < 0 else ()
 

@@ -107,7 +107,7 @@ def test_a_lab_may_forbid_it(options, folder, tmp_path, capsys):
     rubric.write_text(RUBRIC.read_text() + "\nfixes: none\n")
     before = contents(folder)
     assert run(["check", str(folder), "--fix", *options, "--rubric", str(rubric)]) == 2
-    assert "This lab wants you to find it yourself" in capsys.readouterr().err
+    assert "This lab asks you to fix mistakes yourself" in capsys.readouterr().err
     assert contents(folder) == before
 
 

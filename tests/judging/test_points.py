@@ -165,7 +165,7 @@ def test_every_report_gives_the_same_total_and_says_why() -> None:
     assert [points_of(c) for c in found.criteria] == ["0/60", "20/20", "20/20", "not counted", "+5/+5", "-8"]
     text = io.StringIO()
     print_report(found, lab, open_console(text))
-    why = "37 of 100 points before, 15 after: without build, no more than that counts"
+    why = "37 of 100 points were earned, but without build at most 15 count"
     for report in (text.getvalue(), render_markdown(found, lab)):
         assert why in " ".join(report.split())
         assert "15 of 100 points" in report

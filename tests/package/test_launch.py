@@ -65,7 +65,7 @@ def test_attributes_that_are_not_there_are_none():
         ("<launch>\n<group>\n</gruop>\n</launch>", 3, "write `</group>`"),
         ("<launch>\n<node pkg/></launch>", 2, "`pkg` has no value"),
         ('<launch>\n<node a="1" a="2"/></launch>', 2, "`a` is given twice"),
-        ("<launch></launch>\n<launch></launch>", 2, "the line above is there twice: delete line 2"),
+        ("<launch></launch>\n<launch></launch>", 2, "this line repeats the one above: delete line 2"),
         ("<launch></launch>\nbye", 2, "only one `<launch>`"),
         ("<Launch></Launch>", 1, "`<Launch>`; roslaunch wants `<launch>` in lower case"),
         ("<robot/>", 1, "`<robot>`; roslaunch wants `<launch>`"),

@@ -330,7 +330,11 @@ if __name__ == '__main__':
             "Python calls the method `__init__` of a new object, and never `_init_`",
         ),
         ("__init__(self)", "__int__(self)", "and never `__int__`"),
-        ("main_loop(self)", "main_loop()", "`main_loop` is called on an object, and takes no `self`"),
+        (
+            "main_loop(self)",
+            "main_loop()",
+            "`main_loop` is a method, so its first parameter has to be `self`",
+        ),
         ("talker = Talker", "talker = talker", "talker is not defined"),
         ("main_loop(self)", "main_loop(Self)", "is called `self`, and not `Self`"),
         ("main_loop(self)", "main_loopself)", "its opening bracket is missing"),

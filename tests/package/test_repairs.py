@@ -160,7 +160,7 @@ CASES = {
     "between-two-of-one-level": Case(
         swapped(TALKER, ("    rate = rospy", "count = 0\n    rate = rospy")),
         ["python-syntax"],
-        "line 8 of src/talker.py: this line is further out than the lines around it",
+        "line 8 of src/talker.py: this line is indented less than the lines around it",
         after={TALKER: "    count = 0\n    rate = rospy"},
     ),
     "between-two-of-one-level-with-a-tab-below": Case(
@@ -168,7 +168,7 @@ CASES = {
             TALKER, ("    rate = rospy", "count = 0\n    rate = rospy"), ("        rate.sleep()", "\trate.sleep()")
         ),
         ["python-syntax"] * 2,
-        "line 8 of src/talker.py: this line is further out than the lines around it",
+        "line 8 of src/talker.py: this line is indented less than the lines around it",
         after={TALKER: "    count = 0\n    rate = rospy"},
     ),
     "further-out-after-a-deeper-block": Case(

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("without_processes")
         ("ok = math.nan != scan.ranges[i]\n", ("nan", "write `math.isnan(…)`")),
         (
             "a = math.degrees(a)\nx = r * math.cos(a)\n",
-            ("degrees", "leave out `degrees(…)`: the angle is in radians before"),
+            ("degrees", "leave out `degrees(…)`: the angle is already in radians"),
         ),
         ("x = math.cos(math.radians(a))\n", None),
         ("def f(req):\n    AddResponse(sum=1)\n", ("return", "write `return AddResponse(…)`")),
@@ -38,8 +38,8 @@ def test_values_that_are_none(text: str, said: tuple[str, str] | None, tmp_path:
 @pytest.mark.parametrize(
     ("head", "fix"),
     [
-        ("def heard(msg):", "hand it over to what calls it: `rospy.Subscriber(…, heard)`"),
-        ("def on_feedback(msg):", "hand it over: `send_goal(…, feedback_cb=on_feedback)`"),
+        ("def heard(msg):", "pass it to what calls it: `rospy.Subscriber(…, heard)`"),
+        ("def on_feedback(msg):", "pass it: `send_goal(…, feedback_cb=on_feedback)`"),
         ("def heard(msg, pub):", ""),
     ],
 )
@@ -128,7 +128,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
          [("commented-out", 4, "in quotes, so it never runs: remove the quotes")]),
         (node("    p = 'rospy.spin()'\n    rospy.spin()\n") + CALLED, []),
         (node("    s = rospy.Subscriber('a', A, print)\n    s.unregister()\n    rospy.spin()\n") + CALLED,
-         [("unregistered", 5, "line 5 takes `s` off its topic: delete line 5")]),
+         [("unregistered", 5, "line 5 unregisters `s`, which then has no topic: delete line 5")]),
         ("def end():\n    s.unregister()\nrospy.on_shutdown(end)\nrospy.spin()\n", []),
         (node(SERVER + "    rospy.spin()\n") + CALLED,
          [("not-started", 4, "below line 4, write `s.start()`")]),
@@ -160,7 +160,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         ("def f(*a):\n    pass\nrospy.Timer(d, f)\n", []),
         ("def f():\n    return lambda m: 0\nrospy.Subscriber('a', A, f())\n", []),
         ("class A:\n    def f(m):\n        pass\n    def g(self):\n        rospy.Service('a', T, self.f)\n",
-         [("callback-values", 2, "takes no `self`: write `def f(self, m):`")]),
+         [("callback-values", 2, "its first parameter has to be `self`: write `def f(self, m):`")]),
         ("class A:\n    def f():\n        pass\n    def g(self):\n        rospy.Service('a', T, self.f)\n",
          [("callback-values", 2, "write `def f(self, msg):`")]),
         ("def hear(m):\n    print(m)\ndef run():\n    rospy.Subscriber('a', A, run)\n    rospy.spin()\nrun()\n",
@@ -476,7 +476,7 @@ def test_values_that_a_clock_gives_are_not_counted(tmp_path, code, told):
         ("for n in range(9):\n    time.sleep(1)\n", "the loop on line 1 never checks"),
         ("for n in range(9):\n    pub.publish(n)\n", ""),
         ("rospy.init_node('a', disable_signals=True)\n", "`disable_signals=True` on line 1"),
-        ("signal.signal(signal.SIGINT, signal.SIG_IGN)\n", "line 1 gives Ctrl-C another meaning"),
+        ("signal.signal(signal.SIGINT, signal.SIG_IGN)\n", "line 1 replaces what rospy does on Ctrl-C"),
     ],
 )  # fmt: skip
 def test_why_a_node_goes_on_after_ctrl_c(tmp_path, code, told):

@@ -334,7 +334,7 @@ def test_reports_name_the_values_of_the_criteria_that_they_show() -> None:
     shown = criterion("rate", Status.PASS, 40, 40, made_up={"rate": 14, "on": True})
     hidden = criterion("more", Status.FAIL, 0, 60, made_up={"secret": "xvbq"})
     whole = made_result("ada", (shown, hidden))
-    words = "Made up for this submission: rate = 14, on = true"
+    words = "Values chosen at random for this submission: rate = 14, on = true"
     assert made_up_words(whole) == (f"{words}, secret = xvbq",)
     assert made_up_words(for_student(whole, frozenset({"more"}))) == (words,)
     assert words in render_markdown(whole, rubric()).replace("`", "")

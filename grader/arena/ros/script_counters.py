@@ -100,7 +100,7 @@ def counter_slips(tree):
                 turn = [(i - first) % len(body) for i in (reset_at[0], body.index(node))]
                 if turn[0] < turn[1]:
                     line = body[reset_at[0]].lineno
-                    message = "the counter is reset before line %d adds one, and that sum is published"
+                    message = "line %d adds one after the counter was reset, so what follows a reset is one too high"
                     fix = "move line %d above the `if` on line %d" % (node.lineno, line)
                     yield slip(line, "reset-early", message % node.lineno, fix=fix, name=name)
 
@@ -162,7 +162,9 @@ def uncounted(tree):
             sent = [names_in(n) for n in calls_in(loop, "publish")]
             for name in () if ends else (dotted(t) for t in increments(after)):
                 if any(name in names for names in sent):
-                    message = "`%s` is counted below the loop on line %d, which does not end before the node"
+                    message = (
+                        "`%s` is counted below the loop on line %d, and is not reached while the node runs"
+                    )
                     last = after
                     for one in body[at + 2 :]:
                         last = one if name in names_in(one) else last

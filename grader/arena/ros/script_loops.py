@@ -225,7 +225,7 @@ def publishes_twice(tree):
             message, fix = message % (lines[0], lines[1]), fix % lines[1]
         else:
             listed = "lines %s and %d" % (", ".join(map(str, lines[:-1])), lines[-1])
-            message, fix = "each turn of the loop publishes on %s", "delete all but one of %s"
+            message, fix = "each pass through the loop publishes on %s", "delete all but one of %s"
             message, fix = message % listed, fix % listed
         yield slip(lines[1], "publish-twice", message, fix=fix)
 
@@ -349,7 +349,7 @@ def deaf_loops(tree):
             message = "`disable_signals=True` on line %d keeps Ctrl-C from rospy" % node.lineno
             yield slip(node.lineno, "deaf", message, fix="leave it out")
         if is_call(node, "signal") and node.args and dotted(node.args[0]).endswith("SIGINT"):
-            message = "line %d gives Ctrl-C another meaning" % node.lineno
+            message = "line %d replaces what rospy does on Ctrl-C" % node.lineno
             yield slip(node.lineno, "deaf", message, fix="delete it")
     yield from endless or others or counted
 

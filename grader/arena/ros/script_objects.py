@@ -222,7 +222,10 @@ def taken_off(tree):
     spared = {inner for function in functions for inner in ast.walk(function)}
     for node in walk(tree):
         if is_call(node, "unregister") and not node.args and node not in spared:
-            message = "line %d takes `%s` off its topic" % (node.lineno, dotted(node.func.value))
+            message = "line %d unregisters `%s`, which then has no topic" % (
+                node.lineno,
+                dotted(node.func.value),
+            )
             yield slip(node.lineno, "unregistered", message, fix="delete line %d" % node.lineno)
 
 
@@ -277,7 +280,7 @@ def wrong_callback(own, call, functions, bound, values):
         meant = others[0].name if len(others) == 1 else "the name of the function that prints the message"
         return message, "on line %d, write %s instead of %s" % (call.lineno, meant, own.name)
     if bound and len(given) == values and "self" not in given:
-        message = "`%s` is called on an object, and takes no `self`" % own.name
+        message = "`%s` is a method, so its first parameter has to be `self`" % own.name
         return message, "write `def %s(%s):`" % (own.name, ", ".join(["self", *given]))
     return "", "write `def {0}({1}msg):`".format(own.name, "self, " if bound else "")
 

@@ -2,7 +2,8 @@
 
 What nothing calls, statements without an effect, values that are none, imports. Names and texts are for
 `script_names.py`, objects and callbacks for `script_objects.py`, loops for `script_loops.py`, counters and clocks for
-`script_counters.py`. Nothing is executed. Python 3.8, standard library only.
+`script_counters.py`. Nothing is executed; it is here because a file has to be parsed by ROS's own Python, which is to
+run it. Python 3.8, standard library only.
 """
 
 import ast
@@ -140,8 +141,8 @@ def handed_over(function, tree, owner):
         return ""
     name = (owner and "self.") + function.name
     if calls_in(tree, "send_goal") and "feedback" in (function.name + taken[0]).lower():
-        return "hand it over: `send_goal(…, feedback_cb=%s)`" % name
-    return "hand it over to what calls it: `rospy.Subscriber(…, %s)`" % name
+        return "pass it: `send_goal(…, feedback_cb=%s)`" % name
+    return "pass it to what calls it: `rospy.Subscriber(…, %s)`" % name
 
 
 OF_ANGLES = ("sin", "cos", "tan")
@@ -167,7 +168,7 @@ def wrong_values(tree):
             given = dotted(node.args[0])
             if given in degrees or called_name(node.args[0]) in IN_DEGREES:
                 message = "`%s` takes radians, and gets degrees" % called_name(node)
-                fix = "leave out `degrees(…)`: the angle is in radians before"
+                fix = "leave out `degrees(…)`: the angle is already in radians"
                 yield slip(node.lineno, "wrong-value", message, fix=fix, name="degrees")
         elif isinstance(node, ast.Expr) and called_name(node.value).endswith("Response"):
             name = called_name(node.value)

@@ -395,7 +395,9 @@ def _judge_death(count: Count, run: Run, package: PackageFacts, params: WrapPara
         high = next((one for one in limits if int(one.message) > params.maximum), None)
         first = next((one for one in limits if one.fix), None)
         if first is not None:
-            why = f"{message}; line {first.line} works the `%` out before the `+`, so it changes nothing"
+            why = (
+                f"{message}; line {first.line} calculates the `%` before the `+`, so the counter never wraps"
+            )
             return failed(
                 why, hint=f"on line {first.line}, {first.fix}", citations=(first.place, *end.citations)
             )

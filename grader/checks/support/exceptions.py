@@ -238,7 +238,10 @@ def _call(message: str, source: str) -> Meaning | None:
     if given and int(given[3]) == int(given[2]) + 1 and f".{given[1]}(" in source:
         method = given[1]
         taken = "self, …" if int(given[2]) else "self"
-        return f"`{method}` is called on an object, and takes no `self`", f"make it `def {method}({taken}):`"
+        return (
+            f"`{method}` is a method, so its first parameter has to be `self`",
+            f"make it `def {method}({taken}):`",
+        )
     if (lacks := _TOO_FEW.match(message)) and re.search(rf"\b{lacks[1]}\(", source):
         name, values = lacks.groups()
         hint = f"put {values} into its brackets, or remove the call: ROS calls a callback by itself"

@@ -194,7 +194,7 @@ def _ran_to_the_end(printed: Sequence[str]) -> Ending:
     hint = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
     if not PRINTED_ERROR.search(last):
         return Ending("its script ran to the end", hint, by_itself=True)
-    hint = "repair that: without the `except` that prints it, Python says in which line it is"
+    hint = "fix that error; without the `except` that prints it, Python says on which line it is"
     return Ending(f"its script ran to the end, and printed last: {shown(last)}", hint, by_itself=True)
 
 

@@ -167,7 +167,7 @@ def unmade(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     if asked is not None and all(own.module != asked[1] for own in maker.interfaces):
         kind = {"msg": "message", "srv": "service"}[asked[1]]
         hint = f"write the definition in {asked[1]}/, and list it in add_{kind}_files(…)"
-        return f"the package has no .{asked[1]} file for the build to make it of", hint
+        return f"the package has no .{asked[1]} file to build it from", hint
     whose = "the package's own messages" if maker is package else f"the messages of {maker.name}"
     hint = "first get the build to pass: catkin_make"
     if not cmake_calls(maker, "generate_messages"):
@@ -263,7 +263,7 @@ def _own_python_package(name: str, package: PackageFacts) -> tuple[str, str] | N
     call = "catkin_python_setup()"
     if package.file("setup.py") is None:
         fix = f"write setup.py as {SETUP_PAGE} says, and call {call} above catkin_package(…)"
-        return f"src/{name}/ is there, and no setup.py makes it known", fix
+        return f"src/{name}/ exists, but without a setup.py Python does not find it", fix
     if cmake_calls(package, "catkin_python_setup"):
         return None
     return (

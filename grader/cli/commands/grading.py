@@ -160,7 +160,8 @@ def verify(
     results: Annotated[Sequence[Path], RESULTS],
     rubric: Annotated[str | None, RUBRIC] = None,
     allowed_signers: Annotated[
-        Path | None, Option("--allowed-signers", "FILE", "the SSH keys that may have signed, as git has them")
+        Path | None,
+        Option("--allowed-signers", "FILE", "the SSH keys that may sign, as in git's allowed_signers file"),
     ] = None,
     against: Annotated[
         Path | None,

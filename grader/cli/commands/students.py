@@ -25,9 +25,7 @@ STAGED = Flag(
     "--staged", "with --static, for a pre-commit hook: check what git has staged, exit 1 if it fails"
 )
 WATCH = Flag("--watch", "stay, and check again whenever you save a file, until Ctrl-C")
-FIX = Flag(
-    "--fix", "first show how to repair modes, line ends, tabs and misspelt names, and do it if you agree"
-)
+FIX = Flag("--fix", "show how to repair modes, line ends, tabs and misspelt names, and do it if you agree")
 DRY_RUN = Flag("--dry-run", "with --fix: only show it, and exit 1 if a file would change")
 YES = Flag("--yes", "with --fix: do not ask")
 OUT = Option("--out", "DIR", "keep the results in DIR/<submission id>/ (default: only show them)")

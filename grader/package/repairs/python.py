@@ -352,7 +352,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
      "write `global {word}` as the first line of the function"),
     "guard": ("{place}: `__name__` is never {word!r}", ""),
     "line": ("{place}: the line `{word}` is missing", ""),
-    "twice": ("{place}: the line above is there twice", "delete line {line}"),
+    "twice": ("{place}: this line repeats the one above", "delete line {line}"),
     "turned": ("lines {line} and {below} of {file} are the wrong way round", "write line {below} above line {line}"),
     "start": ("{place}: the lines from here on belong to {calls}, so nothing runs them", ""),
     "inside": ("{place}: from here on the lines are outside of {calls}, which makes the node",

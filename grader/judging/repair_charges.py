@@ -1,0 +1,290 @@
+"""Which criterion each repair of a copy is charged to, and what that criterion says then.
+
+One mistake costs one criterion. The others that it kept from passing are judged on the repaired copy, and earn the
+share that the rubric gives for that kind of repair.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from graphlib import TopologicalSorter
+from pathlib import PurePosixPath
+
+from grader.checks.support.text import texts_in
+from grader.model.package import CMAKE, MANIFEST
+from grader.model.repair import Repair, advice_on, messages_of, place_of
+from grader.model.result import CriterionResult
+from grader.model.verdict import FileCitation, Status, Verdict, cited_lines, failed, share_text
+from grader.rubric.model import Criterion, Rubric
+from grader.wording import join_words
+
+BUILD, INSTALL = "build", "cmake-install"
+OF_PACKAGES = {MANIFEST, CMAKE}
+
+NAMES = {
+    "topic-name",
+    "service-name",
+    "node-name",
+    "parameter-name",
+    "file-name",
+    "package-name",
+    "launch-type",
+}
+OF_BUILDS = {"build-line", "manifest-line"}
+"""These explain nothing but the build and the files, unless something is run that the build makes."""
+SEEN_IN_RUNS = {"missing-import", "missing-call", "topic-name", "service-name", "node-name", "parameter-name"}
+"""These are lost in runs, so no criterion of the files asks for them."""
+DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
+"""The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
+OF_SYNTAX = {"python-syntax", "launch-syntax"}
+"""Of a line that could not be read, the copy shows for the first time what it says."""
+MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
+NUMBER = re.compile(r"\d+(\.\d+)?")
+
+
+def is_unmade(found: Verdict | CriterionResult) -> bool:
+    """Return whether a script is lost because the build failed that was to make a program of it."""
+    return found.mistake is not None and found.mistake.kind == "not-made"
+
+
+def charge_repairs(
+    rubric: Rubric,
+    first: Mapping[str, Verdict],
+    better: AbstractSet[str],
+    needs: Mapping[str, tuple[Repair, ...]],
+) -> dict[Repair, set[str]]:
+    """Return for each repair the criterion that asks for what was wrong: one of the files, else by its name where a
+    name was wrong, else the first that failed by itself, at best in that file, and not for its name. What others
+    require comes first."""
+    charges: dict[Repair, set[str]] = {}
+    misnamed: set[str] = set()
+    by_id = {c.id: c for c in rubric.criteria}
+    order = TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order()
+    criteria = [by_id[name] for name in order if name in better]
+    needed = dict.fromkeys(one for repairs in needs.values() for one in repairs)
+    for repair in sorted(needed, key=lambda one: one.kind not in NAMES):
+        asking = [c for c in rubric.criteria if c.scenario is None and asks_for(first[c.id], repair)]
+        if repair.kind in OF_BUILDS:  # of a file with several faults, those that speak of this line
+            new = _new_words(repair)
+            better_by_it = better - {c.id for c in rubric.criteria if c.check == INSTALL}
+            asking = [c for c in asking if c.id in better_by_it or new & words_of(first[c.id].message)]
+        sought = [c for c in asking if _seeks(first[c.id], repair)]
+        asking = sought or [c for c in asking if _names(c, repair)] or asking
+        if asking:
+            charges[repair] = {min(asking, key=lambda c: _lines_away(first[c.id], repair)).id}
+            continue
+        own = [c for c in rubric.criteria if repair.kind == "node-name" and _names(c, repair)]
+        if any(first[c.id].status.is_lost and c.id not in better for c in own):
+            continue  # the criterion of the name says by itself what is wrong with it
+        possible = [c for c in criteria if repair in needs[c.id] and _may_ask_for(first[c.id], repair)]
+        named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
+        failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
+        citing = [c for c in failing if cites_file(first[c.id], repair)]
+        builds = [c for c in possible if repair.kind in OF_BUILDS and c.check == BUILD]
+        counting = [c.id for c in (*builds, *named, *citing, *failing, *possible) if c.points > 0]
+        other = [name for name in counting if name not in misnamed]
+        charges[repair] = set((counting if named else other or counting)[:1])
+        misnamed |= charges[repair] if named else set()
+    return charges
+
+
+def _may_ask_for(found: Verdict, repair: Repair) -> bool:
+    """Return whether a criterion can be lost by what was repaired: by what keeps a script from being started only where
+    that script is named."""
+    return repair.kind not in DONE_BEFORE_RUNS or PurePosixPath(repair.file).name in found.message
+
+
+def _seeks(found: Verdict, repair: Repair) -> bool:
+    """Return whether a criterion is lost by the very call that the repair adds."""
+    return found.sought_name("call") in _new_words(repair)
+
+
+def _lines_away(found: Verdict, repair: Repair) -> float:
+    """Return how far the nearest line that a verdict cites is from the repaired one. The line below which a call that
+    is missing goes is not a fault."""
+    if repair.line is None or found.sought_name("call") or found.sought_name("below"):
+        return math.inf
+    lines = [line for file, line in cited_lines(found.citations) if file == repair.file]
+    return min((abs(line - repair.line) for line in lines), default=math.inf)
+
+
+def cites_file(found: Verdict | CriterionResult, repair: Repair) -> bool:
+    if repair.kind == "executable-bit" and not _is_told(repair, found.hint):
+        return False  # the build installs what runs the script, bit or not
+    return any(getattr(citation, "file", None) == repair.file for citation in found.citations)
+
+
+def asks_for(found: Verdict | CriterionResult, repair: Repair) -> bool:
+    """Return whether a criterion of the files is lost by what was repaired. What is otherwise seen in runs, such as a
+    node's name, one of a launch file can refuse at its very line."""
+    lost = found.status.is_lost and found.status is not Status.BLOCKED
+    if repair.kind in SEEN_IN_RUNS:
+        return lost and (repair.file, repair.line) in cited_lines(found.citations)
+    absent = found.mistake.name if found.mistake and found.mistake.is_absence else ""
+    if is_unmade(found):
+        return False  # the build's own criterion asks for it
+    is_it = repair.kind == "file-name" and PurePosixPath(absent).name == PurePosixPath(repair.after).name
+    return lost and (is_it or cites_file(found, repair))
+
+
+def _names(criterion: Criterion, repair: Repair) -> bool:
+    """Return whether the criterion asks for the name that the repair puts in place; of a parameter's name, for one that
+    has it as a part."""
+    before, after = (set(re.findall(r"[\w.~/-]*\w", text)) for text in (repair.before, repair.after))
+    new = {word.rpartition("/")[2].lstrip("~") for word in after - before}
+    texts = texts_in(criterion.parameters)
+    if repair.kind == "parameter-name":
+        return any(text.startswith("/") and new.intersection(text.split("/")) for text in texts)
+    return any(text.strip("/").rpartition("/")[2] in new for text in texts)
+
+
+def words_of(text: str) -> set[str]:
+    return set(re.findall(r"[\w.-]+", text))
+
+
+def _new_words(repair: Repair) -> set[str]:
+    return words_of(repair.after) - words_of(repair.before)
+
+
+def charged_verdict(
+    verdict: Verdict, copy: Verdict, repairs: Sequence[Repair], lines: Collection[tuple[str, int]]
+) -> Verdict:
+    """Return the loss, with the repairs that were seen to help as its hint, and what the copy loses it by, at these
+    lines of the package as it is."""
+    blocked = verdict.status is Status.BLOCKED
+    is_next = is_next_fault(verdict, copy, repairs) or (blocked and copy.status.is_lost and not copy.unjudged)
+    if blocked:
+        message = "; ".join(messages_of(repairs))
+        verdict = failed(
+            message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
+        )
+    further = copy.status is Status.BLOCKED and verdict.unjudged and copy.cause != verdict.cause
+    paths = re.findall(r"[\w-]+(?:/[\w.-]+)+", copy.hint)
+    told_at_once = paths != [] and all(path in verdict.hint for path in paths)
+    if copy.status.is_lost and verdict.hint and (told_at_once or not (is_next or further)):
+        return verdict  # the repair brings up what its own advice is about
+    told = [one for one in repairs if _is_told(one, verdict.hint) and not _is_further_down(one, verdict)]
+    clauses = verdict.hint.split("; ") if told else []
+    if any(one not in told for one in repairs):
+        clauses = [clause for clause in clauses if any(_is_told(one, clause) for one in told)]
+    hints = clauses + advice_on(one for one in repairs if one not in told)
+    said = verdict.message
+    unsaid = [one for one in repairs if PurePosixPath(one.file).name not in said]
+    words = [said, *(words for words in messages_of(unsaid) if words not in said)]
+    is_new = not copy.hint or not set(copy.hint.split("; ")) <= set(hints)
+    if further:
+        words += [f"with that repaired, it is blocked by {copy.blocked_by}"]
+        hints += [f"then fix {copy.blocked_by}"]
+    elif is_next and is_new:
+        untold = [clause for clause in copy.message.split("; ") if clause not in said]
+        words += [f"with that repaired, {'; '.join(untold)}"] if untold else []
+        hints = _hints_and_next(clauses, [one for one in repairs if one not in told], copy, lines)
+    if verdict.mistake and any(one.kind == "file-name" for one in repairs):
+        verdict = verdict.lost_by("file-elsewhere", verdict.mistake.name)
+    update: dict[str, object] = {
+        "message": "; ".join(words),
+        "hint": "; ".join(hints),
+        "citations": (*_uncited(verdict, repairs, told), *verdict.citations),
+    }
+    of_cmake = (one for one in repairs if PurePosixPath(one.file).name == CMAKE)
+    if any(one not in told for one in of_cmake):  # how the call is written is told
+        update["sought"] = tuple(one for one in verdict.sought if one.kind not in {"call", "uncalled"})
+    return verdict.model_copy(update=update)
+
+
+def _hints_and_next(
+    clauses: list[str], repairs: Iterable[Repair], copy: Verdict, lines: Collection[tuple[str, int]]
+) -> list[str]:
+    """Return the hints on the repairs, followed by the copy's own. Where this one rewrites the only one of `lines`, no
+    other hint on that line is needed; of a launch file's line it gives one attribute."""
+    then = _at_its_line(copy)
+    whole = then.startswith("on line ")
+    rewritten = [
+        one
+        for one in repairs
+        if whole and one.kind != "launch-syntax" and {(one.file, one.line)} == set(lines)
+    ]
+    for one in rewritten:  # by the name that the file still has
+        then = re.sub(r"^on line \d+ of [^,]+", f"on line {one.line} of {one.file}", then)
+    hints = clauses + advice_on(one for one in repairs if one not in rewritten)
+    return [*hints, *([f"{'then ' if hints else ''}{then}"] if then else [])]
+
+
+def _uncited(verdict: Verdict, repairs: Sequence[Repair], told: Collection[Repair]) -> Iterator[FileCitation]:
+    """Yield the lines of the repairs that the verdict does not cite; of one that it tells, only in another file."""
+    cited = {(c.file, c.line) for c in verdict.citations if isinstance(c, FileCitation)}
+    with_lines = {file for file, line in cited if line is not None}
+    for one in repairs:
+        is_new = one.line is not None and (one.file, one.line) not in cited
+        cited.add((one.file, one.line))
+        if is_new and not (one in told and one.file in with_lines):
+            yield FileCitation(file=one.file, line=one.line)
+
+
+def _at_its_line(copy: Verdict) -> str:
+    """Return the hint of a verdict on the copy; what is to be written with its line, where that is plain."""
+    lines = [c for c in copy.citations if isinstance(c, FileCitation) and c.line is not None]
+    if len(lines) != 1 or not copy.hint.startswith("write ") or " line " in copy.hint:
+        return copy.hint
+    return f"on line {lines[0].line} of {lines[0].file}, {copy.hint}"
+
+
+def _is_told(repair: Repair, hint: str) -> bool:
+    """Return whether the check's own hint says how this is repaired: how git learns of a bit, what has a name."""
+    if repair.kind == "executable-bit":
+        return repair.file in hint and "chmod" in hint
+    if repair.kind == "parameter-name" and repair.before.strip() == repair.after.strip():
+        return f"line {repair.line}" in hint
+    new = _new_words(repair)
+    of_package = repair.kind in {"package-name", *OF_BUILDS} and repair.file in OF_PACKAGES
+    return of_package and new <= words_of(hint) and new != set()
+
+
+def _is_further_down(repair: Repair, verdict: Verdict) -> bool:
+    """Return whether the wrong word of a call over several lines stands below the only line that the verdict cites."""
+    lines = [line for file, line in cited_lines(verdict.citations) if file == repair.file]
+    one_word = repair.kind in OF_BUILDS and "\n" not in repair.before + repair.after
+    return one_word and "; " not in verdict.hint and len(lines) == 1 and lines[0] < (repair.line or 0)
+
+
+def _what_was_done(repairs: Iterable[Repair]) -> str:
+    """Return `a.py renamed and b.py line 6 repaired`."""
+    done: dict[str, dict[str, None]] = {}
+    for one in repairs:
+        done.setdefault("renamed" if one.kind == "file-name" else "repaired", {})[place_of(one)] = None
+    return " and ".join(f"{join_words(places)} {how}" for how, places in done.items())
+
+
+def shared_verdict(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:
+    score = copy.score * share
+    status = Status.PARTIAL if share < 1 and copy.status is Status.PASS else copy.status
+    points = f"{share_text(share)} of the points; " if copy.score and not copy.right else ""
+    message = f"judged on a copy with {_what_was_done(repairs)}: {points}{copy.message}"
+    return copy.model_copy(update={"status": status, "score": score, "message": message})
+
+
+def is_next_fault(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> bool:
+    """Return whether a loss is in what was repaired, and the copy loses the criterion by another fault."""
+    files = {repair.file for repair in repairs}
+    found = {(c.file, c.line) for c in one.citations if isinstance(c, FileCitation) and c.file in files}
+    again = cited_lines(copy.citations)
+    again -= lines_read_now(repairs)
+    return found != set() and not copy.unjudged and not found & again and _is_other_fault(one, copy)
+
+
+def lines_read_now(repairs: Iterable[Repair]) -> set[tuple[str, int]]:
+    """Return the lines that could not be read before these repairs."""
+    return {
+        (repair.file, repair.line + further)
+        for repair in repairs
+        if repair.kind in OF_SYNTAX and repair.line is not None
+        for further in range(len(repair.before.split("\n")))
+    }
+
+
+def _is_other_fault(one: Verdict, copy: Verdict) -> bool:
+    said, then = (NUMBER.sub("", verdict.message) for verdict in (one, copy))
+    return copy.status.is_lost and said != then
