@@ -4,16 +4,8 @@ from __future__ import annotations
 
 import math
 
-from grader.arena.run_state import (
-    ROSOUT,
-    RunState,
-    TopicSeen,
-    computes,
-    goes_on,
-    is_fed,
-    is_settled,
-    is_silent,
-)
+from grader.arena.run_state import ROSOUT, RunState, TopicSeen
+from grader.arena.settling import computes, goes_on, is_fed, is_settled, is_silent
 from grader.rubric.scenario import Until
 
 Outcome = tuple[str, str]

@@ -19,8 +19,9 @@ from grader.arena.control_groups import remove_groups
 from grader.arena.killed_processes import Killed
 from grader.arena.process_environment import LOOPBACK, ProcessEnvironment, search_path
 from grader.arena.ros.wire import Frame, FrameReader
-from grader.arena.run_state import ROSOUT, RunState, all_compute
+from grader.arena.run_state import ROSOUT, RunState
 from grader.arena.sandbox_files import HOME
+from grader.arena.settling import all_compute
 from grader.errors import ArenaError
 from grader.evidence.events import (
     NO_ANSWER,
