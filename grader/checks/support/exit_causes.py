@@ -289,42 +289,69 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     """Explain one traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
-    misplaced = (evaluated(found) or wrong_class(found.own_frames[-1].source)) if found.own_frames else None
-    hiding = hiding_file(found, package)
-    slip = hiding or misplaced or _slip(found, package) or _asks_for_input(found, place, package)
-    cause, hint = slip or CAUSES.get(
-        found.kind, ("", "look at that line: the last words say what Python cannot do there")
-    )
-    unbuilt = None if hiding else unmade(found, package)
-    cause, hint = unbuilt or (cause, hint)
     if lacking := lacking_module(found, package):
         return _of_machine(found, lacking, place, package)
     if broken := broken_import(found, package):
-        where = f" ({place.file}, line {place.line})" if place else ""
-        cause = f"{shown(found.text)}{where}: raised by a file of this grading machine, {broken}"
-        line = shown(imported_line(found)) or "what is imported"
-        hint = f"{ON_THE_MACHINE}repair {line}, which fails there by itself"
-        return Ending(cause, hint, (place,) if place else (), of_machine=True)
+        return _of_broken_machine(found, broken, place)
     source = package.file(place.file) if place and found.kind in SYNTAX else None
-    if place is not None and source is not None and source.python_fault is not None:
-        cause = source.python_fault.explanation if source.python_fault.cause else cause
-        hint = syntax_hint(source.python_fault)
-        place = source.python_fault.place
-    if place is not None and misplaced is None:
-        cause, hint = _by_other_lines(found, place, package) or (cause, hint)
+    fault = source.python_fault if source else None
+    place = fault.place if fault else place
+    wrong = _callback(found, place, package) if found.kind == "TypeError" else None
+    hiding = hiding_file(found, package)
+    unbuilt = None if hiding else unmade(found, package)
+    known = hiding or unbuilt or _known_meaning(found, place, package)
+    if fault:
+        known = fault.explanation if fault.cause else known[0], syntax_hint(fault)
+    if wrong:
+        known = wrong.message, wrong.fix
+    elif place is not None:  # other lines are nearer to the mistake than what the exception says of this one
+        known = _by_script(found, place, package) or known
+    cause, hint = known
+    place = place or (wrong.place if wrong else None)
     if place is not None and found.kind in IMPORT_ERRORS and unbuilt is None and not hiding:
         hint = unused_import(place, package) or hint
-    said = re.sub(r" \(/\S+/__init__\.py\)$", "", found.text)
-    if (guess := _BY_PYTHON.search(said)) and (hasattr(builtins, guess[1]) or "did you mean" in cause):
-        said = said.removesuffix(guess[0])
-    if found.kind == "TypeError" and (wrong := _callback(found, place, package)):
-        place = place or wrong.place
-        cause, hint = wrong.message, wrong.fix
-    elif place is not None and found.kind == "TypeError":
-        cause, hint = _operand(found, package) or (cause, hint)
     where = f" ({place.file}, line {place.line})" if place else ""
-    text = f"{shown(said.rstrip('.'))}{where}" + (f": {cause}" if cause else "")
+    text = f"{shown(_said(found, cause).rstrip('.'))}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else (), unbuilt=unbuilt is not None)
+
+
+def _known_meaning(found: Traceback, place: FileCitation | None, package: PackageFacts) -> tuple[str, str]:
+    """Return the cause and the hint, by the first that knows it: a call in which something stands in the wrong place, a known
+    slip, a question; else what the type of the exception says."""
+    return (
+        _misplaced(found)
+        or _slip(found, package)
+        or _asks_for_input(found, place, package)
+        or CAUSES.get(found.kind, ("", "look at that line: the last words say what Python cannot do there"))
+    )
+
+
+def _misplaced(found: Traceback) -> tuple[str, str] | None:
+    own = found.own_frames
+    return (evaluated(found) or wrong_class(own[-1].source)) if own else None
+
+
+def _by_script(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
+    """Return what the sides of a sum are, or what other lines of the script are to blame for."""
+    sum_ = _operand(found, package) if found.kind == "TypeError" else None
+    return sum_ or (None if _misplaced(found) else _by_other_lines(found, place, package))
+
+
+def _said(found: Traceback, cause: str) -> str:
+    """Return the exception's own words, without a guess of Python's where the cause names another one."""
+    said = re.sub(r" \(/\S+/__init__\.py\)$", "", found.text)
+    guess = _BY_PYTHON.search(said)
+    is_spare = guess is not None and (hasattr(builtins, guess[1]) or "did you mean" in cause)
+    return said.removesuffix(guess[0]) if guess is not None and is_spare else said
+
+
+def _of_broken_machine(found: Traceback, broken: str, place: FileCitation | None) -> Ending:
+    """Explain an import that fails within a file of ROS's or of the machine's."""
+    where = f" ({place.file}, line {place.line})" if place else ""
+    cause = f"{shown(found.text)}{where}: raised by a file of this grading machine, {broken}"
+    line = shown(imported_line(found)) or "what is imported"
+    hint = f"{ON_THE_MACHINE}repair {line}, which fails there by itself"
+    return Ending(cause, hint, (place,) if place else (), of_machine=True)
 
 
 def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
