@@ -174,7 +174,7 @@ def _no_result(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
         return end.verdict(failed, f"{said}: {end.cause}")
     message = f"{said}: {shown(goal.end.detail) if goal.end else ''}"
     hint = "every path through the callback must end with set_succeeded, set_aborted or set_preempted"
-    verdict = failed(message, hint=hint).once()
+    verdict = failed(message, hint=hint).if_repeated()
     if _goes_on(run, goal, params):
         verdict = failed(f"{said}: it goes on, though it was cancelled", hint=HINTS["PREEMPTED"])
     return _excused(verdict, run, goal)
@@ -200,7 +200,7 @@ def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResult
             f"{message}: it was over before it could be cancelled",
             hint="let it take as long as the handout says",
         )
-        return _excused(verdict.once(), run, goal)
+        return _excused(verdict.if_repeated(), run, goal)
     unset = any("did not set the goal to a terminal status" in line.line for _, line in run.console)
     if status == "ABORTED" and unset:
         message += ": the callback returns without saying how the goal ends"
@@ -224,7 +224,7 @@ def _too_late(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | Non
     verdict = failed(message, hint=hint)
     if took_s > params.within_s + NEVER_LATE_S * run.warp:
         return verdict
-    return excused(verdict.once(), run, from_ns, goal.ended_ns, why_late)
+    return excused(verdict.if_repeated(), run, from_ns, goal.ended_ns, why_late)
 
 
 def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:
@@ -234,7 +234,7 @@ def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | 
     count = plural(came, "feedback message")
     message = f"{count} came on {goal.name} of {params.action}, but {params.feedback} are expected"
     verdict = failed(message, hint="call server.publish_feedback(feedback) each time around the loop")
-    return verdict if came == 0 else _excused(verdict.once(), run, goal)
+    return verdict if came == 0 else _excused(verdict.if_repeated(), run, goal)
 
 
 def _excused(verdict: Verdict, run: Run, goal: Goal) -> Verdict:

@@ -180,7 +180,9 @@ def _fault(
     what = f"{params.service} is called {plural(came, 'time')}, but there was no other call{with_fields}"
     if end := explain_early_end(package, run) or error:
         return end.verdict(failed, f"{what}: {end.cause}")
-    return failed(what, hint=f"{plural(len(params.wanted), 'call')} are expected: call it again").once()
+    return failed(
+        what, hint=f"{plural(len(params.wanted), 'call')} are expected: call it again"
+    ).if_repeated()
 
 
 def _other_request(params: CallsParams, wanted: dict[str, Any], left: tuple[Request, ...]) -> Verdict:
@@ -256,7 +258,7 @@ def _call(run: Run, service: str) -> str:
 
 def _unless_over(verdict: Verdict, run: Run) -> Verdict:
     """A program that came to its end has done all that it does; one that ran on may have been late with a call."""
-    return verdict if all(one.ended_early for one in lives(run)) else verdict.once()
+    return verdict if all(one.ended_early for one in lives(run)) else verdict.if_repeated()
 
 
 def _judge_refusal(run: Run, service: str) -> Verdict | None:

@@ -158,10 +158,12 @@ def _not_printed(
                 f"it never prints {params.words}: the service's callback returns {wrong}", hint=hint
             )
     if not own:
-        nothing = unjudged(f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True").once()
+        nothing = unjudged(
+            f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True"
+        ).if_repeated()
         return nothing.model_copy(update={"silent": True})
     meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
-    return failed(f"it never prints {params.words}; it prints {shown(meant.text)!r}", hint=hint).once()
+    return failed(f"it never prints {params.words}; it prints {shown(meant.text)!r}", hint=hint).if_repeated()
 
 
 def _slip(line: Line, params: PrintsParams) -> str:
@@ -176,7 +178,7 @@ def _other_end(one: Life, params: PrintsParams) -> Verdict | None:
         return None
     hint = f"end with sys.exit({params.exit_code})"
     if not one.ended_early or one.end is None:
-        return failed("it does not end by itself", hint=hint, measured="no exit code").once()
+        return failed("it does not end by itself", hint=hint, measured="no exit code").if_repeated()
     code = one.end.exit_code
     if code == params.exit_code:
         return None

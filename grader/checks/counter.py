@@ -131,7 +131,7 @@ def judge_start(first: Count, run: Run, params: StartParams) -> Verdict:
         why = f"{message}; but the node floods its topics, and in a flood the publisher's queue drops values"
         return grade_again(why)
     verdict = failed(message, hint=hint)
-    return verdict.once() if _may_follow_others(run, first, params) else verdict
+    return verdict.if_repeated() if _may_follow_others(run, first, params) else verdict
 
 
 def _may_follow_others(run: Run, first: Count, params: StartParams) -> bool:
@@ -281,7 +281,7 @@ def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict 
     if usual == 0:
         hint = "set the counter before the loop, and add one each time around it: nothing inside the loop may reset it"
     verdict = failed(f"the counter {message}: {place}", hint=hint)
-    return verdict.once() if count.is_single(found.own) else verdict
+    return verdict.if_repeated() if count.is_single(found.own) else verdict
 
 
 def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, params: StepParams) -> Verdict:

@@ -118,7 +118,7 @@ class FileLeftParams(Record):
         if len(data) < self.min_bytes:
             wanted = f", not {self.min_bytes}" if data else ""
             what = f"holds only {plural(len(data), 'byte')}{wanted}" if data else "was left empty"
-            return failed(f"{file.path} {what}", hint="write to it, and close it").once()
+            return failed(f"{file.path} {what}", hint="write to it, and close it").if_repeated()
         if self.file.endswith(RECORDINGS):
             return _recording(file, self.topics, run)
         if self._is_table:
@@ -196,8 +196,8 @@ def _not_left(files: Sequence[LeftFile], package: PackageFacts, run: Run, params
         return end.verdict(unjudged, f"{what}: the program ended before ({end.cause})")
     hint = f"write {params.file} before the program ends"
     if paths:
-        return failed(f"{what}; what it wrote is {_list_paths(paths)}", hint=hint).once()
-    return failed(f"{what}, and no other file", hint=hint).once()
+        return failed(f"{what}; what it wrote is {_list_paths(paths)}", hint=hint).if_repeated()
+    return failed(f"{what}, and no other file", hint=hint).if_repeated()
 
 
 def _list_paths(paths: Iterable[str]) -> str:
@@ -224,7 +224,7 @@ def _wrong_topic(
     count = sum(len(channel.messages) for channel in found)
     if not count:
         hint = f"rosbag record {topic} …: name the topic as rostopic list shows it"
-        return failed(f"{path} holds no message on {topic}", hint=hint).once()
+        return failed(f"{path} holds no message on {topic}", hint=hint).if_repeated()
     types = {plain_type(channel.type) for channel in found}
     if wanted.type is not None and types != {wanted.type}:
         message = f"{path}: {topic} has the type {_list_paths(sorted(types))}, not {wanted.type}"
@@ -238,7 +238,7 @@ def _wrong_topic(
 
 def _short(verdict: Verdict, run: Run, count: int, least: int) -> Verdict:
     """A machine that is late makes a recording shorter, but not by half."""
-    once = verdict.once()
+    once = verdict.if_repeated()
     return excused(once, run, run.start_ns, run.end_ns, why_late) if 2 * count >= least else once
 
 

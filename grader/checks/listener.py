@@ -101,7 +101,9 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
         verdict = _judge_missing(package, run, probes, missing, params)
     elif not in_order(places):
         message = f"what came on {params.topic} is printed, but not in the order in which it was sent"
-        verdict = failed(message, hint="print in the callback itself, not later from a variable").once()
+        verdict = failed(
+            message, hint="print in the callback itself, not later from a variable"
+        ).if_repeated()
     else:
         verdict = passed(f"prints each of the {len(probes)} messages on {params.topic}")
     first, last = (missing[0], missing[-1]) if missing else (probes[0], probes[-1])
@@ -349,4 +351,4 @@ def _by_number(
     value = missing[0].value
     first = significant(value) if isinstance(value, int) else repr(value)
     message = f"{len(missing)} of {plural(len(probes), 'message')} not printed, the first of them {first}"
-    return failed(message, hint=CALLBACK_HINT).once()
+    return failed(message, hint=CALLBACK_HINT).if_repeated()

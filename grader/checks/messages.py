@@ -464,7 +464,7 @@ def _in_order(
             verdict = failed(message, hint=hint)
             later = any(params.is_at(one, v) for one in found[at:] for v in params.values[number + 1 :])
             if later or not found[at:]:  # one alone may have been lost on its way
-                verdict = verdict.once()
+                verdict = verdict.if_repeated()
             break
         at = here + 1
     cited = (_span(run, found, params),)
@@ -492,7 +492,7 @@ def _other_value(
         message = (
             f"{params.field} of {params.topic} is {params.words} in none of {plural(len(found), 'message')}"
         )
-        return failed(f"{message}: at first {seen}", hint=hint).once()
+        return failed(f"{message}: at first {seen}", hint=hint).if_repeated()
     if params.when == "every":
         after = time_between(run, found[0].time_ns, first.time_ns)
         where = f"in {len(wrong)} of {plural(len(found), 'message')}: {seen}, {after} after the first"
@@ -503,7 +503,9 @@ def _other_value(
         topics = join_words(sorted(filter(None, sent)))
         message, hint = f"{message}; none came after {topics}", f"publish again in the callback of {topics}"
     verdict = failed(message, hint=hint)
-    return verdict.once() if params.when == "last" else verdict.model_copy(update={"callbacks": "before"})
+    return (
+        verdict.if_repeated() if params.when == "last" else verdict.model_copy(update={"callbacks": "before"})
+    )
 
 
 def _values(asked: Sequence[Reading]) -> str:

@@ -204,7 +204,7 @@ def _early_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
 def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None:
     if not nodes:
         hint = f"call {INIT} before anything that waits"
-        return unjudged(f"{_script(one)} runs, but never registers as a node", hint=hint).once()
+        return unjudged(f"{_script(one)} runs, but never registers as a node", hint=hint).if_repeated()
     # Another tool's recording does not say whose a node is: there, as many nodes as processes are right.
     if len(nodes) > (1 if are_noted(run) else max(1, len(lives(run)))):
         hint = f"one script is one node: call {INIT} once, and start no other process"
@@ -228,7 +228,7 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
         if excuse := _locked_up(one, run) or _asleep(one, package):
             return excuse
         hint = IN_A_LOOP + both("; a bare `except:` in the loop swallows the Ctrl-C", "")
-        return failed(message, hint=hint).once()  # no line of the script is known to be why
+        return failed(message, hint=hint).if_repeated()  # no line of the script is known to be why
     found = process_tracebacks(run, one.name, after_ns=one.interrupt_ns)
     own = [f for f in found if not is_rospys_own(f)]
     if not own:

@@ -271,7 +271,7 @@ def _fell_silent(found: Rhythm, run: Run, package: PackageFacts, params: RatePar
     if others := _goes_on(found, run, params):
         message += f" and goes on publishing on {others}"
         hint = f"publish on {params.topic} in the loop that publishes on {others} too"
-    return failed(message, hint=hint).once()
+    return failed(message, hint=hint).if_repeated()
 
 
 def _goes_on(found: Rhythm, run: Run, params: RateParams) -> str:
@@ -322,7 +322,7 @@ def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -
     share = f"{len(outside)} of {len(found.gaps_ns)} gaps are far from {1 / params.rate_hz:g} s"
     kind = "in bursts" if found.comes_in_bursts else "unevenly"
     message = f"{params.topic} comes {kind}: {hertz(found.mean_hz)} on average, but {share}"
-    return failed(message, hint="publish one message and sleep once each time around the loop").once()
+    return failed(message, hint="publish one message and sleep once each time around the loop").if_repeated()
 
 
 def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
@@ -330,7 +330,7 @@ def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
     message = f"{params.topic} is too {direction}: {hertz(found.mean_hz)} instead of {nominal} Hz"
     ratio = found.mean_hz / params.rate_hz
     verdict = failed(message, hint=_rate_hint(ratio, nominal, even=found.is_even))
-    return verdict.once() if abs(ratio - 1) < NEAR_SHARE else verdict
+    return verdict.if_repeated() if abs(ratio - 1) < NEAR_SHARE else verdict
 
 
 def _by_number(

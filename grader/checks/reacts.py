@@ -227,7 +227,7 @@ def _early(
     if to_s(between[-1].time_ns) >= from_s + params.within_s:
         return verdict
     # what ends so soon may be an older answer of a machine that was late itself
-    return excused(verdict.once(), run, causes[0].time_ns, first, why_late)
+    return excused(verdict.if_repeated(), run, causes[0].time_ns, first, why_late)
 
 
 def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> Verdict | None:
@@ -239,7 +239,7 @@ def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> 
         f"{params.cause.words} never came in this run",
         measured=f"0 of {plural(len(causes), 'message')}",
         hint=f"rostopic echo {params.cause.topic} shows what comes while your node runs",
-    ).once()
+    ).if_repeated()
 
 
 def _instead(
@@ -297,7 +297,7 @@ def _judge_unanswered(
     if late is None and len(slow) == len(answers):
         seen, hint = (f"; {instead[0]}", instead[1]) if instead else ("", hint)
         verdict = failed(f"{reaction.format('never follows')}, which came {times}{seen}", hint=hint).late()
-        return verdict.once() if len(answers) == 1 else verdict
+        return verdict.if_repeated() if len(answers) == 1 else verdict
     how = "does not follow" if late is None else f"comes up to {late:.2f} s after"
-    verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).late().once()
+    verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).late().if_repeated()
     return excused(verdict, run, slow[0].at_ns, run.end_ns, why_late)

@@ -292,7 +292,7 @@ def _excuse_nearly(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
 
     began = (c.times_ns[0] for c in run.student_channels() if c.messages and c.topic not in SYSTEM_TOPICS)
     from_ns, to_ns = min(began, default=run.start_ns), observed_until_ns(run) or run.end_ns
-    return excused(verdict.once() if nearly else verdict, run, from_ns, to_ns, why_late)
+    return excused(verdict.if_repeated() if nearly else verdict, run, from_ns, to_ns, why_late)
 
 
 class StaysWithinParams(Place):

@@ -203,7 +203,7 @@ def _judge_results(found: Results, run: Run, package: PackageFacts, start_ns: in
         message = f"{verdict.message}; a callback fails: {error.cause}"
         about = {"message": message, "hint": error.hint, "citations": error.citations, "unjudged": False}
         verdict = verdict.model_copy(update=about)
-    return excused(verdict.once(), run, start_ns, run.end_ns, _why_late)
+    return excused(verdict.if_repeated(), run, start_ns, run.end_ns, _why_late)
 
 
 def _error_behind(verdict: Verdict, package: PackageFacts, run: Run) -> Ending | None:

@@ -205,7 +205,7 @@ def _backwards(found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
         f"{before.told_s:.3f} to {after.told_s:.3f}"
     )
     verdict = failed(message, hint=_now(params))
-    return verdict if len(falls) > len(found) // 4 else verdict.once()
+    return verdict if len(falls) > len(found) // 4 else verdict.if_repeated()
 
 
 def _limit_s(run: Run, params: StampsParams) -> float:
@@ -231,7 +231,7 @@ def _far(run: Run, found: Sequence[Stamp], params: StampsParams) -> Verdict | No
 
     half_ms = params.within_s / 2 * 1e3 / run.warp
     return excused(
-        verdict.once(), run, found[0].time_ns, found[-1].time_ns, lambda late: late.reason(half_ms)
+        verdict.if_repeated(), run, found[0].time_ns, found[-1].time_ns, lambda late: late.reason(half_ms)
     )
 
 

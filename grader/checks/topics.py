@@ -311,7 +311,7 @@ def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
     if absent := no_node(package, run, f"{first} and {second} were not seen connected over {params.topic}"):
         return absent
     message = f"{first} and {second} are both on {params.topic}, but not connected"
-    return failed(message, hint="do both use the same message type?").once()
+    return failed(message, hint="do both use the same message type?").if_repeated()
 
 
 def _judge_misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:

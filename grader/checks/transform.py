@@ -325,7 +325,7 @@ def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict 
     if until_s - last_s < slack_s or any(to_s(one.time_ns) >= last_s - order_s for one in seen):
         return None
     message = f"{params.name} was no longer sent after the last pose on {params.pose_of}"
-    verdict = failed(message, hint=f"send it in the callback of {params.pose_of}").once()
+    verdict = failed(message, hint=f"send it in the callback of {params.pose_of}").if_repeated()
     return excused(verdict, run, poses[0][0], run.end_ns, why_late)
 
 
@@ -360,7 +360,7 @@ def _wrong_pose(
     # One and the same pose all the time is no lag of the machine's.
     if len(judged) > FEW and len({_text(one) for _, one in judged}) == 1:
         return verdict
-    verdict = verdict.once()
+    verdict = verdict.if_repeated()
     return excused(verdict, run, old[-1], wrong[-1][0], why_late)
 
 
@@ -375,7 +375,7 @@ def _too_seldom(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verd
     asked = f"and the handout asks for at least {params.min_hz:g}"
     message = f"{params.name} is sent {significant(rate_hz)} times a second, {asked}"
     verdict = failed(message, hint=f"send it in a loop with {RATE}, or in the callback of what it follows")
-    return excused(verdict.once(), run, seen[0].time_ns, seen[-1].time_ns, why_late)
+    return excused(verdict.if_repeated(), run, seen[0].time_ns, seen[-1].time_ns, why_late)
 
 
 def _expected_text(params: TransformParams) -> str:

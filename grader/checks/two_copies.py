@@ -132,7 +132,7 @@ def _not_started(package: PackageFacts, run: Run, params: CopiesParams) -> Verdi
             return end.verdict(unjudged, f"{one.name} ended before the copies were started: {end.cause}")
         if not nodes_of(run, one.name):
             message = f"{one.name} never registers as a node, so what waits for it was not started"
-            return unjudged(message, hint=f"call {INIT} before anything that waits").once()
+            return unjudged(message, hint=f"call {INIT} before anything that waits").if_repeated()
     if any(one.name in {params.first, params.second} for one in waited_for):
         return grade_again("only one copy was started")
     return unjudged("no copy was started: there is no script to run", hint=NO_SCRIPT_HINT)
@@ -189,7 +189,7 @@ def _judge_unknown_nodes(run: Run, trio: Trio) -> Verdict | None:
     which = "second" if trio.first_nodes else "first" if trio.second_nodes else ""
     if not which:
         message = "neither copy registers as a node"
-        return unjudged(message, hint=f"call {INIT} before anything that waits").once()
+        return unjudged(message, hint=f"call {INIT} before anything that waits").if_repeated()
     message = f"the {which} copy never registers as a node beside the other"
     return failed(message, hint=f"call {init('…', anonymous=True)} before anything that waits")
 

@@ -227,8 +227,9 @@ class Verdict(Record):
         """Return the verdict marked as one that shows a callback which came too late, or never."""
         return self.model_copy(update={"callbacks": "late"})
 
-    def once(self) -> Verdict:
-        """Return the verdict marked as a loss that one run's timing could have made."""
+    def if_repeated(self) -> Verdict:
+        """Return the verdict as a loss that counts only if it is repeated: one run's timing could have made it, so its
+        scenario is run again."""
         return self.model_copy(update={"timing": True})
 
 

@@ -265,7 +265,7 @@ def _verdict(outcome: SessionOutcome, params: PytestParams) -> Verdict:
     lines = dict.fromkeys((t.file, t.line) for t in lost if t.file)
     cited = tuple(FileCitation(file=file, line=line) for file, line in lines)
     if any(t.late for t in lost):
-        verdict = verdict.once()
+        verdict = verdict.if_repeated()
     return verdict.about(
         expected=f"the tests in {params.file} pass", measured=_sub_scores(outcome.tests), citations=cited
     )

@@ -328,7 +328,7 @@ def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: Wra
     alone = (
         in_range and sum(_is_bad(s, params) for s in turns) == 1 and any(_is_good(s, params) for s in turns)
     )
-    return verdict.once() if alone else verdict
+    return verdict.if_repeated() if alone else verdict
 
 
 def _where_reset(verdict: Verdict, turn: Step, written: Sequence[PythonSlip], params: WrapParams) -> Verdict:
@@ -433,7 +433,7 @@ def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -
         f"the node stops publishing after {significant(count.values[-1])}, although it keeps running{cause}"
     )
     verdict = failed(message, hint=params.reset_hint) if len(count.values) > 1 else unjudged(message)
-    return verdict if found else verdict.once()
+    return verdict if found else verdict.if_repeated()
 
 
 def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Verdict:

@@ -316,8 +316,8 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
 
 
 def _known_meaning(found: Traceback, place: FileCitation | None, package: PackageFacts) -> tuple[str, str]:
-    """Return the cause and the hint, by the first that knows it: a call in which something stands in the wrong place, a known
-    slip, a question; else what the type of the exception says."""
+    """Return the cause and the hint, by the first that knows it: a call in which something stands in the wrong place,
+    a known slip, a question; else what the type of the exception says."""
     return (
         _misplaced(found)
         or _slip(found, package)

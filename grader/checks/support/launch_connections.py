@@ -166,7 +166,7 @@ def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
         message = (
             f"{join_words(publishers)} and {join_words(subscribers)} are both on {topic}, but not connected"
         )
-        return failed(message + said, hint="do both use the same message type?").once()
+        return failed(message + said, hint="do both use the same message type?").if_repeated()
     lacking = "publishes on" if not publishers else "subscribes to"
     seen = topics_with(run, "subscribers" if publishers else "publishers")
     there = f"; one {lacking} {join_words(seen)}" if seen else ""
