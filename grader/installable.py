@@ -1,4 +1,8 @@
-"""What can be installed: ROS packages, Python modules and messages that exist, and the grader's own extras."""
+"""What can be installed: ROS packages, Python modules and messages that exist, and the grader's own extras.
+
+Whether a name in a student's file is one of these, and lacking here, is found where it is asked for:
+`checks/support/missing_names.py` for imports, `checks/support/build_errors.py` for builds.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """The results folder of one submission: evidence and reports replace older ones together, or not at all.
 
-Everything is written into `.grader-new`, flushed to the disk, and renamed to `.grader-ready`: this commits it. Then
-the old result is removed, the new evidence and reports are moved into place, and the new result last. A grader that is
-killed in between leaves no result, or one that fits the evidence beside it; the next one finishes what it had begun.
+Everything is written into `.grader-new` (the reports by `report/files.py`), flushed to the disk, and renamed to
+`.grader-ready`: this commits it. Then the old result is removed, the new evidence and reports are moved into place, and
+the new result last. A grader that is killed in between leaves no result, or one that fits the evidence beside it; the
+next one finishes what it had begun.
 
 Folders and files are private to their owner: they hold a student's marks.
 """

@@ -1,4 +1,4 @@
-"""Rosters that platforms give.
+"""Rosters that platforms give; `SOURCES` in this room's `__init__.py` lists them with all others.
 
 These are a folder with a submission in each entry, the zip of all submissions that Moodle or Canvas offers for
 download, the grades of a GitHub Classroom assignment (CSV), and the projects of a GitLab group (JSON). The names in
