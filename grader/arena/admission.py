@@ -157,7 +157,7 @@ class Admission:
             yield
             return
         with FileLock(self._folder / "runs") as runs:
-            # Whoever holds the turn alone keeps all later ones out while the runs that have begun come to their end.
+            # The run that holds the turn alone keeps all later ones out until those that have begun are over.
             with FileLock(self._folder / "turn") as turn:
                 await _until(lambda: turn.take(shared=not alone), ALONE_PATIENCE_S)
                 await _until(lambda: runs.take(shared=not alone), ALONE_PATIENCE_S)

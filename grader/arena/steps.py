@@ -390,7 +390,7 @@ class StepRunner:
             return
         name = wait.topic or wait.node or ""
         self._tell(f"waiting for {name}")
-        # What did not come the last time is given little time again, until something is started anew.
+        # What did not come the last time gets little time now, until another process is started.
         limit_s = wait.limit_s or (min(SUBSCRIBE_S, patience_s) if name in self._in_vain else patience_s)
         if self._deaf and self._deaf <= live.refused and not live.topics[name].count:
             limit_s = min(limit_s, UNANSWERED_S)  # the node's type is another: it hears nothing to answer

@@ -160,15 +160,12 @@ def apply_repaired_copy(
         verdict, copy = first[criterion.id], on_copy[criterion.id]
         share = min(rubric.share_of(one.kind) for one in needed) if criterion.points else 1.0
         told = repairs_as_handed_in(charged or needed, repairs)
-        verdict = (
-            _without_others(verdict, [one for one in needed if one not in charged]) if charged else verdict
-        )
         placed = with_names_as_handed_in(copy, repairs)
-        verdicts[criterion.id] = (
-            charged_verdict(verdict, copy, told, cited_lines(placed.citations))
-            if charged
-            else shared_verdict(placed, told, share)
-        )
+        if charged:
+            own = _without_others(verdict, [one for one in needed if one not in charged])
+            verdicts[criterion.id] = charged_verdict(own, copy, told, cited_lines(placed.citations))
+        else:
+            verdicts[criterion.id] = shared_verdict(placed, told, share)
         uses[criterion.id] = Repaired(repairs=told, share=share, charged=bool(charged))
     installing = {c.id for c in rubric.criteria if c.check == INSTALL}
     return {i: _at_new_paths(v, repairs) if i in installing else v for i, v in verdicts.items()}, uses

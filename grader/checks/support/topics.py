@@ -393,7 +393,7 @@ def _files_that_run(package: PackageFacts, run: Run) -> set[str | None]:
 def explain_by_waiting_callback(
     check: Check, package: PackageFacts | None, run: object, verdict: Verdict
 ) -> Verdict:
-    """Return a lost mark with the callback that sleeps or never ends, so that its script hears nothing meanwhile."""
+    """Return a lost mark with the callback that sleeps or never ends: until it returns, its script receives nothing."""
     of_callbacks = check.of_callbacks or check.name in OF_RESULTS
     if not of_callbacks or verdict.cause or package is None or not isinstance(run, Run):
         return verdict
