@@ -70,6 +70,7 @@ def prepare(place: Path, ros: RosInstallation) -> None:
         "slips.py",
         "script_loops.py",
         "script_objects.py",
+        "script_callbacks.py",
         "script_counters.py",
         "script_names.py",
     ):

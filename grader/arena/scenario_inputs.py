@@ -21,7 +21,7 @@ PROBE_SHAPES = (
 )  # fmt: skip
 """Long and short, with numbers as a lab's own texts, with commas and colons: a text that is cut anywhere is noticed. No
 number is one that a lab counts."""
-TEXTS_FOR_ONE_TWICE = 4
+VALUES_FOR_ONE_TWICE = 4
 PAUSE_BEFORE_SAME = 3
 RANGES = {
     f"std_msgs/{'U' * (not signed)}Int{bits}": (-(1 << bits - 1), (1 << bits - 1) - 1)
@@ -73,14 +73,15 @@ def _before(shot: Shot, following: Shot) -> Shot:
 
 
 def _values(probe: Probe) -> Iterator[Any]:
-    twice = probe.text >= TEXTS_FOR_ONE_TWICE
+    twice = probe.text >= VALUES_FOR_ONE_TWICE
+    again = probe.integers >= VALUES_FOR_ONE_TWICE
     shapes = cycle(_random.sample(PROBE_SHAPES, len(PROBE_SHAPES)))
     values: list[str | int] = [_made_up_text(next(shapes)) for _ in range(probe.text - twice)]
     if probe.integers or probe.among:
         low, high = RANGES[probe.type]
-        values += [*_integers(probe, low, high), *probe.among]
+        values += [*_integers(probe, probe.integers - again, low, high), *probe.among]
     _random.shuffle(values)
-    if twice:
+    if twice or again:
         _repeat_one(values)
     yield from values
     for _ in range(probe.times if probe.values else 0):
@@ -88,16 +89,15 @@ def _values(probe: Probe) -> Iterator[Any]:
 
 
 def _repeat_one(values: list[str | int]) -> None:
-    """Let one text come twice running, neither first nor last: a listener may not leave out what it knows already."""
-    texts = [i for i, value in enumerate(values) if isinstance(value, str)]
-    at = _random.choice(texts[1:-1])
+    """Let one value come twice running, neither first nor last: a listener may not leave out what it knows already."""
+    at = _random.randrange(1, len(values) - 1)
     values.insert(at, values[at])
 
 
-def _integers(probe: Probe, low: int, high: int) -> Iterator[int]:
-    """Yield integers that differ from each other and from those of `among`."""
+def _integers(probe: Probe, count: int, low: int, high: int) -> Iterator[int]:
+    """Yield so many integers that differ from each other and from those of `among`."""
     taken = set(probe.among)
-    for _ in range(min(probe.integers, high - low + 1 - len(taken))):
+    for _ in range(min(count, high - low + 1 - len(taken))):
         value = _random.randint(low, high)
         while value in taken:
             value = _random.randint(low, high)

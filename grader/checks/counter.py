@@ -87,6 +87,7 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
         return _nothing(package, run, params.topic).about(expected=expected)
     first = found[0]
     verdict = _cite_start(judge_start(first, run, params), first, run, package, params)
+    verdict = verdict if verdict.status is Status.PASS else _of_clock(verdict, first, run, package, params)
     return verdict.about(
         expected=expected,
         measured=first_values(first.values),
@@ -177,6 +178,9 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
         or passed(f"the counter goes up by one, {plural(right, 'time')}")
     )
     verdict = _of_clock(verdict, count, run, package, params)
+    left_out = slips_of(package, run, count.callerid, "published-in-part")
+    if wrong and any(_is_on(one.name, params) for one in left_out):
+        verdict = cite_slip(verdict, count, run, package, "published-in-part")
     verdict = cite_slip(verdict, count, run, package, "no-effect", "set-in-loop")
     at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0, 0)
     return verdict.about(
@@ -218,6 +222,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
         verdict = cite_early(verdict, early)
     else:
         verdict = cite_slip(verdict, count, run, package, "compared", "reset-early")
+    verdict = verdict if verdict.status is Status.PASS else _of_clock(verdict, count, run, package, params)
     turn = f"{significant(seen.before)}→{significant(seen.after)}" if seen else "no reset"
     lowest, highest = significant(min(count.values)), significant(max(count.values))
     measured = f"{plural(len(count.values), 'value')}, {lowest} to {highest}, {turn}"
@@ -284,19 +289,24 @@ def _wrong(count: Count, found: Wrong, run: Run, params: StepParams) -> Verdict 
     return verdict.if_repeated() if count.is_single(found.own) else verdict
 
 
-def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, params: StepParams) -> Verdict:
-    """Return that a clock is not a counter, where the script reads its values from one: it skips when it is late."""
-    slips = slips_of(package, run, count.callerid, "clock-value")
-    last = params.topic.rpartition("/")[2]
-    slip = next((s for s in slips if s.message.rpartition("/")[2].lstrip("~") == last), None)
+def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, params: OnTopic) -> Verdict:
+    """Return that neither a clock nor chance is a counter, where the script has its values from them. A clock may even
+    have passed: it skips only when it is late."""
+    slip = next(
+        (s for s in slips_of(package, run, count.callerid, "clock-value") if _is_on(s.message, params)), None
+    )
     if slip is None or verdict.unjudged or verdict.status not in {Status.PASS, Status.FAIL}:
         return verdict
-    message = (
-        f"the values on {params.topic} are read from a clock, not counted ({slip.file}, line {slip.line})"
-    )
+    how = "made up at random" if slip.name == "random" else "read from a clock"
+    message = f"the values on {params.topic} are {how}, not counted ({slip.file}, line {slip.line})"
     seen = "" if verdict.status is Status.PASS else f"; {verdict.message}"
     hint = "set a counter before the loop, publish it, and add one to it each time around the loop"
     return failed(message + seen, hint=hint, citations=(slip.place,))
+
+
+def _is_on(written: str, params: OnTopic) -> bool:
+    """Whether a name in the source is that of the topic."""
+    return written.rpartition("/")[2].lstrip("~") == params.topic.rpartition("/")[2]
 
 
 def _usual_fault(usual: float) -> str:

@@ -29,6 +29,7 @@ from grader.checks.support.launch_slips import (
     node_slip,
     nodes_of_program,
     nodes_of_script,
+    out_of_comment,
     read_launch,
     refusals,
     starts_built,
@@ -205,8 +206,7 @@ def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
         cited = (FileCitation(file=file.path, line=line),)
         message = f"{message}: the one on line {line} is in a comment, which roslaunch skips"
         kind = "" if (name, line) in file.commented else f', and write type="{name}" in it'
-        hint = f"take the <node> on line {line} out of the comment: remove `<!--` before it and `-->` after it{kind}"
-        return failed(message, hint=hint, citations=cited)
+        return failed(message, hint=f"{out_of_comment(line)}{kind}", citations=cited)
     stem = PurePosixPath(name).stem
     if off := next((one for one in file.switched_off if PurePosixPath(one[0]).stem == stem), None):
         cited = (FileCitation(file=file.path, line=off[1]),)

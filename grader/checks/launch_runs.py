@@ -29,13 +29,16 @@ from grader.checks.support.launch_connections import (
     RENAMES,
     blame_place,
     blame_renaming,
+    blame_same_script,
     over_another_topic,
     together_s,
 )
 from grader.checks.support.launch_slips import (
     Slip,
+    later_fixes,
     nodes_of_program,
     nodes_of_script,
+    out_of_comment,
     own_script,
     read_launch,
     refusals,
@@ -141,10 +144,32 @@ def _why_unconnected(
     if absent and not all(ends):
         return _absent(package, run, nodes, absent)
     if len(nodes) < 2:
+        if skipped := _skipped(package, file, nodes):
+            return skipped
         message = f"{_comes_up(nodes)}; the file declares {plural(len(file.nodes), 'node')}{quoted(run)}"
         return failed(message, hint="give the talker and the listener a <node> each")
     other = over_another_topic(run, params.topic, quoted(run))
-    return blame_renaming(package, run, file.brings, params.topic, other) or other
+    blamed = blame_renaming(package, run, file.brings, params.topic, other)
+    return blamed or blame_same_script(package, run, file.brings, params.topic, other) or other
+
+
+def _skipped(package: PackageFacts, file: LaunchFile, nodes: Sequence[str]) -> Verdict | None:
+    """Return the verdict where a node of the package's is in the file, and an `if`, an `unless` or a comment leaves it
+    out; None where none is."""
+    own = {
+        name for one in package.files for name in (PurePosixPath(one.path).name, PurePosixPath(one.path).stem)
+    }
+    for kind, line, said in file.switched_off:
+        if kind in own:
+            cited = (FileCitation(file=file.path, line=line),)
+            message = f"{_comes_up(nodes)}; {said} on line {line} leaves the <node> of {kind} out"
+            return failed(message, hint="; then ".join(later_fixes(file, kind)), citations=cited)
+    for kind, line in file.commented:
+        if kind in own:
+            cited = (FileCitation(file=file.path, line=line),)
+            message = f"{_comes_up(nodes)}; the <node> of {kind} on line {line} is in a comment, which roslaunch skips"
+            return failed(message, hint=out_of_comment(line), citations=cited)
+    return None
 
 
 def _comes_up(nodes: Sequence[str]) -> str:

@@ -17,7 +17,7 @@ from grader.checks.support.console_output import (
     text_places,
 )
 from grader.checks.support.exit_causes import explain_early_end, explain_error
-from grader.checks.support.processes import GlobalName, lives, named_at, not_started
+from grader.checks.support.processes import GlobalName, lives, named_at, not_started, run_slips
 from grader.checks.support.text import (
     IN_OWN_WORDS,
     OTHER_WORDS_SHARE,
@@ -75,7 +75,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
         the robot those are the readings that matter.
 
     How it is measured
-        The grader publishes messages that it makes up for this run, one text twice in a row. Each has to
+        The grader publishes messages that it makes up for this run, one of them twice in a row. Each has to
         appear on stdout, on stderr or on /rosout, when it is sent or later. Other words on the line do not
         matter; a number has to stand alone (`12` is not in `127`). If the lab gives the line's own words
         (`I heard …`), they have to come before the message, in capitals or not; a message that is printed
@@ -248,11 +248,12 @@ def _judge_missing(
     return (
         _other_words(probes, missing, lines, params)
         or _judge_error(package, run)
-        or _some_numbers(probes, missing, lines)
         or _subscribed_again(package, run, probes, missing)
         or _unregistered(package, run, probes, missing)
-        or _only_again(probes, missing)
         or _waiting(package, run, probes, missing)
+        or _by_callback(package, run, probes, missing, params.topic)
+        or _some_numbers(probes, missing, lines)
+        or _only_again(probes, missing)
         or _some_in_other_words(probes, missing, lines, params)
         or _by_number(probes, missing, lines, _print_in_comment(package, run))
     )
@@ -282,11 +283,12 @@ def _judge_error(package: PackageFacts, run: Run) -> Verdict | None:
 def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]) -> Verdict | None:
     """Typical ways to lose zero, or all negative numbers, and print the others."""
     values = [p.value for p in missing if isinstance(p.value, int)]
-    if not values or len(values) == len(probes):
+    heard = {p.value for p in probes if isinstance(p.value, int) and p not in missing}
+    if not values or not heard or heard.intersection(values):
         return None
     if set(values) == {0}:
         return failed("0 is not printed", hint="0 counts as false: print without `if data.data:`")
-    if any(v >= 0 for v in values):
+    if any(v >= 0 for v in values) or any(v < 0 for v in heard):
         return None
     printed = {n for line in lines for n in numbers_in(line.text)}
     as_unsigned = all(v + 256 in printed for v in values)
@@ -329,6 +331,27 @@ def _waiting(
     message = f"{len(missing)} of {plural(len(probes), 'message')} not printed in time: {slip.message}"
     hint = f"in {slip.file}, {slip.fix}: no further message is read until the callback ends"
     return failed(message, hint=hint, citations=(slip.place,))
+
+
+def _by_callback(
+    package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe], topic: str
+) -> Verdict | None:
+    """What the source of the topic's callback says of it: it prints nothing of a message, or not each of them."""
+    found = [s for s in run_slips(package, run, "not-printed", "printed-in-part") if _is_of(s.name, topic)]
+    few = 2 * len(missing) < len(probes)  # another number may happen to be one that was sent
+    if len(found) != 1 or (found[0].kind == "not-printed" and few):
+        return None
+    slip, lines, gone = found[0], printed_lines(run), _print_in_comment(package, run)
+    if gone is not None and gone.file == slip.file and gone.line > slip.line:
+        return None
+    verdict = _some_numbers(probes, missing, lines) or _only_again(probes, missing)
+    verdict = verdict or _by_number(probes, missing, lines, None)
+    return verdict.explained(f"in {slip.file}, {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
+
+
+def _is_of(written: str, topic: str) -> bool:
+    """Whether a name in the source can be that of a topic; one that stands in a variable is not known."""
+    return written.rpartition("/")[2] in {"", topic.rpartition("/")[2]}
 
 
 def _by_number(

@@ -251,6 +251,7 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
         or _bursts(found, outside, even, params)
         or (_by_slip(wrong, "sleep-twice", run, package, params) if mean_hz < params.rate_hz else None)
         or _by_number(wrong, mean_hz, run, package, params)
+        or _left_out(wrong, mean_hz, run, package, params)
         or _by_parameter(wrong, run, package, params, mean_hz)
     )
 
@@ -310,6 +311,23 @@ def _by_slip(
     """Name the line on which a publisher's loop does twice in a turn what it should do once."""
     slip = next(iter(_slips(run, package, params, kind)), None)
     if slip is None:
+        return None
+    return verdict.explained(f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
+
+
+def _left_out(
+    verdict: Verdict, mean_hz: float, run: Run, package: PackageFacts, params: RateParams
+) -> Verdict | None:
+    """Name the `if` around the `publish(…)` of a loop that goes round as often as it should."""
+    asked = [float(s.message) for s in _slips(run, package, params, "rate-number")]
+    last = params.topic.rpartition("/")[2]
+    slips = _slips(run, package, params, "published-in-part")
+    slip = next((s for s in slips if s.name.rpartition("/")[2].lstrip("~") == last), None)
+    if (
+        slip is None
+        or mean_hz > params.rate_hz
+        or not any(params.low_hz <= hz <= params.high_hz for hz in asked)
+    ):
         return None
     return verdict.explained(f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
 

@@ -267,7 +267,8 @@ SlipKind = Literal[
     "clock-value", "queue-size", "deaf", "node-name", "no-init", "commented-out", "publisher", "publisher-type",
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
     "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
-    "added-first", "publish-twice", "wrong-value", "sets-parameter",
+    "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
+    "published-in-part",
 ]  # fmt: skip
 
 
@@ -300,6 +301,8 @@ class PythonSlip(Placed, Record):
     - `callback-called`, `callback-values`, `callback-missing`: a callback that is called where it should only be named,
       that takes another number of values than ROS passes, or that does not exist.
     - `callback-waits`: a topic's or service's callback that sleeps, or never ends.
+    - `not-printed`: why a topic's callback prints nothing of any message; `name` is the topic as it is written there.
+    - `printed-in-part`: why it prints some messages only, or something else than their values; `name` as above.
     - `subscribed-again`: a `Subscriber(…)` that a loop makes in each turn.
     - `unregistered`: a `Publisher` or `Subscriber` that is taken off its topic.
     - `not-started`: an action server that waits for a `start()` that no line calls.
@@ -307,7 +310,9 @@ class PythonSlip(Placed, Record):
     - `set-in-loop`, `reset-early`: a counter that is set in each turn of its loop, or goes back before one is added.
     - `no-clock`: the file publishes and counts, and nothing that it sends contains the time, except at most the value
       from which it counts on; a slip only if its messages have to contain the time.
-    - `clock-value`: the values of the topic `message` are read from a clock, and nothing is counted.
+    - `clock-value`: the values of the topic `message` are read from a clock, or made up at random (`name`: `random`),
+      and nothing is counted.
+    - `published-in-part`: a loop that counts in each turn, and publishes on the topic `name` only in some.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
       that is made and not returned (`name`: `nan`, `degrees`, `return`).
 

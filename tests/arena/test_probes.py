@@ -30,10 +30,19 @@ def test_the_first_of_the_two_has_time_to_be_printed() -> None:
 
 def test_few_texts_and_numbers_come_once() -> None:
     texts = [shot.value for shot in make_shots((CHATTER.model_copy(update={"text": 3}),))]
-    numbers = Probe(topic="/n", type="std_msgs/Int8", integers=20, among=(-128, 0, 127))
+    numbers = Probe(topic="/n", type="std_msgs/Int8", integers=3, among=(-128, 0, 127))
     values = [shot.value for shot in make_shots((numbers,))]
     assert len(set(texts)) == len(texts) == 3
-    assert len(set(values)) == len(values) == 23
+    assert len(set(values)) == len(values) == 6
+
+
+def test_one_of_many_numbers_comes_twice_in_a_row() -> None:
+    numbers = Probe(topic="/n", type="std_msgs/Int8", integers=20, among=(-128, 0, 127))
+    values = [shot.value for shot in make_shots((numbers,))]
+    assert len(values) == 23
+    assert len(set(values)) == 22
+    assert sum(a == b for a, b in pairwise(values)) == 1
+    assert {-128, 0, 127} <= set(values)
 
 
 def test_topics_take_turns() -> None:

@@ -229,6 +229,18 @@ PLAIN_CALLS = {
 }  # fmt: skip
 
 
+RANDOM = {
+    "random",
+    "randint",
+    "randrange",
+    "uniform",
+    "choice",
+    "gauss",
+    "rand",
+    "randn",
+    "getrandbits",
+    "urandom",
+}
 CLOCK_METHODS = {"to_sec", "to_nsec"}
 
 
@@ -245,17 +257,35 @@ def sends_no_time(tree):
 
 
 def clock_values(tree):
-    """Topics whose values are read from a clock in each turn, and not counted."""
+    """Topics whose values are read from a clock in each turn, or made up at random, and not counted."""
     source = Source(tree)
     for node in calls_in(tree, "publish"):
-        makers = source.bound.get(dotted(node.func.value), [])
-        named = [
-            m.args[0] for m in makers if isinstance(m, ast.Call) and m.args and called_name(m) == "Publisher"
-        ]
-        found = source.reached(node.args)
-        name = text_of(named[0]) if len(named) == 1 else ""
-        if name and found.clock and not found.counts and not found.unknown:
-            yield slip(node.lineno, "clock-value", name)
+        found, topic = source.reached(node.args), source.topic(node)
+        if topic and not found.counts and found.random:
+            yield slip(node.lineno, "clock-value", topic, name="random")
+        elif topic and found.clock and not found.counts and not found.unknown:
+            yield slip(node.lineno, "clock-value", topic)
+
+
+def values_left_out(tree):
+    """Loops that count in each turn, and publish only in some: an `if` asks for what is counted."""
+    source = Source(tree)
+    for loop in walk(tree):
+        for one in loop.body if isinstance(loop, (ast.While, ast.For)) else ():
+            sent = (
+                [n for part in one.body for n in calls_in(part, "publish")] if isinstance(one, ast.If) else []
+            )
+            inside = set(ast.walk(one))
+            counted = {dotted(t) for n in ast.walk(loop) if n not in inside for t in increments(n)}
+            others = {ast.dump(n.func) for n in calls_in(loop, "publish") if n not in sent}
+            if sent and names_in(one.test) & counted and ast.dump(sent[0].func) not in others:
+                lines = (sent[0].lineno, one.lineno)
+                message = "line %d publishes only under the condition on line %d" % lines
+                fix = (
+                    "move line %d out of the `if` on line %d, so that it runs each time around the loop"
+                    % lines
+                )
+                yield slip(sent[0].lineno, "published-in-part", message, fix=fix, name=source.topic(sent[0]))
 
 
 class Source:
@@ -290,6 +320,12 @@ class Source:
                     self.bound.setdefault(dotted(part), []).append(value)
                     part = getattr(part, "value", None)  # `msg.data = …` is a part of `msg`
 
+    def topic(self, publish):
+        """Return the topic of a `pub.publish(…)`, as it is written in the only `Publisher(…)` that `pub` is given."""
+        makers = self.bound.get(dotted(publish.func.value), [])
+        named = [m.args[0] for m in makers if called_name(m) == "Publisher" and m.args]
+        return text_of(named[0]) if len(named) == 1 else ""
+
     def reached(self, values):
         """Return what the values are made of."""
         found, left, seen = Reached(), list(values), set()
@@ -299,6 +335,8 @@ class Source:
                 last = called_name(node) or name
                 if name.rpartition(".")[2] in CLOCKS and name != "time":
                     found.clock = True
+                elif isinstance(node, ast.Call) and last in RANDOM:
+                    found.random = True
                 elif isinstance(node, ast.Call) and last not in CLOCK_METHODS and not last[:1].isupper():
                     found.unknown = found.unknown or (last not in PLAIN_CALLS and name not in self.functions)
                 counting = isinstance(node, ast.Call) and last in ("next", "count", "len", "range")
@@ -311,9 +349,9 @@ class Source:
 
 
 class Reached:
-    """Whether a clock, something that counts, or a call of unknown doings is among what a value is made of."""
+    """Whether a clock, chance, something that counts, or a call of unknown doings is among what a value is made of."""
 
-    clock = counts = unknown = False
+    clock = random = counts = unknown = False
 
 
 def is_plain(module):

@@ -1,5 +1,5 @@
 """Finds attributes that a class in a student's Python gives no object, classes used as objects, and what ROS is given
-that does not fit: callbacks and sizes of queues. For `slips.py`.
+that does not fit: sizes of queues, servers that are not started, names that hide others. For `slips.py`.
 
 Nothing is executed. Python 3.8, standard library only.
 """
@@ -9,15 +9,12 @@ import difflib
 
 from script_names import (
     TEXT_LIMIT,
-    argument,
     bound_names,
     called_name,
     calls_in,
     dotted,
-    functions_in,
     is_call,
     slip,
-    text_of,
     walk,
 )  # fmt: skip
 
@@ -143,63 +140,6 @@ def classes_as_objects(classes, tree):
 
 # ---- what ROS is given
 
-CALLBACKS = {
-    "Subscriber": ("callback", 2, 1),
-    "Timer": ("callback", 1, 1),
-    "Service": ("handler", 2, 1),
-    "SimpleActionServer": ("execute_cb", 2, 1),
-    "on_shutdown": ("h", 0, 0),
-    "signal": ("handler", 1, 2),
-}
-"""What takes a function: the argument's name, its place, and with how many values ROS calls it."""
-
-
-def callbacks(tree):
-    """Functions that ROS calls with another number of values than they take, and those that are called where the
-    function itself is meant.
-    """
-    yield from ending_callbacks(tree)
-    functions = functions_in(tree)
-    for node in walk(tree):
-        name = called_name(node)
-        if name not in CALLBACKS:
-            continue
-        keyword, place, values = CALLBACKS[name]
-        given = argument(node, place, keyword)
-        if (
-            not given
-            and dotted(node.func) == "rospy.Subscriber"
-            and len(node.args) == place
-            and all(k.arg for k in node.keywords)
-        ):
-            fix = "write the function's name as its third value"
-            yield slip(node.lineno, "callback-missing", "`Subscriber(…)` gets no callback", fix=fix)
-        values += any(k.arg == "callback_args" for k in node.keywords) or len(node.args) > place + 1
-        for one in given[:1]:
-            text = text_of(one)
-            if text.isidentifier():
-                message, fix = "'%s' is a string, not a function" % text, "write `%s`, without quotes" % text
-                yield slip(one.lineno, "callback-called", message, fix=fix, name=text)
-            called = isinstance(one, ast.Call)
-            meant = one.func if called else one
-            own = functions.get(dotted(meant).rpartition(".")[2])
-            least, most = takes(own, isinstance(meant, ast.Attribute)) if own else (values, values)
-            if own and called and (least or not gives_value(own)):
-                message, fix = "`%s()` is called here", "write `%s`, without brackets"
-                name = dotted(meant)
-                yield slip(one.lineno, "callback-called", message % name, fix=fix % name, name=name)
-            elif own and not called and not least <= values <= most:
-                what = {
-                    "Service": "the request",
-                    "SimpleActionServer": "the goal",
-                    "Timer": "the event",
-                    "on_shutdown": "nothing",
-                    "signal": "the signal's number and a frame",
-                }.get(name, "the message")
-                message, fix = wrong_callback(own, node, functions, isinstance(meant, ast.Attribute), values)
-                message = message or "`%s` takes %d arguments, but ROS passes it %s" % (own.name, least, what)
-                yield slip(own.lineno, "callback-values", message, fix=fix, name=own.name)
-
 
 def subscribed_again(tree):
     """Yield each `Subscriber(…)` in a loop that runs until the node ends: each turn makes another one."""
@@ -271,24 +211,6 @@ def hidden_names(tree):
             )
 
 
-def wrong_callback(own, call, functions, bound, values):
-    """Return why a function does not fit as a callback, "" where only its arguments do not, and what to write."""
-    given = [one.arg for one in own.args.args]
-    if any(inner is call for inner in ast.walk(own)):
-        others = [f for f in functions.values() if f is not own and takes(f, bound)[0] == values]
-        message = "`%s` is the function that makes this call, not its callback" % own.name
-        meant = others[0].name if len(others) == 1 else "the name of the function that prints the message"
-        return message, "on line %d, write %s instead of %s" % (call.lineno, meant, own.name)
-    if bound and len(given) == values and "self" not in given:
-        message = "`%s` is a method, so its first parameter has to be `self`" % own.name
-        return message, "write `def %s(%s):`" % (own.name, ", ".join(["self", *given]))
-    return "", "write `def {0}({1}msg):`".format(own.name, "self, " if bound else "")
-
-
-def gives_value(function):
-    return any(isinstance(n, (ast.Return, ast.Yield)) and n.value is not None for n in ast.walk(function))
-
-
 def queue_sizes(tree):
     """Publishers whose `queue_size` is a string: rospy takes it, and sends nothing."""
     for node in walk(tree):
@@ -301,31 +223,3 @@ def queue_sizes(tree):
                 size = one.value.value[:TEXT_LIMIT]
                 fix = "write `queue_size=%s`, without quotes" % (size or "10")
                 yield slip(one.value.lineno, "queue-size", "`queue_size` is a string", fix=fix)
-
-
-ENDING = ("signal_shutdown", "exit", "quit", "_exit")
-"""Calls that end the node."""
-
-
-def ending_callbacks(tree):
-    """Callbacks of topics that end the node at the first message."""
-    functions = functions_in(tree)
-    for node in walk(tree):
-        given = argument(node, 2, "callback") if called_name(node) == "Subscriber" else []
-        own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
-        for one in own.body if own is not None else ():
-            if isinstance(one, ast.Expr) and called_name(one.value) in ENDING:
-                message = "the callback `%s` ends the node on line %d, at the first message" % (
-                    own.name,
-                    one.lineno,
-                )
-                yield slip(one.lineno, "loop-left", message, fix="delete line %d" % one.lineno)
-
-
-def takes(function, bound):
-    """Return with how many values a function can be called at least and at most; of a method without `self`."""
-    given = function.args.posonlyargs + function.args.args
-    of_class = any(getattr(d, "id", "") == "staticmethod" for d in function.decorator_list)
-    own = 1 if bound and not of_class else 0
-    least = len(given) - len(function.args.defaults) - own
-    return least, 99 if function.args.vararg else len(given) - own

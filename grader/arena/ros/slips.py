@@ -1,9 +1,9 @@
 """Finds what compiles in a student's Python and is not meant: `slips` of a syntax tree, for `syntax.py`.
 
 What nothing calls, statements without an effect, values that are none, imports. Names and texts are for
-`script_names.py`, objects and callbacks for `script_objects.py`, loops for `script_loops.py`, counters and clocks for
-`script_counters.py`. Nothing is executed; it is here because a file has to be parsed by ROS's own Python, which is to
-run it. Python 3.8, standard library only.
+`script_names.py`, objects for `script_objects.py`, callbacks for `script_callbacks.py`, loops for `script_loops.py`,
+counters and clocks for `script_counters.py`. Nothing is executed; it is here because a file has to be parsed by ROS's
+own Python, which is to run it. Python 3.8, standard library only.
 """
 
 import ast
@@ -13,6 +13,7 @@ import sys
 
 # `-I` leaves this folder out
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
+from script_callbacks import callbacks, unprinted_messages
 from script_counters import (
     PLAIN_MODULES,
     clock_values,
@@ -22,6 +23,7 @@ from script_counters import (
     knows_time,
     resets,
     sends_no_time,
+    values_left_out,
 )  # fmt: skip
 from script_loops import (
     deaf_loops,
@@ -46,7 +48,6 @@ from script_names import (
     walk,
 )  # fmt: skip
 from script_objects import (
-    callbacks,
     hidden_names,
     object_slips,
     queue_sizes,
@@ -76,7 +77,7 @@ def slips(tree):
         misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice,
         publishes_twice, callbacks, waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops,
         clock_values, counter_slips, counter_starts, without_effect, assigned_late, hidden_names, subscribed_again,
-        imports, taken_off, unstarted_servers, wrong_values,
+        imports, taken_off, unstarted_servers, wrong_values, unprinted_messages, values_left_out,
     )  # fmt: skip
     for find in finders:
         found += find(tree)

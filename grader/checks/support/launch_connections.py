@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.support.launch import nodes_up
@@ -187,6 +188,34 @@ def blame_renaming(
     return verdict.model_copy(update=update)
 
 
+def blame_same_script(
+    package: PackageFacts, run: Run, nodes: Sequence[LaunchNode], topic: str, verdict: Verdict
+) -> Verdict | None:
+    """Return the verdict with the lines that all start one script, where another one of the package is for the end that
+    is missing; None where the nodes run several scripts."""
+    scripts = [own_script(package, node) for node in nodes]
+    same = scripts[0] if scripts else None
+    if len(nodes) < 2 or same is None or any(one is None or one.path != same.path for one in scripts):
+        return None
+    lacking = "publisher" if nodes_on(run, topic, "subscribers") else "subscriber"
+    ends = (s for s in package.slips if s.kind == lacking and s.file != same.path)
+    others = sorted({s.file for s in ends if s.message.strip("/") == topic.strip("/")})
+    if not others:
+        return None
+    meant = [(n, o) for n in nodes for o in others if PurePosixPath(o).stem == n.name] or [
+        (nodes[-1], others[0])
+    ]
+    node, name = meant[0][0], PurePosixPath(meant[0][1]).name
+    lines = join_words(str(one.line) for one in nodes)
+    message = f"{verdict.message}: lines {lines} both start {nodes[0].type}"
+    update = {
+        "message": message if len(nodes) == 2 else message.replace(" both ", " all "),
+        "hint": f'on line {node.line}, write type="{name}"',
+        "citations": tuple(one.place for one in nodes),
+    }
+    return verdict.model_copy(update=update)
+
+
 def blame_place(
     package: PackageFacts, file: LaunchFile, nodes: Sequence[LaunchNode], topic: str, verdict: Verdict
 ) -> Verdict | None:
@@ -195,7 +224,7 @@ def blame_place(
     moved = [node for node in nodes if node.remaps or node.namespace != "/"]
     if len({node.namespace for node in moved} - {"/"}) > 1:
         return _in_namespaces(file, verdict, moved, topic)
-    return _named_in_scripts(package, file, verdict, nodes, topic) if moved else None
+    return _blame_scripts(package, file, verdict, nodes, topic) if moved else None
 
 
 def _in_namespaces(file: LaunchFile, verdict: Verdict, nodes: Sequence[LaunchNode], topic: str) -> Verdict:
@@ -222,7 +251,7 @@ def together_s(run: Run, topic: str) -> float:
     return sum(after - at for (at, event), (after, _) in pairwise(run.graph) if has_both(event)) / 1e9
 
 
-def _named_in_scripts(
+def _blame_scripts(
     package: PackageFacts, file: LaunchFile, verdict: Verdict, nodes: Sequence[LaunchNode], topic: str
 ) -> Verdict:
     """Name the lines of the scripts that have another topic, and what gives the right one another name then."""

@@ -239,6 +239,10 @@ def later_fixes(file: LaunchFile, script: str) -> Iterator[str]:
     yield from (f'write type="{name}" {place}, not type="{kind}"' for kind, place in named if kind != name)
 
 
+def out_of_comment(line: int) -> str:
+    return f"take the <node> on line {line} out of the comment: remove `<!--` before it and `-->` after it"
+
+
 def illegal_name(node: LaunchNode) -> Slip | None:
     """Return a name at which roslaunch only warns, and which other tools stumble over."""
     name = node.name or ""

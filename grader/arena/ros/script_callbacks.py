@@ -1,0 +1,356 @@
+"""Finds what is wrong with the functions that ROS calls in a student's Python, for `slips.py`: how ROS is given them,
+what they do to the node, and what they print of a message.
+
+Nothing is executed. Python 3.8, standard library only.
+"""
+
+import ast
+
+from script_names import argument, called_name, calls_in, dotted, functions_in, is_call, slip, text_of, walk
+
+CALLBACKS = {
+    "Subscriber": ("callback", 2, 1),
+    "Timer": ("callback", 1, 1),
+    "Service": ("handler", 2, 1),
+    "SimpleActionServer": ("execute_cb", 2, 1),
+    "on_shutdown": ("h", 0, 0),
+    "signal": ("handler", 1, 2),
+}
+"""What takes a function: the argument's name, its place, and with how many values ROS calls it."""
+
+
+def callbacks(tree):
+    """Functions that ROS calls with another number of values than they take, and those that are called where the
+    function itself is meant.
+    """
+    yield from ending_callbacks(tree)
+    functions = functions_in(tree)
+    for node in walk(tree):
+        name = called_name(node)
+        if name not in CALLBACKS:
+            continue
+        keyword, place, values = CALLBACKS[name]
+        given = argument(node, place, keyword)
+        if (
+            not given
+            and dotted(node.func) == "rospy.Subscriber"
+            and len(node.args) == place
+            and all(k.arg for k in node.keywords)
+        ):
+            fix = "write the function's name as its third value"
+            yield slip(node.lineno, "callback-missing", "`Subscriber(…)` gets no callback", fix=fix)
+        values += any(k.arg == "callback_args" for k in node.keywords) or len(node.args) > place + 1
+        for one in given[:1]:
+            text = text_of(one)
+            if text.isidentifier():
+                message, fix = "'%s' is a string, not a function" % text, "write `%s`, without quotes" % text
+                yield slip(one.lineno, "callback-called", message, fix=fix, name=text)
+            called = isinstance(one, ast.Call)
+            meant = one.func if called else one
+            own = functions.get(dotted(meant).rpartition(".")[2])
+            least, most = takes(own, isinstance(meant, ast.Attribute)) if own else (values, values)
+            if own and called and (least or not gives_value(own)):
+                message, fix = "`%s()` is called here", "write `%s`, without brackets"
+                name = dotted(meant)
+                yield slip(one.lineno, "callback-called", message % name, fix=fix % name, name=name)
+            elif own and not called and not least <= values <= most:
+                what = {
+                    "Service": "the request",
+                    "SimpleActionServer": "the goal",
+                    "Timer": "the event",
+                    "on_shutdown": "nothing",
+                    "signal": "the signal's number and a frame",
+                }.get(name, "the message")
+                message, fix = wrong_callback(own, node, functions, isinstance(meant, ast.Attribute), values)
+                message = message or "`%s` takes %d arguments, but ROS passes it %s" % (own.name, least, what)
+                yield slip(own.lineno, "callback-values", message, fix=fix, name=own.name)
+
+
+def wrong_callback(own, call, functions, bound, values):
+    """Return why a function does not fit as a callback, "" where only its arguments do not, and what to write."""
+    given = [one.arg for one in own.args.args]
+    if any(inner is call for inner in ast.walk(own)):
+        others = [f for f in functions.values() if f is not own and takes(f, bound)[0] == values]
+        message = "`%s` is the function that makes this call, not its callback" % own.name
+        meant = others[0].name if len(others) == 1 else "the name of the function that prints the message"
+        return message, "on line %d, write %s instead of %s" % (call.lineno, meant, own.name)
+    if bound and len(given) == values and "self" not in given:
+        message = "`%s` is a method, so its first parameter has to be `self`" % own.name
+        return message, "write `def %s(%s):`" % (own.name, ", ".join(["self", *given]))
+    return "", "write `def {0}({1}msg):`".format(own.name, "self, " if bound else "")
+
+
+def gives_value(function):
+    return any(isinstance(n, (ast.Return, ast.Yield)) and n.value is not None for n in ast.walk(function))
+
+
+def takes(function, bound):
+    """Return with how many values a function can be called at least and at most; of a method without `self`."""
+    given = function.args.posonlyargs + function.args.args
+    of_class = any(getattr(d, "id", "") == "staticmethod" for d in function.decorator_list)
+    own = 1 if bound and not of_class else 0
+    least = len(given) - len(function.args.defaults) - own
+    return least, 99 if function.args.vararg else len(given) - own
+
+
+ENDING = ("signal_shutdown", "exit", "quit", "_exit")
+"""Calls that end the node."""
+
+
+def ending_callbacks(tree):
+    """Callbacks of topics that end the node at the first message."""
+    functions = functions_in(tree)
+    for node in walk(tree):
+        given = argument(node, 2, "callback") if called_name(node) == "Subscriber" else []
+        own = functions.get(dotted(given[0]).rpartition(".")[2]) if given else None
+        for one in own.body if own is not None else ():
+            if isinstance(one, ast.Expr) and called_name(one.value) in ENDING:
+                message = "the callback `%s` ends the node on line %d, at the first message" % (
+                    own.name,
+                    one.lineno,
+                )
+                yield slip(one.lineno, "loop-left", message, fix="delete line %d" % one.lineno)
+
+
+# ---- what a topic's callback prints of its message
+
+LOGS = ("loginfo", "logwarn", "logerr", "logfatal")
+STREAMS = ("sys.stdout.write", "sys.stderr.write", "stdout.write", "stderr.write")
+CONVERSIONS = {
+    "str", "repr", "int", "float", "format", "type", "len", "isinstance", "get_caller_id", "get_name", "get_time",
+}  # fmt: skip
+CHANGES = {
+    "abs", "round", "min", "max", "len", "bool", "ord", "chr", "hex", "bin", "sum", "sorted", "reversed", "sqrt",
+    "type", "upper", "lower", "title", "capitalize", "swapcase", "split", "partition", "replace", "zfill",
+}  # fmt: skip
+"""Calls whose result is not the value that they are given."""
+WITH_DATA = {
+    "String", "Bool", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64", "Float32", "Float64",
+}  # fmt: skip
+"""Types of std_msgs whose value is in `data`."""
+ALWAYS, NEVER, UNKNOWN = "always", "never", "unknown"
+LEAVES = (ast.Return, ast.Raise)
+
+
+def unprinted_messages(tree):
+    """Callbacks of topics that print nothing of a message (`not-printed`), or of some messages only, or what they make
+    of it (`printed-in-part`). Nothing of one that hands its message to another function, or keeps it for later."""
+    functions = functions_in(tree)
+    level = any(k.arg == "log_level" for n in walk(tree) if is_call(n, "init_node") for k in n.keywords)
+    for node in walk(tree):
+        given = argument(node, 2, "callback") if called_name(node) == "Subscriber" else []
+        if not given:
+            continue
+        own = (
+            given[0]
+            if isinstance(given[0], ast.Lambda)
+            else functions.get(dotted(given[0]).rpartition(".")[2])
+        )
+        taken = [one.arg for one in own.args.args if one.arg != "self"] if own is not None else []
+        if not taken:
+            continue
+        kinds, topics = argument(node, 1, "data_class"), argument(node, 0, "name")
+        plain = kinds and dotted(kinds[0]).rpartition(".")[2] in WITH_DATA
+        callback = Printing(own, taken[0], taken[0] + (".data" if plain else ""), set(functions))
+        found = callback.found(level)
+        if found:
+            line, kind, message, fix = found
+            yield slip(line, kind, message, fix=fix, name=text_of(topics[0]) if topics else "")
+
+
+class Printing:
+    """What a callback prints. `value` is how the message's value is written in it; `known` has for each name that holds
+    something of the message where it got it, and whether that is something else than the value itself."""
+
+    def __init__(self, own, message, value, functions):
+        self.own, self.value, self.functions = own, value, functions
+        self.body = own.body if isinstance(own.body, list) else [ast.Expr(own.body)]
+        self.name = "the callback `%s`" % own.name if hasattr(own, "name") else "the `lambda`"
+        self.known, self.shared = {message: ((0, 0), False)}, []
+        nodes = [n for one in self.body for n in ast.walk(one)]
+        self.nodes = sorted((n for n in nodes if hasattr(n, "lineno")), key=place)
+        outer = {name for n in nodes if isinstance(n, (ast.Global, ast.Nonlocal)) for name in n.names}
+        for n in self.nodes:
+            if isinstance(n, (ast.Assign, ast.AugAssign, ast.AnnAssign)) and n.value is not None:
+                self.follow(n, outer)
+        self.prints = [n for n in self.nodes if is_print(n)]
+
+    def follow(self, assigned, outer):
+        of_message, changed = self.holds(assigned.value)
+        for target in getattr(assigned, "targets", None) or [assigned.target]:
+            for one in target.elts if isinstance(target, ast.Tuple) else [target]:
+                if of_message and not isinstance(one, ast.Name):
+                    self.shared.append(dotted(one))
+                if of_message and dotted(one) not in self.known:
+                    changed = changed or isinstance(assigned, ast.AugAssign)
+                    self.known[dotted(one)] = (place(assigned), changed or isinstance(target, ast.Tuple))
+                    self.shared += [dotted(one)] if dotted(one) in outer else []
+
+    def holds(self, node):
+        """Return whether an expression holds something of the message, and whether that is not the value itself."""
+        name = dotted(node) if isinstance(node, (ast.Name, ast.Attribute)) else ""
+        for known, (since, changed) in self.known.items() if name else ():
+            if (name == known or name.startswith(known + ".")) and since < place(node):
+                return True, changed
+        found = [self.holds(child) for child in ast.iter_child_nodes(node)]
+        of_message = [changed for holds, changed in found if holds]
+        return bool(of_message), bool(of_message) and (all(of_message) or changes(node, found))
+
+    def found(self, level):
+        """Return line, kind, message and fix of what is wrong; None where nothing is, or it cannot be told."""
+        if self.is_elsewhere():
+            return None
+        told = [n for n in self.prints if self.of_message(n)]
+        if told:
+            return self.in_part(told)
+        if not self.prints:
+            return None if self.shared else self.silent(level)
+        return self.another()
+
+    def of_message(self, call):
+        return any(self.holds(one)[0] for one in [*call.args, *(k.value for k in call.keywords)])
+
+    def is_elsewhere(self):
+        """Whether something else than this function may print the message."""
+        for n in self.nodes:
+            name = called_name(n)
+            known = is_print(n) or name.startswith("logdebug") or name in CONVERSIONS | CHANGES | {"publish"}
+            if isinstance(n, (ast.For, ast.While)) and any(is_print(one) for one in ast.walk(n)):
+                return True
+            if name in self.functions or isinstance(n, (ast.FunctionDef, ast.Lambda, ast.Yield)):
+                return True
+            if name and not known and self.of_message(n):
+                return True
+        return False
+
+    def silent(self, level):
+        debug = [n for n in self.nodes if called_name(n).startswith("logdebug")]
+        if debug and level:
+            return None
+        if debug:
+            line, name = debug[0].lineno, called_name(debug[0])
+            fix = "on line %d, write `rospy.loginfo`" % line
+            return (
+                line,
+                "not-printed",
+                "`%s` on line %d shows nothing: rospy shows `loginfo` and above" % (name, line),
+                fix,
+            )
+        line = self.own.lineno
+        fix = "print in it what it hears: `rospy.loginfo(%s)`" % self.value
+        return line, "not-printed", "%s on line %d prints nothing" % (self.name, line), fix
+
+    def another(self):
+        call = self.prints[0]
+        read = [n for one in call.args for n in ast.walk(one) if isinstance(n, (ast.Name, ast.Attribute))]
+        called = {id(part) for n in ast.walk(call) if isinstance(n, ast.Call) for part in ast.walk(n.func)}
+        inner = {id(n.value) for n in read if isinstance(n, ast.Attribute)}
+        names = [dotted(n) for n in read if id(n) not in called and id(n) not in inner]
+        late = [name for name in names if name in self.known]
+        if self.shared and not late:
+            return None
+        line, kind = call.lineno, "not-printed"
+        fix = "on line %d, print `%s`" % (line, self.value)
+        if late:
+            since = self.known[late[0]][0][0]
+            message = "line %d prints `%s`, which gets the message's value only on line %d" % (
+                line,
+                late[0],
+                since,
+            )
+            return line, "printed-in-part", message, fix
+        if len(set(names)) == 1:
+            return line, kind, "line %d prints `%s`, and not the message's value" % (line, names[0]), fix
+        return line, kind, "what line %d prints has nothing of the message in it" % line, fix
+
+    def in_part(self, told):
+        kind, often = "printed-in-part", [n for n in told if called_name(n) in LOGS or not is_log(n)]
+        if not often:
+            line, name = told[0].lineno, called_name(told[0])
+            fix = "on line %d, write `rospy.%s(…)`" % (line, name.partition("_")[0])
+            fix += " without the seconds" * ("_throttle" in name)
+            what = "the first message only" if name.endswith("_once") else "some of the messages only"
+            return line, kind, "`%s` on line %d logs %s" % (name, line, what), fix
+        why = self.whether(self.body)
+        if isinstance(why, ast.If):
+            return (why.lineno, kind, *under_condition(why, often))
+        if why == ALWAYS and all(self.holds(one)[1] for n in often for one in n.args if self.holds(one)[0]):
+            line = often[0].lineno
+            message = (
+                "line %d prints something that is made of the message's value, not the value itself" % line
+            )
+            return line, kind, message, "on line %d, print `%s` as it is" % (line, self.value)
+        return None
+
+    def whether(self, body):
+        """Return whether these lines always print the message, or never, or the `if` that decides."""
+        for at, one in enumerate(body):
+            if isinstance(one, ast.If) and not calls_in(one.test, "is_shutdown"):
+                return self.decided(one, body[at + 1 :])
+            inside = NEVER
+            if isinstance(one, (ast.Try, ast.With, ast.If)):
+                inside = self.whether(one.body)
+            elif any(is_print(n) and self.of_message(n) for n in ast.walk(one)):
+                inside = ALWAYS if isinstance(one, ast.Expr) and is_print(one.value) else UNKNOWN
+            if inside != NEVER or isinstance(one, LEAVES):
+                return inside
+        return NEVER
+
+    def decided(self, one, rest):
+        ways = [
+            self.whether(way if way and isinstance(way[-1], LEAVES) else way + rest)
+            for way in (one.body, one.orelse)
+        ]
+        if UNKNOWN in ways:
+            return UNKNOWN
+        return ways[0] if ways[0] == ways[1] else one
+
+
+def under_condition(one, prints):
+    """Return why these calls do not always print, as an `if` decides about it, and what to do."""
+    line, printed = one.lineno, prints[0].lineno
+    if printed > one.end_lineno:
+        left = next(n.lineno for n in ast.walk(one) if isinstance(n, LEAVES))
+        message = "the callback ends on line %d, before line %d prints, under the condition on line %d"
+        return message % (left, printed, line), "print above line %d" % line
+    if len(one.orelse) == 1 and isinstance(one.orelse[0], ast.If):
+        message = "the `if` on line %d prints nothing where none of its conditions holds" % line
+        return message, "print the message outside of it, or in an `else` at its end too"
+    message = "line %d prints only under the condition on line %d" % (printed, line)
+    if printed == line:
+        message = "line %d prints only where its `if` holds" % line
+    return message, "print outside of the `if` on line %d, without a condition" % line
+
+
+def place(node):
+    return node.lineno, node.col_offset
+
+
+def is_log(node):
+    return called_name(node).partition("_")[0] in LOGS
+
+
+def is_print(node):
+    """Whether it is a call that prints on the terminal."""
+    if not isinstance(node, ast.Call):
+        return False
+    into = [
+        k for k in node.keywords if k.arg == "file" and dotted(k.value) not in ("sys.stdout", "sys.stderr")
+    ]
+    return (called_name(node) == "print" and not into) or is_log(node) or dotted(node.func) in STREAMS
+
+
+def changes(node, found):
+    """Whether an expression makes something else of the message's value in it."""
+    if isinstance(node, ast.Call):
+        return called_name(node) in CHANGES
+    if isinstance(node, ast.Subscript):
+        return True
+    if isinstance(node, ast.UnaryOp):
+        return isinstance(node.op, (ast.USub, ast.Not))
+    if not isinstance(node, ast.BinOp):
+        return isinstance(node, ast.Compare)
+    other = node.right if found[0][0] else node.left
+    if isinstance(node.op, ast.Add):
+        return isinstance(other, ast.Constant) and not isinstance(other.value, str)
+    return not (isinstance(node.op, ast.Mod) and not found[0][0])

@@ -1,0 +1,131 @@
+"""What a topic's callback prints of its message, and what a loop publishes of its count, read from the source."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader.package.python import check_syntax
+
+SUBSCRIBED = "\nrospy.Subscriber('c', Int8, {})\n"
+
+
+def said(text: str, tmp_path: Path, callback: str = "cb") -> list[tuple[str, str, str]]:
+    (tmp_path / "a.py").write_text(text + SUBSCRIBED.format(callback), encoding="utf-8")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    return [(s.kind, s.message, s.fix) for s in slips if s.kind in {"not-printed", "printed-in-part"}]
+
+
+@pytest.mark.parametrize(
+    ("body", "message", "fix"),
+    [
+        ("    pass", "the callback `cb` on line 1 prints nothing", "`rospy.loginfo(m.data)`"),
+        ("    number = m.data", "the callback `cb` on line 1 prints nothing", "`rospy.loginfo(m.data)`"),
+        ("    global n\n    n += 1\n    print('heard', n)", "line 4 prints `n`", "on line 4, print `m.data`"),
+        ("    print(rospy.get_caller_id() + ' I heard')", "line 2 prints has nothing of the message", "`m.data`"),
+        ("    rospy.logdebug('%d', m.data)", "`logdebug` on line 2 shows nothing", "write `rospy.loginfo`"),
+    ],
+)  # fmt: skip
+def test_a_callback_that_shows_nothing(body: str, message: str, fix: str, tmp_path: Path) -> None:
+    ((kind, why, what),) = said(f"def cb(m):\n{body}", tmp_path)
+    assert kind == "not-printed"
+    assert message in why
+    assert fix in what
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("    if m.data:\n        print(m.data)", "line 3 prints only under the condition on line 2"),
+        ("    if m.data: print(m.data)", "line 2 prints only where its `if` holds"),
+        ("    if m.data > 0:\n        print(m.data)\n    elif m.data < 0:\n        print(m.data)",
+         "the `if` on line 2 prints nothing where none of its conditions holds"),
+        ("    if m.data == 5:\n        return\n    x = m.data\n    print(x)", "ends on line 3, before line 5 prints"),
+        ("    rospy.loginfo('I heard %d', m.data + 1)", "something that is made of the message's value"),
+        ("    x = abs(m.data)\n    print('x = {}'.format(x))", "something that is made of the message's value"),
+        ("    print(f'{m.data[:5]}')", "something that is made of the message's value"),
+        ("    print(m.data.split()[0])", "something that is made of the message's value"),
+        ("    rospy.loginfo_once(m.data)", "`loginfo_once` on line 2 logs the first message only"),
+        ("    rospy.loginfo_throttle(1, m.data)", "`loginfo_throttle` on line 2 logs some of the messages only"),
+        ("    global last\n    print(last)\n    last = m.data", "which gets the message's value only on line 4"),
+    ],
+)  # fmt: skip
+def test_a_callback_that_shows_some_or_something_else(body: str, message: str, tmp_path: Path) -> None:
+    ((kind, why, _),) = said(f"def cb(m):\n{body}", tmp_path)
+    assert kind == "printed-in-part"
+    assert message in why
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "    print(m)",
+        "    rospy.loginfo(rospy.get_caller_id() + 'I heard %s', m.data)",
+        "    out = 'n: %d' % m.data\n    sys.stdout.write(out + '\\n')",
+        "    print('a ' + str(int(m.data)) + '!')",
+        "    print(m.data, m.data + 1)",
+        "    if m.data > 0:\n        print('+', m.data)\n    else:\n        print('-', m.data)",
+        "    if m.data > 0:\n        print('+', m.data)\n        return\n    print('-', m.data)",
+        "    if m.data > 3:\n        t = 'big %d' % m.data\n    else:\n        t = 'small %d' % m.data\n    print(t)",
+        "    if not rospy.is_shutdown():\n        print(m.data)",
+        "    try:\n        print(m.data)\n    except Exception:\n        pass",
+        # what may be printed elsewhere is not told
+        "    global v\n    v = m.data",
+        "    seen.append(m.data)",
+        "    logging.info('heard %s', m.data)",
+        "    cb2(m)",
+        "    for c in m.data:\n        print(c)",
+        "    print(m.data, file=f)",
+    ],
+)
+def test_nothing_is_said_of_a_callback_that_prints_or_hands_on(body: str, tmp_path: Path) -> None:
+    assert said(f"def cb2(m):\n    print(m)\ndef cb(m):\n{body}", tmp_path) == []
+
+
+def test_lambdas_and_methods_are_read_too(tmp_path: Path) -> None:
+    assert [kind for kind, _, _ in said("", tmp_path, "lambda m: print('got one')")] == ["not-printed"]
+    assert said("", tmp_path, "callback=lambda m: print(m.data)") == []
+    method = "class A:\n    def cb(self, m):\n        print(self.n)\n    def run(self):\n"
+    assert [kind for kind, _, _ in said(method, tmp_path, "self.cb")] == []  # it does not parse
+    method += "        rospy.Subscriber('c', Int8, self.cb)\n"
+    (tmp_path / "b.py").write_text(method, encoding="utf-8")
+    kinds = [s.kind for s in check_syntax(tmp_path, ["b.py"]).slips]
+    assert "not-printed" in kinds
+
+
+LOOP = "pub = rospy.Publisher('n', Int8)\nn = 0\nwhile not rospy.is_shutdown():\n"
+
+
+@pytest.mark.parametrize(
+    ("turn", "message"),
+    [
+        ("    if n % 10 != 3:\n        pub.publish(n)\n    n += 1\n",
+         "line 5 publishes only under the condition on line 4"),
+        ("    if n > 5: pub.publish(n)\n    n = (n + 1) % 128\n",
+         "line 4 publishes only under the condition on line 4"),
+        ("    if n % 2:\n        pub.publish(n)\n    else:\n        pub.publish(n)\n    n += 1\n", ""),
+        ("    if n % 2:\n        n += 1\n        pub.publish(n)\n", ""),
+        ("    if pub.get_num_connections():\n        pub.publish(n)\n    n += 1\n", ""),
+        ("    if n > 127:\n        n = 0\n    pub.publish(n)\n    n += 1\n", ""),
+    ],
+)  # fmt: skip
+def test_a_loop_that_counts_more_than_it_publishes(turn: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(LOOP + turn, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "published-in-part"]
+    assert [(s.message, s.name) for s in slips] == ([(message, "n")] if message else [])
+
+
+@pytest.mark.parametrize(
+    ("value", "random"),
+    [
+        ("random.randint(0, 127)", True),
+        ("int(127 * random.random())", True),
+        ("n + random.choice([1])", False),
+    ],
+)
+def test_values_made_up_at_random_are_not_counted(value: str, random: bool, tmp_path: Path) -> None:
+    text = f"import random\n{LOOP}    pub.publish({value})\n    n += 1\n"
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "clock-value"]
+    assert [s.name for s in slips] == (["random"] if random else [])
