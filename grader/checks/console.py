@@ -21,7 +21,15 @@ from grader.checks.support.exit_causes import (
     process_tracebacks,
 )
 from grader.checks.support.fields import unit_slip
-from grader.checks.support.processes import Life, early_end, life, lives, nodes_of, not_started
+from grader.checks.support.processes import (
+    Life,
+    early_end,
+    life,
+    lives,
+    nodes_of,
+    not_started,
+    run_slips,
+)
 from grader.checks.support.text import (
     INIT,
     NUMBER,
@@ -392,8 +400,16 @@ def _nothing(
     if lines:
         message = f"{join_words(nodes)} logs {shown(lines[0].text)!r}, not {params.text!r}"
         return failed(message, hint=_call(params)).about(said=lines[0].text)
-    hint = f"{_call(params)} below {INIT}: above it, nothing is sent"
-    return failed(f"{join_words(nodes)} logs nothing", hint=hint)
+    return _silent(package, run, nodes, params)
+
+
+def _silent(package: PackageFacts, run: Run, nodes: tuple[str, ...], params: LogsParams) -> Verdict:
+    message = f"{join_words(nodes)} logs nothing"
+    debug = (s for s in run_slips(package, run, "prints") if s.name.startswith("logdebug"))
+    if slip := next(debug, None):
+        message = f"{message}: `rospy.{slip.name}` on line {slip.line} of {slip.file} is not sent"
+        return failed(message, hint=f"on line {slip.line}, {_call(params)}", citations=(slip.place,))
+    return failed(message, hint=f"{_call(params)} below {INIT}: above it, nothing is sent")
 
 
 def _call(params: LogsParams) -> str:

@@ -26,7 +26,11 @@ from grader.checks.support.counters import (
     wrong_steps,
 )
 from grader.checks.support.exit_causes import explain_early_end
-from grader.checks.support.processes import OnTopic, slips_of
+from grader.checks.support.processes import (
+    OnTopic,
+    is_written_as,
+    slips_of,
+)
 from grader.checks.support.text import LOOP
 from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
@@ -179,7 +183,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     )
     verdict = _of_clock(verdict, count, run, package, params)
     left_out = slips_of(package, run, count.callerid, "published-in-part")
-    if wrong and any(_is_on(one.name, params) for one in left_out):
+    if wrong and any(is_written_as(one.name, params.topic) for one in left_out):
         verdict = cite_slip(verdict, count, run, package, "published-in-part")
     verdict = cite_slip(verdict, count, run, package, "no-effect", "set-in-loop")
     at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0, 0)
@@ -293,7 +297,12 @@ def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, p
     """Return that neither a clock nor chance is a counter, where the script has its values from them. A clock may even
     have passed: it skips only when it is late."""
     slip = next(
-        (s for s in slips_of(package, run, count.callerid, "clock-value") if _is_on(s.message, params)), None
+        (
+            s
+            for s in slips_of(package, run, count.callerid, "clock-value")
+            if is_written_as(s.message, params.topic)
+        ),
+        None,
     )
     if slip is None or verdict.unjudged or verdict.status not in {Status.PASS, Status.FAIL}:
         return verdict
@@ -302,11 +311,6 @@ def _of_clock(verdict: Verdict, count: Count, run: Run, package: PackageFacts, p
     seen = "" if verdict.status is Status.PASS else f"; {verdict.message}"
     hint = "set a counter before the loop, publish it, and add one to it each time around the loop"
     return failed(message + seen, hint=hint, citations=(slip.place,))
-
-
-def _is_on(written: str, params: OnTopic) -> bool:
-    """Whether a name in the source is that of the topic."""
-    return written.rpartition("/")[2].lstrip("~") == params.topic.rpartition("/")[2]
 
 
 def _usual_fault(usual: float) -> str:

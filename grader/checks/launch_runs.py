@@ -434,6 +434,12 @@ def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
     others = [n.full_name for n in file.brings]
     near = near_names(name, others) or tuple(others)
     seen = f"; it has {join_words(near)}" if near else ""
+    moved = [n for n in file.brings if n.pkg == pkg and f"/{n.name}" == name and n.namespace != "/"]
+    spaces = [line for node in moved for line in node.renaming if line.tag not in RENAMES]
+    if len(moved) == len(spaces) == 1:
+        why = f"{file.path} has no node {name}{seen}"
+        hint = f'remove ns="{spaces[0].value}" on line {spaces[0].line}: then {name.lstrip("/")} is {name}'
+        return failed(why, hint=hint, citations=(spaces[0].place,))
     hint = f'write <node pkg="{pkg}" name="{name.lstrip("/")}" …/>'
     return failed(f"{file.path} has no node {name}{seen}", hint=hint)
 

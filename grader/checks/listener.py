@@ -17,7 +17,14 @@ from grader.checks.support.console_output import (
     text_places,
 )
 from grader.checks.support.exit_causes import explain_early_end, explain_error
-from grader.checks.support.processes import GlobalName, lives, named_at, not_started, run_slips
+from grader.checks.support.processes import (
+    GlobalName,
+    is_written_as,
+    lives,
+    named_at,
+    not_started,
+    run_slips,
+)
 from grader.checks.support.text import (
     IN_OWN_WORDS,
     OTHER_WORDS_SHARE,
@@ -337,7 +344,10 @@ def _by_callback(
     package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe], topic: str
 ) -> Verdict | None:
     """What the source of the topic's callback says of it: it prints nothing of a message, or not each of them."""
-    found = [s for s in run_slips(package, run, "not-printed", "printed-in-part") if _is_of(s.name, topic)]
+    told = run_slips(package, run, "not-printed", "printed-in-part")
+    found = [
+        s for s in told if not s.name or is_written_as(s.name, topic)
+    ]  # a name in a variable is not known
     few = 2 * len(missing) < len(probes)  # another number may happen to be one that was sent
     if len(found) != 1 or (found[0].kind == "not-printed" and few):
         return None
@@ -347,11 +357,6 @@ def _by_callback(
     verdict = _some_numbers(probes, missing, lines) or _only_again(probes, missing)
     verdict = verdict or _by_number(probes, missing, lines, None)
     return verdict.explained(f"in {slip.file}, {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
-
-
-def _is_of(written: str, topic: str) -> bool:
-    """Whether a name in the source can be that of a topic; one that stands in a variable is not known."""
-    return written.rpartition("/")[2] in {"", topic.rpartition("/")[2]}
 
 
 def _by_number(

@@ -15,7 +15,14 @@ from grader.checks.support.clocks import NO_EXCUSE, Lateness, excused, lateness
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.fields import value_text
 from grader.checks.support.parameters import params_on_server, resolved_param, where_given
-from grader.checks.support.processes import OnTopic, life_of, observed_until_ns, run_scripts, slips_of
+from grader.checks.support.processes import (
+    OnTopic,
+    is_written_as,
+    life_of,
+    observed_until_ns,
+    run_scripts,
+    slips_of,
+)
 from grader.checks.support.text import LOOP, both, loop_rate
 from grader.checks.support.topics import (
     SYSTEM_TOPICS,
@@ -320,9 +327,8 @@ def _left_out(
 ) -> Verdict | None:
     """Name the `if` around the `publish(…)` of a loop that goes round as often as it should."""
     asked = [float(s.message) for s in _slips(run, package, params, "rate-number")]
-    last = params.topic.rpartition("/")[2]
     slips = _slips(run, package, params, "published-in-part")
-    slip = next((s for s in slips if s.name.rpartition("/")[2].lstrip("~") == last), None)
+    slip = next((s for s in slips if is_written_as(s.name, params.topic)), None)
     if (
         slip is None
         or mean_hz > params.rate_hz

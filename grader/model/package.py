@@ -268,7 +268,7 @@ SlipKind = Literal[
     "subscriber", "subscriber-type", "outside-method", "object", "undefined", "no-effect", "compared", "publishes",
     "prints", "argument-text", "unused-import", "lacking-import", "unregistered", "not-started", "start-value",
     "added-first", "publish-twice", "wrong-value", "sets-parameter", "not-printed", "printed-in-part",
-    "published-in-part",
+    "published-in-part", "never-published",
 ]  # fmt: skip
 
 
@@ -312,6 +312,7 @@ class PythonSlip(Placed, Record):
       from which it counts on; a slip only if its messages have to contain the time.
     - `clock-value`: the values of the topic `message` are read from a clock, or made up at random (`name`: `random`),
       and nothing is counted.
+    - `never-published`: a publisher of the topic `name` that nothing in the script uses.
     - `published-in-part`: a loop that counts in each turn, and publishes on the topic `name` only in some.
     - `wrong-value`: a value that is none: a comparison with NaN, the sine of an angle in degrees, a service's answer
       that is made and not returned (`name`: `nan`, `degrees`, `return`).
@@ -323,8 +324,8 @@ class PythonSlip(Placed, Record):
       gets the publisher, or `anonymous`; a node's name that stands in a variable has a `fix`, that line with `{}` in
       its place.
     - `publisher-type`, `subscriber-type`: the message type on that line.
-    - `publishes`, `prints`: a text that is published or printed, with `{}` for a value in it and `{data}` for that of a
-      message.
+    - `publishes`, `prints`: a text that is published or printed by the call `name` (`loginfo`), with `{}` for a value
+      in it and `{data}` for that of a message.
     - `rate-number`, `rate-parameter`: a loop or a timer whose rate is a number, in Hz, or a parameter.
     - `start-value`, `added-first`: where a counter, `name`, gets its first number, `message`, and where a loop adds one
       to it before it publishes (`fix`: which lines to move).

@@ -171,7 +171,7 @@ def test_what_never_runs_is_known(tmp_path, text, found):
     (tmp_path / "a.py").write_text(text)
     others = {
         "deaf", "rate-number", "no-clock", "misspelt", "undefined", "publishes", "prints", "not-called", "node-name",
-        "no-init", "publisher", "publisher-type", "subscriber", "subscriber-type", "not-printed",
+        "no-init", "publisher", "publisher-type", "subscriber", "subscriber-type", "not-printed", "never-published",
     }  # fmt: skip
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind not in others]
     assert [(s.kind, s.line) for s in slips] == [one[:2] for one in found]

@@ -515,14 +515,14 @@ def said_texts(tree):
     for node in walk(tree):
         if is_call(node, "publish") and len(node.args) == 1:
             place, text = read.message(node.args[0])
-            yield from said("publishes", place, text.replace(NODE, VALUE))
+            yield from said("publishes", place, text.replace(NODE, VALUE), "publish")
         elif called_name(node) in PRINTED and node.args:
-            yield from said("prints", node, read.printed(node))
+            yield from said("prints", node, read.printed(node), called_name(node))
 
 
-def said(kind, node, text):
+def said(kind, node, text, call):
     if text and text != VALUE and len(text) <= TEXT_LIMIT:
-        yield slip(node.lineno, kind, text)
+        yield slip(node.lineno, kind, text, name=call)
 
 
 class Texts:

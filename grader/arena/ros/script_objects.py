@@ -9,12 +9,14 @@ import difflib
 
 from script_names import (
     TEXT_LIMIT,
+    argument,
     bound_names,
     called_name,
     calls_in,
     dotted,
     is_call,
     slip,
+    text_of,
     walk,
 )  # fmt: skip
 
@@ -167,6 +169,18 @@ def taken_off(tree):
                 dotted(node.func.value),
             )
             yield slip(node.lineno, "unregistered", message, fix="delete line %d" % node.lineno)
+
+
+def unused_publishers(tree):
+    """Yield each `pub = Publisher(…)` whose `pub` nothing in the script uses, so that nothing is published by it."""
+    read = {dotted(n) for n in walk(tree) if isinstance(getattr(n, "ctx", None), ast.Load)}
+    for node in walk(tree):
+        made = isinstance(node, ast.Assign) and is_call(node.value, "Publisher")
+        name, topics = (dotted(node.targets[0]), argument(node.value, 0, "name")) if made else ("", [])
+        if topics and name not in read:
+            message = "nothing in the script calls `%s.publish(…)`" % name
+            fix = "call `%s.publish(…)` inside the loop" % name
+            yield slip(node.lineno, "never-published", message, fix=fix, name=text_of(topics[0]))
 
 
 def unstarted_servers(tree):

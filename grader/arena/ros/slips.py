@@ -54,6 +54,7 @@ from script_objects import (
     subscribed_again,
     taken_off,
     unstarted_servers,
+    unused_publishers,
 )
 
 SLIPS_LIMIT = 100
@@ -78,6 +79,7 @@ def slips(tree):
         publishes_twice, callbacks, waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops,
         clock_values, counter_slips, counter_starts, without_effect, assigned_late, hidden_names, subscribed_again,
         imports, taken_off, unstarted_servers, wrong_values, unprinted_messages, values_left_out,
+        unused_publishers,
     )  # fmt: skip
     for find in finders:
         found += find(tree)

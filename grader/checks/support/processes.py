@@ -142,11 +142,14 @@ def named_at(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> tupl
     return tuple(found) if len(found) == 1 else ()
 
 
+def is_written_as(written: str, topic: str) -> bool:
+    """Return whether a name in the source can be that of a topic, in whatever namespace the node is."""
+    return written.rpartition("/")[2].lstrip("~") == topic.rpartition("/")[2]
+
+
 def slips_that_name(package: PackageFacts, run: Run, kind: SlipKind, name: str) -> list[PythonSlip]:
     """Return where the run's scripts name this node, topic or parameter; those of a node may be in a variable."""
-    last = name.rpartition("/")[2]
-    said = run_slips(package, run, kind)
-    return [s for s in said if s.message.rpartition("/")[2].lstrip("~") == last]
+    return [s for s in run_slips(package, run, kind) if is_written_as(s.message, name)]
 
 
 def run_slips(package: PackageFacts, run: Run, *kinds: SlipKind) -> list[PythonSlip]:
@@ -265,8 +268,10 @@ def name_hint(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous
     if counted and anonymous == "allowed":
         name = names[0].lstrip("/")
         return f"write {init(name, anonymous=True)}: that adds numbers by itself"
-    spare = anonymous == "forbidden" and any(base_name(n) != n for n in there)
-    call = init(names[0].lstrip("/"), anonymous=anonymous == "required")
+    numbered = any(base_name(n) != n for n in there)
+    spare = anonymous == "forbidden" and numbered
+    keeps = anonymous == "required" or (anonymous == "allowed" and numbered)
+    call = init(names[0].lstrip("/"), anonymous=keeps)
     return f"write {call} without {ANONYMOUS}" if spare else f"write {call}"
 
 

@@ -12,6 +12,7 @@ from grader.checks.support.exit_causes import explain_end, explain_error
 from grader.checks.support.processes import (
     NO_SCRIPT_HINT,
     early_end,
+    is_written_as,
     lives,
     named_at,
     plain_type,
@@ -141,7 +142,7 @@ def no_message(
     if absent := no_node(package, run, what) or _judge_refused(run, topic) or misfit(run):
         return absent if topic in published else _with_others(absent, published)
     if topic in published:
-        return _judge_advertised(package, run, what, of_node)
+        return _judge_advertised(package, run, topic, what, of_node)
     return _not_advertised(package, run, topic, of_node, kind)
 
 
@@ -218,7 +219,9 @@ def _with_others(absent: Verdict, published: Collection[str]) -> Verdict:
     return absent.model_copy(update={"message": f"{absent.message}{others}"})
 
 
-def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Callable[..., Verdict]) -> Verdict:
+def _judge_advertised(
+    package: PackageFacts, run: Run, topic: str, what: str, of_node: Callable[..., Verdict]
+) -> Verdict:
     message = f"{what}, although it is advertised"
     if end := explain_error(package, run):
         return end.verdict(of_node, f"{message}: an error comes first: {end.cause}", measured="no message")
@@ -230,6 +233,10 @@ def _judge_advertised(package: PackageFacts, run: Run, what: str, of_node: Calla
         return verdict.model_copy(update={"cause": deaf.message})
     if slip := call_in_comment(package, run, "publish"):
         return _commented_out(message, slip, of_node)
+    unused = [s for s in run_slips(package, run, "never-published") if is_written_as(s.name, topic)]
+    if unused:
+        verdict = of_node(f"{message}: {unused[0].message}", measured="no message", hint=unused[0].fix)
+        return verdict.about(citations=(unused[0].place,))
     return _by_what_is_heard(run, message, of_node)
 
 
