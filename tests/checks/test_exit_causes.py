@@ -170,6 +170,10 @@ from std_msgs.msg import Int8
         (1, "import std_msgs.msg.String",
          "ModuleNotFoundError: No module named 'std_msgs.msg.String'; 'std_msgs.msg' is not a package",
          "write `from std_msgs.msg import String`"),
+        (1, "from std_msgs.mgs import String", "ModuleNotFoundError: No module named 'std_msgs.mgs'",
+         "write std_msgs.msg instead of std_msgs.mgs"),
+        (1, "from sensor_msgs.msgs import Imu", "ModuleNotFoundError: No module named 'sensor_msgs.msgs'",
+         "write sensor_msgs.msg instead of sensor_msgs.msgs"),
     ],
 )  # fmt: skip
 def test_the_hint_is_the_line_as_it_should_be(tmp_path, line, source, error, hint):

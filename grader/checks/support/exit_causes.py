@@ -429,9 +429,13 @@ def _asks_for_input(
         return CAUSES["EOFError"][0], "write a value in the code in place of `input()`"
     if found.kind != "EOFError" or place is None or place.file not in rated:
         return None
+    numbered = next(
+        (s.fix for s in package.slips if s.kind == "input" and s.file == place.file and s.fix), ""
+    )
+    in_place = f"{NO_INPUT}; {numbered}" if numbered else NO_INPUT
     if "paused" in asks.values():
-        return CAUSES["EOFError"][0], NO_INPUT
-    return CAUSES["EOFError"][0], f"{NO_INPUT}, and make sure that the loop calls `sleep()` of its Rate"
+        return CAUSES["EOFError"][0], in_place
+    return CAUSES["EOFError"][0], f"{in_place}, and make sure that the loop calls `sleep()` of its Rate"
 
 
 def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
@@ -461,7 +465,11 @@ def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> t
     here = next((one for one in meant if name and (one.line, one.name) == (place.line, name[1])), None)
     if here is None:
         return None
-    others = {one.fix: one for one in reversed(meant) if one.line != place.line and one.fix != here.fix}
+    # what gives a name its value is told once, however often it is read
+    others = {one.name if one.fix.startswith("above line ") else one.fix: one for one in reversed(meant)}
+    others = {
+        key: o for key, o in others.items() if o.line != place.line and key not in {here.name, here.fix}
+    }
     fixes = [one.fix for one in reversed(others.values())]
     return here.why, "; ".join([here.fix, *fixes[:OTHER_NAMES_SHOWN]])
 
