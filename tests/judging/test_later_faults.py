@@ -135,6 +135,16 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
     "a function that nothing calls": (
         "node", DIES, TALKER, [slip("never-called", "nothing calls `talk()`", name="talk")],
         f"; then call `talk()`, which nothing in {FILE} calls"),
+    "a callback that is handed to nobody": (
+        "node", DIES, TALKER,
+        [slip("never-called", "nothing calls `heard()`", name="heard", fix="pass it to what calls it: `…`")],
+        "; then pass it to what calls it: `…`"),
+    "a callback whose name is misspelt where it is handed over": (
+        "node", DIES, TALKER,
+        [slip("never-called", "nothing calls `herd()`", name="herd", fix="pass it to what calls it: `…`"),
+         slip("misspelt", "did you mean herd?", 9, name="heard", fix="write herd instead of heard"),
+         slip("rate-number", "2", 4)],
+        "; then on line 9, write herd instead of heard and make it 10 Hz"),
     "rate.sleep without brackets behind it": (
         "node", DIES, TALKER, [slip("not-called", "", name="rate.sleep", fix="write `rate.sleep()`")],
         f"; then on line 5 of {FILE}, write `rate.sleep()`"),

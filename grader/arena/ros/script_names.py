@@ -585,7 +585,8 @@ class Texts:
         """Return the text of `a + b`, `a % b` or `a.format(b)`."""
         operator = getattr(node, "op", None)
         if isinstance(operator, ast.Add):
-            return self.of(node.left, depth) + self.of(node.right, depth)
+            number = any(isinstance(getattr(n, "value", ""), (int, float)) for n in (node.left, node.right))
+            return VALUE if number else self.of(node.left, depth) + self.of(node.right, depth)
         if isinstance(operator, ast.Mod) and isinstance(node.left, ast.Constant):
             values = node.right.elts if isinstance(node.right, ast.Tuple) else [node.right]
             return self.filled(self.of(node.left), values)
