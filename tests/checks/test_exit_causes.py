@@ -216,6 +216,24 @@ def said(package, *frames, error):
     return tracebacks([*lines, error])[0]
 
 
+@pytest.mark.parametrize(
+    ("call", "hint"),
+    [
+        ("heard(1)", "delete that call: ROS calls `heard` with each message"),
+        ("heard('a')  # try", "delete that call: ROS calls `heard` with each message"),
+        ("heard(last)", "leave out `.data` here"),
+    ],
+)
+def test_a_callback_that_the_script_calls_itself_gets_no_message(tmp_path, call, hint):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "src").mkdir()
+    (tmp_path / "src" / "talker.py").write_text(SCRIPT)
+    frames = ("src/talker.py", 24, call), ("src/talker.py", 9, "print(msg.data)")
+    package = facts_of(tmp_path)
+    error = "AttributeError: 'int' object has no attribute 'data'"
+    assert explain_traceback(said(package, *frames, error=error), package).hint == hint
+
+
 LIBRARY = "/opt/ros/noetic/lib/python3/dist-packages/rospy/__init__.py"
 IMPORTS = ("src/talker.py", 1, "import rospy")
 INSIDE = (LIBRARY, 47, "from .client import spin")

@@ -34,7 +34,7 @@ from grader.checks.support.missing_names import (
     unused_import,
 )
 from grader.checks.support.processes import Life, early_end, lives
-from grader.checks.support.rospy_calls import unfit_value, wrong_class
+from grader.checks.support.rospy_calls import unfit_value, without_message, wrong_class
 from grader.checks.support.scripts import OF_INTERFACES, SYNTAX, path_in_package
 from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, shown
 from grader.evidence.events import STOPPED
@@ -320,6 +320,7 @@ def _known_meaning(found: Traceback, place: FileCitation | None, package: Packag
     a known slip, a question; else what the type of the exception says."""
     return (
         _misplaced(found)
+        or without_message(found)
         or _slip(found, package)
         or _asks_for_input(found, place, package)
         or CAUSES.get(found.kind, ("", "look at that line: the last words say what Python cannot do there"))
