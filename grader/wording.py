@@ -92,6 +92,20 @@ def has_role_of(one: str, other: str) -> bool:
     )
 
 
+def is_of_other_role(one: str, other: str) -> bool:
+    """Return whether two scripts are called by words for different kinds of node: "pub" and "sub"."""
+    given, wanted = (
+        {
+            number
+            for part in PARTS.findall(_stem(path))
+            for number, words in enumerate(ROLES)
+            if _role(part) in words
+        }
+        for path in (one, other)
+    )
+    return bool(given and wanted) and given.isdisjoint(wanted)
+
+
 def is_role(stem: str) -> bool:
     """Return whether a script's name, without its suffix, is the word for a kind of node and nothing else."""
     return _role(stem) in chain(*ROLES)

@@ -305,7 +305,7 @@ def _lack(
     package: PackageFacts, all_named: Sequence[Installed], script: str, wanted: Sequence[str]
 ) -> Lack | None:
     """Return None where `catkin_install_python` puts the script where `rosrun` looks."""
-    there = [f.path for f in copies_of(package, script)]
+    there = sorted((f.path for f in copies_of(package, script)), key=lambda path: path != script)
     paths, name = there or [script], PurePosixPath(script).name
     hits = [one for one in all_named if any(names_script(one, path) for path in paths)]
     if not there and not hits:  # that it is missing is another criterion's
@@ -368,7 +368,8 @@ def _why_unnamed(
         return _named_elsewhere(package, names[near[0]], path)
     why = "catkin_install_python(…) does not name {}"
     if any(one.kind == "PROGRAMS" and is_bin(one.destination or "", package) for one in of_python):
-        absent = next((shown(one.path) for one in names.values() if one.known), "")
+        nowhere = (one for name, one in names.items() if one.known and not copies_of(package, name))
+        absent = next((shown(one.path) for one in nowhere), "")
         fix = "write {} " + (f"in place of `{absent}`" if absent else "into it, after PROGRAMS")
         why += f", and names `{absent}`, which does not exist" if absent else ""
         return Lack(why, fix, None, path)

@@ -32,7 +32,7 @@ from grader.model.record import Record
 from grader.model.repair import as_code
 from grader.model.submission import chmod_hint
 from grader.model.verdict import FileCitation, MistakeKind, Verdict, failed, inconclusive, passed, unjudged
-from grader.wording import join_words, there_is
+from grader.wording import is_of_other_role, join_words, there_is
 
 # a script without its first line is run by the shell, which knows no `import`
 TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
@@ -196,7 +196,7 @@ def _dangling(file: SourceFile) -> Verdict:
 def _missing(package: PackageFacts, path: str) -> Verdict:
     names = paths_by_name(package)
     wanted = PurePosixPath(path)
-    near = [names[n] for n in near_names(wanted.name, names)]
+    near = [names[n] for n in near_names(wanted.name, names) if not is_of_other_role(n, wanted.name)]
     near += [p for n, p in names.items() if n == wanted.stem and p not in near]
     movable = [p for p in near if can_be_moved(p, path)]
     scripts = [p for n, p in names.items() if n.endswith(".py")]

@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import DependencyName, NoParams, PackageName, check
-from grader.checks.support.scripts import add_hint, find_script, move_hint
+from grader.checks.support.scripts import add_hint, find_script, is_product, move_hint
 from grader.checks.support.text import near_names, shown
 from grader.model.package import MANIFEST, Manifest, PackageFacts, meant_manifest
 from grader.model.record import Record
@@ -390,7 +390,8 @@ def _last_line(found: Manifest) -> int:
 def _unreadable(package: PackageFacts, name: str) -> Verdict:
     fault = package.manifest_fault
     if fault is None or package.has_no_manifest:
-        meant = next(filter(None, (meant_manifest(file.path) for file in package.files)), "")
+        paths = (file.path for file in package.files if not is_product(file.path))
+        meant = next(filter(None, map(meant_manifest, paths)), "")
         hint = "write package.xml beside CMakeLists.txt, as catkin_create_pkg makes it, and push it"
         if package.cmake is None:
             hint = "write package.xml and CMakeLists.txt, as catkin_create_pkg makes them, and push both"

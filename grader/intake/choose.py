@@ -272,7 +272,7 @@ def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
             if entry.name == wanted and entry.is_symlink():
                 return f"{printable(folder.inside(wanted))} is a link: hand in the folder itself."
         meant = next(filter(None, map(meant_manifest, sorted(files - {MANIFEST}))), "")
-        if meant and MANIFEST not in files:
+        if meant and MANIFEST not in files and BUILD_SPACES.isdisjoint(folder.path.split("/")):
             where = "" if folder.path == "." else f"In {printable(folder.path)}/, "
             return f"{where}{printable(meant)}."
         packed = [entry.name for entry in folder.others if is_archive_name(entry.name)]

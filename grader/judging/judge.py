@@ -128,7 +128,13 @@ def judge_all_runs(
             builds=was_built(first),
             launched=launched_in(of_copy.package),
         )
-        verdicts = add_later_faults(verdicts, rubric, of_copy, handed_in=facts.package, repairs=repairs)
+        as_it_is = add_later_faults(
+            verdicts, rubric, facts
+        )  # what no repair helps still has all of its faults
+        behind = add_later_faults(verdicts, rubric, of_copy, handed_in=facts.package, repairs=repairs)
+        verdicts = {
+            i: behind[i] if i in uses or not v.of_machine else as_it_is[i] for i, v in verdicts.items()
+        }
     else:
         verdicts = add_later_faults(verdicts, rubric, facts)
     shown = {

@@ -34,7 +34,7 @@ from grader.checks.support.text import (
 )
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
-from grader.installable import NOTHING_TO_DO
+from grader.installable import NOTHING_TO_DO, PYTHON_2
 from grader.judging.as_handed_in import text_as_handed_in
 from grader.judging.cited_lines import LINE_CHARS, LINES_READ
 from grader.judging.facts import SOURCES, Facts, names_started, scripts_of, sources_of
@@ -42,7 +42,7 @@ from grader.model.package import PackageFacts, PythonSlip
 from grader.model.repair import Repair
 from grader.model.verdict import Verdict
 from grader.rubric.model import Criterion, Rubric
-from grader.wording import join_words, significant
+from grader.wording import join_words, numbers_text, significant
 
 NAMES_SHOWN = 3
 ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
@@ -215,20 +215,38 @@ class Later:
     def _names(self) -> Iterator[str]:
         """Names that are not there, of which an `except` is not reached, and functions that nothing calls."""
         told: set[tuple[str, int]] = set()
+        given: set[tuple[str, str, int]] = set()
         for slip in self._of("misspelt", "undefined"):
             caught = self._text_of(slip).lstrip().startswith("except")
             if (one := name_slip(slip, self._package)) is not None and not caught:
                 told.add((slip.file, slip.line))
-                yield one.fix
+                place = (slip.file, one.name, self._function_at(slip))
+                yield from () if place in given else (one.fix,)
+                given |= {place} if one.fix.startswith("above line ") else set()
         for file, line in sorted(self._asked() - told):
             yield f"write a value in the code where line {line} of {file} asks for input"
+        yield from self._left_over()
+
+    def _left_over(self) -> Iterator[str]:
+        """Modules of Python 2 behind one that the machine lacks, and slips that are told as they are."""
+        for slip in self._of("lacking-import"):
+            if slip.message in PYTHON_2 and slip.message not in self._verdict.message:
+                yield f"write {PYTHON_2[slip.message]} instead of {slip.message} on {_line(slip)}"
+        meant = {one.fix.partition(" instead of ")[0] for one in self._of("misspelt")}
         for slip in self._of("never-called"):
-            yield f"call `{slip.name}()`, which nothing in {slip.file} calls"
+            if f"write {slip.name}" not in meant:  # else what calls it has its name wrong
+                passed = slip.fix.startswith("pass it")
+                yield slip.fix if passed else f"call `{slip.name}()`, which nothing in {slip.file} calls"
         for slip in self._of("main-guard"):
             yield f"write `if __name__ == '__main__':` on {_line(slip)}"
         for slip in self._of("loop-left"):
             if named := OF_LINE.fullmatch(slip.fix):
                 yield f"write {named['code']} on {_line(slip)}"
+
+    def _function_at(self, slip: PythonSlip) -> int:
+        """Return the line of the last `def` above the slip: what gives a name its value there is of use below it."""
+        lines = self._build.file_lines(slip.file)[: slip.line] if self._build is not None else []
+        return max((n for n, text in enumerate(lines, 1) if text.lstrip().startswith("def ")), default=0)
 
     def _text_of(self, slip: PythonSlip) -> str:
         lines = self._build.file_lines(slip.file) if self._build is not None else ()
@@ -251,8 +269,10 @@ class Later:
         pauses = [one for one in numbers if one.name]
         if len(pauses) == 1 and self._lacks_words(".sleep()"):  # no Rate is ever slept by
             numbers = pauses
-        if len(numbers) == 1 and is_other_rate(numbers[0], hz):
-            yield f"make it {significant(hz)} Hz on {_line(numbers[0])}, which asks for {numbers[0].message} Hz"
+        if len({(one.file, one.message) for one in numbers}) == 1 and is_other_rate(numbers[0], hz):
+            word, ask = ("lines", "ask") if len(numbers) > 1 else ("line", "asks")
+            where = f"{word} {numbers_text(sorted(one.line for one in numbers))} of {numbers[0].file}"
+            yield f"make it {significant(hz)} Hz on {where}, which {ask} for {numbers[0].message} Hz"
         for slip in self._of("not-called"):
             if "sleep" in slip.name:
                 yield f"on {_line(slip)}, {slip.fix}"
@@ -362,8 +382,8 @@ class Later:
     def _retype(self, verb: str, wanted: str, slip: PythonSlip) -> str:
         lines = self._build.file_lines(slip.file) if self._build is not None else []
         making = re.compile(rf"^[^#]*(?<![\w.]){slip.message}\(")
-        others = [str(n) for n, text in enumerate(lines, 1) if n != slip.line and making.search(text)]
-        more = f" (made on line {join_words(others)})" if others else ""
+        others = [n for n, text in enumerate(lines, 1) if n != slip.line and making.search(text)]
+        more = f" (made on line{'s' if len(others) > 1 else ''} {numbers_text(others)})" if others else ""
         fault = f"{verb} {wanted} on {_line(slip)}, not {slip.message}{more}"
         self.retyped[fault] = wanted, slip.message
         return fault

@@ -165,7 +165,7 @@ def charged_verdict(
     paths = re.findall(r"[\w-]+(?:/[\w.-]+)+", copy.hint)
     told_at_once = paths != [] and all(path in verdict.hint for path in paths)
     if copy.status.is_lost and verdict.hint and (told_at_once or not (is_next or further)):
-        return verdict  # the repair brings up what its own advice is about
+        return _with_passed(verdict, copy, repairs)  # the repair brings up what its own advice is about
     told = [one for one in repairs if _is_told(one, verdict.hint) and not _is_further_down(one, verdict)]
     clauses = verdict.hint.split("; ") if told else []
     if any(one not in told for one in repairs):
@@ -193,6 +193,15 @@ def charged_verdict(
     if any(one not in told for one in of_cmake):  # how the call is written is told
         update["sought"] = tuple(one for one in verdict.sought if one.kind not in {"call", "uncalled"})
     return verdict.model_copy(update=update)
+
+
+def _with_passed(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdict:
+    """Return the loss of a node that ended; where the copy ended by another cause, with what it got past besides."""
+    if not copy.cause or not verdict.cause or copy.cause == verdict.cause:
+        return verdict
+    cited = cited_lines(verdict.citations)
+    others = [one for one in repairs if (one.file, one.line) not in cited and one.kind in SEEN_IN_RUNS]
+    return verdict.model_copy(update={"hint": "; ".join((verdict.hint, *advice_on(others)))})
 
 
 def _hints_and_next(

@@ -170,6 +170,10 @@ from std_msgs.msg import Int8
         (1, "import std_msgs.msg.String",
          "ModuleNotFoundError: No module named 'std_msgs.msg.String'; 'std_msgs.msg' is not a package",
          "write `from std_msgs.msg import String`"),
+        (1, "from std_msgs.mgs import String", "ModuleNotFoundError: No module named 'std_msgs.mgs'",
+         "write std_msgs.msg instead of std_msgs.mgs"),
+        (1, "from sensor_msgs.msgs import Imu", "ModuleNotFoundError: No module named 'sensor_msgs.msgs'",
+         "write sensor_msgs.msg instead of sensor_msgs.msgs"),
     ],
 )  # fmt: skip
 def test_the_hint_is_the_line_as_it_should_be(tmp_path, line, source, error, hint):
@@ -210,6 +214,24 @@ def said(package, *frames, error):
             f"    {source}",
         ]
     return tracebacks([*lines, error])[0]
+
+
+@pytest.mark.parametrize(
+    ("call", "hint"),
+    [
+        ("heard(1)", "delete that call: ROS calls `heard` with each message"),
+        ("heard('a')  # try", "delete that call: ROS calls `heard` with each message"),
+        ("heard(last)", "leave out `.data` here"),
+    ],
+)
+def test_a_callback_that_the_script_calls_itself_gets_no_message(tmp_path, call, hint):
+    (tmp_path / "package.xml").write_text("<package><name>lab</name></package>")
+    (tmp_path / "src").mkdir()
+    (tmp_path / "src" / "talker.py").write_text(SCRIPT)
+    frames = ("src/talker.py", 24, call), ("src/talker.py", 9, "print(msg.data)")
+    package = facts_of(tmp_path)
+    error = "AttributeError: 'int' object has no attribute 'data'"
+    assert explain_traceback(said(package, *frames, error=error), package).hint == hint
 
 
 LIBRARY = "/opt/ros/noetic/lib/python3/dist-packages/rospy/__init__.py"

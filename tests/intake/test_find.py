@@ -114,6 +114,7 @@ def test_the_package_is_found(files, path, hints, tmp_path):
             "In a/, Package.xml has to be called package.xml: git mv Package.xml",
         ),
         ({"package (1).xml": ""}, "no package.xml", "git mv 'package (1).xml' package.xml."),
+        ({"build/stamps/package.xml.stamp": ""}, "no package.xml", "<name>lab1</name>: was it handed in"),
         (
             {"a/manifest.xml": ""},
             "no package.xml",

@@ -102,6 +102,14 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
     "rate behind an undefined name": (
         "node", DIES, TALKER, [slip("undefined", "", 3, **UNDEFINED), slip("rate-number", "2", 4)],
         f"above line 3, create the message: `countmsg = Int32()`; then make it 10 Hz on line 4 of {FILE}"),
+    "the same name several times in one function": (
+        "node", DIES, TALKER,
+        [slip("undefined", "", 3, **UNDEFINED), slip("undefined", "", 4, name="countmsg", fix="above line 4, …"),
+         slip("rate-number", "2", 4), slip("rate-number", "2", 6)],
+        f"create the message: `countmsg = Int32()`; then make it 10 Hz on lines 4 and 6 of {FILE}, which ask for 2 Hz"),
+    "a module of Python 2 behind it": (
+        "node", DIES, TALKER, [slip("lacking-import", "Tkinter")],
+        f"; then write tkinter instead of Tkinter on line 5 of {FILE}"),
     "text behind an undefined name": (
         "node", DIES, TALKER, [slip("publishes", "my words {}")],
         f'; then publish `"hello world %s" % rospy.get_time()` on line 5 of {FILE}, not \'my words <value>\''),
@@ -127,6 +135,16 @@ CASES: dict[str, tuple[str, dict[str, Any], list[dict[str, Any]], list[dict[str,
     "a function that nothing calls": (
         "node", DIES, TALKER, [slip("never-called", "nothing calls `talk()`", name="talk")],
         f"; then call `talk()`, which nothing in {FILE} calls"),
+    "a callback that is handed to nobody": (
+        "node", DIES, TALKER,
+        [slip("never-called", "nothing calls `heard()`", name="heard", fix="pass it to what calls it: `…`")],
+        "; then pass it to what calls it: `…`"),
+    "a callback whose name is misspelt where it is handed over": (
+        "node", DIES, TALKER,
+        [slip("never-called", "nothing calls `herd()`", name="herd", fix="pass it to what calls it: `…`"),
+         slip("misspelt", "did you mean herd?", 9, name="heard", fix="write herd instead of heard"),
+         slip("rate-number", "2", 4)],
+        "; then on line 9, write herd instead of heard and make it 10 Hz"),
     "rate.sleep without brackets behind it": (
         "node", DIES, TALKER, [slip("not-called", "", name="rate.sleep", fix="write `rate.sleep()`")],
         f"; then on line 5 of {FILE}, write `rate.sleep()`"),
@@ -191,6 +209,8 @@ def test_a_type_that_the_lab_does_not_want_is_not_imported_first() -> None:
     slips = slip("publisher", "chatter"), slip("publisher-type", "JointState")
     told = hint_of("node", run, TALKER, *slips, source=source)
     assert told.startswith(f"{retyped} (made on line 7)")
+    told = hint_of("node", run, TALKER, *slips, source=f"{source}n = JointState()\n")
+    assert told.startswith(f"{retyped} (made on lines 7 and 8)")
 
 
 @pytest.mark.parametrize("case", NOTHING)

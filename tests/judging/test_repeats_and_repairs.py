@@ -528,3 +528,27 @@ def test_what_a_launch_file_starts_is_no_module_of_another_script() -> None:
             if is_used_by(one, repair, asked, built=True, launched=names)
         }
         assert used == runs
+
+
+def test_what_no_repair_helps_is_told_with_all_of_its_faults() -> None:
+    lacking = [
+        "Traceback (most recent call last):",
+        '  File "/ws/src/lab1/src/numeric_talker.py", line 3, in <module>',
+        "ModuleNotFoundError: No module named 'numpy'",
+    ]
+    console = {"process": "talker", "stream": "stderr", "at_s": 0.2, "every_s": 0.001, "lines": lacking}
+    died = {**DIED, "console": [console]}
+    slip = {
+        "file": TABS.file,
+        "line": 9,
+        "kind": "misspelt",
+        "name": "calback",
+        "message": "did you mean callback?",
+    }
+    slip["fix"] = "write callback instead of calback"
+    runs = build_runs({"runs": {"talker": died}, "package": {**PACKAGE, "slips": [slip]}})
+    about = {"repairs": json.dumps([TOPIC.model_dump()])}
+    for name, run in build_runs({"runs": {"talker": died}, "package": PACKAGE}).items():
+        runs[f"repaired-1/{name}"] = replace(run, metadata={**run.metadata, **about})
+    hints = {c.id: c.hint for c in judge(rubric(*ALL), runs)}
+    assert hints["node"].startswith("on line 9, write callback instead of calback. For the rest, tell")

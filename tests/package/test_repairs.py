@@ -424,6 +424,11 @@ CASES = {
         {CMAKELISTS: CMAKE + INSTALL.replace("scripts/other.py", "bin/hello"), **INSTALLED}, ["build-line"],
         "CMakeLists.txt line 8: write src/listener.py src/talker.py in place of bin/hello", INSTALLS,
     ),
+    "installed-beside-one-that-lies-elsewhere": Case(
+        {CMAKELISTS: CMAKE + INSTALL.replace("scripts/other.py", "scripts/a.py"), **INSTALLED,
+         "scripts/old/a.py": INSTALLED["scripts/other.py"]}, ["build-line", "build-line"],
+        "CMakeLists.txt line 7: write src/listener.py src/talker.py after PROGRAMS", INSTALLS,
+    ),
     "installed-in-another-place": Case(
         {CMAKELISTS: CMAKE + INSTALL.replace("_BIN_", "_SHARE_"), **INSTALLED}, ["build-line"],
         "write catkin_install_python(PROGRAMS src/listener.py src/talker.py DESTINATION ${CATKIN_PACKAGE_BIN_DEST",

@@ -180,16 +180,55 @@ def test_what_never_runs_is_known(tmp_path, text, found):
     )
 
 
+@pytest.mark.parametrize(
+    ("below", "fix"),
+    [
+        ("n = int (n)", "delete line 2, which makes a number of it"),
+        ("n = float(n)", "delete line 2, which makes a number of it"),
+        ("m = int(n)", ""),
+        ("n = int(n, 2)", ""),
+    ],
+)
+def test_the_line_that_makes_a_number_of_what_is_typed_is_known(below: str, fix: str, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"n = input()\n{below}\n", encoding="utf-8")
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "input"] == [fix]
+
+
 @pytest.mark.parametrize(("end", "name"), [("A()\n", "A().go"), ("a = A()\n", "a.go")])
 def test_a_method_that_nothing_calls_is_called_on_its_object(tmp_path, end, name):
     (tmp_path / "a.py").write_text("class A:\n    def go(self):\n        self.p.publish(1)\n" + end)
     assert [s.name for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "never-called"] == [name]
 
 
+@pytest.mark.parametrize(
+    ("lines", "fix"),
+    [
+        ("goal.pose.x = 1\np = rospy.Publisher('a', Pose, queue_size=1)\np.publish(goal)\n",
+         "above line 1, create the message: `goal = Pose()`"),
+        ("goal.pose.x = 1\nprint(goal)\n", "above line 1, write `goal = …`, with the value that it should have"),
+        ("p = rospy.Publisher('a', String, queue, queue_size=1)\n",
+         "on line 1, delete `queue` from the call of `Publisher`"),
+        ("p = rospy.Publisher('a', String, queue_size)\n", "write `queue_size=10`"),
+    ],
+)  # fmt: skip
+def test_a_name_without_a_value_gets_one_by_what_it_is_used_for(lines: str, fix: str, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(lines, encoding="utf-8")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "undefined"]
+    found = [s.fix for s in slips if s.name not in {"rospy", "String"}]
+    assert found[:1] == [fix]
+
+
+def test_a_sum_of_numbers_is_no_text(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("a = n * 2 + 10\nt = 'n is ' + str(n)\np.publish(a)\np.publish(t)\n")
+    slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "publishes"]
+    assert [one.message for one in slips if any(map(str.isalnum, one.message))] == ["n is {}"]
+
+
 def test_where_names_of_the_graph_are_written_is_known(tmp_path):
     (tmp_path / "a.py").write_text(
         "rospy.init_node('talker')\nrospy.Publisher(\n    name='/chatter', data_class=String)\n"
         "from rospy import Subscriber\nSubscriber('~scan', LaserScan)\nrospy.Publisher(TOPIC, String)\n"
+        "x = rospy.wait_for_message('odom', Odometry)\n"
     )
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind != "undefined"]
     assert [(s.kind, s.line, s.message) for s in slips] == [
@@ -199,6 +238,8 @@ def test_where_names_of_the_graph_are_written_is_known(tmp_path):
         ("subscriber", 5, "~scan"),
         ("subscriber-type", 5, "LaserScan"),
         ("publisher-type", 6, "String"),
+        ("subscriber", 7, "odom"),
+        ("subscriber-type", 7, "Odometry"),
     ]
 
 

@@ -86,7 +86,8 @@ def slip(line, kind, message, fix="", name=""):
 # ---- where ROS is told a name
 
 NAMED = {
-    "init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber", "set_param": "sets-parameter",
+    "init_node": "node-name", "Publisher": "publisher", "Subscriber": "subscriber", "wait_for_message": "subscriber",
+    "set_param": "sets-parameter",
 }  # fmt: skip
 """Calls whose first argument is a name, and the kind of slip that tells where."""
 
@@ -440,6 +441,8 @@ def undefined(node, tree):
     calls = [n for n in walk(tree) if isinstance(n, ast.Call) and node in n.args]
     if name in GIVEN_BY_NAME and calls:
         return "`%s` is named here without its value" % name, "write `%s=%s`" % (name, GIVEN_BY_NAME[name])
+    if any(called_name(n) == "Publisher" and node in n.args[2:] for n in calls):
+        return why, "on line %d, delete `%s` from the call of `Publisher`" % (node.lineno, name)
     inner = used.attr if isinstance(used, ast.Attribute) else ""
     module = "%s.%s" % (name, inner) if inner in ("msg", "srv") else ALIASES.get(name, name)
     if module != name or (name in MODULES and inner):
@@ -463,8 +466,8 @@ def what_to_write(node, used, tree):
     if inner in MADE:
         loops = [n.lineno for n in walk(tree) if isinstance(n, (ast.While, ast.For)) and node in ast.walk(n)]
         return min([line, *loops]), "write `%s = %s`" % (name, MADE[inner])
-    is_set = isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)
-    if is_set or any(node in n.args for n in calls_in(tree, "publish")):
+    sent = {one.id for n in calls_in(tree, "publish") for one in n.args if isinstance(one, ast.Name)}
+    if name in sent or (isinstance(used, ast.Attribute) and isinstance(used.ctx, ast.Store)):
         return line, "create the message: `%s = %s()`" % (name, types.pop() if len(types) == 1 else "<Type>")
     return line, "write `%s = …`, with the value that it should have" % name
 
@@ -582,7 +585,8 @@ class Texts:
         """Return the text of `a + b`, `a % b` or `a.format(b)`."""
         operator = getattr(node, "op", None)
         if isinstance(operator, ast.Add):
-            return self.of(node.left, depth) + self.of(node.right, depth)
+            number = any(isinstance(getattr(n, "value", ""), (int, float)) for n in (node.left, node.right))
+            return VALUE if number else self.of(node.left, depth) + self.of(node.right, depth)
         if isinstance(operator, ast.Mod) and isinstance(node.left, ast.Constant):
             values = node.right.elts if isinstance(node.right, ast.Tuple) else [node.right]
             return self.filled(self.of(node.left), values)

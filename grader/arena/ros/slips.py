@@ -73,7 +73,9 @@ def slips(tree):
         name = asked(node, functions)
         if name:
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
-            found.append(slip(node.lineno, "input", message, name=how_often(node, tree)))
+            line = numbered(node, tree)
+            fix = "delete line %d, which makes a number of it" % line if line else ""
+            found.append(slip(node.lineno, "input", message, fix=fix, name=how_often(node, tree)))
     finders = (
         misspelt, loop_rates, resets, never_run, never_reached, stopped_loops, sleepless_loops, sleeps_twice,
         publishes_twice, callbacks, waiting_callbacks, queue_sizes, graph_names, object_slips, said_texts, deaf_loops,
@@ -219,6 +221,20 @@ def how_often(node, tree):
     if not loops:
         return "once"
     return "paused" if calls_in(loops[-1], "sleep") else ""
+
+
+def numbered(node, tree):
+    """Return the line on which the variable that gets what is typed is made a number, `n = int(n)`; 0 for none."""
+    assigned = [n for n in walk(tree) if isinstance(n, ast.Assign) and n.lineno >= node.lineno]
+    names = {dotted(n.targets[0]) for n in assigned if n.value is node}
+    lines = [
+        n.lineno
+        for n in assigned
+        if called_name(n.value) in ("int", "float")
+        and [dotted(one) for one in n.value.args] == [dotted(n.targets[0])]
+        and dotted(n.targets[0]) in names
+    ]
+    return min(lines, default=0)
 
 
 IMPORTS_LIMIT = 30

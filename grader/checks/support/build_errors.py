@@ -311,6 +311,11 @@ def _late_project(found: re.Match[str], package: PackageFacts, _lines: Sequence[
     return Explained(why, f"{fix} just below cmake_minimum_required(…), with find_package(…) next")
 
 
+def _other_project(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    why = f"project({found[1]}) differs from the package's name {package.name}"
+    return Explained(why, f"write project({package.name})")
+
+
 def _missing_message(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     path = _below(found[1], package)
     return _missing_files([path], package, f"add_{found[2]}_files(…) names {path}")
@@ -541,6 +546,7 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"(Invalid declaration|is not a legal message|InvalidMsgSpec|MsgNotFound)", _no_definition),
     (r"(generate_messages)\(\) must be called before catkin_package\(\)", _before_catkin_package),
     (r"You must call project\(\) before calling (\w+)\(\)", _late_project),
+    (r"does not match current PROJECT_NAME '([^']*)'", _other_project),
     (UNKNOWN_COMMAND + r' "(\w+)"', _unknown_command),
     (r"Parse error\.|Error\(s\) in package", _unreadable),
     (r"does not contain a CMakeLists\.txt", _no_cmake_lists),

@@ -34,7 +34,7 @@ from grader.checks.support.missing_names import (
     unused_import,
 )
 from grader.checks.support.processes import Life, early_end, lives
-from grader.checks.support.rospy_calls import unfit_value, wrong_class
+from grader.checks.support.rospy_calls import unfit_value, without_message, wrong_class
 from grader.checks.support.scripts import OF_INTERFACES, SYNTAX, path_in_package
 from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, shown
 from grader.evidence.events import STOPPED
@@ -320,6 +320,7 @@ def _known_meaning(found: Traceback, place: FileCitation | None, package: Packag
     a known slip, a question; else what the type of the exception says."""
     return (
         _misplaced(found)
+        or without_message(found)
         or _slip(found, package)
         or _asks_for_input(found, place, package)
         or CAUSES.get(found.kind, ("", "look at that line: the last words say what Python cannot do there"))
@@ -429,9 +430,13 @@ def _asks_for_input(
         return CAUSES["EOFError"][0], "write a value in the code in place of `input()`"
     if found.kind != "EOFError" or place is None or place.file not in rated:
         return None
+    numbered = next(
+        (s.fix for s in package.slips if s.kind == "input" and s.file == place.file and s.fix), ""
+    )
+    in_place = f"{NO_INPUT}; {numbered}" if numbered else NO_INPUT
     if "paused" in asks.values():
-        return CAUSES["EOFError"][0], NO_INPUT
-    return CAUSES["EOFError"][0], f"{NO_INPUT}, and make sure that the loop calls `sleep()` of its Rate"
+        return CAUSES["EOFError"][0], in_place
+    return CAUSES["EOFError"][0], f"{in_place}, and make sure that the loop calls `sleep()` of its Rate"
 
 
 def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
@@ -461,7 +466,11 @@ def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> t
     here = next((one for one in meant if name and (one.line, one.name) == (place.line, name[1])), None)
     if here is None:
         return None
-    others = {one.fix: one for one in reversed(meant) if one.line != place.line and one.fix != here.fix}
+    # what gives a name its value is told once, however often it is read
+    others = {one.name if one.fix.startswith("above line ") else one.fix: one for one in reversed(meant)}
+    others = {
+        key: o for key, o in others.items() if o.line != place.line and key not in {here.name, here.fix}
+    }
     fixes = [one.fix for one in reversed(others.values())]
     return here.why, "; ".join([here.fix, *fixes[:OTHER_NAMES_SHOWN]])
 

@@ -58,6 +58,8 @@ class Slip(NamedTuple):
 PROGRAMS_OF = {
     "rospy_tutorials": ("listener.py", "talker.py", "listener", "talker"),
     "turtlesim": ("turtlesim_node", "turtle_teleop_key", "draw_square", "mimic"),
+    "rviz": ("rviz",),
+    "rqt_graph": ("rqt_graph",),
 }
 """What tutorials start of ROS's own packages."""
 
@@ -189,7 +191,10 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
         told = "".join(f"; it has no attribute {name}" for name in slips)
         fix = "; ".join(f"write {right}= instead of {name}=" for name, right in slips.items())
         stem = PurePosixPath(node.type or "<file>.py").stem
-        own = {"pkg": package.name, "type": f"{node.name or '<file>'}.py", "name": stem}
+        program = f"{node.name or '<file>'}.py"
+        if node.pkg and owner_of(package, node) is None:  # another package's: the name that it has is its own
+            program = next((one for one in PROGRAMS_OF.get(node.pkg, ()) if one == node.name), "…")
+        own = {"pkg": package.name, "type": program, "name": stem}
         add = " ".join(f'{name}="{own[name]}"' for name in missing)
         why = f"<node> has no {join_words(missing)}{told}"
         return _slip(node, why, fix or f"add {add} to the <node>")._replace(refused=True)

@@ -29,7 +29,7 @@ from grader.installable import (
 from grader.model.package import PackageFacts, PythonSlip
 from grader.model.verdict import FileCitation
 from grader.syntax_fixes import parsed
-from grader.wording import join_words
+from grader.wording import closest, join_words
 
 SETUP_PAGE = "http://docs.ros.org/en/noetic/api/catkin/html/howto/format2/installing_python.html"
 IMPORT_ERRORS = ("ImportError", "ModuleNotFoundError")
@@ -40,6 +40,7 @@ _FROM_PACKAGE = re.compile(r"cannot import name '(\w+)' from '(\w+)'")
 _IN_MODULE = re.compile(r"No module named '(\w+\.(?:msg|srv))\.(\w+)'")
 _KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
 NO_MODULE = re.compile(r"No module named '(\w+)'$")
+_OF_MESSAGES = re.compile(r"No module named '(\w+)\.(\w+)'$")
 _HIDDEN = re.compile(r"'(\w+)\.[\w.]+'; '\1' is not a package|partially initialized module '(\w+)'")
 KEYWORDS = (
     "anonymous", "log_level", "disable_signals", "argv", "queue_size", "latch", "tcp_nodelay", "headers", "callback",
@@ -202,6 +203,12 @@ def _other_module(found: Traceback, package: PackageFacts) -> tuple[str, str] | 
             else own
         )
         return f"{inner[2]} is a class in {inner[1]}", hint
+    inner = _OF_MESSAGES.search(message)
+    if inner and inner[1] in noetic_messages() and (right := closest(inner[2], ("msg", "srv"))):
+        return (
+            f"did you mean {inner[1]}.{right}?",
+            f"write {inner[1]}.{right} instead of {inner[1]}.{inner[2]}",
+        )
     asked, wanted = NO_MODULE.search(message), _FROM_PACKAGE.search(message)
     if asked and (known := _module_of_others(asked[1], package)):
         return known

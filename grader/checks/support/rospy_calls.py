@@ -18,6 +18,7 @@ _BAD_TOPIC = re.compile(
     r"^topic name is not a non-empty string|^(?:topic parameter 'data_class'|data_class \[)"
     r"|^(?:Publisher|Subscriber)\.__init__\(\) missing"
 )
+_VALUE_ALONE = re.compile(r"\s*(\w+)\((?:-?[\d.]+|'[^']*'|\"[^\"]*\")\)\s*(?:#.*)?$")
 
 
 def line_tree(source: str) -> ast.AST:
@@ -247,3 +248,16 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     call = "str(…)" if wants_text else "int(…)"
     hint = f"publish a {kind} here, `{call}`; {other} go to the publisher of their own topic"
     return f"the message takes a {kind} but gets something else", hint
+
+
+def without_message(found: Traceback) -> tuple[str, str] | None:
+    """Return the line that calls a function with a plain value where it wants a whole message."""
+    if len(found.frames) < 2 or not found.message.endswith("has no attribute 'data'"):
+        return None
+    caller = found.frames[-2]
+    call = None if caller.in_library else _VALUE_ALONE.match(caller.source)
+    if call is None:
+        return None
+    said = shown(caller.source.partition("#")[0].strip())
+    why = f"line {caller.line} calls it with a value in place of a message: `{said}`"
+    return why, f"delete that call: ROS calls `{call[1]}` with each message"

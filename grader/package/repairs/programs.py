@@ -205,8 +205,9 @@ def _name_scripts(files: Files, own: Sequence[str], paths: Sequence[str]) -> Non
     programs = next(t for t in words if t.value == "PROGRAMS")
     message = f"line {call.line} of {CMAKE}: {INSTALL}(…) does not name {join_words(unnamed)}"
     behind = words[words.index(programs) + 1 :][:1]
-    known = {"DESTINATION", *own}
-    stray = next((t for t in behind if "$" not in t.value and _plain(t.value) not in known), None)
+    known = {"DESTINATION", *(PurePosixPath(one).name for one in own)}  # that it lies elsewhere is told of it
+    strays = (t for t in behind if PurePosixPath(_plain(t.value)).name not in known)
+    stray = next((t for t in strays if "$" not in t.value), None)
     fix = f"write {listed} in place of {stray.value}" if stray else f"write {listed} after PROGRAMS"
     changed = replace_token(text, stray or programs, listed if stray else f"PROGRAMS {listed}")
     files.change("build-line", CMAKE, changed, message, fix)
