@@ -410,6 +410,11 @@ def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
     near = near_names(name, others) or tuple(others)
     seen = f"; it has {join_words(near)}" if near else ""
     hint = f'write <node pkg="{pkg}" name="{name.lstrip("/")}" …/>'
+    twice = next(
+        (n for n in file.brings if n.ns and n.full_name.replace(f"/{n.ns.strip('/')}/", "/", 1) == name), None
+    )
+    if twice is not None:
+        hint = f'on line {twice.line}, delete ns="{twice.ns}": the names of two namespaces are joined'
     return failed(f"{file.path} has no node {name}{seen}", hint=hint)
 
 

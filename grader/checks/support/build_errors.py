@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from pathlib import PurePosixPath
 
 from grader.checks.support.build_output import FIRST_ERROR_HINT, BuildError, Explained, folder_names
-from grader.checks.support.cpp_errors import CPP_ERRORS, call_below, programs_without
+from grader.checks.support.cpp_errors import CPP_ERRORS, CPP_SUFFIXES, call_below, programs_without
 from grader.checks.support.scripts import OF_FILES, OF_INTERFACES, cmake_calls, installed
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
@@ -23,7 +23,15 @@ from grader.installable import (
     noetic_messages,
 )
 from grader.model.message_definitions import meant_type
-from grader.model.package import CMAKE, MANIFEST, CMakeCall, Fault, PackageFacts, meant_command
+from grader.model.package import (
+    CMAKE,
+    INTERFACE_FOLDERS,
+    MANIFEST,
+    CMakeCall,
+    Fault,
+    PackageFacts,
+    meant_command,
+)
 from grader.model.verdict import FileCitation
 from grader.wording import join_words, numbers_text, there_is
 
@@ -36,7 +44,6 @@ UNKNOWN_COMMAND = "Unknown CMake command"
 BACKSLASH = 'bad character with text "\\"'
 _QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
 """As compilers and linkers write them."""
-CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
 OF_TARGETS = (
     "add_executable",
     "add_library",
@@ -193,8 +200,10 @@ def _missing_library(found: re.Match[str], package: PackageFacts, lines: Sequenc
     return Explained(why, hint, of_machine=True)
 
 
-def _missing_folder(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+def _missing_folder(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     call, folder = found[1], posixpath.basename(found[2].rstrip("/"))
+    if wrong := _of_another_kind(call, package):
+        return wrong
     why = f"{call}(…) needs the folder {folder}/, which is not in the package"
     return Explained(why, f"put your .{folder} files into {folder}/ and push them, or remove {call}(…)")
 
@@ -312,8 +321,29 @@ def _late_project(found: re.Match[str], package: PackageFacts, _lines: Sequence[
 
 
 def _missing_message(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    path = _below(found[1], package)
-    return _missing_files([path], package, f"add_{found[2]}_files(…) names {path}")
+    path, call = _below(found[1], package), f"add_{found[2]}_files"
+    name, folder = posixpath.basename(path), INTERFACE_FOLDERS[call]
+    elsewhere = next((f.path for f in package.files if posixpath.basename(f.path) == name), "")
+    if wrong := _of_another_kind(call, package):
+        return wrong
+    if elsewhere and path == f"{folder}/{name}":
+        why = f"{call}(…) looks for {name} in {folder}/, and it is {elsewhere}"
+        return Explained(why, f"make the folder {folder}/, if there is none, and move {elsewhere} into it")
+    return _missing_files([path], package, f"{call}(…) names {path}")
+
+
+def _of_another_kind(call: str, package: PackageFacts) -> Explained | None:
+    """Explain `add_message_files(FILES Add.srv)`."""
+    named = [word for one in cmake_calls(package, call) for word in one.args]
+    for other, kind in INTERFACE_FOLDERS.items():
+        if other != call and (name := next((word for word in named if word.endswith(f".{kind}")), "")):
+            return Explained(f"{call}(…) names {name}, which is for {other}(…)", f"name {name} in {other}(…)")
+    return None
+
+
+def _generated_before(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    why = f"{found[1]}(…) is called after generate_messages(…)"
+    return Explained(why, f"move {found[1]}(…) above generate_messages(…)")
 
 
 def _missing_script(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -388,12 +418,6 @@ def _missing_dependency(found: re.Match[str], package: PackageFacts, _lines: Seq
         return Explained(f"{why}: the package has no messages of its own", hint)
     hint = f"{hint}; messages of your own need generate_messages(…) above it"
     return Explained(why, hint, uncalled="generate_messages")
-
-
-def _missing_target(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    name = found[1]
-    why = f"it names the target {name}, which no add_executable(…) or add_library(…) above it makes"
-    return Explained(why, f"take that line out, or make {name} above it")
 
 
 def _depends(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -539,6 +563,8 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"Could not find messages which '([^']+)' depends on", _message_of_another),
     (r"Messages depends on unknown pkg: ([\w-]+)", _unfound_dependency),
     (r"(Invalid declaration|is not a legal message|InvalidMsgSpec|MsgNotFound)", _no_definition),
+    (r"genaction\.py", _no_definition),
+    (r"generate_messages\(\) must be called after (\w+)\(\)", _generated_before),
     (r"(generate_messages)\(\) must be called before catkin_package\(\)", _before_catkin_package),
     (r"You must call project\(\) before calling (\w+)\(\)", _late_project),
     (UNKNOWN_COMMAND + r' "(\w+)"', _unknown_command),
@@ -546,8 +572,6 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"does not contain a CMakeLists\.txt", _no_cmake_lists),
     (r"contains non-catkin packages", _not_catkin),
     (NO_TARGET, _missing_dependency),
-    (r'dependencies to non-existent target "([^"]+)"', _missing_target),
-    (r'link libraries for target "([^"]+)" which is not built', _missing_target),
     (
         r"catkin package '([^']+)' has been find_package\(\)-ed but is not listed as a build",
         _build_dependency,
