@@ -9,7 +9,13 @@ from difflib import get_close_matches
 from pathlib import PurePosixPath
 
 from grader.checks.support.build_output import FIRST_ERROR_HINT, BuildError, Explained, folder_names
-from grader.checks.support.cpp_errors import CPP_ERRORS, CPP_SUFFIXES, call_below, programs_without
+from grader.checks.support.cpp_errors import (
+    CPP_ERRORS,
+    CPP_SUFFIXES,
+    call_below,
+    other_namespace,
+    programs_without,
+)
 from grader.checks.support.scripts import OF_FILES, OF_INTERFACES, cmake_calls, installed
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
@@ -202,7 +208,7 @@ def _missing_library(found: re.Match[str], package: PackageFacts, lines: Sequenc
 
 def _missing_folder(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     call, folder = found[1], posixpath.basename(found[2].rstrip("/"))
-    if wrong := _of_another_kind(call, package):
+    if wrong := _misplaced(call, package, f".{folder}"):
         return wrong
     why = f"{call}(…) needs the folder {folder}/, which is not in the package"
     return Explained(why, f"put your .{folder} files into {folder}/ and push them, or remove {call}(…)")
@@ -322,22 +328,24 @@ def _late_project(found: re.Match[str], package: PackageFacts, _lines: Sequence[
 
 def _missing_message(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     path, call = _below(found[1], package), f"add_{found[2]}_files"
-    name, folder = posixpath.basename(path), INTERFACE_FOLDERS[call]
-    elsewhere = next((f.path for f in package.files if posixpath.basename(f.path) == name), "")
-    if wrong := _of_another_kind(call, package):
+    if wrong := _misplaced(call, package, posixpath.basename(path)):
         return wrong
-    if elsewhere and path == f"{folder}/{name}":
-        why = f"{call}(…) looks for {name} in {folder}/, and it is {elsewhere}"
-        return Explained(why, f"make the folder {folder}/, if there is none, and move {elsewhere} into it")
     return _missing_files([path], package, f"{call}(…) names {path}")
 
 
-def _of_another_kind(call: str, package: PackageFacts) -> Explained | None:
-    """Explain `add_message_files(FILES Add.srv)`."""
+def _misplaced(call: str, package: PackageFacts, ending: str) -> Explained | None:
+    """Explain `add_message_files(FILES Add.srv)`, and a definition that lies in another folder."""
     named = [word for one in cmake_calls(package, call) for word in one.args]
+    folder = INTERFACE_FOLDERS[call]
     for other, kind in INTERFACE_FOLDERS.items():
         if other != call and (name := next((word for word in named if word.endswith(f".{kind}")), "")):
-            return Explained(f"{call}(…) names {name}, which is for {other}(…)", f"name {name} in {other}(…)")
+            mixed = any(not word.endswith(f".{kind}") for word in named if "." in word)
+            fix = f"name {name} in {other}(…)" if mixed else f"write {other} instead of {call}"
+            return Explained(f"{call}(…) names {name}, which is for {other}(…)", fix)
+    there = [f.path for f in package.files if f.path.endswith(ending) and posixpath.dirname(f.path) != folder]
+    if there:
+        why = f"{call}(…) looks for {posixpath.basename(there[0])} in {folder}/, and it is {there[0]}"
+        return Explained(why, f"make the folder {folder}/, if there is none, and move {there[0]} into it")
     return None
 
 
@@ -480,7 +488,7 @@ def _half_written(found: re.Match[str], package: PackageFacts, lines: Sequence[s
     """What a header declares is not there although it is included: the build is just writing it."""
     made = any(file.path.endswith(MADE) for file in package.files)
     if found[1] != package.name or not made or not cmake_calls(package, "generate_messages"):
-        return Explained(found.string, FIRST_ERROR_HINT)
+        return other_namespace(found, package)
     text = f"{found[1]} is not declared, since the header of its message was not written yet"
     return _unwaited(package, text, "its message", OWN_TARGETS, lines)
 

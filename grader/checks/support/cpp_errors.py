@@ -69,7 +69,7 @@ def _standard_type(found: re.Match[str], _package: PackageFacts, _lines: Sequenc
     return Explained(found.string, f"write std::{name}, and #include <{STANDARD[name]}> at the top")
 
 
-def _other_namespace(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+def other_namespace(found: re.Match[str], package: PackageFacts, _lines: Sequence[str] = ()) -> Explained:
     """Of `ROS::init`, and of `std_msg::String`."""
     named = [name for call in cmake_calls(package, "find_package") for name in call.args]
     near = near_names(found[1], ["ros", "std", *named])
@@ -164,7 +164,7 @@ CPP_ERRORS: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"'([^']+)::(\w+)' has not been declared", _no_type),
     (r"'(\w+)' does not name a (?:template )?type", _standard_type),
     (r"'__s_get\w+' is not a member of '([^']+)'", _no_message),
-    (r"'(\w+)' (?:has not been declared|is not a class, namespace, or enumeration)", _other_namespace),
+    (r"'(\w+)' (?:has not been declared|is not a class, namespace, or enumeration)", other_namespace),
     (r"'([^']+)' is not a member of .*; did you mean '([^']+)'", _no_member),
     (r"has no member named '([^']+)'; did you mean '([^']+)'", _no_member),
     (r"undefined reference to '([^']+)", _explain_unlinked),
