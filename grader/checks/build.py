@@ -9,7 +9,7 @@ from typing import NamedTuple
 from grader.checks.registry import NoParams, check
 from grader.checks.support.build_errors import UNKNOWN_COMMAND, explain_error_of_build
 from grader.checks.support.build_output import FIRST_ERROR_HINT, first_error
-from grader.checks.support.exit_causes import explain_end
+from grader.checks.support.exit_causes import RUN_IT, explain_end
 from grader.checks.support.launch import IGNORE
 from grader.checks.support.processes import Life, lives
 from grader.checks.support.scripts import (
@@ -321,11 +321,8 @@ def _broken_programs(package: PackageFacts, run: Run, programs: list[Life]) -> I
         unloaded = next((mark for mark in LOADER if mark in words), None)
         if one.end.signal is not None or one.end.stopped_by is not None:
             end = explain_end(one, run, package)
-            hint = (
-                "fix the error in its last output"
-                if any(mark in words for mark in TELLING)
-                else INVALID_MEMORY_HINT
-            )
+            told = "fix the error in its last output" if any(mark in words for mark in TELLING) else ""
+            hint = end.hint if end.hint != RUN_IT else told or INVALID_MEMORY_HINT
             yield Broken(_name(one), f"{end.cause}{quoted}", hint, one)
         elif unloaded or code in CANNOT_START:
             yield Broken(

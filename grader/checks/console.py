@@ -22,6 +22,7 @@ from grader.checks.support.exit_causes import (
 )
 from grader.checks.support.fields import unit_slip
 from grader.checks.support.processes import (
+    LOGGERS,
     Life,
     early_end,
     life,
@@ -37,8 +38,10 @@ from grader.checks.support.text import (
     PLACE,
     both,
     log,
+    near_names,
     refuse_others,
     shown,
+    unfilled,
     words_pattern,
 )
 from grader.checks.support.topics import cite
@@ -159,19 +162,40 @@ def _not_printed(
     if error := explain_error(package, run):
         return error.verdict(unjudged, f"it never prints {params.words}: {error.cause}")
     own = [line for line in lines if one.interrupt_ns is None or line.at_ns < one.interrupt_ns]
-    for said, wrong in WRONG_ANSWERS.items():
-        if any(said in line.text for line in own):
-            hint = "end the service's callback with `return …Response(…)`"
-            return unjudged(
-                f"it never prints {params.words}: the service's callback returns {wrong}", hint=hint
-            )
+    if unserved := _unserved(one, own, run, params.words):
+        return unserved
     if not own:
         nothing = unjudged(
             f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True"
         ).if_repeated()
         return nothing.model_copy(update={"silent": True})
     meant = max(own, key=lambda line: SequenceMatcher(None, params.words, line.text[:LINE_CHARS_MAX]).ratio())
+    hint = unfilled(meant.text) or hint
     return failed(f"it never prints {params.words}; it prints {shown(meant.text)!r}", hint=hint).if_repeated()
+
+
+def _unserved(one: Life, own: Sequence[Line], run: Run, words: str) -> Verdict | None:
+    """Of a client: what its service does wrong, or that it asks for another one, or before a node offers it."""
+    never = f"it never prints {words}"
+    for said, wrong in WRONG_ANSWERS.items():
+        if any(said in line.text for line in own):
+            hint = "end the service's callback with `return …Response(…)`"
+            return unjudged(f"{never}: the service's callback returns {wrong}", hint=hint)
+    nodes = nodes_of(run, one.name)
+    asked = [
+        e.topic for _, e in run.actors if e.action == "lookup" and e.detail and e.actor in nodes and e.topic
+    ]
+    offered = {name for _, e in run.graph for name in e.services if not name.endswith(LOGGERS)}
+    absent = next((name for name in asked if name not in offered), "")
+    near = near_names(absent, offered) or (tuple(offered) if len(offered) == 1 else ())
+    if absent and near:
+        hint = f"use the name {near[0]} both where you wait for it and where you call it"
+        return unjudged(f"{never}: it asks for {absent}, and {near[0]} is offered", hint=hint)
+    early = next((n for n in asked if any(f"service [{n}] unavailable" in line.text for line in own)), "")
+    if early in offered:
+        hint = f"wait for it before the call: `rospy.wait_for_service('{early}')`"
+        return failed(f"{never}: it calls {early} before a node offers it", hint=hint).if_repeated()
+    return None
 
 
 def _slip(line: Line, params: PrintsParams) -> str:
@@ -251,6 +275,7 @@ ALIKE = 0.7
 WRONG_ANSWERS = {
     "service handler returned None": "nothing",
     "handler returned wrong number of values": "something that is not a response",
+    "handler returned invalid value": "something that is not a response",
 }
 """What rospy tells a client whose server's callback returns nothing that it can send."""
 
@@ -367,7 +392,7 @@ def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | No
         alike = max(texts, key=lambda text: _likeness(text, params.text), default="")
         if _likeness(alike, params.text) >= ALIKE:
             text = (split_log_line(alike) or ("", alike))[1]
-            message, hint = f"{shown(text)!r} {how}, not {params.text!r}", _call(params)
+            message, hint = f"{shown(text)!r} {how}, not {params.text!r}", unfilled(text) or _call(params)
             share = OTHER_WORDS_SHARE if texts is logged else 0.0
             verdict = failed(message, hint=hint).in_part(share, "the level, and nearly the text")
             return verdict.about(said=text)
@@ -399,7 +424,7 @@ def _nothing(
         return unjudged("no node was registered that could log", hint=hint)
     if lines:
         message = f"{join_words(nodes)} logs {shown(lines[0].text)!r}, not {params.text!r}"
-        return failed(message, hint=_call(params)).about(said=lines[0].text)
+        return failed(message, hint=unfilled(lines[0].text) or _call(params)).about(said=lines[0].text)
     return _silent(package, run, nodes, params)
 
 

@@ -22,7 +22,7 @@ from grader.model.message_definitions import (
 from grader.model.package import Fault, Interface, InterfaceField, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed
-from grader.wording import closest, join_words, plural
+from grader.wording import closest, join_words, numbers_text, plural
 
 FAULTS_SHOWN = 3
 FieldType = Annotated[str, Field(pattern=r"^[A-Za-z]\w*(/[A-Za-z]\w*)?(\[\d*\])?$"), Refers("field")]
@@ -178,15 +178,21 @@ def _faults(
 
 
 def _unreadable(found: Interface, fault: Fault, wanted: list[InterfaceField]) -> _Fault:
-    """Of a line that is not a field, or of a missing `---`: it belongs below the last field of the first part."""
+    """Of a line that is not a field, or of a missing `---`: it belongs below the last field of a part, or in front of
+    the last part where its fields are missing too."""
     fix = fault.fix or "one field per line, type before name"
     line = fault.line
     if fault.kind == "OtherParts":
-        fix = "write `---` on a line of its own between the parts"
-        first = [one.name for one in wanted if one.part == wanted[0].part]
-        lines = [one.line for one in found.fields if one.name in first]
-        if lines and len(lines) == len(first):
-            line, fix = max(lines), f"write a line `---` below line {max(lines)}"
+        parts = {one.name: one.part for one in wanted}
+        there = sorted((one for one in found.fields if one.name in parts), key=lambda one: one.line)
+        ends = [a.line for a, b in pairwise(there) if parts[a.name] != parts[b.name] and a.part == b.part]
+        last = PARTS[PurePosixPath(found.path).suffix][-1]
+        lacking = [f"`{one.type} {one.name}`" for one in wanted if one.part == last]
+        if ends:
+            line = ends[0]
+            fix = f"write a line `---` below {'line' if len(ends) == 1 else 'lines'} {numbers_text(ends)}"
+        elif lacking and there and last not in (parts[one.name] for one in there):
+            fix = f"at the end of the file, write a line `---`, and {join_words(lacking)} below it"
     return _Fault(shown(fault.message), line, fix)
 
 

@@ -441,6 +441,11 @@ def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
         hint = f'remove ns="{spaces[0].value}" on line {spaces[0].line}: then {name.lstrip("/")} is {name}'
         return failed(why, hint=hint, citations=(spaces[0].place,))
     hint = f'write <node pkg="{pkg}" name="{name.lstrip("/")}" …/>'
+    twice = next(
+        (n for n in file.brings if n.ns and n.full_name.replace(f"/{n.ns.strip('/')}/", "/", 1) == name), None
+    )
+    if twice is not None:
+        hint = f'on line {twice.line}, delete ns="{twice.ns}": the names of two namespaces are joined'
     return failed(f"{file.path} has no node {name}{seen}", hint=hint)
 
 

@@ -200,16 +200,27 @@ def _judge_results(found: Results, run: Run, package: PackageFacts, start_ns: in
     if dead is not None:
         verdict = _with_cause(verdict, dead, run, package)
     elif error := _error_behind(verdict, package, run):
-        message = f"{verdict.message}; a callback fails: {error.cause}"
+        fails = "" if error.hint == TYPES_HINT else "a callback fails: "
+        message = f"{verdict.message}; {fails}{error.cause}"
         about = {"message": message, "hint": error.hint, "citations": error.citations, "unjudged": False}
         verdict = verdict.model_copy(update=about)
     return excused(verdict.if_repeated(), run, start_ns, run.end_ns, _why_late)
+
+
+TYPES_HINT = "give the topic the handout's type where it is advertised, and where it is subscribed to"
+_WANTS_TYPE = re.compile(
+    r"wants topic (\S+) to have datatype/md5sum \[([\w/]+)/\w+\], but our version has \[([\w/]+)/\w+\]"
+)
 
 
 def _error_behind(verdict: Verdict, package: PackageFacts, run: Run) -> Ending | None:
     """Return the error in a callback of a node that publishes on a topic which the testcase that failed first names."""
     topics = [topic for topic in published_topics(run) if re.search(rf"{topic}(?![\w/])", verdict.message)]
     nodes = {node for topic in topics for node in nodes_on(run, topic, "publishers")}
+    for line in (c.line for one in lives(run) for _, c in run.lines(one.name)):
+        if (wanted := _WANTS_TYPE.search(line)) and wanted[1] in topics:
+            topic, theirs, own = wanted.groups()
+            return Ending(f"{topic} is advertised as {own}, and a node hears it as {theirs}", TYPES_HINT)
     processes = {event.processes.get(node, "") for _, event in run.graph for node in nodes} - {""}
     return explain_error(package, run, only=processes) if processes else None
 

@@ -11,7 +11,7 @@ from grader.checks.registry import Refers, check
 from grader.checks.support.console_output import Traceback
 from grader.checks.support.exit_causes import explain_end, explain_traceback, process_tracebacks
 from grader.checks.support.fields import differences, fields_text, value_text
-from grader.checks.support.processes import GlobalName, TypeName, life_of, plain_type
+from grader.checks.support.processes import LOGGERS, GlobalName, TypeName, life_of, plain_type
 from grader.checks.support.text import SERVICE, SPIN, imports, near_names, service_call, shown
 from grader.checks.support.topics import cite, no_node, why_unreached
 from grader.evidence.events import MISFIT, NO_ANSWER
@@ -29,8 +29,6 @@ from grader.model.verdict import (
     unjudged,
 )
 from grader.wording import join_words, plural
-
-LOGGERS = ("/get_loggers", "/set_logger_level")
 
 
 class ServiceParams(Record):

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import clock_slack_s, excused, no_clock, run_seconds, why_late
 from grader.checks.support.frames import (
+    NO_LENGTH,
     TOPICS,
     Frame,
     Sent,
@@ -85,6 +86,7 @@ class Seen(NamedTuple):
 
     time_ns: int
     value: Transform | None
+    length: float = 1.0
 
 
 @check("transform", params=TransformParams, messages_only=True, of_callbacks=True)
@@ -132,7 +134,11 @@ def transform(package: PackageFacts, run: Run, params: TransformParams) -> Verdi
 def _seen_transforms(run: Run, own: Sequence[Sent], params: TransformParams) -> list[Seen]:
     """Return the transform each time that it was sent, or that one of its path was."""
     if not params.through:
-        return [Seen(s.time_ns, s.value) for s in own if (s.parent, s.child) == (params.parent, params.child)]
+        return [
+            Seen(s.time_ns, s.value, s.length)
+            for s in own
+            if (s.parent, s.child) == (params.parent, params.child)
+        ]
     every = sent_on(run.channels)
     tree = Tree(every)
     found = [Seen(one.time_ns, tree.lookup(params.parent, params.child, one.time_ns)) for one in every]
@@ -228,6 +234,11 @@ def _no_rotation(seen: Sequence[Seen], params: TransformParams) -> Verdict | Non
     hint = (
         "a quaternion without rotation has w = 1.0; quaternion_from_euler(roll, pitch, yaw) gives any other"
     )
+    length = wrong[0].length
+    if length > NO_LENGTH and math.isfinite(length):
+        why = f"the length of its quaternion is {significant(length)} and not 1, so that tf ignores it"
+        fix = "x, y, z and w are no angles, and belong together: quaternion_from_euler(roll, pitch, yaw) gives all four"
+        return failed(f"{message}: {why}", hint=fix)
     return failed(f"{message}: its quaternion is 0, or contains something that is not a number", hint=hint)
 
 
@@ -313,7 +324,7 @@ def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict 
     slack_s = params.within_s + clock_slack_s(run)
     order_s, timed = ORDER_S * run.warp, [(to_s(t), pose) for t, pose in poses]
     from_s = timed[0][0] + slack_s
-    judged = [(t, value) for t, value in seen if value is not None and to_s(t) >= from_s]
+    judged = [(t, value) for t, value, _ in seen if value is not None and to_s(t) >= from_s]
     wrong = [
         (t, value)
         for t, value in judged

@@ -299,7 +299,7 @@ class Later:
             yield f"let the loop of {path} wait: `rate = rospy.Rate({hz})` above it, `rate.sleep()` in it"
 
     def _node_name(self) -> Iterator[str]:
-        own, names = self._of("node-name"), list(texts_in(self._wanted.get("names")))
+        own, names = self._of_process(self._of("node-name")), list(texts_in(self._wanted.get("names")))
         plain = self._wanted.get("anonymous") == "forbidden"
         for slip in self._of("commented-out") if plain and not own and not self._ran else ():
             if slip.name == "init_node" and "anonymous=True" in self._text_of(slip).replace(" ", ""):
@@ -310,6 +310,15 @@ class Later:
             yield f"name the node {names[0]} on {_line(own[0])}, not {own[0].message}"
         if own[0].name == "anonymous" and plain and not own[0].fix:
             yield f"remove anonymous=True from {_line(own[0])}"
+
+    def _of_process(self, slips: list[PythonSlip]) -> list[PythonSlip]:
+        """Return those of the script that the criterion's own process runs, where it names one of several."""
+        started = self._rubric.scenarios[self._criterion.scenario or ""].start
+        own = next((one.script for one in started if one.name == self._wanted.get("process")), None)
+        names = {PurePosixPath(own).name} if own else None
+        return [
+            s for s in slips if names is None or s.file in self._moved or PurePosixPath(s.file).name in names
+        ]
 
     def _copied(self) -> Iterator[str]:
         started = [one.script for one in self._rubric.scenarios[self._criterion.scenario or ""].start]

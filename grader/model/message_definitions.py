@@ -16,6 +16,7 @@ PARTS = {".msg": ("",), ".srv": ("request", "response"), ".action": ("goal", "re
 NOT_FINITE = {".inf": math.inf, "+.inf": math.inf, "-.inf": -math.inf, ".nan": math.nan}
 """As YAML writes them. A rubric's data holds them as text, as JSON has no other form for them."""
 DIVIDER = re.compile(r"^---\s*$", re.MULTILINE)
+DIVIDING = "---"
 RULE = "=" * 80
 """Before the types that a full definition brings along, behind its own."""
 BUILT_IN = {*(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)), "bool", "float32", "float64",
@@ -101,9 +102,14 @@ def _no_field(text: str, path: str, line: int) -> Fault:
     shown = text.strip()[:60]
     message = f"`{shown}` is not a field: a line is a type and a name, like `float64 speed`"
     bare = shown.partition("//")[0].strip().rstrip(";, ")
-    right = re.sub(r"^(\w+)\.", r"\1/", bare) + (
-        f"  # {note.strip()}" if (note := shown.partition("//")[2]) else ""
-    )
+    if re.fullmatch(r"[-_=*\u2013\u2014]{1,}", bare) and not path.endswith(".msg"):
+        cause = f"`{shown}` on line {line} does not divide its parts: that takes three of `-`"
+        return Fault(
+            file=path, line=line, kind="NoField", message=cause, cause=cause, fix=f"write `{DIVIDING}`"
+        )
+    right = re.sub(
+        r"^(\w+\s+\w+)\s*(?::=?|==|\s)\s*(?=[-\d])", r"\1 = ", re.sub(r"^(\w+)\.", r"\1/", bare)
+    ) + (f"  # {note.strip()}" if (note := shown.partition("//")[2]) else "")
     if not bare and shown.startswith("//"):
         right = f"# {shown.lstrip('/ ')}"
     is_known = (right != shown and _parse_line(right, "", line)) or right.startswith("#")
@@ -124,7 +130,8 @@ def _other_parts(path: str, number: int, parts: tuple[str, ...]) -> Fault:
         message = f"it has no line `---` between {parts[0]} and {parts[1]}"
     elif parts[1:]:
         message += f", between {', '.join(parts[:-1])} and {parts[-1]}"
-    return Fault(file=path, line=None, kind="OtherParts", message=message, cause=message)
+    fix = f"write `{DIVIDING}` on a line of its own between the parts" if number < len(parts) - 1 else ""
+    return Fault(file=path, line=None, kind="OtherParts", message=message, cause=message, fix=fix)
 
 
 def other_fields(type_: str, found: str, wanted: str) -> str:

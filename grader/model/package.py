@@ -346,8 +346,8 @@ class PythonSlip(Placed, Record):
 
     @property
     def is_endless(self) -> bool:
-        """Whether it is a callback that never ends, and not one that only sleeps."""
-        return self.kind == "callback-waits" and "never ends" in self.message
+        """Whether it is a callback that never ends, or that is never called, and not one that only sleeps."""
+        return self.kind == "callback-waits" and bool(re.search(r"never (?:ends|calls)", self.message))
 
 
 class LaunchLine(Placed, Record):

@@ -24,6 +24,8 @@ _ENDLESS = re.compile(
 )
 _LEAVES = re.compile(r"\b(?:break|return|throw|goto|spinOnce)\b")
 _SPIN = re.compile(r"\bros::spin\s*\(")
+_SPINS = re.compile(r"spin|Spinner|call(?:Available|One)\b")
+_LOOP = re.compile(r"\bwhile\s*\([^;{}]*\bok\s*\(\s*\)")
 _SLEEP = re.compile(
     r"\b(?:ros::)?(?:Wall)?Duration\s*\(\s*(?P<s>[\d.]+)\s*\)\s*\.\s*sleep\s*\(|\bus?leep\s*\(\s*(?P<us>\d+)"
     r"|\bsleep_for\s*\(\s*(?:std::)?(?:chrono::)?milliseconds\s*\(\s*(?P<ms>\d+)|\bsleep(?:_for)?\s*\("
@@ -62,6 +64,7 @@ def slips_of(path: str, text: str) -> Iterator[PythonSlip]:
     """Yield the slips of one source, in the order of their kinds."""
     code = _TEXT.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
     yield from _waiting(path, code)
+    yield from _unspun(path, code)
     yield from _degrees(path, code)
 
 
@@ -81,6 +84,17 @@ def _waiting(path: str, code: str) -> Iterator[PythonSlip]:
                 fix=fix.format(line=line),
                 name=name,
             )
+
+
+def _unspun(path: str, code: str) -> Iterator[PythonSlip]:
+    """Yield the loop of a node that subscribes, or offers a service, and never lets ROS call anything."""
+    loop = _LOOP.search(code)
+    if loop is None or not _CALLBACK.search(code) or _SPINS.search(code):
+        return
+    line = code.count("\n", 0, loop.start()) + 1
+    message = f"the loop on line {line} never calls ros::spinOnce(), so that no callback is ever called"
+    fix = f"write `ros::spinOnce();` in the loop on line {line}"
+    yield PythonSlip(file=path, line=line, kind="callback-waits", message=message, fix=fix)
 
 
 def _body(name: str, code: str) -> _Body | None:

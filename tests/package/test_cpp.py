@@ -17,7 +17,7 @@ void hear(const std_msgs::Float32::ConstPtr& distance)
 int main(int argc, char** argv)
 {
   ros::Subscriber distances = node.subscribe("/distance", 10, %s);
-  while (ros::ok()) ros::Duration(5).sleep();
+  while (ros::ok()) ros::Duration(5).sleep(), ros::spinOnce();
 }
 """
 
@@ -81,3 +81,18 @@ def test_a_callback_that_is_right(line: str) -> None:
 def test_a_sine_of_degrees(line: str, fix: str) -> None:
     (found,) = _told(line)
     assert f" takes radians, and gets degrees; {fix}" in found
+
+
+@pytest.mark.parametrize(
+    ("loop", "told"),
+    [
+        ("while (ros::ok()) rate.sleep();", ["2: the loop on line 2 never calls ros::spinOnce()"]),
+        ("while (node.ok()) {\n  rate.sleep();\n}", ["2: the loop on line 2 never calls ros::spinOnce()"]),
+        ("while (ros::ok()) { ros::spinOnce(); }", []),
+        ("ros::AsyncSpinner spinner(1); spinner.start(); while (ros::ok()) rate.sleep();", []),
+        ("while (ros::ok()) queue.callAvailable(d);", []),
+    ],
+)
+def test_a_loop_in_which_no_callback_is_called(loop: str, told: list[str]) -> None:
+    found = slips_of("src/node.cpp", f'auto sub = node.subscribe("/distance", 10, hear);\n{loop}\n')
+    assert [f"{one.line}: {one.message.partition(', so')[0]}" for one in found] == told

@@ -676,6 +676,22 @@ CASES = {
         {**OWN, CMAKELISTS: OWN_CMAKE + "generate_messages(\n)\n"}, ["build-line"],
         "move generate_messages(…), from line 6, above catkin_package(…)",
     ),
+    "own-service-behind-generation": Case(
+        {**SERVICE, CMAKELISTS: CMAKE.replace(
+            "rospy)\n", "message_generation rospy)\ngenerate_messages()\nadd_service_files(\n  FILES Two.srv)\n")},
+        ["build-line"], "move add_service_files(…), from line 5, above generate_messages(…)",
+        after={CMAKELISTS: "add_service_files(\n  FILES Two.srv)\n\ngenerate_messages()\ncatkin_package()"},
+    ),
+    "own-service-called-a-message": Case(
+        {**SERVICE, CMAKELISTS: SERVICE_CMAKE.replace("service_files", "message_files")},
+        ["build-line"], "write add_service_files instead of add_message_files",
+        after={CMAKELISTS: "add_service_files(FILES Two.srv)"},
+    ),
+    "own-service-with-two-dashes": Case(
+        {**SERVICE, "srv/Two.srv": "int64 a\n--\nint64 b\n", CMAKELISTS: SERVICE_CMAKE},
+        ["build-line"], "line 2 does not divide its parts: that takes three of `-`",
+        after={"srv/Two.srv": "int64 a\n---\nint64 b\n"},
+    ),
     "own-message-named-otherwise": Case(
         {**OWN, CMAKELISTS: OWN_CMAKE.replace("Level", "level").replace("catkin_p", "generate_messages()\ncatkin_p")},
         ["build-line"], "write Level.msg instead of level.msg",

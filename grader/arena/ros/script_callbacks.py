@@ -17,6 +17,8 @@ CALLBACKS = {
     "signal": ("handler", 1, 2),
 }
 """What takes a function: the argument's name, its place, and with how many values ROS calls it."""
+VALUES = {"Service": "request", "SimpleActionServer": "goal", "Timer": "event"}
+"""What ROS passes to the function, where that is no message."""
 
 
 def callbacks(tree):
@@ -55,12 +57,9 @@ def callbacks(tree):
                 yield slip(one.lineno, "callback-called", message % name, fix=fix % name, name=name)
             elif own and not called and not least <= values <= most:
                 what = {
-                    "Service": "the request",
-                    "SimpleActionServer": "the goal",
-                    "Timer": "the event",
                     "on_shutdown": "nothing",
                     "signal": "the signal's number and a frame",
-                }.get(name, "the message")
+                }.get(name, "the %s" % VALUES.get(name, "message"))
                 message, fix = wrong_callback(own, node, functions, isinstance(meant, ast.Attribute), values)
                 message = message or "`%s` takes %d arguments, but ROS passes it %s" % (own.name, least, what)
                 yield slip(own.lineno, "callback-values", message, fix=fix, name=own.name)
@@ -77,7 +76,19 @@ def wrong_callback(own, call, functions, bound, values):
     if bound and len(given) == values and "self" not in given:
         message = "`%s` is a method, so its first parameter has to be `self`" % own.name
         return message, "write `def %s(%s):`" % (own.name, ", ".join(["self", *given]))
-    return "", "write `def {0}({1}msg):`".format(own.name, "self, " if bound else "")
+    kept = [name for name in given if not bound or name != "self"]
+    spare = [VALUES.get(called_name(call), "msg"), "args"]
+    kept = ["self"] * bound + (kept + spare[len(kept) :])[:values]
+    return "", "write `def %s(%s):`%s" % (own.name, ", ".join(kept), made_response(own, call, kept))
+
+
+def made_response(own, call, kept):
+    """Return where to make the response that a service's function takes as its last argument, as in ROS 2."""
+    lost = [one.arg for one in own.args.args if one.arg not in kept]
+    used = {n.id for one in own.body for n in walk(one) if isinstance(n, ast.Name)}
+    if called_name(call) != "Service" or len(lost) != 1 or lost[0] not in used or len(call.args) < 2:
+        return ""
+    return ", and `%s = %sResponse()` as its first line" % (lost[0], dotted(call.args[1]))
 
 
 def gives_value(function):

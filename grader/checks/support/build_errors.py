@@ -9,7 +9,13 @@ from difflib import get_close_matches
 from pathlib import PurePosixPath
 
 from grader.checks.support.build_output import FIRST_ERROR_HINT, BuildError, Explained, folder_names
-from grader.checks.support.cpp_errors import CPP_ERRORS, call_below, programs_without
+from grader.checks.support.cpp_errors import (
+    CPP_ERRORS,
+    CPP_SUFFIXES,
+    call_below,
+    other_namespace,
+    programs_without,
+)
 from grader.checks.support.scripts import OF_FILES, OF_INTERFACES, cmake_calls, installed
 from grader.checks.support.text import near_names, shown
 from grader.installable import (
@@ -23,7 +29,15 @@ from grader.installable import (
     noetic_messages,
 )
 from grader.model.message_definitions import meant_type
-from grader.model.package import CMAKE, MANIFEST, CMakeCall, Fault, PackageFacts, meant_command
+from grader.model.package import (
+    CMAKE,
+    INTERFACE_FOLDERS,
+    MANIFEST,
+    CMakeCall,
+    Fault,
+    PackageFacts,
+    meant_command,
+)
 from grader.model.verdict import FileCitation
 from grader.wording import join_words, numbers_text, there_is
 
@@ -36,7 +50,6 @@ UNKNOWN_COMMAND = "Unknown CMake command"
 BACKSLASH = 'bad character with text "\\"'
 _QUOTES = dict.fromkeys(map(ord, "\u2018\u2019`"), "'")
 """As compilers and linkers write them."""
-CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
 OF_TARGETS = (
     "add_executable",
     "add_library",
@@ -193,8 +206,10 @@ def _missing_library(found: re.Match[str], package: PackageFacts, lines: Sequenc
     return Explained(why, hint, of_machine=True)
 
 
-def _missing_folder(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+def _missing_folder(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     call, folder = found[1], posixpath.basename(found[2].rstrip("/"))
+    if wrong := _misplaced(call, package, f".{folder}"):
+        return wrong
     why = f"{call}(…) needs the folder {folder}/, which is not in the package"
     return Explained(why, f"put your .{folder} files into {folder}/ and push them, or remove {call}(…)")
 
@@ -317,8 +332,31 @@ def _other_project(found: re.Match[str], package: PackageFacts, _lines: Sequence
 
 
 def _missing_message(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    path = _below(found[1], package)
-    return _missing_files([path], package, f"add_{found[2]}_files(…) names {path}")
+    path, call = _below(found[1], package), f"add_{found[2]}_files"
+    if wrong := _misplaced(call, package, posixpath.basename(path)):
+        return wrong
+    return _missing_files([path], package, f"{call}(…) names {path}")
+
+
+def _misplaced(call: str, package: PackageFacts, ending: str) -> Explained | None:
+    """Explain `add_message_files(FILES Add.srv)`, and a definition that lies in another folder."""
+    named = [word for one in cmake_calls(package, call) for word in one.args]
+    folder = INTERFACE_FOLDERS[call]
+    for other, kind in INTERFACE_FOLDERS.items():
+        if other != call and (name := next((word for word in named if word.endswith(f".{kind}")), "")):
+            mixed = any(not word.endswith(f".{kind}") for word in named if "." in word)
+            fix = f"name {name} in {other}(…)" if mixed else f"write {other} instead of {call}"
+            return Explained(f"{call}(…) names {name}, which is for {other}(…)", fix)
+    there = [f.path for f in package.files if f.path.endswith(ending) and posixpath.dirname(f.path) != folder]
+    if there:
+        why = f"{call}(…) looks for {posixpath.basename(there[0])} in {folder}/, and it is {there[0]}"
+        return Explained(why, f"make the folder {folder}/, if there is none, and move {there[0]} into it")
+    return None
+
+
+def _generated_before(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    why = f"{found[1]}(…) is called after generate_messages(…)"
+    return Explained(why, f"move {found[1]}(…) above generate_messages(…)")
 
 
 def _missing_script(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -395,12 +433,6 @@ def _missing_dependency(found: re.Match[str], package: PackageFacts, _lines: Seq
     return Explained(why, hint, uncalled="generate_messages")
 
 
-def _missing_target(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
-    name = found[1]
-    why = f"it names the target {name}, which no add_executable(…) or add_library(…) above it makes"
-    return Explained(why, f"take that line out, or make {name} above it")
-
-
 def _depends(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
     why = f"DEPENDS in catkin_package(…) names {found[1]}, which is not a library that find_package(…) found"
     return Explained(why, f"take {found[1]} out of DEPENDS; ROS packages go after CATKIN_DEPENDS")
@@ -461,7 +493,7 @@ def _half_written(found: re.Match[str], package: PackageFacts, lines: Sequence[s
     """What a header declares is not there although it is included: the build is just writing it."""
     made = any(file.path.endswith(MADE) for file in package.files)
     if found[1] != package.name or not made or not cmake_calls(package, "generate_messages"):
-        return Explained(found.string, FIRST_ERROR_HINT)
+        return other_namespace(found, package)
     text = f"{found[1]} is not declared, since the header of its message was not written yet"
     return _unwaited(package, text, "its message", OWN_TARGETS, lines)
 
@@ -544,6 +576,8 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"Could not find messages which '([^']+)' depends on", _message_of_another),
     (r"Messages depends on unknown pkg: ([\w-]+)", _unfound_dependency),
     (r"(Invalid declaration|is not a legal message|InvalidMsgSpec|MsgNotFound)", _no_definition),
+    (r"genaction\.py", _no_definition),
+    (r"generate_messages\(\) must be called after (\w+)\(\)", _generated_before),
     (r"(generate_messages)\(\) must be called before catkin_package\(\)", _before_catkin_package),
     (r"You must call project\(\) before calling (\w+)\(\)", _late_project),
     (r"does not match current PROJECT_NAME '([^']*)'", _other_project),
@@ -552,8 +586,6 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
     (r"does not contain a CMakeLists\.txt", _no_cmake_lists),
     (r"contains non-catkin packages", _not_catkin),
     (NO_TARGET, _missing_dependency),
-    (r'dependencies to non-existent target "([^"]+)"', _missing_target),
-    (r'link libraries for target "([^"]+)" which is not built', _missing_target),
     (
         r"catkin package '([^']+)' has been find_package\(\)-ed but is not listed as a build",
         _build_dependency,

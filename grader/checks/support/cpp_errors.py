@@ -11,10 +11,18 @@ from grader.checks.support.text import near_names
 from grader.installable import ON_THE_MACHINE
 from grader.model.package import PackageFacts
 
+CPP_SUFFIXES = (".c", ".cc", ".cpp", ".cxx")
 STANDARD = {
     **dict.fromkeys(("cout", "cin", "cerr", "endl"), "iostream"),
     **dict.fromkeys(("string", "to_string", "stoi"), "string"),
-    **{name: name for name in ("vector", "map")},
+    **{
+        name: name for name in ("vector", "map", "deque", "list", "set", "queue", "array", "function", "pair")
+    },
+    "function": "functional",
+    "pair": "utility",
+    **dict.fromkeys(("unique_ptr", "shared_ptr", "make_shared", "make_unique"), "memory"),
+    **dict.fromkeys(("sqrt", "abs", "pow", "isnan", "isinf"), "cmath"),
+    **dict.fromkeys(("sort", "min_element", "max_element"), "algorithm"),
 }
 """Names of C++'s standard library that are written without `std::`, with their headers."""
 
@@ -51,6 +59,36 @@ def _explain_undeclared(found: re.Match[str], _package: PackageFacts, lines: Seq
     return Explained(
         found.string,
         f"write {near} there, if that is what you mean; otherwise {declare}" if near else declare,
+    )
+
+
+def _standard_type(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    name = found[1]
+    if name not in STANDARD:
+        return Explained(found.string, f"declare {name} above that line, or include the header that does")
+    return Explained(found.string, f"write std::{name}, and #include <{STANDARD[name]}> at the top")
+
+
+def other_namespace(found: re.Match[str], package: PackageFacts, _lines: Sequence[str] = ()) -> Explained:
+    """Of `ROS::init`, and of `std_msg::String`."""
+    named = [name for call in cmake_calls(package, "find_package") for name in call.args]
+    near = near_names(found[1], ["ros", "std", *named])
+    hint = f"write {near[0]}:: instead of {found[1]}::" if near else FIRST_ERROR_HINT
+    return Explained(f"{found.string}: it is no namespace" if near else found.string, hint)
+
+
+def _no_message(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+    """Of a callback, or a topic, with what is no message: a pointer to one, or another class."""
+    kind = re.sub(r"_<std::allocator<void> ?>", "", found[1]).strip()
+    own = re.compile(r"/src/\S*?([\w-]+\.(?:cpp|cc|cxx)):(\d+):\d+:\s+required from here")
+    place = next((m for line in lines if (m := own.search(line))), None)
+    where = f"{place[1]}:{place[2]}: " if place else ""
+    bare = kind.removeprefix("const ").rstrip("*& ")
+    if kind.endswith("*"):
+        why = f"{where}a callback takes a plain pointer, `{kind}`, and ROS has none to give it"
+        return Explained(why, f"write `const {bare}::ConstPtr&` as the type of what the callback takes")
+    return Explained(
+        f"{where}`{kind}` is not the type of a message", "write the type of the topic's messages"
     )
 
 
@@ -102,14 +140,35 @@ def _main_twice(_found: re.Match[str], _package: PackageFacts, _lines: Sequence[
     return Explained(why, "write a separate add_executable(…) for each program")
 
 
+def _missing_target(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    name = found[1]
+    why = f"it names the target {name}, which no add_executable(…) or add_library(…) above it makes"
+    made = cmake_calls(package, "add_executable", "add_library")
+    source = next(
+        (f.path for f in package.files if f.path.endswith(tuple(f"/{name}{end}" for end in CPP_SUFFIXES))), ""
+    )
+    other = next((call for call in made if source and source in call.args), None)
+    if other is not None:
+        there = f"{other.name}({other.args[0]} …) on line {other.line} makes {other.args[0]} of {source}"
+        return Explained(f"{why}: {there}", f"write {name} instead of {other.args[0]} on line {other.line}")
+    if source:
+        return Explained(why, f"above it, write add_executable({name} {source})")
+    return Explained(why, f"take that line out, or make {name} above it")
+
+
 CPP_ERRORS: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]], ...] = (
     (r"expected (',' or )?';' before '([^']+)'", _no_semicolon),
     (r"expected initializer before '([^']+)'", _no_semicolon_above),
     (r"expected '}' at end of input", _no_brace),
     (r"'([^']+)' was not declared in this scope(?:; did you mean '([^']+)')?", _explain_undeclared),
     (r"'([^']+)::(\w+)' has not been declared", _no_type),
+    (r"'(\w+)' does not name a (?:template )?type", _standard_type),
+    (r"'__s_get\w+' is not a member of '([^']+)'", _no_message),
+    (r"'(\w+)' (?:has not been declared|is not a class, namespace, or enumeration)", other_namespace),
     (r"'([^']+)' is not a member of .*; did you mean '([^']+)'", _no_member),
     (r"has no member named '([^']+)'; did you mean '([^']+)'", _no_member),
     (r"undefined reference to '([^']+)", _explain_unlinked),
     (r"multiple definition of 'main", _main_twice),
+    (r'dependencies to non-existent target "([^"]+)"', _missing_target),
+    (r'link libraries for target "([^"]+)" which is not built', _missing_target),
 )

@@ -17,6 +17,7 @@ from grader.checks.support.rospy_calls import (
     is_text,
     line_tree,
     rewritten,
+    uncalled_proxy,
 )
 from grader.checks.support.text import shown
 from grader.installable import noetic_messages
@@ -73,10 +74,27 @@ SLIPS = {
      "one script is one node: call `rospy.init_node(…)` once"),
     "Inappropriate ioctl for device": ("it reads keys from its terminal, and a node that is started for you has none",
      "leave the keys out: publish in the loop by itself, or read keys in a node of their own"),
+    "sendTransform() takes 2 positional arguments but 6": (
+     "a broadcaster of tf2_ros takes one TransformStamped; these are the values for one of `tf`",
+     "give it the TransformStamped alone, or make the broadcaster with `tf.TransformBroadcaster()`"),
+    "sendTransform() missing 4 required": (
+     "a broadcaster of `tf` takes translation, rotation, time, child and parent",
+     "make it with `tf2_ros.TransformBroadcaster()`, which takes a TransformStamped"),
     "Invalid number of arguments, args should be": (
      "the message gets a different number of values than it has fields",
      'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not with a comma'),
 }  # fmt: skip
+
+
+OF_ROSCPP = {
+    "You must call ros::init() before creating the first NodeHandle": (
+     "a NodeHandle is made before `ros::init(…)` is called",
+     "move `ros::init(…)` up, above the first `ros::NodeHandle`, one that is made outside of `main` too"),
+    "Call to publish() on an invalid Publisher": (
+     "`publish(…)` is called on a Publisher that nothing has advertised",
+     "give that Publisher its value, `pub = nh.advertise<…>(…)`: a type in front of `pub` makes another variable"),
+}  # fmt: skip
+"""What roscpp says before it ends a program."""
 
 
 def explain_exception(kind: str, message: str, source: str, marked: tuple[int, int] | None) -> Meaning | None:
@@ -139,10 +157,39 @@ def _value(message: str, source: str, _marked: tuple[int, int] | None) -> Meanin
         came = f"; {found[3]} came" if found[3] else ""
         hint = f"check how many there are before you unpack them: {NUMBER_OF_PARTS}"
         return f"{plural(int(found[2]), 'value')} are expected on the right of `=`{came}", hint
-    if found := _NO_NUMBER.search(message):
+    if (found := _NO_NUMBER.search(message)) and found[1].endswith(".py'"):
+        return _program(source)
+    if found:
         hint = "convert only what is a number, and print text as it is"
         return f"{shown(found[1])} is text, not a number", hint
     return None
+
+
+def _program(source: str) -> Meaning:
+    """Of `float(sys.argv[0])`: the first argument is the program's own path."""
+    cause = "the first of `sys.argv` is the path of the script itself, and its arguments begin at 1"
+    parts = [
+        n for n in ast.walk(line_tree(source)) if isinstance(n, ast.Subscript) and "argv" in ast.unparse(n)
+    ]
+    places = [n.slice for n in parts if not isinstance(n.slice, ast.Slice)]
+    slices = [n.slice for n in parts if isinstance(n.slice, ast.Slice)]
+    places += [one for s in slices for one in (s.lower, s.upper) if one is not None]
+    begins = [s for s in slices if s.lower is None]
+    numbers = {p: p.value + 1 for p in places if isinstance(p, ast.Constant) and isinstance(p.value, int)}
+    if not parts or begins or len(numbers) < len(places):
+        return cause, "begin at `sys.argv[1]`"
+    return cause, rewritten(source, *((place, str(number)) for place, number in numbers.items()))
+
+
+def _place_in_list(message: str, source: str) -> Meaning | None:
+    """Of `grid.data[row * width + x / resolution]`."""
+    if not re.match(r"(?:list|tuple|string) indices must be integers(?: or slices)?, not float", message):
+        return None
+    found = _subscript(source, None)
+    cause = "a place in a list is a whole number, and `/`, or `//` with a decimal number, gives none"
+    if found is None:
+        return cause, "make it one with `int(…)`"
+    return cause, rewritten(source, (found.slice, f"int({ast.unparse(found.slice)})"))
 
 
 def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
@@ -150,6 +197,7 @@ def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning
         meaning := explain_ros_call(message, source)
         or _call(message, source)
         or _nested_index(message, source)
+        or _place_in_list(message, source)
     ):
         return meaning
     if "'NoneType' object" in message:
@@ -164,7 +212,7 @@ def _type(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning
 
 
 def _tuple(source: str) -> Meaning:
-    """Of `scan.ranges[i] = 0`: what a message has as a list is a tuple once it is received."""
+    """Of `scan.ranges[i] = 0`: what a message has as a list is a tuple once it is received, or was made one."""
     tree = line_tree(source)
     target = next(
         (n.value for n in ast.walk(tree) if isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store)),
@@ -172,7 +220,7 @@ def _tuple(source: str) -> Meaning:
     )
     name = shown(ast.unparse(target)) if target is not None else "values"
     return (
-        "a list in a message that was received is a tuple, which cannot be changed",
+        "this is a tuple, as each list is in a message that was received, and cannot be changed",
         f"write `{name} = list({name})` first",
     )
 
@@ -312,10 +360,8 @@ def _future(message: str, source: str, _marked: tuple[int, int] | None) -> Meani
 
 
 def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning | None:
-    if (action := re.match(r"'(\w+)Action' object has no attribute", message)) and "send_goal" in source:
-        goal = f"{action[1]}Goal"
-        cause = f"`{action[1]}Action` is the type of the action, and a goal is a `{goal}`"
-        return cause, f"make it with `{goal}(…)`"
+    if meaning := uncalled_proxy(message, source):
+        return meaning
     if found := re.match(r"'(Duration|int|float)' object has no attribute 'sleep'", message):
         hint = "make it with `rospy.Rate(…)`, which takes how many times a second the loop runs"
         what = "a Duration is a length of time" if found[1] == "Duration" else "this is a plain number"

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from grader.checks.registry import Check
 from grader.checks.support.console_output import Frame, Traceback, tracebacks, unpack_traceback
 from grader.checks.support.exceptions import (
+    OF_ROSCPP,
     SLIPS,
     evaluated,
     explain_exception,
@@ -34,7 +35,13 @@ from grader.checks.support.missing_names import (
     unused_import,
 )
 from grader.checks.support.processes import Life, early_end, lives
-from grader.checks.support.rospy_calls import unfit_value, without_message, wrong_class
+from grader.checks.support.rospy_calls import (
+    other_items,
+    part_of_action,
+    unfit_value,
+    without_message,
+    wrong_class,
+)
 from grader.checks.support.scripts import OF_INTERFACES, SYNTAX, path_in_package
 from grader.checks.support.text import LOOP, RATE_SLOT, SPIN, VALUE_SLOT, shown
 from grader.evidence.events import STOPPED
@@ -167,9 +174,10 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     code = life.end.exit_code if life.end else None
     if found and code != 0:
         return explain_traceback(found[-1], package)
-    if life.end is not None and life.end.signal is not None and life.end.stopped_by is None:
-        return Ending(f"{_signal_name(life.end.signal)} ended it", RUN_IT)
     printed = [line.line for _, line in run.lines(life.name) if line.line.strip()]
+    if life.end is not None and life.end.signal is not None and life.end.stopped_by is None:
+        said = (known for line in printed for text, known in OF_ROSCPP.items() if text in line)
+        return Ending(*next(said, (f"{_signal_name(life.end.signal)} ended it", RUN_IT)))
     if code == 0:
         return _not_run(life, package) or _ran_to_the_end(printed)
     exceptions = [line for line in printed if line.startswith("RLException: ")]
@@ -449,7 +457,13 @@ def _slip(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
         return "a comment begins with `#` in Python", f"write `{shown(source.replace('//', '#', 1))}`"
     known = next((known for said, known in SLIPS.items() if said in found.message), None)
     known = explain_number_of_values(found.message) or known
-    meant = unfit_value(found, package) or known or other_name(found, package)
+    meant = (
+        part_of_action(found)
+        or other_items(found)
+        or unfit_value(found, package)
+        or known
+        or other_name(found, package)
+    )
     frame = found.own_frames[-1] if found.own_frames else Frame("", 0)
     meant = meant or explain_formatting(found.message, source)
     return meant or explain_exception(found.kind, found.message, frame.source, frame.marked)

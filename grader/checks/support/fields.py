@@ -130,6 +130,8 @@ def is_within(value: float, low: float | None, high: float | None) -> bool:
 
 
 FLOAT32 = 1e-6
+SQUARED_MIN = 2
+"""The square of smaller numbers is too near to twice or half of them, or to themselves."""
 SLIP = 5e-3
 """By what share a number in another unit may differ from the one that is meant."""
 UNITS = (
@@ -212,14 +214,17 @@ def unit_slip(got: object, wanted: object) -> str:
         return ""
     if isinstance(got, int) and isinstance(wanted, int):  # numbers of things
         return ""
-    if math.isclose(got, -wanted, rel_tol=SLIP):
-        return " (the sign is wrong)"
+    others = {-wanted: "the sign is wrong"}
+    if wanted > SQUARED_MIN:
+        others[wanted**2] = "the square of that, as without a square root"
     for factor, small, large in UNITS:
         if math.isclose(got, wanted * factor, rel_tol=SLIP):
             return f" ({significant(factor)} times too large, as {small} in place of {large} are)"
         if math.isclose(got * factor, wanted, rel_tol=SLIP):
             return f" ({significant(factor)} times too small, as {large} in place of {small} are)"
-    return ""
+    return next(
+        (f" ({what})" for other, what in others.items() if math.isclose(got, other, rel_tol=SLIP)), ""
+    )
 
 
 def has_hole(value: object) -> bool:

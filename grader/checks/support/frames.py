@@ -15,6 +15,8 @@ TOPICS = ("/tf", "/tf_static")
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 NO_LENGTH = 1e-6
+LENGTH_TOLERANCE = 0.01
+"""How much the square of a quaternion's length may differ from 1: tf2 ignores transforms beyond that."""
 POSE_DEPTH = 3
 FRAME_PATTERN = r"^[^/\s]\S*$"
 Frame = Annotated[str, Field(pattern=FRAME_PATTERN)]
@@ -83,13 +85,15 @@ def _rotate(turn: Quaternion, vector: Vector) -> Vector:
 
 
 class Sent(NamedTuple):
-    """A transform that was sent. `value` is None where its quaternion has no length, or holds what is not a number."""
+    """A transform that was sent. `value` is None where tf does not take it: the `length` of its quaternion is not 1, or
+    it holds what is not a number."""
 
     time_ns: int
     parent: str
     child: str
     topic: str
     value: Transform | None
+    length: float = 1.0
 
 
 def sent_on(channels: Sequence[Channel]) -> list[Sent]:
@@ -100,7 +104,10 @@ def sent_on(channels: Sequence[Channel]) -> list[Sent]:
             header["frame_id"],
             one["child_frame_id"],
             channel.topic,
-            _make_transform(one["transform"]["translation"], one["transform"]["rotation"]),
+            _make_transform(one["transform"]["translation"], one["transform"]["rotation"])
+            if abs(_length(one["transform"]["rotation"]) ** 2 - 1) <= LENGTH_TOLERANCE
+            else None,
+            _length(one["transform"]["rotation"]),
         )
         for channel in channels
         if channel.topic in TOPICS
@@ -111,10 +118,14 @@ def sent_on(channels: Sequence[Channel]) -> list[Sent]:
     return sorted(found, key=lambda one: one.time_ns)
 
 
+def _length(turn: Mapping[str, float]) -> float:
+    return math.hypot(turn["x"], turn["y"], turn["z"], turn["w"])
+
+
 def _make_transform(at: Mapping[str, float], turn: Mapping[str, float]) -> Transform | None:
     vector = (at["x"], at["y"], at["z"])
     turn_ = (turn["x"], turn["y"], turn["z"], turn["w"])
-    length = math.hypot(*turn_)
+    length = _length(turn)
     if not (length > NO_LENGTH and math.isfinite(length) and all(map(math.isfinite, vector))):
         return None
     return Transform(vector, (turn_[0] / length, turn_[1] / length, turn_[2] / length, turn_[3] / length))

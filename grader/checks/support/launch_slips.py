@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
+from grader.checks.support.cpp_errors import CPP_SUFFIXES
 from grader.checks.support.scripts import (
     add_hint,
     can_be_moved,
@@ -320,6 +321,12 @@ def _nothing_like_it(package: PackageFacts, node: LaunchNode, why: str) -> Slip:
     if known := next((pkg for pkg, named in PROGRAMS_OF.items() if node.type in named), None):
         return _slip(node, f"{why}; ROS has one in {known}", f'write pkg="{known}"')
     fix = "type is the script's whole file name, with its ending"
+    source = next(
+        (f.path for f in package.files if f.path.endswith(tuple(f"/{plain}{end}" for end in CPP_SUFFIXES))),
+        "",
+    )
+    if source:
+        fix = f"write `add_executable({plain} {source})` in CMakeLists.txt, which nothing there does"
     return _slip(node, why, f"write the script {plain}, or the name of one that is there" if suffix else fix)
 
 

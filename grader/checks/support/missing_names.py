@@ -76,7 +76,9 @@ def other_name(found: Traceback, package: PackageFacts) -> tuple[str, str] | Non
         return _field_of_number(found, wrong[1]) or _other_attributes(package, wrong[1], wrong[2], source)
     if wrong := re.match(r"(\w+) is not an attribute of (\w+)$", found.message):
         known = fields_of(package, wrong[2])
-        near = near_names(wrong[1], known) or (known if len(known) == 1 else ())
+        source = found.own_frames[-1].source if found.own_frames else ""
+        left = [one for one in known if not re.search(rf"\b{one}=", source)]
+        near = near_names(wrong[1], known) or (left if len(left) == 1 else ())
         hint = f"write `{near[0]}=` instead of `{wrong[1]}=`" if near else ""
         said = f"{wrong[2]} has {join_words(known[:ATTRIBUTES_SHOWN])}" if known else ""
         return said, hint or f"leave out `{wrong[1]}=`, or write the field that you mean"
@@ -313,6 +315,13 @@ def _other_field(owner: str, known: tuple[str, ...], wrong: str, source: str) ->
         return f"it is the {owner} already", hint
     if len(known) == 1:
         return f"{owner} has only {known[0]}", _line_with(source, wrong, known[0])
+    way = [
+        field
+        for field in known
+        if any(wrong in types.get(field.capitalize(), ()) for types in noetic_messages().values())
+    ]
+    if len(way) == 1:
+        return f"{wrong} is in its {way[0]}", _line_with(source, wrong, f"{way[0]}.{wrong}")
     listed = join_words(known[:ATTRIBUTES_SHOWN]) + (", …" if len(known) > ATTRIBUTES_SHOWN else "")
     return f"{owner} has {listed}", f"write the field that you mean instead of {wrong}"
 
@@ -326,6 +335,8 @@ def _field_of_number(found: Traceback, owner: str) -> tuple[str, str] | None:
     if path is None:
         return None
     field, inner = path[1], f"{path[1]}.{path[2]}"
+    if path[2] in {"secs", "nsecs"}:
+        return f"the message's {field} is a Time, and not a number", f"write `.{field} = rospy.Time.now()`"
     return f"the message's {field} has fields of its own", f"write `.{inner} = …`, not `.{field} = …`"
 
 

@@ -24,6 +24,8 @@ from grader.model.package import LaunchNode, LaunchParam, PackageFacts
 from grader.model.verdict import EvidenceCitation, Verdict
 from grader.wording import plural, there_is
 
+UNNAMED = "/unnamed"
+"""What rospy calls a node before `init_node`."""
 SYSTEM = (
     "/rosdistro",
     "/rosversion",
@@ -229,6 +231,8 @@ def explain_by_unread_parameter(
     own = [(node, n) for node, n in asked if last in n.split("/") or near_names(last, n.split("/"))]
     seen = f"; {own[0][0]} asks for {own[0][1]}" if own else ""
     hint = f"read it with {get_param(f'~{last}' if above in run.student_nodes() else name)}"
+    if _is_too_early(run):
+        hint = "move `rospy.init_node(…)` above the line that reads it: before, the node has no name"
     if own and own[0][1] == f"{own[0][0]}/{last}" and above not in run.student_nodes():
         hint = f"name the node {above}: {init(above.lstrip('/'))}"
     why = f"the run sets {name} to {value!r}, and no node reads it{seen}"
@@ -242,18 +246,30 @@ def explain_by_misplaced_parameter(
     if not is_unexplained(check, verdict) or package is None or not isinstance(run, Run) or early_end(run):
         return verdict
     found = next(_misplaced(package, run, _publishing(verdict, run)), None)
+    if _is_too_early(run):
+        why = "a parameter is read before `rospy.init_node(…)`, when the node has no name yet"
+        return verdict.explained(why, "move `rospy.init_node(…)` above the line that reads it", cause=why)
     if found is None:
         return verdict
     asked, param, node = found
     sets = f"line {param.line} of {param.file} sets {param.name}, and {node.full_name} reads {asked}"
     last, within = asked.rpartition("/")[2], f"{node.full_name}/"
     hint = f"on line {param.line} of {param.file}, write "
-    if asked.startswith(within) and not param.name.startswith(within):
+    if param.name.startswith(within) and not asked.startswith(within):
+        own = param.name.removeprefix(within)
+        hint = f"in the script, read it with {get_param(f'~{own}')}: it is the node's own"
+    elif asked.startswith(within) and not param.name.startswith(within):
         place = f"the <node> on line {node.line}"
         hint = f'move line {param.line} of {param.file} into {place}, as <param name="{last}" …/>'
     else:
         hint += f'name="{last if asked.startswith(within) else asked}"'
     return verdict.explained(sets, hint, (param.place,), cause=asked)
+
+
+def _is_too_early(run: Run) -> bool:
+    """Return whether a node asked for a private parameter before it had a name: rospy takes another one then."""
+    early = (e for _, e in run.actors if e.action == "read" and e.actor.endswith(UNNAMED))
+    return any((e.topic or "").startswith(f"{e.actor}/") for e in early)
 
 
 def _publishing(verdict: Verdict, run: Run) -> set[str]:
@@ -277,8 +293,11 @@ def _misplaced(
         for file in package.launch_files:
             node = next((one for one in file.brings if one.full_name == event.actor), None)
             last = name.rpartition("/")[2]
-            params = (p for p in file.params if p.name in there and p.name.rpartition("/")[2] == last)
-            if node is not None and (param := next(params, None)):
+            own = [p for p in file.params if p.name in there and p.name.startswith(f"{event.actor}/")]
+            params = [*own, *(p for p in file.params if p.name in there)]
+            same = [p for p in params if p.name.rpartition("/")[2] == last]
+            near = [p for p in own if near_names(last, [p.name.rpartition("/")[2]])]
+            if node is not None and (param := next(iter(same or near), None)):
                 yield name, param, node
 
 

@@ -23,6 +23,8 @@ from grader.model.verdict import FileCitation, Verdict, unjudged
 from grader.wording import join_words, seconds, shorten
 
 NO_SCRIPT_HINT = "add the script to the package, and push it"
+LOGGERS = ("/get_loggers", "/set_logger_level")
+"""How the names of the services end that every node has."""
 STEPS = ("stop", "kill")
 FLOOD_HZ = 100
 SILENT_AFTER_NS = 500_000_000

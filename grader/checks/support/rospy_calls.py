@@ -40,8 +40,9 @@ def explain_ros_call(message: str, source: str) -> Meaning | None:
         elif slept is not None and isinstance(slept.func, ast.Attribute):
             rate = ast.unparse(slept.func.value)
         return "a Rate already knows how long to sleep", f"write `{shown(rate)}.sleep()`"
-    if meaning := _init_node(message, source) or _parameter(message, source) or _sent_class(message, source):
-        return meaning
+    for explain in (_init_node, _parameter, _sent_class, _request_class, uncalled_proxy):
+        if meaning := explain(message, source):
+            return meaning
     if asks_for_rate := calls_in_line(source, "Rate"):
         return explain_rate(asks_for_rate[0])
     return None
@@ -84,6 +85,75 @@ def wrong_class(source: str) -> Meaning | None:
         return None
     kind = "an action" if of_action else "a service"
     return f"the type of {kind} is the class `{shown(right)}`", rewritten(source, (type_, right))
+
+
+ACTION_PARTS = {
+    "send_goal": "Goal", "send_goal_and_wait": "Goal", "publish_feedback": "Feedback",
+    "set_succeeded": "Result", "set_aborted": "Result", "set_preempted": "Result",
+}  # fmt: skip
+"""Methods of actionlib's servers and clients, and which part of the action each takes."""
+_HAS_NOT = re.compile(r"'(?:(\w+?)(Action|Goal|Result|Feedback)|\w+)' object has no attribute '(\w+)'")
+
+
+def part_of_action(found: Traceback) -> Meaning | None:
+    """Of `publish_feedback(…)` and the like with another part of the action, with its class, or with a plain value."""
+    source = found.own_frames[-1].source if found.own_frames else ""
+    call = next(iter(calls_in_line(source, *ACTION_PARTS)), None)
+    lacks = _HAS_NOT.search(found.message)
+    if lacks is None or call is None or not call.args or not isinstance(call.func, ast.Attribute):
+        return None
+    given, part, kind = call.args[0], ACTION_PARTS[call.func.attr], lacks[0].split("'")[1]
+    if lacks[2] == part or kind == "NoneType" or re.search(rf"\.{lacks[3]}\b", source):
+        return None
+    takes = f"`{call.func.attr}(…)` takes the action's {part.lower()}"
+    if kind == "member_descriptor":
+        name = shown(ast.unparse(given))
+        return f"{takes}, and `{name}` is its type", f"write brackets with its fields: `{name}(…)`"
+    cause = f"{takes}, and this is {'an' if kind[0] in 'aeiou' else 'a'} {kind}"
+    if lacks[1] is None:
+        return cause, f"make a message of it: `…{part}(…)`"
+    right = f"{lacks[1]}{part}"
+    if isinstance(given, ast.Call) and ast.unparse(given.func).rpartition(".")[2] == kind:
+        return cause, rewritten(source, (given.func, ast.unparse(given.func).replace(kind, right)))
+    return cause, f"make it with `{right}(…)`"
+
+
+def other_items(found: Traceback) -> Meaning | None:
+    """Of a list of numbers in a message that has something else in it, such as lists."""
+    listed = re.search(r"field (\w+)\[\] must be an? (?:unsigned )?integer type", found.message)
+    if listed is None:
+        return None
+    why = f"`{listed[1]}` is one list of whole numbers, and something in it is no whole number"
+    return (
+        why,
+        f"put whole numbers alone into `{listed[1]}`: no lists in it, and `int(…)` around any other number",
+    )
+
+
+def uncalled_proxy(message: str, source: str) -> Meaning | None:
+    """Of a `ServiceProxy` in the place of what a call of it gives."""
+    if not re.search(r"not '?ServiceProxy'?$|'ServiceProxy' object has no attribute", message):
+        return None
+    attribute = message.rpartition(" has no attribute ")[2].strip("'")
+    read = (n for n in ast.walk(line_tree(source)) if isinstance(n, ast.Attribute) and n.attr == attribute)
+    owner = next((shown(ast.unparse(n.value)) for n in read), "")
+    where = f" where `{owner}` gets its value" if owner else ""
+    hint = f"call the proxy{where}: brackets with the request's values behind its name, as in `ask(…)`"
+    return f"{f'`{owner}`' if owner else 'this'} is the proxy itself, and not the answer of a call", hint
+
+
+def _request_class(message: str, source: str) -> Meaning | None:
+    """Of `add(AddRequest)`."""
+    if message != "request object is not a valid request message instance":
+        return None
+    calls = (n for n in ast.walk(line_tree(source)) if isinstance(n, ast.Call))
+    given = next((shown(ast.unparse(c.args[0])) for c in calls if len(c.args) == 1), "")
+    if not re.fullmatch(r"[\w.]+Request", given):
+        return None
+    return (
+        f"`{given}` is the type of the requests, not a request",
+        f"write brackets with its fields: `{given}(…)`",
+    )
 
 
 def _init_node(message: str, source: str) -> Meaning | None:

@@ -145,6 +145,26 @@ def both(python: str, cpp: str) -> str:
     return f"\ue000{python}\ue001{cpp}\ue002"
 
 
+_PLACES = re.compile(
+    r"(?P<name>\{[A-Za-z_][\w.]*(?:\[[^][{}]*\]|\([^(){}]*\))*(?:![rsa])?(?::[^{}]*)?\})|\{\}|%[-+0-9.]*[dfs](?!\w)"
+)
+
+
+def unfilled(text: str) -> str:
+    """Return what to write where a text came out with the places for its values, and not with the values; "" for any
+    other text."""
+    found = _PLACES.search(text)
+    if found is None:
+        return ""
+    if found["name"]:
+        return (
+            f"write an `f` before the opening quote of that text: without it, `{shown(found[0])}` is no value"
+        )
+    if found[0] == "{}":
+        return "write `.format(…)` behind that text, with a value for each `{}`"
+    return f"give that text a value for its `{shown(found[0])}`: {both('`% value` behind it', 'the next argument')}"
+
+
 VALUE_SLOT, RATE_SLOT, TYPE_SLOT = "\ue003", "\ue004", "\ue005"
 """Parts of a hint in whose place the judge writes what the lab asks for: a node's text, the rate of its loop, and the
 type of what is sent to it."""

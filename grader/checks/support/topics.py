@@ -197,6 +197,8 @@ def _not_advertised(
         publisher(topic, f"{name}, queue_size=10", type=f"{of_types}::{name}") if name else publisher(topic)
     )
     hint = f"add {call} and publish in the loop"
+    if topic in TF_TOPICS:
+        hint = f"send it with a `tf2_ros.{'Static' * (topic != TF_TOPICS[0])}TransformBroadcaster()`"
     if slip := call_in_comment(package, run, "Publisher"):
         return _commented_out(what, slip, of_node).about(measured=measured)
     if not published:
@@ -208,7 +210,7 @@ def _not_advertised(
     meant = [name for name, type_ in published.items() if kind and type_ == plain_type(kind)] or list(
         published
     )
-    hint += f", or rename {join_words(meant, 'or')} if that is meant to be it"
+    hint += "" if topic in TF_TOPICS else f", or rename {join_words(meant, 'or')} if that is meant to be it"
     verdict = of_node(f"{what}; the node publishes on {join_words(published)}", measured=measured, hint=hint)
     return verdict.about(citations=named_at(package, run, "publisher", meant[0]))
 
@@ -246,7 +248,13 @@ def _by_what_is_heard(run: Run, message: str, of_node: Callable[..., Verdict]) -
         why = f"{message}: the node looks up the frame {shown(frame)}, and tf knows none of that name"
         hint = "write the name of a frame that is sent: `rosrun tf view_frames` draws them"
         return of_node(why, measured="no message", hint=hint).seeking("quoted", frame)
-    if heard := _heard_topics(run):
+    heard = _heard_topics(run)
+    if heard and set(heard) <= set(TF_TOPICS):
+        why, hint = next(
+            (known for said, known in OF_TF.items() if any(said in line for line in _output(run))), UNTOLD
+        )
+        return of_node(f"{message}: {why}", measured="no message", hint=hint)
+    if heard:
         answering = f"publish in the callback of {join_words(heard)}, or in the loop"
         hint = both(
             answering,
@@ -261,12 +269,28 @@ def _by_what_is_heard(run: Run, message: str, of_node: Callable[..., Verdict]) -
     return of_node(message, measured="no message", hint=hint)
 
 
+TF_TOPICS = ("/tf", "/tf_static")
+OF_TF = {
+    "into the future": (
+        "it asks where the frame is now, and the newest transform is a little older",
+        "write `rospy.Time(0)` as the time in `lookup_transform(…)`: it stands for the newest transform",
+    ),
+    "frame_ids cannot start with a '/'": (
+        "it looks up a frame whose name begins with a slash, which tf2 does not accept",
+        "write the names of the frames without the slash",
+    ),
+}
+"""What a node prints of an error of tf's that it catches, and what that means."""
+UNTOLD = (
+    "transforms are sent, and nothing follows from them",
+    "print what the lookup raises: `except tf2_ros.TransformException as error: rospy.logwarn(error)`",
+)
 _LOOKED_UP = re.compile(r"\"([^\"]{1,80})\" passed to lookupTransform argument \w+ does not exist")
 
 
 def _unknown_frame(run: Run) -> str:
     """Return the frame that a node still cannot look up when the run ends, as its output says; "" for none."""
-    found = [m[1] for one in lives(run) for _, c in run.lines(one.name) if (m := _LOOKED_UP.search(c.line))]
+    found = [m[1] for line in _output(run) if (m := _LOOKED_UP.search(line))]
     sent = {
         name
         for channel in run.channels
@@ -276,6 +300,10 @@ def _unknown_frame(run: Run) -> str:
         for name in (one.get("child_frame_id"), one.get("header", {}).get("frame_id"))
     }
     return next((name for name in found[-1:] if name not in sent), "")
+
+
+def _output(run: Run) -> Iterator[str]:
+    return (c.line for one in lives(run) for _, c in run.lines(one.name))
 
 
 def _heard_topics(run: Run) -> list[str]:
@@ -311,12 +339,21 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     )
     others = topics_with(run, "subscribers")
     missed = [topic for topic in topics if topic not in others]
+    connected = {
+        one.topic for _, e in run.graph for one in e.connections if run.is_student_node(one.subscriber)
+    }
+    heard = [topic for topic in topics if topic not in missed and topic not in connected]
+    if refused := next(filter(None, (refused_type(run, topic) for topic in heard)), None):
+        return refused
     near = next(((topic, found) for topic in missed if (found := near_names(topic, others))), None)
     if not missed or not run.student_nodes() or (near is None and len(missed) < len(topics)):
         return None
     topic, found = near or (missed[0], others)
     if refused := refused_type(run, topic):
         return refused
+    if topic in TF_TOPICS:
+        message = f"the run publishes on {topic}, and no node listens to tf"
+        return failed(message, hint="`listener = tf2_ros.TransformListener(buffer)` fills the buffer")
     seen = f"; {nodes_on(run, found[0], 'subscribers')[0]} subscribes to {join_words(found)}" if found else ""
     message = f"the run publishes on {topic}, and no node subscribes to it{seen}"
     remapped = _remap_to(package, run, topic, found[0]) if package is not None and found else ""
@@ -415,7 +452,7 @@ def explain_by_waiting_callback(
     if not verdict.status.is_lost or not (slip.is_endless or verdict.callbacks == "late"):
         return verdict
     ends = "the caller waits" if check.name == "service-answers" else "nothing else is heard"
-    hint = f"in {slip.file}, {slip.fix}: {ends} until the callback ends"
+    hint = f"in {slip.file}, {slip.fix}" + (f": {ends} until the callback ends" if slip.name else "")
     return verdict.explained(f"in {slip.file}, {slip.message}", hint, (slip.place,), cause=slip.message)
 
 

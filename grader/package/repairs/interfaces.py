@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 from cmake_parser.ast import Command
 
 from grader.installable import noetic_messages
-from grader.model.message_definitions import DIVIDER, PARTS, exchanged_parts, meant_type
+from grader.model.message_definitions import DIVIDER, DIVIDING, PARTS, exchanged_parts, meant_type
 from grader.model.package import CMAKE, INTERFACE_FOLDERS, PackageFacts
 from grader.package.repairs.cmake_calls import (
     add_call,
@@ -50,6 +50,8 @@ def make_interfaces(files: Files, package: PackageFacts, name: str, scripts: Col
         _delete_generation(files, package)
         return
     _correct_types(files, package)
+    _correct_dividers(files, package)
+    _call_by_kind(files)
     _wait_for_headers(files, package, name)
     _generate(files, package)  # from below, so that the lines above stay where they are
     run = [path for path in code if path in scripts or path.endswith(CPP)]
@@ -167,6 +169,31 @@ def _correct_types(files: Files, package: PackageFacts) -> None:
                 files.change("build-line", one.path, "\n".join(lines), message)
 
 
+def _correct_dividers(files: Files, package: PackageFacts) -> None:
+    """Write `---` where a line is meant to divide the parts, and is one of other dashes."""
+    for fault in (one.fault for one in package.interfaces if one.fault and DIVIDING in one.fault.fix):
+        lines = (files.text(fault.file) or "").split("\n")
+        if fault.line and fault.line <= len(lines):
+            lines[fault.line - 1] = DIVIDING
+            files.change(
+                "build-line", fault.file, "\n".join(lines), f"{fault.file}: {fault.cause}", fault.fix
+            )
+
+
+def _call_by_kind(files: Files) -> None:
+    """Call `add_service_files(…)` where `add_message_files(…)` names services alone, and so on."""
+    for name, folder in INTERFACE_FOLDERS.items():
+        for call in calls_of(files, name):
+            named = values_behind(call, "FILES")
+            kinds = {PurePosixPath(word).suffix.removeprefix(".") for word in named}
+            right = next((c for c, kind in INTERFACE_FOLDERS.items() if kinds == {kind} != {folder}), "")
+            if right:
+                text, at = cmake_text(files), call.span.start
+                changed = text[:at] + re.sub(r"^\w+", right, text[at:], count=1)
+                message = f"line {call.line} of {CMAKE}: {name}(…) names {join_words(named)}"
+                files.change("build-line", CMAKE, changed, message, f"write {right} instead of {name}")
+
+
 def _definitions(package: PackageFacts, folder: str) -> list[str]:
     paths = (PurePosixPath(file.path) for file in package.files)
     return sorted(p.name for p in paths if str(p.parent) == folder and p.suffix == f".{folder}")
@@ -217,6 +244,15 @@ def _generate(files: Files, package: PackageFacts) -> None:
     if not calls:
         line = f"{GENERATE}({' '.join(['DEPENDENCIES', *sorted(needed)] if needed else [])})"
         add_call(files, f"{GENERATE}(…)", line, (*INTERFACE_FOLDERS, "find_package"), sorted(needed))
+        return
+    late = [c for name in INTERFACE_FOLDERS for c in calls_of(files, name) if c.line > calls[0].line]
+    if late and (not of_catkin or late[0].line < of_catkin[0].line):
+        text, call, at = cmake_text(files), late[0].span, calls[0].span.start
+        changed = f"{text[:at]}{text[call]}\n\n{text[at : call.start].rstrip()}\n{text[call.stop :].lstrip()}"
+        name = re.match(r"\w+", text[call])[0]  # type: ignore[index] # a call begins with its name
+        message = f"line {late[0].line} of {CMAKE}: {name}(…) is called after {GENERATE}(…)"
+        fix = f"move {name}(…), from line {late[0].line}, above {GENERATE}(…)"
+        files.change("build-line", CMAKE, changed, message, fix)
         return
     if of_catkin and calls[0].line > of_catkin[0].line:
         text, call, at = cmake_text(files), calls[0].span, of_catkin[0].span.start
