@@ -12,6 +12,7 @@ import yaml
 from grader.model.package import PackageFacts
 from grader.package.repairs.editing import Files
 from grader.package.repairs.names import Wanted
+from grader.wording import plural
 from grader.yaml_fixes import YAML_LINES_MAX, slip_of_yaml
 
 SUFFIXES = (".yaml", ".yml")
@@ -23,6 +24,7 @@ COLUMNS_MAX = 6
 class _Repaired(NamedTuple):
     text: str
     why: str
+    fix: str = ""
 
 
 def repair_yaml_files(files: Files, package: PackageFacts, wanted: Wanted) -> None:
@@ -46,7 +48,7 @@ def _repair_file(files: Files, path: str, wanted: Wanted) -> None:
             return
         text = one.text
     for one in steps:
-        files.change("yaml-syntax", path, one.text, one.why.format(path=path))
+        files.change("yaml-syntax", path, one.text, one.why.format(path=path), one.fix)
 
 
 def _without_fault(text: str, at: int, wanted: Wanted) -> _Repaired | None:
@@ -55,14 +57,20 @@ def _without_fault(text: str, at: int, wanted: Wanted) -> _Repaired | None:
     tabbed = next((n for n, line in enumerate(lines, 1) if "\t" in _blanks(line)), None)
     if tabbed is not None and tabbed <= at:
         why = f"line {tabbed} of {{path}} is indented with a tab, which YAML does not accept"
-        return _best([_Repaired(one, why) for one in _untabbed(lines, tabbed)], wanted)
+        return _best(
+            [_Repaired(one, why, _begin(one, lines, tabbed)) for one in _untabbed(lines, tabbed)], wanted
+        )
     if slip := slip_of_yaml(text, at):
         comment = re.search(r"\s+#.*", lines[slip.number - 1])
         changed = f"{_blanks(lines[slip.number - 1])}{slip.right}{comment[0] if comment else ''}"
         repaired = "\n".join([*lines[: slip.number - 1], changed, *lines[slip.number :]])
         return _Repaired(repaired, f"line {slip.number} of {{path}} {slip.why}")
     moved = [
-        _Repaired(one, f"line {number} of {{path}} does not line up with the lines beside it")
+        _Repaired(
+            one,
+            f"line {number} of {{path}} does not line up with the lines beside it",
+            _begin(one, lines, number),
+        )
         for number in (at, at - 1)
         for one in _moved(lines, number)
     ]
@@ -74,6 +82,14 @@ def _untabbed(lines: list[str], number: int) -> Iterator[str]:
     yield from _moved(lines, number)
     for spaces in (2, 4):
         yield "\n".join(_blanks(line).replace("\t", " " * spaces) + line.lstrip() for line in lines)
+
+
+def _begin(text: str, lines: list[str], number: int) -> str:
+    """Return how to change the lines' beginnings: that of one, or of all."""
+    changed = text.split("\n")
+    if sum(one != other for one, other in zip(changed, lines, strict=True)) > 1:
+        return "indent with spaces only, two per level"
+    return f"begin the line with {plural(len(_blanks(changed[number - 1])), 'space')}"
 
 
 def _moved(lines: list[str], number: int) -> Iterator[str]:
