@@ -64,7 +64,7 @@ def _without_fault(text: str, at: int, wanted: Wanted) -> _Repaired | None:
         comment = re.search(r"\s+#.*", lines[slip.number - 1])
         changed = f"{_blanks(lines[slip.number - 1])}{slip.right}{comment[0] if comment else ''}"
         repaired = "\n".join([*lines[: slip.number - 1], changed, *lines[slip.number :]])
-        return _Repaired(repaired, f"line {slip.number} of {{path}} {slip.why}")
+        return _Repaired(repaired, f"line {slip.number} of {{path}} {slip.why}", f"write `{slip.right}`")
     moved = [
         _Repaired(
             one,
